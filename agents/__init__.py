@@ -1,0 +1,1 @@
+"""Policies: they only decide."""

@@ -1,0 +1,1 @@
+"""Worlds and environments: floors, simulation, onboard software, wrappers."""

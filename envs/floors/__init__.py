@@ -1,0 +1,1 @@
+"""Floors: solids in metres, importers, generator, catalogue."""

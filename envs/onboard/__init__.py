@@ -1,0 +1,1 @@
+"""A robot's own software: perception, driving, operating states."""

@@ -1,0 +1,1 @@
+"""Bodies, lasers and noise, over arrays of episodes and robots."""

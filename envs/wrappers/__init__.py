@@ -1,0 +1,1 @@
+"""Wrappers that change what a policy decides or sees."""

@@ -1,0 +1,99 @@
+"""The one decorator of all numba kernels: exact arithmetic, cached where a directory can be written.
+
+Numba caches compiled code per source file and does not see a change in another file that the kernel calls into. The
+cache directory is therefore keyed by a hash of all sources with kernels, and is the first writable one of: the
+package's own folder, the user's cache folder, the temporary folder.
+"""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+PACKAGE_FOLDERS = ("mapping", "envs")
+
+
+def _source_folders() -> list[Path]:
+    """Folders whose kernels call each other: this one and its neighbour of the environments."""
+    here = Path(__file__).resolve().parent
+    return [here.parent / name for name in PACKAGE_FOLDERS]
+
+
+def _sources_hash() -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for folder in _source_folders():
+        for path in sorted(folder.rglob("*.py")):
+            source = path.read_bytes()
+            if b"@kernel" in source:
+                digest.update(path.relative_to(folder.parent).as_posix().encode())
+                digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def _is_writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _cache_folder() -> Path | None:
+    """Return the first writable cache folder, or None where nothing can be written."""
+    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    candidates = (
+        Path(__file__).resolve().parent / "__pycache__" / "kernels",
+        user_cache / "lidarium" / "kernels",
+        Path(tempfile.gettempdir()) / "lidarium-kernels",
+    )
+    for candidate in candidates:
+        folder = candidate / _sources_hash()
+        if _is_writable(folder):
+            return folder
+    return None
+
+
+_CHOSEN_BY_USER = bool(os.environ.get("NUMBA_CACHE_DIR"))
+_FOLDER = None if _CHOSEN_BY_USER else _cache_folder()
+_CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
+
+
+def kernel(function: Function | None = None, *, parallel: bool = False, inline: bool = False) -> Any:  # noqa: ANN401
+    """Compile a function of arrays with numba: nopython, exact floating point, no GIL, cached.
+
+    Parameters
+    ----------
+    function : callable
+        The function to compile.
+    parallel : bool
+        Whether ``numba.prange`` loops run on threads. Only loops whose iterations write to places of their own may,
+        so that the result does not depend on the number of threads.
+    inline : bool
+        Whether the function is inlined into its callers by LLVM (small helpers in hot loops).
+
+    Returns
+    -------
+    callable
+        The compiled function.
+    """
+
+    def decorate(target: Function) -> Any:  # noqa: ANN401
+        options: dict[str, Any] = {"nogil": True, "fastmath": False, "parallel": parallel, "cache": _CAN_CACHE}
+        if inline:
+            options["forceinline"] = True
+        previous = numba.config.CACHE_DIR
+        if _FOLDER is not None:
+            numba.config.CACHE_DIR = str(_FOLDER)
+        try:
+            return numba.njit(**options)(target)
+        finally:
+            numba.config.CACHE_DIR = previous
+
+    return decorate if function is None else decorate(function)
