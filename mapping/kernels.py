@@ -3,6 +3,10 @@
 Numba caches compiled code per source file and does not see a change in another file that the kernel calls into. The
 cache directory is therefore keyed by a hash of all sources with kernels, and is the first writable one of: the
 package's own folder, the user's cache folder, the temporary folder.
+
+Batches hold floors and maps of different sizes. Kernels therefore take tables of addresses and view each array where it
+lies (``*_at`` below): nothing is concatenated or copied, a floor is shared by all episodes on it, and a map grows alone.
+The Python side that fills such a table keeps its arrays alive.
 """
 
 import hashlib
@@ -13,6 +17,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -97,3 +104,43 @@ def kernel(function: Function | None = None, *, parallel: bool = False, inline: 
             numba.config.CACHE_DIR = previous
 
     return decorate if function is None else decorate(function)
+
+
+@intrinsic
+def _pointer_at(typing_context: Any, address: Any) -> Any:  # noqa: ANN401, ARG001
+    """Turn an integer into a pointer inside a kernel."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401, ARG001
+        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+
+    return types.voidptr(address), generate
+
+
+@kernel(inline=True)
+def bytes_at(address: int, count: int) -> Any:  # noqa: ANN401
+    """View ``count`` uint8 at an address inside a kernel; the caller keeps the array alive."""
+    return numba.carray(_pointer_at(address), (count,), np.uint8)
+
+
+@kernel(inline=True)
+def int8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
+    """View a (rows, columns) int8 grid at an address inside a kernel."""
+    return numba.carray(_pointer_at(address), (rows, columns), np.int8)
+
+
+@kernel(inline=True)
+def uint8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
+    """View a (rows, columns) uint8 grid at an address inside a kernel."""
+    return numba.carray(_pointer_at(address), (rows, columns), np.uint8)
+
+
+@kernel(inline=True)
+def word_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
+    """View a (rows, columns) uint64 grid at an address inside a kernel."""
+    return numba.carray(_pointer_at(address), (rows, columns), np.uint64)
+
+
+@kernel(inline=True)
+def int32_table_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
+    """View a (rows, columns) int32 table at an address inside a kernel."""
+    return numba.carray(_pointer_at(address), (rows, columns), np.int32)

@@ -1,0 +1,131 @@
+"""What counts as explored, and what a robot earns for it.
+
+The scorer keeps a bit per robot and cell of the floor, at the resolution of the beliefs: the cells seen by true beams from
+true poses, before noise. Of these only the cells of F count: those that the disc of the smallest robot sweeps over its
+configuration space, connected to the starts.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import kernel, word_grid_at
+
+ENTRY = 3
+"""A robot's news of a step are entries of row, word and bits."""
+
+
+def pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
+    """Pack a (rows, columns) mask into (rows, words) uint64, bit 0 of word 0 at column 0."""
+    rows, columns = cells.shape
+    words = -(-columns // 64)
+    padded = np.zeros((rows, words * 64), np.bool_)
+    padded[:, :columns] = cells
+    return np.packbits(padded, axis=1, bitorder="little").view("<u8").astype(np.uint64).copy()
+
+
+def unpack_bits(bits: NDArray[np.uint64], columns: int) -> NDArray[np.bool_]:
+    """Unpack (rows, words) uint64 into a (rows, columns) mask."""
+    return np.unpackbits(bits.astype("<u8").view(np.uint8), axis=1, bitorder="little")[:, :columns].astype(np.bool_)
+
+
+@kernel(inline=True)
+def count_bits(value):  # noqa: ANN001, ANN201
+    """Count the set bits of a uint64."""
+    value = value - ((value >> np.uint64(1)) & np.uint64(0x5555555555555555))
+    value = (value & np.uint64(0x3333333333333333)) + ((value >> np.uint64(2)) & np.uint64(0x3333333333333333))
+    value = (value + (value >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+    return int((value * np.uint64(0x0101010101010101)) >> np.uint64(56))
+
+
+@kernel
+def mark_seen(own, team, counted, bits, row_low, row_high, row_offset, word_offset, news):  # noqa: ANN001, ANN201
+    """Add a scan's seen cells to a robot's mask and list what is new to the team.
+
+    Parameters
+    ----------
+    own, team, counted : (rows, words) uint64
+        What the robot has seen (updated), what any robot had seen before the step, and F.
+    bits : (window rows, words) uint64
+        The seen area.
+    row_low, row_high : int
+        Rows of the window that may hold bits.
+    row_offset, word_offset : int
+        Place of the window in the masks.
+    news : (entries, 3) uint64
+        Result: row, word and bits of the cells that the team had not seen.
+
+    Returns
+    -------
+    new_own, entries : int
+        Cells new to the robot, and the number of entries.
+    """
+    rows, words = own.shape
+    new_own, entries = 0, 0
+    for row in range(max(row_low, -row_offset), min(row_high, rows - row_offset)):
+        for word in range(max(0, -word_offset), min(bits.shape[1], words - word_offset)):
+            value = bits[row, word]
+            if value == np.uint64(0):
+                continue
+            i, j = row + row_offset, word + word_offset
+            value &= counted[i, j] & ~own[i, j]
+            if value == np.uint64(0):
+                continue
+            own[i, j] |= value
+            new_own += count_bits(value)
+            value &= ~team[i, j]
+            if value != np.uint64(0):
+                news[entries, 0], news[entries, 1], news[entries, 2] = np.uint64(i), np.uint64(j), value
+                entries += 1
+    return new_own, entries
+
+
+@kernel
+def share_news(owns, team, news, entries, first, robots, gains):  # noqa: ANN001, ANN201
+    """Credit each cell that is new to the team in equal parts to the robots that saw it in this step, in robot order.
+
+    Parameters
+    ----------
+    owns : (maps,) int64
+        Addresses of the robots' masks, of the shape of ``team``.
+    team : (rows, words) uint64
+        What the team has seen; updated.
+    news, entries : (maps, entries, 3) uint64, (maps,) int64
+        What ``mark_seen`` listed for each robot.
+    first, robots : int
+        The episode's robots in these arrays.
+    gains : (maps,) float64
+        Result: cells credited to each robot.
+
+    Returns
+    -------
+    int
+        Cells new to the team.
+    """
+    rows, words = team.shape
+    total = 0
+    for robot in range(first, first + robots):
+        gain = 0.0
+        for k in range(entries[robot]):
+            row, word, value = int(news[robot, k, 0]), int(news[robot, k, 1]), news[robot, k, 2]
+            others = np.uint64(0)
+            for other in range(first, first + robots):
+                if other != robot and entries[other] > 0:
+                    others |= word_grid_at(owns[other], rows, words)[row, word]
+            alone = value & ~others
+            gain += count_bits(alone)
+            value &= others
+            while value != np.uint64(0):
+                bit = value & (~value + np.uint64(1))
+                value ^= bit
+                seen_by = 1
+                for other in range(first, first + robots):
+                    if other != robot and entries[other] > 0 and word_grid_at(owns[other], rows, words)[row, word] & bit:
+                        seen_by += 1
+                gain += 1.0 / seen_by
+        gains[robot] = gain
+    for robot in range(first, first + robots):
+        for k in range(entries[robot]):
+            row, word, value = int(news[robot, k, 0]), int(news[robot, k, 1]), news[robot, k, 2]
+            total += count_bits(value & ~team[row, word])
+            team[row, word] |= value
+    return total

@@ -1,0 +1,84 @@
+"""Importers of floors: one file per format, and one line each in the registry below."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.importers import amrl, arrays, houseexpo, images, kth, lifull, ros_map
+from lidarium.mapping.map_files import check_file
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A file format of floors.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    suffixes : tuple of str
+        How the names of its files end.
+    matches : callable
+        Whether a file with such a name is of this format, by its content.
+    load : callable
+        Reads the file; gets the path and the resolution asked for, or None.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    matches: Callable[[Path], bool]
+    load: Callable[[Path, float | None], Floor]
+
+
+def _always(path: Path) -> bool:
+    return True
+
+
+# The first that matches reads the file.
+FORMATS = (
+    Format("ROS map", (".yaml", ".yml"), _always, ros_map.load),
+    Format("HouseExpo", (".json", ".json.gz"), _always, houseexpo.load),
+    Format("KTH floor plan", (".xml", ".xml.gz"), _always, kth.load),
+    Format("AMRL vector map", (".txt", ".txt.gz"), amrl.matches, amrl.load),
+    Format("LIFULL vector annotation", (".txt", ".txt.gz"), _always, lifull.load),
+    Format("numpy array", (".npy", ".npz"), _always, arrays.load),
+    Format("dungeon", images.SUFFIXES, images.is_dungeon, images.load_dungeon),
+    Format("image", images.SUFFIXES, _always, images.load_image),
+)
+
+
+def load_file(path: Path, resolution: float | None = None) -> Floor:
+    """Read a floor from a file of any known format, recognised by its name and content.
+
+    Parameters
+    ----------
+    path : Path
+        The file: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy array.
+    resolution : float or None
+        Side of a pixel [m] where the file does not say it: needed for plain images and numpy arrays.
+
+    Returns
+    -------
+    Floor
+        The floor. Where it comes from pixels or rooms, its largest connected free area is free (of a dungeon: that of the
+        start) and all else is solid. It has starts only if the file has.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is a folder, of no known format, or not what its name says, or if a resolution is missing, not positive, or
+        given for a file that has its own scale.
+    """
+    path = Path(path)
+    check_file(path)
+    if resolution is not None and not 0.0 < resolution < float("inf"):
+        raise ValueError(f"resolution is {resolution} m; want a positive number of metres per pixel")
+    lower = path.name.lower()
+    for known in FORMATS:
+        if lower.endswith(known.suffixes) and known.matches(path):
+            return known.load(path, resolution)
+    suffixes = sorted({suffix for known in FORMATS for suffix in known.suffixes})
+    raise ValueError(f"{path} is of no known floor format; want a file that ends in {', '.join(suffixes)}")

@@ -1,0 +1,50 @@
+"""Numpy arrays as floors: grey levels (KTH floors of MapEx) or solid cells."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.importers.common import floor_of_cells, refuse_resolution
+
+_FREE_ABOVE = 127
+
+
+def load(path: Path, resolution: float | None) -> Floor:
+    """Read an array.
+
+    ``.npy`` is an image, row 0 at the top: grey levels (above 127 is free) or booleans (true is solid); it needs a
+    resolution. ``.npz`` holds ``solid`` (row 0 at the lowest y), ``origin`` (x, y) and ``resolution`` [m].
+    """
+    try:
+        content = np.load(path, allow_pickle=False)
+        named = {name: content[name] for name in content.files} if isinstance(content, np.lib.npyio.NpzFile) else None
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path} is not a numpy array that can be read: {error}") from error
+    if named is not None:
+        return _load_named(path, named, resolution)
+    if resolution is None:
+        raise ValueError(f"{path} is an array without a scale; pass --resolution with its metres per cell")
+    _check_grid(path, content)
+    free = ~content if content.dtype == np.bool_ else content > _FREE_ABOVE
+    return floor_of_cells(path, free[::-1], (0.0, 0.0), resolution)
+
+
+def _load_named(path: Path, named: dict[str, NDArray[np.generic]], resolution: float | None) -> Floor:
+    missing = [name for name in ("solid", "origin", "resolution") if name not in named]
+    if missing:
+        raise ValueError(f"{path} has no array {', '.join(missing)}; want solid, origin and resolution")
+    refuse_resolution(path, resolution)
+    _check_grid(path, named["solid"])
+    origin = np.asarray(named["origin"], dtype=np.float64).ravel()
+    side = np.asarray(named["resolution"], dtype=np.float64).ravel()
+    if origin.size != 2 or not np.isfinite(origin).all() or side.size != 1 or not 0.0 < side[0] < np.inf:
+        raise ValueError(f"{path} has origin {origin} and resolution {side}; want (x, y) and a positive number in metres")
+    return floor_of_cells(path, named["solid"] == 0, (float(origin[0]), float(origin[1])), float(side[0]))
+
+
+def _check_grid(path: Path, grid: NDArray[np.generic]) -> None:
+    if grid.ndim != 2 or grid.size == 0 or grid.dtype.kind not in "buif":
+        raise ValueError(f"{path} has shape {grid.shape} of {grid.dtype}; want rows and columns of numbers")

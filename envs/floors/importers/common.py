@@ -1,0 +1,152 @@
+"""What several importers share: reading text, free areas of pixel floors, walls around line drawings."""
+
+import gzip
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip
+from lidarium.envs.floors.floor import Floor, Raster, Solid
+
+# Where a drawing has walls without thickness [m].
+WALL_THICKNESS = 0.1
+
+# Gaps in the outer wall of a drawing that are tried until it is closed [m], and the share of the largest area wanted.
+_GAPS = (0.0, 0.2, 0.5, 1.0, 2.0, 3.0)
+_CLOSED_SHARE = 0.8
+_OUTLINE_RESOLUTION = 0.02
+_MAX_OUTLINE_CELLS = 50_000_000
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file, unpacked if its name ends in .gz.
+
+    Raises
+    ------
+    ValueError
+        If the packed file is damaged or truncated, or it is not text.
+    """
+    content = path.read_bytes()
+    try:
+        return (gzip.decompress(content) if path.suffix.lower() == ".gz" else content).decode("utf-8-sig")
+    except (OSError, EOFError, zlib.error) as error:
+        raise ValueError(f"{path} is damaged or truncated: {error}") from error
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path} is not a text file: {error.reason} at byte {error.start}") from error
+
+
+def floor_name(path: Path) -> str:
+    """Return the file's name without what says its format."""
+    name = path.name
+    for suffix in (".gz", ".txt", ".vectormap", ".xml", ".json"):
+        if name.lower().endswith(suffix):
+            name = name[: -len(suffix)]
+    return Path(name).stem if name == path.name else name
+
+
+def refuse_resolution(path: Path, resolution: float | None) -> None:
+    """Raise ValueError if a resolution is given for a file that has its own scale."""
+    if resolution is not None:
+        raise ValueError(f"{path} has its own scale, but a resolution of {resolution} m is given; want none")
+
+
+def floor_of_cells(
+    path: Path,
+    free: NDArray[np.bool_],
+    origin: tuple[float, float],
+    resolution: float,
+    seed_cell: tuple[int, int] | None = None,
+    starts: NDArray[np.float64] | None = None,
+) -> Floor:
+    """Return a floor of free cells, of which one 4-connected area stays free.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for the name and for messages.
+    free : (rows, columns) bool
+        Free cells, row 0 at the lowest y.
+    origin, resolution : (float, float), float
+        Lower left corner of cell (0, 0) and side of a cell [m].
+    seed_cell : (row, column) or None
+        A cell of the area that stays free; None for the largest.
+    starts : (K, 3) float64 or None
+        Starts that the file proposes [m, rad].
+
+    Raises
+    ------
+    ValueError
+        If no cell, or all, are free, or the seed cell is not.
+    """
+    if not free.any() or (free.all() and free.size > 1):
+        raise ValueError(f"{path} is {'all free' if free.any() else 'all solid'}; want a floor with free space and walls")
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
+    label = int(labels[seed_cell]) if seed_cell is not None else 1 + int(np.argmax(statistics[1:count, cv2.CC_STAT_AREA]))
+    if label == 0:
+        raise ValueError(f"{path} has its start in a wall; want it in free space")
+    left, bottom, width, height = (int(value) for value in statistics[label, :4])
+    solid = (labels[bottom : bottom + height, left : left + width] != label).astype(np.uint8)
+    corner = (origin[0] + left * resolution, origin[1] + bottom * resolution)
+    bounds = (*corner, corner[0] + width * resolution, corner[1] + height * resolution)
+    cells = Raster(np.pad(solid, 1, constant_values=1), (corner[0] - resolution, corner[1] - resolution), resolution)
+    return Floor(floor_name(path), bounds, cells=cells, starts=np.zeros((0, 3)) if starts is None else starts)
+
+
+def floor_of_lines(path: Path, walls: NDArray[np.float64], openings: NDArray[np.float64]) -> Floor:
+    """Return a floor of a line drawing; what the drawing does not enclose is solid.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for the name and for messages.
+    walls : (N, 4) float64
+        Wall lines x1, y1, x2, y2 [m]; they become `WALL_THICKNESS` thick.
+    openings : (M, 4) float64
+        Lines that are passable inside the building, but close its outline [m].
+    """
+    everything = np.concatenate([walls, openings])
+    low, high = everything.reshape(-1, 2).min(axis=0), everything.reshape(-1, 2).max(axis=0)
+    solids = [Solid(strip(wall, WALL_THICKNESS, overhang=WALL_THICKNESS / 2.0)) for wall in walls]
+    half = WALL_THICKNESS / 2.0
+    bounds = (low[0] - half, low[1] - half, high[0] + half, high[1] + half)
+    surroundings = Solid(_box(low - 1.0, high + 1.0), holes=_enclosed(path, everything, low, high))
+    return Floor(floor_name(path), (float(bounds[0]), float(bounds[1]), float(bounds[2]), float(bounds[3])), (surroundings, *solids))
+
+
+def _box(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+
+
+def _enclosed(path: Path, lines: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Return the outlines of what the lines enclose, along the middle of the outer walls.
+
+    Drawings have gaps in the outer wall. They are closed by the smallest widening of the lines that encloses nearly as
+    much as the largest does; the outline is moved back by it.
+    """
+    widest = max(_GAPS) + WALL_THICKNESS
+    size = high - low + 2.0 * widest
+    resolution = max(_OUTLINE_RESOLUTION, float(np.sqrt(size.prod() / _MAX_OUTLINE_CELLS)))
+    origin = (float(low[0] - widest), float(low[1] - widest))
+    drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
+    fill_shapes(drawn, origin, resolution, [ring_edges(strip(line, WALL_THICKNESS, WALL_THICKNESS / 2.0)) for line in lines], 1)
+    distance = cv2.distanceTransform(1 - drawn, cv2.DIST_L2, 5) * resolution
+    insides = [_inside(distance, gap / 2.0, resolution) for gap in _GAPS]
+    areas = [int(inside.sum()) for inside in insides]
+    if max(areas) == 0:
+        raise ValueError(f"{path} has no walls that enclose a space; want a floor plan")
+    inside = next(inside for inside, area in zip(insides, areas, strict=True) if area >= _CLOSED_SHARE * max(areas))
+    contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    rings = [contour[:, 0, :].astype(np.float64) for contour in contours if len(contour) >= 3]
+    return tuple((ring + 0.5) * resolution + origin for ring in rings)
+
+
+def _inside(distance: NDArray[np.float32], widening: float, resolution: float) -> NDArray[np.uint8]:
+    """Return what cannot be reached from the border between the widened lines, less half of the wall."""
+    passable = (distance > widening).astype(np.uint8)
+    _, labels = cv2.connectedComponents(passable, connectivity=4, ltype=cv2.CV_32S)
+    kept = (labels != labels[0, 0]).astype(np.uint8)
+    to_outside = cv2.distanceTransform(kept, cv2.DIST_L2, 5) * resolution
+    return (to_outside > widening + WALL_THICKNESS / 2.0).astype(np.uint8)

@@ -1,0 +1,74 @@
+"""Images as floors: dungeons of the exploration literature, and plain pictures.
+
+Dungeons follow the reading rule of their projects (DRL_robot_exploration, ARiADNE and their kin): 0.1 m a pixel, grey
+above 150 is free, the start is the middle of a yellow block, which is grey 208 where the file has no colours.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.importers.common import floor_of_cells
+from lidarium.mapping.map_files import read_image
+
+SUFFIXES = (".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff")
+
+DUNGEON_RESOLUTION = 0.1
+_DUNGEON_FREE_ABOVE = 150
+_MARK_GREY = 208
+_FREE_ABOVE = 127
+_MAP_SERVER_LEVELS = (0, 205, 254)
+
+
+def is_dungeon(path: Path) -> bool:
+    """Return whether an image is a dungeon: a start mark, a grey for walls and a grey for free space."""
+    pixels = read_image(path)
+    mark = _mark(pixels)
+    levels = np.unique(_grey(pixels)[~mark])
+    walls, free = levels[levels <= _DUNGEON_FREE_ABOVE], levels[levels > _DUNGEON_FREE_ABOVE]
+    return bool(mark.any() and walls.size and free.size and np.ptp(walls) <= 1 and np.ptp(free) <= 1)
+
+
+def load_dungeon(path: Path, resolution: float | None) -> Floor:
+    """Read a dungeon with its start; what cannot be reached from there is solid."""
+    side = DUNGEON_RESOLUTION if resolution is None else resolution
+    pixels = read_image(path)
+    mark = _mark(pixels)[::-1]
+    row, column = (float(indices.mean()) for indices in np.nonzero(mark))
+    free = (_grey(pixels) > _DUNGEON_FREE_ABOVE)[::-1] | mark
+    start = np.array([[(column + 0.5) * side, (row + 0.5) * side, 0.0]])
+    return floor_of_cells(path, free, (0.0, 0.0), side, seed_cell=(int(row), int(column)), starts=start)
+
+
+def load_image(path: Path, resolution: float | None) -> Floor:
+    """Read a picture: grey above 127 is free; in the greys of map_server (0, 205, 254 alone) 205 is unknown, so solid."""
+    if resolution is None:
+        raise ValueError(f"{path} is an image without a scale; pass --resolution with its metres per pixel")
+    grey = _grey(read_image(path))
+    free = grey > _FREE_ABOVE
+    if np.isin(grey, _MAP_SERVER_LEVELS).all():
+        free = grey == max(_MAP_SERVER_LEVELS)
+    return floor_of_cells(path, free[::-1], (0.0, 0.0), resolution)
+
+
+def _grey(pixels: NDArray[Any]) -> NDArray[np.uint8]:
+    eight = pixels if pixels.dtype == np.uint8 else (pixels // 257).astype(np.uint8)
+    if eight.ndim == 2:
+        return eight
+    if eight.shape[2] == 2:
+        return eight[..., 0]
+    return np.asarray(cv2.cvtColor(np.ascontiguousarray(eight[..., :3]), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def _mark(pixels: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return the pixels of the start mark: yellow, or grey 208 in an image without colours."""
+    if pixels.ndim == 3 and pixels.shape[2] >= 3:
+        blue, green, red = (pixels[..., channel].astype(np.int64) for channel in range(3))
+        yellow = (blue < 100) & (green > 150) & (red > 150)
+        if yellow.any():
+            return np.asarray(yellow)
+    return np.asarray(_grey(pixels) == _MARK_GREY)

@@ -1,0 +1,78 @@
+"""LIFULL apartments: walls, openings and rooms as tab-separated lines ``x1 y1 x2 y2 label ...`` in pixels, y down.
+
+The annotation has no scale: its median opening is taken as 0.8 m wide.
+
+References
+----------
+C. Liu et al., Raster-to-Vector: Revisiting Floorplan Transformation, ICCV 2017 (the annotation).
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.importers.common import WALL_THICKNESS, floor_of_lines, read_text, refuse_resolution
+
+OPENING_WIDTH = 0.8
+
+# Shorter pieces of wall than this beside an opening are slips of the annotation [m].
+_SLIP = 0.02
+
+
+def load(path: Path, resolution: float | None) -> Floor:
+    """Read an annotation: walls stand, doors are open, outside of the outer walls is solid."""
+    refuse_resolution(path, resolution)
+    lines = _lines(path)
+    walls, doors = (np.array(lines[label], dtype=np.float64).reshape(-1, 4) for label in ("wall", "door"))
+    widths = np.hypot(doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1])
+    if len(walls) == 0 or not (len(doors) and np.median(widths) > 0.0):
+        raise ValueError(f"{path} has {len(walls)} walls and {len(doors)} doors; want both, as doors give the scale")
+    scale = OPENING_WIDTH / float(np.median(widths))
+    everything = np.concatenate([walls, doors])
+    left, bottom = everything[:, [0, 2]].min(), everything[:, [1, 3]].max()
+    to_metres = np.array([scale, -scale, scale, -scale])
+    walls, doors = ((part - [left, bottom, left, bottom]) * to_metres for part in (walls, doors))
+    pieces = [piece for wall in walls for piece in _without_doors(wall, doors)]
+    return floor_of_lines(path, np.array(pieces).reshape(-1, 4), doors)
+
+
+def _lines(path: Path) -> dict[str, list[list[float]]]:
+    lines: dict[str, list[list[float]]] = {"wall": [], "door": []}
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        words = line.split()
+        if not words:
+            continue
+        try:
+            corners = [float(word) for word in words[:4]]
+            label = words[4]
+        except (ValueError, IndexError):
+            raise ValueError(f"{path}, line {number}: {line[:60]!r} is no annotation; want x1 y1 x2 y2 label") from None
+        if not np.isfinite(corners).all():
+            raise ValueError(f"{path}, line {number}: {line[:60]!r} has coordinates that are not finite")
+        if label in lines:
+            lines[label].append(corners)
+    return lines
+
+
+def _without_doors(wall: NDArray[np.float64], doors: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return what is left of a wall between the doors that lie along it."""
+    start, end = wall[:2], wall[2:]
+    length = float(np.hypot(*(end - start)))
+    if length == 0.0:
+        return []
+    along = (end - start) / length
+    across = np.array([-along[1], along[0]])
+    gaps = []
+    for door in doors.reshape(-1, 2, 2):
+        offsets = (door - start) @ across
+        if np.abs(offsets).max() <= WALL_THICKNESS:
+            first, last = sorted(((door - start) @ along).tolist())
+            gaps.append((first, last))
+    pieces, reached = [], 0.0
+    for first, last in [*sorted(gaps), (length, length)]:
+        if first - reached > _SLIP:
+            pieces.append(np.concatenate([start + along * reached, start + along * min(first, length)]))
+        reached = max(reached, last)
+    return pieces

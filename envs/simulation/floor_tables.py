@@ -1,0 +1,65 @@
+"""What the kernels look up for one floor: rays, bodies and the cells that count; shared by all episodes on it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import Floor, Raster
+from lidarium.envs.simulation.lidar import RayTables
+from lidarium.envs.simulation.motion import distance_bound
+
+LIMITLESS_BODY = 0.05
+"""The body touches what stands higher than this above the floor [m]."""
+
+
+@dataclass(frozen=True)
+class FloorTables:
+    """Rasters and look-up tables of one floor for one height of laser and body.
+
+    Attributes
+    ----------
+    laser : Raster
+        Solid cells in the laser's plane.
+    body : Raster
+        Solid cells within the body's height.
+    rays : RayTables
+        Tables of the ray casters.
+    bound : (rows, columns) uint8
+        Lower bound of the distance to the bodies' solid cells [cells].
+    """
+
+    laser: Raster
+    body: Raster
+    rays: RayTables = field(repr=False)
+    bound: NDArray[np.uint8] = field(repr=False)
+
+    @classmethod
+    def of_floor(cls, floor: Floor, resolution: float, laser_height: float, body_height: float) -> "FloorTables":
+        """Rasterise a floor and prepare its tables.
+
+        Parameters
+        ----------
+        floor : Floor
+            What stands there.
+        resolution : float
+            Side of a cell of the world's raster [m].
+        laser_height, body_height : float
+            Height of the laser's plane and of the highest body [m].
+        """
+        body = floor.raster(resolution, LIMITLESS_BODY, body_height)
+        # A floor of one height has the same cells in both rasters; keep one.
+        laser = floor.raster(resolution, laser_height, laser_height)
+        if np.array_equal(laser.solid, body.solid):
+            laser = body
+        return cls(laser, body, RayTables(laser.solid), distance_bound(body.solid))
+
+    @property
+    def row(self) -> NDArray[np.int64]:
+        """Row of the kernels' table of floors, shape (10,): the rays' 8 numbers, the bound's and the solid cells' addresses."""
+        return np.concatenate([self.rays.addresses, [self.bound.ctypes.data, self.body.solid.ctypes.data]]).astype(np.int64)
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """Origin x, y [m] and resolution [m/cell], shape (3,)."""
+        return np.array([*self.laser.origin, self.laser.resolution])

@@ -1,0 +1,219 @@
+"""The kinematic world: the arrays of all episodes x robots, and the calls that step them.
+
+Row = episode * robots + robot. Maps of the scorer and of the beliefs share the floor's lattice: where a robot's believed
+pose is the true one, its map and its mask agree to the cell.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.coverage import ENTRY, pack_bits
+from lidarium.envs.floors.starts import swept_free_space
+from lidarium.envs.simulation.floor_tables import FloorTables
+from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.noise import GAUSSIAN_TABLE
+from lidarium.envs.simulation.robots import Robot
+from lidarium.envs.simulation.stages import perceive_parallel, perceive_serial, step_parallel, step_serial
+from lidarium.envs.simulation.world import Sensed
+from lidarium.mapping.occupancy import BYTE_MASKS, WORD, OccupancySettings
+from lidarium.mapping.scan_polygon import window_rows, window_words
+
+TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME = 1, 2, 4, 8
+"""Flags of a row, see ``stages``."""
+
+ROWS_FOR_THREADS = 8
+"""Threads pay only for batches of at least this many rows."""
+
+
+def counted_cells(body_free: NDArray[np.bool_], multiple: int) -> NDArray[np.bool_]:
+    """Return the map cells whose world cells all count, for a map cell of ``multiple`` x ``multiple`` world cells."""
+    rows, columns = (-(-size // multiple) * multiple for size in body_free.shape)
+    padded = np.zeros((rows, columns), np.bool_)
+    padded[: body_free.shape[0], : body_free.shape[1]] = body_free
+    return padded.reshape(rows // multiple, multiple, columns // multiple, multiple).all(axis=(1, 3))
+
+
+class KinematicWorld:
+    """Robots on floors, stepped by kernels.
+
+    Parameters
+    ----------
+    robots : sequence of Robot
+        The team of every episode.
+    lidar : Lidar
+        The laser of every robot.
+    occupancy : OccupancySettings
+        Resolution and sensor model of the maps; its cell must be a whole multiple of the floors' raster cell.
+    time_step : float
+        Length of a step [s].
+    episodes : int
+        Number of episodes.
+    threads : int
+        1 for the serial kernels; more lets batches of 8 rows and more run on numba's threads, with the same result.
+
+    Attributes
+    ----------
+    poses, velocities, believed : (rows, 3), (rows, 2), (rows, 3) float64
+        True poses and velocities; poses as the localizers believe, in the floor's axes where starts are known.
+    ranges : (rows, beams) float32
+        The last scans [m]; inf for no return.
+    gains : (rows,) float64
+        Cells credited to each robot in the last step.
+    seen : (rows,) int64
+        Cells of F that each robot has seen.
+    team_seen, counted : (episodes,) int64
+        Cells of F that the team has seen, and the size of F.
+    windows : (rows, 4) int64
+        What part of each map has changed since ``forget_changes``: row_low, row_high, column_low, column_high.
+    """
+
+    def __init__(
+        self, robots: Sequence[Robot], lidar: Lidar, occupancy: OccupancySettings, time_step: float = 0.1, episodes: int = 1, threads: int = 1
+    ) -> None:
+        self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
+        self.robots, self.episodes = len(robots), episodes
+        rows = self.robots * episodes
+        self.bodies = np.stack([robot.numbers for robot in robots])
+        self.smallest_radius = float(self.bodies[:, 0].min())
+        self.poses, self.velocities, self.believed = np.zeros((rows, 3)), np.zeros((rows, 2)), np.zeros((rows, 3))
+        self.starts = np.zeros((rows, 3))
+        self.ranges = np.full((rows, lidar.beams), np.inf, np.float32)
+        self.bumpers, self.contacts = np.zeros((rows, 3), np.int8), np.zeros(rows, np.uint8)
+        self.moves, self.flags = np.ones(rows, np.uint8), np.zeros(rows, np.int64)
+        self.gains, self.seen = np.zeros(rows), np.zeros(rows, np.int64)
+        self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
+        self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
+        self.windows = np.zeros((rows, 4), np.int64)
+        self.log_odds: list[NDArray[np.int8]] = [np.zeros((0, WORD), np.int8)] * rows
+        self.masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * rows
+        self.team_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes
+        self.counted_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes
+        self.floors: list[FloorTables | None] = [None] * episodes
+        self._floor_rows, self._frames = np.zeros((episodes, 10), np.int64), np.zeros((episodes, 3))
+        self._belief_rows, self.origins = np.zeros((rows, 3), np.int64), np.zeros((rows, 2))
+        self._mask_rows = np.zeros((rows, 5), np.int64)
+        reach = lidar.range_max / occupancy.resolution
+        self._news = np.zeros((rows, window_rows(reach) * window_words(reach), ENTRY), np.uint64)
+        self._entries = np.zeros(rows, np.int64)
+        self._unit_vectors, self._increments = lidar.unit_vectors, occupancy.increments
+        self._sensor = np.array(
+            [
+                lidar.angle_first,
+                lidar.angle_increment,
+                float(lidar.is_full_circle),
+                lidar.range_min,
+                lidar.range_max,
+                lidar.noise_floor,
+                lidar.noise_share,
+                lidar.height,
+                occupancy.resolution,
+                time_step,
+            ]
+        )
+        is_parallel = threads > 1 and rows >= ROWS_FOR_THREADS
+        self._threads = min(threads, numba.config.NUMBA_NUM_THREADS)
+        self._step = step_parallel if is_parallel else step_serial
+        self._perceive = perceive_parallel if is_parallel else perceive_serial
+
+    def place(self, episode: int, floor: FloorTables, starts: NDArray[np.float64], seed: int, known_starts: bool = True) -> None:
+        """Start an episode: robots at ``starts`` (robots, 3) of a floor, blank maps and masks, noise from ``seed``.
+
+        Raises
+        ------
+        ValueError
+            Where the maps' cell is not a whole multiple of the floor's raster cell.
+        """
+        resolution, map_resolution = floor.laser.resolution, self.occupancy.resolution
+        multiple = round(map_resolution / resolution)
+        if multiple < 1 or abs(multiple * resolution - map_resolution) > 1e-9:
+            raise ValueError(f"a map cell of {map_resolution} m is not a whole multiple of the floor's raster cell of {resolution} m")
+        first, last = episode * self.robots, (episode + 1) * self.robots
+        free = swept_free_space(floor.body, self.smallest_radius, starts)
+        counted = pack_bits(counted_cells(free, multiple))
+        rows, words = counted.shape
+        self.floors[episode] = floor
+        self._floor_rows[episode], self._frames[episode] = floor.row, floor.frame
+        self.counted_masks[episode], self.team_masks[episode] = counted, np.zeros_like(counted)
+        self.counted[episode] = int(np.bitwise_count(counted).sum())
+        self.team_seen[episode], self.seeds[episode], self.steps[episode] = 0, seed, 0
+        self.poses[first:last], self.velocities[first:last] = starts, 0.0
+        self.bumpers[first:last], self.contacts[first:last], self.moves[first:last] = 0, 0, 1
+        self.ranges[first:last], self.seen[first:last], self.gains[first:last] = np.inf, 0, 0.0
+        for row in range(first, last):
+            self.masks[row] = np.zeros_like(counted)
+            self._mask_rows[row] = (
+                self.masks[row].ctypes.data, self.team_masks[episode].ctypes.data, counted.ctypes.data, rows, words
+            )  # fmt: skip
+            if known_starts:
+                self.believed[row], self.origins[row] = starts[row - first], floor.laser.origin
+                self.log_odds[row] = np.zeros((rows, words * WORD), np.int8)
+            else:
+                self.believed[row] = 0.0
+                self.log_odds[row], self.origins[row] = self._blank_map_around(floor, starts[row - first])
+            self._belief_rows[row] = (self.log_odds[row].ctypes.data, *self.log_odds[row].shape)
+        self.starts[first:last] = starts
+        self.flags[first:last] = TRUE_POSE | (KNOWN_MATES if known_starts else OWN_FRAME)
+        self.forget_changes(first, last)
+
+    def _blank_map_around(self, floor: FloorTables, start: NDArray[np.float64]) -> tuple[NDArray[np.int8], tuple[float, float]]:
+        """Return a map in the start's own frame that holds the whole floor, however it is turned (memory is touched where seen)."""
+        rows, columns = floor.laser.solid.shape
+        size = np.array([columns, rows]) * floor.laser.resolution
+        corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size + floor.laser.origin - start[:2]
+        cosine, sine = math.cos(start[2]), math.sin(start[2])
+        turned = corners @ np.array([[cosine, -sine], [sine, cosine]])
+        resolution = self.occupancy.resolution
+        low = np.floor(turned.min(axis=0) / resolution).astype(int)
+        high = np.ceil(turned.max(axis=0) / resolution).astype(int)
+        cells = high - low
+        log_odds = np.zeros((int(cells[1]), -(-int(cells[0]) // WORD) * WORD), np.int8)
+        return log_odds, (float(low[0] * resolution), float(low[1] * resolution))
+
+    def forget_changes(self, first: int, last: int) -> None:
+        """Start anew to note what part of the maps changes, for rows ``first`` to ``last``."""
+        for row in range(first, last):
+            map_rows, map_columns = self.log_odds[row].shape
+            self.windows[row] = (map_rows, 0, map_columns, 0)
+
+    def step(self, commands: NDArray[np.float64], *, moves_bodies: bool = True, perceives: bool = True) -> None:
+        """Run a step of all episodes, both stages in one call.
+
+        Parameters
+        ----------
+        commands : (rows, 2) float64
+            Wanted speed and turn rate [m/s, rad/s].
+        moves_bodies : bool
+            False for the first scan of an episode, taken where the robots stand.
+        perceives : bool
+            False for stage one alone; ``perceive`` is stage two.
+        """
+        if self._threads > 1 and numba.get_num_threads() != self._threads:
+            numba.set_num_threads(self._threads)
+        self._step(
+            self.robots, self._floor_rows, self._frames, self.bodies, self.moves, self.poses, self.velocities, self.starts, self.believed, commands,
+            self._sensor, self._unit_vectors, self.seeds, self.steps, GAUSSIAN_TABLE, self.flags, self.ranges, self._belief_rows,
+            self.origins, self.windows, self._increments, BYTE_MASKS, self._mask_rows, self._news, self._entries, self.seen, self.gains,
+            self.team_seen, self.bumpers, self.contacts, moves_bodies, perceives,
+        )  # fmt: skip
+        self.steps += 1
+
+    def move_and_sense(self, commands: NDArray[np.float64], step: int) -> Sensed:
+        """Run stage one alone and return what it brings; the arrays are the world's own, valid until the next step."""
+        self.steps[:] = step
+        self.step(commands, perceives=False)
+        return Sensed(self.ranges, self.velocities, self.bumpers, self.contacts, self.poses)
+
+    def perceive(self) -> None:
+        """Run stage two alone: update the maps from ``ranges`` at the believed poses."""
+        self._perceive(
+            self.robots, self.bodies, self.believed, self._sensor, self._unit_vectors, self.flags, self.ranges, self._belief_rows,
+            self.origins, self.windows, self._increments, BYTE_MASKS,
+        )  # fmt: skip
+
+    def coverage(self, episode: int) -> float:
+        """Return the sensed share of F, ``C_free``."""
+        return float(self.team_seen[episode] / max(int(self.counted[episode]), 1))

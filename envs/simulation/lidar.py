@@ -1,0 +1,368 @@
+"""Laser scans by exact traversal of the world's cells.
+
+Two casters give the same ranges. The *quadrant caster* jumps, from the ray's cell, to the border of the largest free
+square that opens the way the ray goes; a byte per cell and quadrant tells its side. The *face caster* draws the wall
+faces in reach into the beams, nearest first wins; it is the faster one where walls are long and straight. Which one runs
+is decided for each pose by the number of faces in reach, so a scan depends on the pose and the floor alone.
+
+A ray ends where it enters a solid cell. A ray that runs exactly through a corner of the lattice enters the cell beside it
+in x first.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import bytes_at, int32_table_at, kernel
+from lidarium.mapping.scans import ScanGeometry, beam_directions, beams_towards
+
+TILE = 128
+"""Side of the square tiles that group the faces [cells]."""
+
+FACE_LIMIT = 420
+"""Most faces in reach for which the face caster is the faster one (measured, see docs/results/speed.md)."""
+
+CORNER_OVERLAP = 1e-9
+"""Faces reach this far beyond their corners, so that rounding leaves no gap between two of them [cells]."""
+
+MAX_SQUARE = 255
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lidar(ScanGeometry):
+    """A planar laser range finder at the centre of the robot.
+
+    Attributes
+    ----------
+    noise_floor, noise_share : float
+        Standard deviation of the range noise: max(noise_floor, noise_share * range) [m, 1].
+    height : float
+        Height of the laser's plane above the floor [m].
+    """
+
+    noise_floor: float = 0.0
+    noise_share: float = 0.0
+    height: float = 0.3
+
+    def __post_init__(self) -> None:
+        ScanGeometry.__post_init__(self)
+        if not (self.noise_floor >= 0.0 and self.noise_share >= 0.0):
+            raise ValueError(f"noise_floor is {self.noise_floor} and noise_share is {self.noise_share}; want 0 or more")
+        if not self.height > 0.0:
+            raise ValueError(f"height of the laser's plane is {self.height} m; want more than 0")
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether ranges carry noise."""
+        return self.noise_floor > 0.0 or self.noise_share > 0.0
+
+
+@kernel
+def _fill_squares(solid, squares):  # noqa: ANN001, ANN202
+    rows, columns = solid.shape
+    for quadrant in range(4):
+        step_column = 1 if quadrant & 1 == 0 else -1
+        step_row = 1 if quadrant & 2 == 0 else -1
+        for i in range(rows):
+            row = rows - 1 - i if step_row > 0 else i
+            for j in range(columns):
+                column = columns - 1 - j if step_column > 0 else j
+                if solid[row, column] != 0:
+                    squares[quadrant, row, column] = 0
+                    continue
+                next_row = row + step_row
+                next_column = column + step_column
+                side = 0
+                if 0 <= next_row < rows and 0 <= next_column < columns:
+                    side = min(
+                        squares[quadrant, next_row, column],
+                        squares[quadrant, row, next_column],
+                        squares[quadrant, next_row, next_column],
+                    )
+                squares[quadrant, row, column] = min(side + 1, MAX_SQUARE)
+
+
+@kernel
+def _count_or_list_faces(solid, tile_columns, starts, faces, listing):  # noqa: ANN001, ANN202
+    """Count the faces of each (tile, direction) in ``starts[1:]``, or list them from ``starts`` on."""
+    rows, columns = solid.shape
+    for direction in range(4):
+        along_rows = direction < 2
+        step = 1 if direction & 1 == 0 else -1
+        fixed_count = columns if along_rows else rows
+        run_count = rows if along_rows else columns
+        for fixed in range(fixed_count):
+            behind = fixed + step
+            if behind < 0 or behind >= fixed_count:
+                continue
+            run_start = -1
+            for k in range(run_count + 1):
+                is_face = False
+                if k < run_count:
+                    if along_rows:
+                        is_face = solid[k, fixed] == 0 and solid[k, behind] != 0
+                    else:
+                        is_face = solid[fixed, k] == 0 and solid[behind, k] != 0
+                if run_start >= 0 and (not is_face or k % TILE == 0):
+                    tile = (run_start // TILE) * tile_columns + fixed // TILE
+                    if not along_rows:
+                        tile = (fixed // TILE) * tile_columns + run_start // TILE
+                    group = tile * 4 + direction
+                    if listing:
+                        place = starts[group]
+                        faces[place, 0] = fixed + (1 if step > 0 else 0)
+                        faces[place, 1] = run_start
+                        faces[place, 2] = k
+                        starts[group] += 1
+                    else:
+                        starts[group + 1] += 1
+                    run_start = -1
+                if is_face and run_start < 0:
+                    run_start = k
+
+
+class RayTables:
+    """What the casters look up for one raster of solid cells; shared by all episodes on that floor.
+
+    Parameters
+    ----------
+    solid : (rows, columns) uint8
+        1 where the world is solid; the outermost ring must be solid.
+
+    Attributes
+    ----------
+    squares : (4, rows, columns) uint8
+        Side of the largest free square that opens from the cell into each quadrant [cells]; 0 in solid cells.
+    faces : (F, 3) int32
+        Wall faces as fixed coordinate, low end and high end [cells], grouped by tile and direction.
+    face_starts : (tiles * 4 + 1,) int32
+        First face of each group.
+    """
+
+    def __init__(self, solid: NDArray[np.uint8]) -> None:
+        if solid.ndim != 2 or min(solid.shape) < 3:
+            raise ValueError(f"the raster of solid cells has shape {solid.shape}; want at least 3 rows and 3 columns")
+        border = (solid[0], solid[-1], solid[:, 0], solid[:, -1])
+        if not all(side.all() for side in border):
+            raise ValueError("the outermost ring of the raster is not all solid; a ray could leave the floor")
+        self.rows, self.columns = solid.shape
+        self.squares = np.empty((4, *solid.shape), np.uint8)
+        _fill_squares(solid, self.squares)
+        tile_rows, self.tile_columns = -(-self.rows // TILE), -(-self.columns // TILE)
+        counts = np.zeros(tile_rows * self.tile_columns * 4 + 1, np.int32)
+        _count_or_list_faces(solid, self.tile_columns, counts, np.empty((0, 3), np.int32), False)
+        self.face_starts = np.cumsum(counts, dtype=np.int32)
+        self.faces = np.empty((max(int(self.face_starts[-1]), 1), 3), np.int32)
+        _count_or_list_faces(solid, self.tile_columns, self.face_starts[:-1].copy(), self.faces, True)
+
+    @cached_property
+    def addresses(self) -> NDArray[np.int64]:
+        """Row of the kernels' table of floors: where the arrays lie, and their sizes."""
+        return np.array(
+            [
+                self.squares.ctypes.data,
+                self.rows,
+                self.columns,
+                self.faces.ctypes.data,
+                self.faces.shape[0],
+                self.face_starts.ctypes.data,
+                self.face_starts.shape[0],
+                self.tile_columns,
+            ],
+            np.int64,
+        )
+
+
+@kernel(inline=True)
+def _fast_angle(y, x):  # noqa: ANN001, ANN202
+    """Angle of (x, y) to within 2e-5 rad [rad], after Abramowitz and Stegun 4.4.49."""
+    absolute_x, absolute_y = abs(x), abs(y)
+    larger, smaller = max(absolute_x, absolute_y), min(absolute_x, absolute_y)
+    if larger == 0.0:
+        return 0.0
+    z = smaller / larger
+    square = z * z
+    angle = z * (0.9998660 + square * (-0.3302995 + square * (0.1801410 + square * (-0.0851330 + square * 0.0208351))))
+    if absolute_y > absolute_x:
+        angle = 0.5 * math.pi - angle
+    if x < 0.0:
+        angle = math.pi - angle
+    return -angle if y < 0.0 else angle
+
+
+@kernel
+def _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges):  # noqa: ANN001, ANN202
+    """Fill ``ranges`` [cells] with the distance to the first solid cell, or ``reach``."""
+    plane = rows * columns
+    start_column, start_row = int(math.floor(x)), int(math.floor(y))
+    for beam in range(ranges.shape[0]):
+        direction_x, direction_y = directions[0, beam], directions[1, beam]
+        inverse_x, inverse_y = directions[2, beam], directions[3, beam]
+        quadrant = 0
+        step_x, step_y = 1, 1
+        if direction_x < 0.0:
+            quadrant, step_x = 1, -1
+        if direction_y < 0.0:
+            quadrant, step_y = quadrant + 2, -1
+        offset = quadrant * plane
+        forward_x, forward_y = (1 + step_x) // 2, (1 + step_y) // 2
+        column, row = start_column, start_row
+        distance = 0.0
+        while True:
+            side = int(squares[offset + row * columns + column])
+            if side == 0:
+                break
+            # The square spans `side` cells the way the ray goes; its far borders are the next candidates.
+            border_x = column + forward_x + step_x * (side - 1)
+            border_y = row + forward_y + step_y * (side - 1)
+            distance_x = (border_x - x) * inverse_x
+            distance_y = (border_y - y) * inverse_y
+            if distance_x <= distance_y:
+                distance = distance_x
+                if distance >= reach:
+                    break
+                last_row = row + step_y * (side - 1)
+                crossed = int(y + distance * direction_y)
+                # Rounding at a lattice corner must never step back or out of the square: the loop would not end.
+                row = min(max(crossed, row), last_row) if step_y > 0 else max(min(crossed, row), last_row)
+                column += step_x * side
+            else:
+                distance = distance_y
+                if distance >= reach:
+                    break
+                last_column = column + step_x * (side - 1)
+                crossed = int(x + distance * direction_x)
+                column = min(max(crossed, column), last_column) if step_x > 0 else max(min(crossed, column), last_column)
+                row += step_y * side
+        ranges[beam] = min(distance, reach)
+
+
+@kernel(inline=True)
+def _draw_face(first, last, distance, run, low, high, inverse, direction, ranges):  # noqa: ANN001, ANN202
+    """Lower the ranges of beams ``first`` to ``last`` to a face at ``distance`` that spans low to high along its run."""
+    for beam in range(first, last + 1):
+        candidate = distance * inverse[beam]
+        along = run + candidate * direction[beam]
+        nearer = (along >= low) & (along <= high) & (candidate > 0.0) & (candidate < ranges[beam])
+        ranges[beam] = candidate if nearer else ranges[beam]
+
+
+@kernel
+def _cast_by_faces(faces, starts, tile_columns, window, x, y, heading, angle_first, increment, directions, reach, ranges):  # noqa: ANN001, ANN202
+    """Fill ``ranges`` [cells] from the faces of the tiles in ``window`` (row_low, row_high, column_low, column_high)."""
+    beams = ranges.shape[0]
+    for beam in range(beams):
+        ranges[beam] = reach
+    turn = 2.0 * math.pi / increment
+    for tile_row in range(window[0], window[1] + 1):
+        for tile_column in range(window[2], window[3] + 1):
+            group = (tile_row * tile_columns + tile_column) * 4
+            for direction in range(4):
+                along_rows = direction < 2
+                forward = direction & 1 == 0
+                fixed_own, run_own = (x, y) if along_rows else (y, x)
+                for k in range(starts[group + direction], starts[group + direction + 1]):
+                    distance = faces[k, 0] - fixed_own
+                    if forward != (distance > 0.0) or abs(distance) >= reach:
+                        continue
+                    low, high = float(faces[k, 1]), float(faces[k, 2])
+                    sideways = max(0.0, max(low - run_own, run_own - high))
+                    if distance * distance + sideways * sideways >= reach * reach:
+                        continue
+                    if along_rows:
+                        angle_low, angle_high = _fast_angle(low - y, distance), _fast_angle(high - y, distance)
+                    else:
+                        angle_low, angle_high = _fast_angle(distance, low - x), _fast_angle(distance, high - x)
+                    # Seen from inside, the low end is the clockwise one on the right and below.
+                    if forward != along_rows:
+                        angle_low, angle_high = angle_high, angle_low
+                    span = angle_high - angle_low
+                    if span < 0.0:
+                        span += 2.0 * math.pi
+                    begin = (angle_low - heading - angle_first) / increment
+                    begin -= turn * math.floor(begin / turn)
+                    count = span / increment
+                    row = 2 if along_rows else 3
+                    other = 1 if along_rows else 0
+                    low -= CORNER_OVERLAP
+                    high += CORNER_OVERLAP
+                    # One beam more on each side: the exact test is the one along the face.
+                    for lap in range(2):
+                        first = int(math.floor(begin - lap * turn)) - 1
+                        last = int(math.floor(begin - lap * turn + count)) + 2
+                        first, last = max(first, 0), min(last, beams - 1)
+                        if first <= last:
+                            _draw_face(first, last, distance, run_own, low, high, directions[row], directions[other], ranges)
+
+
+@kernel
+def cast_scan(tables, x, y, heading, angle_first, increment, directions, reach, ranges):  # noqa: ANN001, ANN201
+    """Fill ``ranges`` with the distances to the first solid cell along each beam.
+
+    Parameters
+    ----------
+    tables : (8,) int64
+        ``RayTables.addresses`` of the floor.
+    x, y : float
+        Position of the laser [cells].
+    heading, angle_first, increment : float
+        Heading of the robot, angle of the first beam against it, angle between beams [rad].
+    directions : (4, beams) float64
+        Unit vectors of the beams in the world's axes (x, y) and their inverses.
+    reach : float
+        Longest range [cells].
+    ranges : (beams,) float64
+        Result [cells]; ``reach`` where nothing is met.
+    """
+    rows, columns, tile_columns = tables[1], tables[2], tables[7]
+    starts = int32_table_at(tables[5], 1, tables[6])[0]
+    window = (
+        max(int(y - reach) // TILE, 0),
+        min(int(y + reach), rows - 1) // TILE,
+        max(int(x - reach) // TILE, 0),
+        min(int(x + reach), columns - 1) // TILE,
+    )
+    in_reach = 0
+    for tile_row in range(window[0], window[1] + 1):
+        first = (tile_row * tile_columns + window[2]) * 4
+        last = (tile_row * tile_columns + window[3]) * 4 + 4
+        in_reach += starts[last] - starts[first]
+    if in_reach <= FACE_LIMIT:
+        faces = int32_table_at(tables[3], tables[4], 3)
+        _cast_by_faces(faces, starts, tile_columns, window, x, y, heading, angle_first, increment, directions, reach, ranges)
+    else:
+        squares = bytes_at(tables[0], 4 * rows * columns)
+        _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges)
+
+
+@kernel
+def cut_by_disc(x, y, heading, angle_first, increment, directions, disc_x, disc_y, disc_radius, reach, ranges):  # noqa: ANN001, ANN201
+    """Shorten the beams that meet a disc (another robot); positions, radius and ranges in cells."""
+    offset_x, offset_y = disc_x - x, disc_y - y
+    squared = offset_x * offset_x + offset_y * offset_y
+    gap = squared - disc_radius * disc_radius
+    if gap <= 0.0 or squared > (reach + disc_radius) ** 2:
+        return
+    beams = ranges.shape[0]
+    begin, count = beams_towards(offset_x, offset_y, disc_radius, heading, angle_first, increment)
+    turn = 2.0 * math.pi / increment
+    for lap in range(2):
+        first = max(int(math.floor(begin - lap * turn)) - 1, 0)
+        last = min(int(math.floor(begin - lap * turn + count)) + 2, beams - 1)
+        for beam in range(first, last + 1):
+            middle = offset_x * directions[0, beam] + offset_y * directions[1, beam]
+            inside = middle * middle - gap
+            if inside >= 0.0 and middle > 0.0:
+                ranges[beam] = min(ranges[beam], middle - math.sqrt(inside))
+
+
+@kernel
+def cast_scans(tables, poses, unit_vectors, angle_first, increment, reach, ranges):  # noqa: ANN001, ANN201
+    """Cast a scan at each pose (x, y [cells], heading) of one floor; ``ranges`` (poses, beams) float64 [cells]."""
+    directions = np.empty((4, unit_vectors.shape[1]))
+    for k in range(poses.shape[0]):
+        beam_directions(poses[k, 2], unit_vectors, directions)
+        cast_scan(tables, poses[k, 0], poses[k, 1], poses[k, 2], angle_first, increment, directions, reach, ranges[k])

@@ -1,0 +1,52 @@
+"""Noise from a counter: the same draw for the same (key, robot, step, beam), whatever the order of threads or rows.
+
+A 32-bit hash of the counter picks one entry from each of two tables; the sum of the two entries is Gaussian.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from lidarium.mapping.kernels import kernel
+
+TABLE_SIZE = 4096
+
+
+def _half_variance_table() -> NDArray[np.float32]:
+    """Quantiles of a Gaussian of variance 1/2, scaled to have that variance exactly."""
+    quantiles = ndtri((np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE)
+    return (quantiles * np.sqrt(0.5 / np.mean(quantiles**2))).astype(np.float32)
+
+
+GAUSSIAN_TABLE = _half_variance_table()
+
+
+@kernel(inline=True)
+def mix(value):  # noqa: ANN001, ANN201
+    """Scramble 32 bits (finaliser of MurmurHash3, by A. Appleby, public domain)."""
+    value = np.uint32(value)
+    value ^= value >> np.uint32(16)
+    value = np.uint32(value * np.uint32(0x85EBCA6B))
+    value ^= value >> np.uint32(13)
+    value = np.uint32(value * np.uint32(0xC2B2AE35))
+    value ^= value >> np.uint32(16)
+    return value
+
+
+@kernel(inline=True)
+def stream_key(seed, robot, step):  # noqa: ANN001, ANN201
+    """Key of one robot's draws in one step, from a 64-bit seed."""
+    low = np.uint32(seed & np.uint64(0xFFFFFFFF))
+    high = np.uint32(seed >> np.uint64(32))
+    key = mix(low ^ np.uint32(0x9E3779B9))
+    key = mix(key ^ high)
+    key = mix(key ^ np.uint32(robot))
+    return mix(key ^ np.uint32(step))
+
+
+@kernel
+def fill_gaussian(key, table, values):  # noqa: ANN001, ANN201
+    """Fill ``values`` (count,) float32 with standard Gaussian draws of the stream ``key``."""
+    for k in range(values.shape[0]):
+        bits = mix(np.uint32(key + np.uint32(np.uint32(k) * np.uint32(0x9E3779B9))))
+        values[k] = table[bits & np.uint32(4095)] + table[(bits >> np.uint32(12)) & np.uint32(4095)]

@@ -1,0 +1,62 @@
+"""The robots of the catalogue: bodies and drives (design, section 6)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robot:
+    """A differential-drive robot with a round body.
+
+    Attributes
+    ----------
+    radius : float
+        Radius of the body [m].
+    height : float
+        Height of the body [m]; solids and other robots' lasers below it meet the body.
+    cruise_speed, max_speed : float
+        Speed that its own driving keeps to, and the limit of the drive [m/s].
+    max_turn_rate : float
+        Limit of the turn rate [rad/s].
+    max_acceleration, max_turn_acceleration : float
+        Limits of the drive [m/s2, rad/s2].
+    """
+
+    radius: float = 0.18
+    height: float = 0.52
+    cruise_speed: float = 0.33
+    max_speed: float = 0.77
+    max_turn_rate: float = 3.14
+    max_acceleration: float = 1.0
+    max_turn_acceleration: float = 6.0
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "height", "cruise_speed", "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration"):
+            value = getattr(self, name)
+            if not (0.0 < value < float("inf")):
+                raise ValueError(f"{name} of the robot is {value}; want a number above 0")
+        if self.cruise_speed > self.max_speed:
+            raise ValueError(f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s")
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """What the kernels know of the body, shape (6,): see ``motion``."""
+        return np.array(
+            [self.radius, self.max_speed, self.max_turn_rate, self.max_acceleration, self.max_turn_acceleration, self.height]
+        )
+
+
+ROBOTS: dict[str, Robot] = {
+    "kobuki": Robot(),
+    "pioneer": Robot(
+        radius=0.267, height=0.24, cruise_speed=0.5, max_speed=1.2, max_turn_rate=5.24, max_acceleration=0.8, max_turn_acceleration=3.0
+    ),
+    "service": Robot(
+        radius=0.30, height=1.2, cruise_speed=0.5, max_speed=1.0, max_turn_rate=1.8, max_acceleration=0.6, max_turn_acceleration=2.0
+    ),
+    "point": Robot(
+        radius=0.01, height=0.5, cruise_speed=1.0, max_speed=1.0, max_turn_rate=6.28, max_acceleration=100.0, max_turn_acceleration=600.0
+    ),
+}

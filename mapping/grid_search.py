@@ -1,0 +1,307 @@
+"""The kernel of all searches over a belief: Dijkstra's algorithm and A* with buckets.
+
+Costs are integers, so that sums are exact and the same everywhere: a straight step on open floor costs 4756 units and a
+diagonal one 6726 (their ratio is sqrt 2 to one part in ten million). A bucket holds the cells of a band of costs that
+is narrower than the cheapest step; so nothing inside a bucket can improve anything else inside it, its cells need no
+order, and the search is exact without a heap (Dial, Algorithm 360, CACM 1969; Denardo and Fox, Operations Research
+1979). A* has steps that add nothing to its estimate; there a bucket is worked on until it stays empty.
+
+A search keeps what *remains* of its budget in each cell, 0 = not reached: memory is touched only where the search goes,
+and cleared from the list of touched cells.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.grid_lines import line_is_open
+from lidarium.mapping.kernels import kernel
+
+STRAIGHT = 4756
+DIAGONAL = 6726
+BUCKET_SHIFT = 12
+NO_ENTRY = 2**31 - 1  # what remains in a cell that a disc blocks: no path improves on it
+LARGEST_BUDGET = 2**31 - 2
+LEAVING = 8  # mark beside the direction in `parent`: the cell is passed only to leave a blocked zone
+TILE_SHIFT = 4  # targets are counted in tiles of 16 x 16 cells
+
+ROW_STEPS = np.array([0, 0, 1, -1, 1, 1, -1, -1])
+COLUMN_STEPS = np.array([1, -1, 0, 0, 1, -1, 1, -1])
+
+
+@kernel
+def close_discs(remaining: NDArray[np.int32], touched: NDArray[np.int32], discs: NDArray[np.float64]) -> int:
+    """Mark the cells whose centres lie inside discs (row, column, radius in cells); return how many (kernel)."""
+    rows, columns = remaining.shape
+    count = 0
+    for k in range(len(discs)):
+        centre_row, centre_column, radius = discs[k]
+        for row in range(max(int(centre_row - radius), 0), min(int(centre_row + radius) + 2, rows)):
+            for column in range(max(int(centre_column - radius), 0), min(int(centre_column + radius) + 2, columns)):
+                if (row - centre_row) ** 2 + (column - centre_column) ** 2 < radius * radius and remaining[row, column] == 0:
+                    remaining[row, column] = NO_ENTRY
+                    touched[count] = (row << 16) | column
+                    count += 1
+    return count
+
+
+@kernel
+def clear(remaining: NDArray[np.int32], touched: NDArray[np.int32], count: int) -> None:
+    """Forget a search (kernel)."""
+    for i in range(count):
+        remaining[touched[i] >> 16, touched[i] & 0xFFFF] = 0
+
+
+@kernel
+def _estimate(row: int, column: int, goal_row: int, goal_column: int) -> int:
+    """Cost of the way to the goal on open floor."""
+    rise = abs(goal_row - row)
+    run = abs(goal_column - column)
+    return STRAIGHT * max(rise, run) + (DIAGONAL - STRAIGHT) * min(rise, run)
+
+
+@kernel
+def sees_target(
+    log_odds: NDArray[np.int8], mask: NDArray[np.uint8], near: NDArray[np.uint8], spans: NDArray[np.int64], row: int, column: int
+) -> bool:
+    """Whether a cell with mask 1 lies in the disc of ``spans`` around a cell and in its line of sight (kernel)."""
+    if near[row >> TILE_SHIFT, column >> TILE_SHIFT] == 0:
+        return False
+    reach = len(spans) // 2
+    rows, columns = mask.shape
+    for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
+        span = spans[other - row + reach]
+        for another in range(max(column - span, 0), min(column + span + 1, columns)):
+            if mask[other, another] == 1 and line_is_open(log_odds, row, column, other, another):
+                return True
+    return False
+
+
+@kernel
+def _margin(
+    closeness: NDArray[np.uint16], limit: int, radius: float, discs: NDArray[np.float64], row: int, column: int
+) -> float:
+    """Room [cells] between a body centred in a cell and what is nearest, walls and discs; negative inside a blocked zone."""
+    margin = np.sqrt(float(limit - closeness[row, column])) * 0.5 - radius
+    for k in range(len(discs)):
+        distance = np.sqrt((row - discs[k, 0]) ** 2 + (column - discs[k, 1]) ** 2)
+        margin = min(margin, distance - discs[k, 2])
+    return margin
+
+
+@kernel
+def _step_is_open(
+    log_odds: NDArray[np.int8],
+    closeness: NDArray[np.uint16],
+    half_costs: NDArray[np.int32],
+    roomy: int,
+    row: int,
+    column: int,
+    to_row: int,
+    to_column: int,
+) -> bool:
+    """Whether a diagonal step keeps its clearance on the way.
+
+    Between the centres of two diagonal neighbours the squared clearance in half cells falls at most 2 below that of
+    both ends, and not at all where both cells beside the step have it too. So the path of centres is exact.
+    """
+    free_beside = log_odds[to_row, column] < 0
+    free_abeam = log_odds[row, to_column] < 0
+    if max(closeness[row, column], closeness[to_row, to_column]) <= roomy:
+        return free_beside or free_abeam
+    if not (free_beside and free_abeam):
+        return False
+    return half_costs[0, closeness[to_row, column]] > 0 and half_costs[0, closeness[row, to_column]] > 0
+
+
+@kernel
+def _leave(
+    log_odds: NDArray[np.int8],
+    closeness: NDArray[np.uint16],
+    limit: int,
+    half_costs: NDArray[np.int32],
+    radius: float,
+    discs: NDArray[np.float64],
+    remaining: NDArray[np.int32],
+    parent: NDArray[np.uint8],
+    touched: NDArray[np.int32],
+    touched_count: int,
+    buckets: NDArray[np.int32],
+    sizes: NDArray[np.int64],
+    fullest: int,
+    row: int,
+    column: int,
+    budget: int,
+    goal_row: int,
+    goal_column: int,
+    guided: bool,
+) -> tuple[int, int, int]:
+    """Step on from a cell inside a blocked zone: to open cells, or to blocked ones with no less room.
+
+    Each step costs as much as the dearest of all, so that the way out is short.
+    """
+    rows, columns = log_odds.shape
+    pushed = 0
+    margin = _margin(closeness, limit, radius, discs, row, column)
+    after = remaining[row, column] - 2 * half_costs.max()
+    for k in range(8):
+        to_row = row + ROW_STEPS[k]
+        to_column = column + COLUMN_STEPS[k]
+        if to_row < 0 or to_row >= rows or to_column < 0 or to_column >= columns or log_odds[to_row, to_column] >= 0:
+            continue
+        if k >= 4 and (log_odds[to_row, column] > 0 or log_odds[row, to_column] > 0):
+            continue
+        is_new = remaining[to_row, to_column] == 0
+        before = 0 if remaining[to_row, to_column] == NO_ENTRY else remaining[to_row, to_column]
+        if after <= before:
+            continue
+        was_passed = before > 0 and parent[to_row, to_column] >= LEAVING
+        mark = 0
+        if half_costs[0, closeness[to_row, to_column]] == 0 or remaining[to_row, to_column] == NO_ENTRY or was_passed:
+            if _margin(closeness, limit, radius, discs, to_row, to_column) < margin:
+                continue
+            mark = LEAVING
+        to_cell = (to_row << 16) | to_column
+        if is_new:
+            touched[touched_count] = to_cell
+            touched_count += 1
+        remaining[to_row, to_column] = after
+        parent[to_row, to_column] = k | mark
+        ahead = _estimate(to_row, to_column, goal_row, goal_column) if guided else 0
+        slot = ((budget - after + ahead) >> BUCKET_SHIFT) & (buckets.shape[0] - 1)
+        buckets[slot, sizes[slot]] = to_cell
+        sizes[slot] += 1
+        fullest = max(fullest, sizes[slot])
+        pushed += 1
+    return touched_count, fullest, pushed
+
+
+@kernel
+def spread(
+    log_odds: NDArray[np.int8],
+    closeness: NDArray[np.uint16],
+    limit: int,
+    half_costs: NDArray[np.int32],
+    roomy: int,
+    radius: float,
+    discs: NDArray[np.float64],
+    remaining: NDArray[np.int32],
+    parent: NDArray[np.uint8],
+    touched: NDArray[np.int32],
+    touched_count: int,
+    buckets: NDArray[np.int32],
+    start_row: int,
+    start_column: int,
+    budget: int,
+    goal_row: int,
+    goal_column: int,
+    guided: bool,
+    mask: NDArray[np.uint8],
+    near: NDArray[np.uint8],
+    spans: NDArray[np.int64],
+    wanted: int,
+    hits: NDArray[np.int32],
+) -> tuple[int, int, int, NDArray[np.int32]]:
+    """Spread costs from the start until the goal, the wanted number of targets, the budget or all is reached (kernel).
+
+    Returns the number of touched cells, of targets hit, the last band of costs that is final, and the buckets (grown
+    where they were too small).
+    """
+    rows, columns = log_odds.shape
+    slots = buckets.shape[0] - 1
+    sizes = np.zeros(buckets.shape[0], np.int64)
+    capacity = buckets.shape[1]
+    fullest = 1
+    hit_count = 0
+    log_odds_at = log_odds.reshape(-1)
+    closeness_at = closeness.reshape(-1)
+    remaining_at = remaining.reshape(-1)
+    parent_at = parent.reshape(-1)
+
+    start_is_open = log_odds[start_row, start_column] < 0 and half_costs[0, closeness[start_row, start_column]] > 0
+    start_is_open = start_is_open and remaining[start_row, start_column] == 0
+    remaining[start_row, start_column] = budget
+    parent[start_row, start_column] = 0 if start_is_open else LEAVING
+    touched[touched_count] = (start_row << 16) | start_column
+    touched_count += 1
+    current = 0
+    if guided:
+        current = _estimate(start_row, start_column, goal_row, goal_column) >> BUCKET_SHIFT
+    buckets[current & slots, 0] = (start_row << 16) | start_column
+    sizes[current & slots] = 1
+    pending = 1
+    while pending > 0:
+        slot = current & slots
+        i = 0
+        while i < sizes[slot]:
+            cell = buckets[slot, i]
+            i += 1
+            row = cell >> 16
+            column = cell & 0xFFFF
+            left = remaining[row, column]
+            estimate = budget - left
+            if guided:
+                estimate += _estimate(row, column, goal_row, goal_column)
+            if estimate >> BUCKET_SHIFT != current:
+                continue  # reached more cheaply in the meantime
+            if fullest + 8 > capacity:
+                capacity *= 2
+                wider = np.empty((slots + 1, capacity), np.int32)
+                for k in range(slots + 1):
+                    wider[k, : sizes[k]] = buckets[k, : sizes[k]]
+                buckets = wider
+            leaving = parent[row, column] >= LEAVING
+            if wanted > 0 and not leaving and sees_target(log_odds, mask, near, spans, row, column):
+                hits[hit_count] = cell
+                hit_count += 1
+            if leaving:
+                touched_count, fullest, added = _leave(
+                    log_odds, closeness, limit, half_costs, radius, discs, remaining, parent, touched, touched_count, buckets, sizes,
+                    fullest, row, column, budget, goal_row, goal_column, guided,
+                )  # fmt: skip
+                pending += added
+                continue
+            here = np.uintp(row * columns + column)
+            inside = 0 < row < rows - 1 and 0 < column < columns - 1
+            own_straight = half_costs[0, closeness_at[here]]
+            own_diagonal = half_costs[1, closeness_at[here]]
+            for k in range(8):
+                to_row = row + ROW_STEPS[k]
+                to_column = column + COLUMN_STEPS[k]
+                if not inside and (to_row < 0 or to_row >= rows or to_column < 0 or to_column >= columns):
+                    continue
+                there = np.uintp(to_row * columns + to_column)
+                before = remaining_at[there]
+                if before >= left - (DIAGONAL if k >= 4 else STRAIGHT) or log_odds_at[there] >= 0:
+                    continue
+                half = half_costs[1 if k >= 4 else 0, closeness_at[there]]
+                after = left - half - (own_diagonal if k >= 4 else own_straight)
+                if half == 0 or after <= before or (before > 0 and parent_at[there] >= LEAVING):
+                    continue
+                if k >= 4 and not _step_is_open(log_odds, closeness, half_costs, roomy, row, column, to_row, to_column):
+                    continue
+                to_cell = (to_row << 16) | to_column
+                if before == 0:
+                    touched[np.uintp(touched_count)] = to_cell
+                    touched_count += 1
+                remaining_at[there] = after
+                parent_at[there] = k
+                ahead = _estimate(to_row, to_column, goal_row, goal_column) if guided else 0
+                bucket = (budget - after + ahead) >> BUCKET_SHIFT
+                if before > 0 and bucket != current and (budget - before + ahead) >> BUCKET_SHIFT == bucket:
+                    continue  # it waits there already
+                to_slot = np.uintp(bucket & slots)
+                size = sizes[to_slot]
+                buckets[to_slot, np.uintp(size)] = to_cell
+                sizes[to_slot] = size + 1
+                fullest = max(fullest, size + 1)
+                pending += 1
+        pending -= sizes[slot]
+        sizes[slot] = 0
+        if goal_row >= 0 and remaining[goal_row, goal_column] > 0:
+            estimate = budget - remaining[goal_row, goal_column]
+            if estimate >> BUCKET_SHIFT <= current:
+                break
+        if wanted > 0 and hit_count >= wanted:
+            break
+        current += 1
+    return touched_count, hit_count, current, buckets

@@ -1,0 +1,324 @@
+"""Occupancy grids in log-odds, updated by scans.
+
+The inverse sensor model is that of the OccupancyGrid algorithm (Thrun, Burgard, Fox: Probabilistic Robotics, section 9.2)
+with the beams' fans in place of single cones: a cell whose centre the scan has seen becomes more likely free, a cell in
+which a beam ended more likely occupied, each once per scan; all others keep their value. Log-odds are integers of
+``LOG_ODDS_UNIT``; 0 is unknown.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lidarium.mapping.kernels import kernel
+from lidarium.mapping.scan_polygon import fill_scan_polygon, window_rows, window_words
+from lidarium.mapping.scans import ScanGeometry, beam_directions
+
+LOG_ODDS_UNIT = 0.05
+OCCUPIED, UNKNOWN, FREE = 0, 127, 255
+WORD = 64
+MAX_CELLS = 400_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OccupancySettings:
+    """How scans change the log-odds.
+
+    Attributes
+    ----------
+    resolution : float
+        Side of a cell [m].
+    hit, miss : float
+        Added where a beam ended, taken where the scan saw through [log-odds, positive].
+    minimum, maximum : float
+        Bounds of a cell's value [log-odds].
+    """
+
+    resolution: float = 0.05
+    hit: float = 0.85
+    miss: float = 0.4
+    minimum: float = -2.0
+    maximum: float = 3.5
+
+    def __post_init__(self) -> None:
+        if not (self.resolution > 0.0 and math.isfinite(self.resolution)):
+            raise ValueError(f"resolution of the map is {self.resolution} m/cell; want more than 0")
+        if not (self.hit >= LOG_ODDS_UNIT and self.miss >= LOG_ODDS_UNIT):
+            raise ValueError(f"hit is {self.hit} and miss is {self.miss}; want at least {LOG_ODDS_UNIT} each")
+        largest = 127 * LOG_ODDS_UNIT
+        if not (-largest <= self.minimum <= -self.miss and self.hit <= self.maximum <= largest):
+            raise ValueError(
+                f"log-odds are bounded to [{self.minimum}, {self.maximum}]; want minimum in [{-largest}, -miss] and maximum in [hit, {largest}]"
+            )
+
+    @property
+    def increments(self) -> NDArray[np.int64]:
+        """Hit, miss, minimum and maximum in units of ``LOG_ODDS_UNIT``, shape (4,)."""
+        return np.array([round(value / LOG_ODDS_UNIT) for value in (self.hit, self.miss, self.minimum, self.maximum)], np.int64)
+
+
+def _byte_masks() -> NDArray[np.uint64]:
+    """For each byte of bits, eight bytes that are 255 where the bit is set."""
+    bits = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little")
+    return np.ascontiguousarray(bits * np.uint8(255)).view("<u8")[:, 0].astype(np.uint64)
+
+
+BYTE_MASKS = _byte_masks()
+
+
+@kernel
+def _raise_hits(log_odds, ranges, is_hit, directions, x, y, row_offset, column_offset, increments, bits, hit_bits):  # noqa: ANN001, ANN202
+    """Raise the cells in which a beam ended, once each, and take them out of the seen area."""
+    hit, maximum = increments[0], increments[3]
+    rows, columns = log_odds.shape
+    for beam in range(ranges.shape[0]):
+        if not is_hit[beam]:
+            continue
+        column = int(math.floor(x + ranges[beam] * directions[0, beam]))
+        row = int(math.floor(y + ranges[beam] * directions[1, beam]))
+        if row < 0 or row >= bits.shape[0] or column < 0:
+            continue
+        word = column >> 6
+        if word >= bits.shape[1]:
+            continue
+        bit = np.uint64(1) << np.uint64(column & 63)
+        if hit_bits[row, word] & bit:
+            continue
+        hit_bits[row, word] |= bit
+        bits[row, word] &= ~bit
+        map_row, map_column = row + row_offset, column + column_offset
+        if 0 <= map_row < rows and 0 <= map_column < columns:
+            log_odds[map_row, map_column] = min(log_odds[map_row, map_column] + hit, maximum)
+
+
+@kernel
+def _lower_seen(log_odds, bits, row_low, row_high, row_offset, column_offset, increments, byte_masks):  # noqa: ANN001, ANN202
+    """Lower the seen cells in whole blocks of 64 under a byte mask."""
+    miss, minimum = np.int8(increments[1]), np.int8(increments[2])
+    threshold = np.int8(increments[1] + increments[2])
+    masks = np.empty(8, np.uint64)
+    selected = masks.view(np.uint8)
+    words = log_odds.shape[1] // 64
+    word_offset = column_offset // 64
+    full = ~np.uint64(0)
+    for row in range(max(row_low, -row_offset), min(row_high, log_odds.shape[0] - row_offset)):
+        for word in range(max(0, -word_offset), min(bits.shape[1], words - word_offset)):
+            value = bits[row, word]
+            if value == np.uint64(0):
+                continue
+            first = (word + word_offset) * 64
+            block = log_odds[row + row_offset, first : first + 64]
+            if value == full:
+                for k in range(64):
+                    old = block[k]
+                    block[k] = np.int8(old - miss) if old > threshold else minimum
+            else:
+                for k in range(8):
+                    masks[k] = byte_masks[(value >> np.uint64(8 * k)) & np.uint64(255)]
+                for k in range(64):
+                    old = block[k]
+                    new = np.int8(old - miss) if old > threshold else minimum
+                    block[k] = new if selected[k] != 0 else old
+
+
+@kernel
+def integrate_scan(log_odds, bits, row_low, row_high, ranges, is_hit, directions, x, y, row_offset, column_offset, increments, byte_masks, hit_bits):  # noqa: ANN001, ANN201, E501
+    """Update a map by a scan whose seen area is in ``bits``; clears ``bits`` and ``hit_bits`` for the next scan.
+
+    Parameters
+    ----------
+    log_odds : (rows, columns) int8
+        The map; columns a multiple of 64.
+    bits, hit_bits : (window rows, words) uint64
+        The seen area of ``fill_scan_polygon``; zeros.
+    row_low, row_high : int
+        Rows of the window that may hold bits.
+    ranges, is_hit : (beams,) float64 and bool
+        Length of each beam [cells] and whether something ended it.
+    directions : (2 or more, beams) float64
+        Unit vectors of the beams in the map's axes.
+    x, y : float
+        Position of the laser in the window [cells].
+    row_offset, column_offset : int
+        Place of the window's first cell in the map; column_offset a multiple of 64.
+    increments : (4,) int64
+        ``OccupancySettings.increments``.
+    byte_masks : (256,) uint64
+        ``BYTE_MASKS``.
+    """
+    _raise_hits(log_odds, ranges, is_hit, directions, x, y, row_offset, column_offset, increments, bits, hit_bits)
+    _lower_seen(log_odds, bits, row_low, row_high, row_offset, column_offset, increments, byte_masks)
+    # A hit may lie one row beyond the rows of the seen area.
+    for row in range(max(row_low - 1, 0), min(row_high + 1, bits.shape[0])):
+        for word in range(bits.shape[1]):
+            bits[row, word] = np.uint64(0)
+            hit_bits[row, word] = np.uint64(0)
+
+
+@kernel
+def _integrate_one(log_odds, x, y, heading, ranges, geometry, unit_vectors, increments, byte_masks, window):  # noqa: ANN001, ANN202
+    """Update a map by one scan at x, y [cells]; ``geometry`` is (increment, range_max [cells], cells per metre, full circle)."""
+    reach, scale = geometry[1], geometry[2]
+    beams = ranges.shape[0]
+    directions = np.empty((4, beams))
+    beam_directions(heading, unit_vectors, directions)
+    lengths = np.empty(beams)
+    is_hit = np.empty(beams, np.bool_)
+    for beam in range(beams):
+        value = float(ranges[beam])
+        is_hit[beam] = math.isfinite(value) and value * scale <= reach
+        lengths[beam] = 0.0 if math.isnan(value) else min(value * scale, reach)
+    bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
+    hit_bits = np.zeros_like(bits)
+    margin = int(reach) + 3
+    row_offset = int(math.floor(y)) - margin
+    column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
+    local_x, local_y = x - column_offset, y - row_offset
+    row_low, row_high = fill_scan_polygon(lengths, directions, local_x, local_y, geometry[0], geometry[3] != 0.0, bits)
+    window[0], window[1] = row_low + row_offset, row_high + row_offset
+    window[2], window[3] = column_offset, column_offset + 64 * bits.shape[1]
+    integrate_scan(
+        log_odds, bits, row_low, row_high, lengths, is_hit, directions, local_x, local_y, row_offset, column_offset, increments, byte_masks, hit_bits
+    )
+
+
+class OccupancyGrid:
+    """A robot's map: a grid of log-odds that grows without moving its coordinates.
+
+    Parameters
+    ----------
+    settings : OccupancySettings
+        Resolution and sensor model.
+    bounds : (x_min, y_min, x_max, y_max) or None
+        Rectangle that the map holds from the start [m]; it grows beyond it where needed.
+
+    Attributes
+    ----------
+    log_odds : (rows, columns) int8
+        Units of ``LOG_ODDS_UNIT``; 0 unknown, negative free, positive occupied. Row 0 at the lowest y.
+    origin : (x, y)
+        Lower left corner of cell (0, 0) [m], always a whole number of cells from the first origin.
+    """
+
+    def __init__(self, settings: OccupancySettings | None = None, bounds: tuple[float, float, float, float] | None = None) -> None:
+        self.settings = settings or OccupancySettings()
+        low_x, low_y, high_x, high_y = bounds or (0.0, 0.0, 0.0, 0.0)
+        resolution = self.settings.resolution
+        self._first_column = math.floor(low_x / resolution + 1e-9)
+        self._first_row = math.floor(low_y / resolution + 1e-9)
+        rows = max(math.ceil(high_y / resolution - 1e-9) - self._first_row, 0)
+        columns = max(math.ceil(high_x / resolution - 1e-9) - self._first_column, 0)
+        self.log_odds: NDArray[np.int8] = _blank(rows, -(-columns // WORD) * WORD)
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Lower left corner of cell (0, 0) [m]."""
+        return self._first_column * self.settings.resolution, self._first_row * self.settings.resolution
+
+    def contain(self, x_min: float, y_min: float, x_max: float, y_max: float) -> None:
+        """Grow so that the rectangle [m] lies within the map; what is known keeps its place."""
+        resolution = self.settings.resolution
+        rows, columns = self.log_odds.shape
+        low_row, high_row = math.floor(y_min / resolution) - self._first_row, math.ceil(y_max / resolution) - self._first_row
+        low_column = math.floor(x_min / resolution) - self._first_column
+        high_column = math.ceil(x_max / resolution) - self._first_column
+        if 0 <= low_row and high_row <= rows and 0 <= low_column and high_column <= columns:
+            return
+        # Half of the new size on each grown side, so that a drive across a building grows the map a few times only.
+        spare_rows, spare_columns = rows // 2, columns // 2
+        below = max(0, -low_row) and max(0, -low_row) + spare_rows
+        above = max(0, high_row - rows) and max(0, high_row - rows) + spare_rows
+        left = max(0, -low_column) and -(-(max(0, -low_column) + spare_columns) // WORD) * WORD
+        right = max(0, high_column - columns) and -(-(max(0, high_column - columns) + spare_columns) // WORD) * WORD
+        grown = _blank(below + rows + above, left + columns + right)
+        grown[below : below + rows, left : left + columns] = self.log_odds
+        self.log_odds = grown
+        self._first_row -= below
+        self._first_column -= left
+
+    def integrate(self, pose: ArrayLike, ranges: ArrayLike, geometry: ScanGeometry) -> tuple[int, int, int, int]:
+        """Update the map by one scan.
+
+        Parameters
+        ----------
+        pose : (3,)
+            x, y, theta of the laser in the map's frame [m, rad].
+        ranges : (beams,)
+            Ranges [m]; inf for no return, nan for an invalid beam.
+        geometry : ScanGeometry
+            Which way the beams look.
+
+        Returns
+        -------
+        tuple of int
+            row_low, row_high, column_low, column_high: the cells outside did not change (high ends exclusive).
+
+        Raises
+        ------
+        ValueError
+            Where the pose is not finite or the number of ranges is not that of the geometry.
+        """
+        x, y, theta = np.asarray(pose, np.float64)
+        scan = np.asarray(ranges, np.float32)
+        if not np.isfinite([x, y, theta]).all():
+            raise ValueError(f"pose is ({x}, {y}, {theta}); want finite metres and radians")
+        if scan.shape != (geometry.beams,):
+            raise ValueError(f"ranges have shape {scan.shape}; want ({geometry.beams},), one per beam")
+        resolution, reach = self.settings.resolution, geometry.range_max
+        margin = 4 * resolution
+        self.contain(x - reach - margin, y - reach - margin, x + reach + margin, y + reach + margin)
+        window = np.zeros(4, np.int64)
+        numbers = (geometry.angle_increment, reach / resolution, 1.0 / resolution, float(geometry.is_full_circle))
+        grid_x, grid_y = x / resolution - self._first_column, y / resolution - self._first_row
+        _integrate_one(
+            self.log_odds, grid_x, grid_y, theta, scan, numbers, geometry.unit_vectors, self.settings.increments, BYTE_MASKS, window
+        )
+        rows, columns = self.log_odds.shape
+        low_row, high_row, low_column, high_column = (int(value) for value in window)
+        return max(low_row - 1, 0), min(high_row + 1, rows), max(low_column, 0), min(high_column, columns)
+
+    def levels(self) -> NDArray[np.uint8]:
+        """Return the three-level map: 0 occupied, 127 unknown, 255 free, shape (rows, columns)."""
+        return three_levels(self.log_odds)
+
+    def probability(self) -> NDArray[np.float32]:
+        """Return the probability of being occupied, shape (rows, columns)."""
+        return (1.0 / (1.0 + np.exp(-LOG_ODDS_UNIT * self.log_odds.astype(np.float32)))).astype(np.float32)
+
+
+def three_levels(log_odds: NDArray[np.int8]) -> NDArray[np.uint8]:
+    """Return 0 where occupied, 127 where unknown, 255 where free."""
+    levels = np.full(log_odds.shape, UNKNOWN, np.uint8)
+    levels[log_odds > 0] = OCCUPIED
+    levels[log_odds < 0] = FREE
+    return levels
+
+
+def _blank(rows: int, columns: int) -> NDArray[np.int8]:
+    if rows * columns > MAX_CELLS:
+        raise ValueError(f"a map of {rows} x {columns} cells is larger than {MAX_CELLS} cells; use a coarser resolution")
+    return np.zeros((rows, columns), np.int8)
+
+
+@kernel
+def crop_levels(log_odds, row, column, crop):  # noqa: ANN001, ANN201
+    """Copy the cells around (row, column) into ``crop`` (side, side) as levels; unknown outside of the map."""
+    side = crop.shape[0]
+    first_row, first_column = row - side // 2, column - side // 2
+    rows, columns = log_odds.shape
+    low, high = min(max(0, -first_column), side), max(min(side, columns - first_column), 0)
+    for i in range(side):
+        target = crop[i]
+        map_row = first_row + i
+        if map_row < 0 or map_row >= rows or low >= high:
+            target[:] = np.uint8(127)
+            continue
+        target[:low] = np.uint8(127)
+        target[high:] = np.uint8(127)
+        source = log_odds[map_row, first_column + low : first_column + high]
+        inner = target[low:high]
+        for j in range(high - low):
+            value = source[j]
+            inner[j] = np.uint8(255) if value < 0 else (np.uint8(0) if value > 0 else np.uint8(127))

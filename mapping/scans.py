@@ -1,0 +1,87 @@
+"""The geometry of a scan: which way its beams look and how far they reach."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import kernel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScanGeometry:
+    """Beams of a planar laser range finder, counter-clockwise, symmetric about the heading.
+
+    Attributes
+    ----------
+    beams : int
+        Number of beams, at least 1.
+    field_of_view : float
+        Angle between the first and the last beam, or the full circle 2 pi, whose last beam does not repeat the first [rad].
+    range_min, range_max : float
+        Shortest and longest measured range [m].
+    """
+
+    beams: int = 727
+    field_of_view: float = math.radians(240.0)
+    range_min: float = 0.02
+    range_max: float = 5.6
+
+    def __post_init__(self) -> None:
+        if self.beams < 1:
+            raise ValueError(f"beams is {self.beams}; a lidar has at least 1")
+        if not 0.0 < self.field_of_view <= 2.0 * math.pi + 1e-9:
+            raise ValueError(f"field_of_view is {self.field_of_view} rad; want more than 0 and at most 2 pi")
+        if not 0.0 <= self.range_min < self.range_max or not math.isfinite(self.range_max):
+            raise ValueError(f"range_min is {self.range_min} m and range_max is {self.range_max} m; want 0 <= range_min < range_max")
+
+    @property
+    def is_full_circle(self) -> bool:
+        """Whether the last beam is a neighbour of the first."""
+        return self.field_of_view > 2.0 * math.pi - 1e-9
+
+    @property
+    def angle_increment(self) -> float:
+        """Angle between neighbouring beams [rad]."""
+        gaps = self.beams if self.is_full_circle else max(self.beams - 1, 1)
+        return self.field_of_view / gaps
+
+    @property
+    def angle_first(self) -> float:
+        """Angle of the first beam against the heading [rad]."""
+        return -self.field_of_view / 2 if self.beams > 1 else 0.0
+
+    @property
+    def angles(self) -> NDArray[np.float64]:
+        """Angle of each beam against the heading, shape (beams,) [rad]."""
+        return self.angle_first + self.angle_increment * np.arange(self.beams)
+
+    @property
+    def unit_vectors(self) -> NDArray[np.float64]:
+        """Cosines and sines of the beams' angles, shape (2, beams)."""
+        return np.stack([np.cos(self.angles), np.sin(self.angles)])
+
+
+@kernel
+def beam_directions(heading, unit_vectors, directions):  # noqa: ANN001, ANN201
+    """Turn the beams' unit vectors (2, beams) by the heading, into ``directions`` (4, beams): x, y and their inverses."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    for beam in range(unit_vectors.shape[1]):
+        direction_x = cosine * unit_vectors[0, beam] - sine * unit_vectors[1, beam]
+        direction_y = sine * unit_vectors[0, beam] + cosine * unit_vectors[1, beam]
+        directions[0, beam] = direction_x
+        directions[1, beam] = direction_y
+        directions[2, beam] = 1.0 / direction_x if direction_x != 0.0 else math.inf
+        directions[3, beam] = 1.0 / direction_y if direction_y != 0.0 else math.inf
+
+
+@kernel(inline=True)
+def beams_towards(offset_x, offset_y, radius, heading, angle_first, increment):  # noqa: ANN001, ANN201
+    """Beams that a disc at an offset from the laser may meet, as a first beam (not rounded) and a count; the next lap starts a turn later."""
+    distance = math.sqrt(offset_x * offset_x + offset_y * offset_y)
+    half = math.asin(radius / distance) if radius < distance else math.pi
+    begin = (math.atan2(offset_y, offset_x) - half - heading - angle_first) / increment
+    turn = 2.0 * math.pi / increment
+    begin -= turn * math.floor(begin / turn)
+    return begin, 2.0 * half / increment

@@ -1,0 +1,19 @@
+"""What all tests share."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+def _data_folder() -> Path:
+    return Path(os.environ.get("LIDARIUM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of real maps and floors; the test is skipped where it is absent."""
+    folder = _data_folder()
+    if not folder.is_dir():
+        pytest.skip(f"no real data at {folder}; set LIDARIUM_DATA")
+    return folder
