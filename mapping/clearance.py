@@ -108,7 +108,7 @@ class ClearanceField:
     @property
     def reach(self) -> int:
         """Cells, along a row or a column, over which an occupied cell is felt."""
-        return self._stamp.shape[0] // 2
+        return int(self._stamp.shape[0]) // 2
 
     def update(self, log_odds: NDArray[np.int8], window: Window | None = None) -> bool:
         """Take over what became occupied, or ceased to be, inside a window of the belief.
@@ -158,7 +158,7 @@ class ClearanceField:
 
 @lru_cache(maxsize=16)
 def _stamp_of(limit: int) -> NDArray[np.uint16]:
-    """Closeness around one occupied cell."""
+    """Return the closeness around one occupied cell."""
     reach = 0
     while (2 * reach + 1) ** 2 < limit:
         reach += 1
@@ -169,9 +169,7 @@ def _stamp_of(limit: int) -> NDArray[np.uint16]:
 
 
 @kernel
-def _changes(
-    log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: int, window: Window
-) -> tuple[int, int, int, int, int, int]:
+def _changes(log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: int, window: Window) -> tuple[int, int, int, int, int, int]:
     """Count cells that became occupied or free, and bound them by a box."""
     row_low, row_high, column_low, column_high = window
     added = 0
@@ -199,9 +197,7 @@ def _changes(
 
 
 @kernel
-def _stamp_new(
-    log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: int, stamp: NDArray[np.uint16], box: Window
-) -> None:
+def _stamp_new(log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: int, stamp: NDArray[np.uint16], box: Window) -> None:
     """Raise the closeness around each newly occupied cell of the box."""
     rows, columns = log_odds.shape
     reach = stamp.shape[0] // 2
@@ -221,9 +217,7 @@ def _stamp_new(
 
 
 @kernel
-def _recompute(
-    log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: int, reach: int, target: Window, source: Window
-) -> None:
+def _recompute(log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: int, reach: int, target: Window, source: Window) -> None:
     """Compute the closeness of the target window from all occupied cells of the source window."""
     row_low, row_high, column_low, column_high = target
     source_low, source_high, left, right = source
@@ -265,7 +259,8 @@ def _recompute(
             if square + least >= cap:
                 continue
             low = max(column_low + offset, left) - offset - column_low  # first cell whose neighbour lies inside the source
-            high = min(column_high + offset, right) - offset - column_low
+            high = max(min(column_high + offset, right) - offset - column_low, 0)
+            low = min(low, high)
             nearer = squares[column_low + low + offset - left : column_low + high + offset - left]
             target_row = best[low:high]
             for i in range(target_row.size):

@@ -40,7 +40,9 @@ def visible(
     ValueError
         If a cell lies outside the grid, or ``cells`` is not (N, 2).
     """
-    ends = np.ascontiguousarray(cells, dtype=np.int64).reshape(-1, 2) if np.size(cells) == 0 else np.ascontiguousarray(cells, dtype=np.int64)
+    ends = (
+        np.ascontiguousarray(cells, dtype=np.int64).reshape(-1, 2) if np.size(cells) == 0 else np.ascontiguousarray(cells, dtype=np.int64)
+    )
     if ends.ndim != 2 or ends.shape[1] != 2:
         raise ValueError(f"cells has shape {ends.shape}; want (N, 2) pairs (row, column)")
     row, column = int(from_cell[0]), int(from_cell[1])

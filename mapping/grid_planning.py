@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping import grid_search
 from lidarium.mapping.clearance import ClearanceField, limit_of
+from lidarium.mapping.search_targets import Targets
 
 Cell = tuple[int, int]
 Disc = tuple[float, float, float]
@@ -23,7 +24,8 @@ Disc = tuple[float, float, float]
 def cells_of(points: NDArray[np.float64], origin: tuple[float, float], resolution: float) -> NDArray[np.int64]:
     """Cells (row, column) that hold points (..., 2) given as (x, y) [m]; not clipped to any grid."""
     steps = (np.asarray(points, dtype=np.float64) - np.asarray(origin)) / resolution
-    return np.floor(steps[..., ::-1]).astype(np.int64)
+    cells: NDArray[np.int64] = np.floor(steps[..., ::-1]).astype(np.int64)
+    return cells
 
 
 def centres_of(cells: NDArray[np.integer], origin: tuple[float, float], resolution: float) -> NDArray[np.float64]:
@@ -61,53 +63,6 @@ class Footprint:
             raise ValueError(f"radius is {self.radius} m and preferred clearance {self.preferred} m; want 0 <= radius <= preferred")
         if not 0.0 <= self.penalty <= 1000.0:
             raise ValueError(f"penalty is {self.penalty}; want 0 to 1000 times the length of a step")
-
-
-@dataclass(frozen=True, slots=True)
-class Targets:
-    """Cells that a search looks for: it is there once it can see one of them within reach.
-
-    Attributes
-    ----------
-    mask : (rows, columns) uint8
-        1 in the cells looked for; other values are ignored.
-    near : (ceil(rows / 16), ceil(columns / 16)) uint8
-        Not 0 in tiles from which a cell of the mask may be within reach.
-    spans : (2 k + 1,) int64
-        The disc of ``reach`` around a cell: in row i - k from the cell the columns up to ``spans[i]`` on either side.
-    """
-
-    mask: NDArray[np.uint8]
-    near: NDArray[np.uint8]
-    spans: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, mask: NDArray[np.bool_] | NDArray[np.uint8], reach: float = 0.0) -> "Targets":
-        """Look for the cells of a mask (rows, columns), from up to ``reach`` cells away."""
-        cells = np.ascontiguousarray(mask, dtype=np.uint8)
-        size = 1 << grid_search.TILE_SHIFT
-        counts = np.add.reduceat(np.add.reduceat(cells == 1, np.arange(0, cells.shape[0], size), axis=0, dtype=np.int32), np.arange(0, cells.shape[1], size), axis=1)
-        return cls(cells, near_tiles(counts, reach), disc_spans(reach))
-
-
-@lru_cache(maxsize=64)
-def disc_spans(reach: float) -> NDArray[np.int64]:
-    """Half widths of the rows of a disc of ``reach`` cells around the centre of a cell."""
-    squared = reach * reach + 1e-9
-    steps = np.arange(-math.floor(math.sqrt(squared)), math.floor(math.sqrt(squared)) + 1)
-    spans: NDArray[np.int64] = np.floor(np.sqrt(squared - steps * steps)).astype(np.int64)
-    spans.flags.writeable = False
-    return spans
-
-
-def near_tiles(counts: NDArray[np.int32], reach: float) -> NDArray[np.uint8]:
-    """Tiles whose cells may be within ``reach`` cells of a cell counted in ``counts`` (one number per tile)."""
-    rows, columns = counts.shape
-    grown = math.ceil(reach / (1 << grid_search.TILE_SHIFT))
-    near = np.zeros((rows, columns), dtype=np.uint8)
-    for row, column in np.argwhere(counts > 0):
-        near[max(row - grown, 0) : row + grown + 1, max(column - grown, 0) : column + grown + 1] = 1
-    return near
 
 
 @lru_cache(maxsize=64)
@@ -220,7 +175,8 @@ class Search:
         cells = np.stack((packed >> 16, packed & 0xFFFF), axis=1)
         left = self.space.remaining[cells[:, 0], cells[:, 1]]
         passable = self.space.parent[cells[:, 0], cells[:, 1]] < grid_search.LEAVING
-        return cells[(left != grid_search.NO_ENTRY) & (self.budget - left <= self.settled) & passable]
+        reached: NDArray[np.int64] = cells[(left != grid_search.NO_ENTRY) & (self.budget - left <= self.settled) & passable]
+        return reached
 
     def path(self, cell: Cell) -> NDArray[np.int64]:
         """Cheapest path to a cell.
@@ -237,14 +193,7 @@ class Search:
         """
         if math.isinf(self.cost(cell)):
             raise ValueError(f"cell {(int(cell[0]), int(cell[1]))} was not reached from {self.start}; ask for its cost first")
-        row, column = int(cell[0]), int(cell[1])
-        cells = [(row, column)]
-        while (row, column) != self.start:
-            direction = int(self.space.parent[row, column]) % grid_search.LEAVING
-            row -= int(grid_search.ROW_STEPS[direction])
-            column -= int(grid_search.COLUMN_STEPS[direction])
-            cells.append((row, column))
-        return np.array(cells[::-1], dtype=np.int64)
+        return np.asarray(grid_search.trace(self.space.parent, self.start[0], self.start[1], int(cell[0]), int(cell[1])))
 
     def _check(self) -> None:
         if self.generation != self.space.generation:

@@ -52,6 +52,28 @@ def clear(remaining: NDArray[np.int32], touched: NDArray[np.int32], count: int) 
 
 
 @kernel
+def trace(parent: NDArray[np.uint8], start_row: int, start_column: int, row: int, column: int) -> NDArray[np.int64]:
+    """Follow the parents from a cell back to the start; return the cells from the start on (kernel)."""
+    end_row, end_column = row, column
+    count = 1
+    while row != start_row or column != start_column:
+        direction = parent[row, column] % LEAVING
+        row -= ROW_STEPS[direction]
+        column -= COLUMN_STEPS[direction]
+        count += 1
+    cells = np.empty((count, 2), np.int64)
+    row, column = end_row, end_column
+    for i in range(count - 1, -1, -1):
+        cells[i, 0] = row
+        cells[i, 1] = column
+        direction = parent[row, column] % LEAVING
+        if i > 0:
+            row -= ROW_STEPS[direction]
+            column -= COLUMN_STEPS[direction]
+    return cells
+
+
+@kernel
 def _estimate(row: int, column: int, goal_row: int, goal_column: int) -> int:
     """Cost of the way to the goal on open floor."""
     rise = abs(goal_row - row)
@@ -77,15 +99,13 @@ def sees_target(
 
 
 @kernel
-def _margin(
-    closeness: NDArray[np.uint16], limit: int, radius: float, discs: NDArray[np.float64], row: int, column: int
-) -> float:
+def _margin(closeness: NDArray[np.uint16], limit: int, radius: float, discs: NDArray[np.float64], row: int, column: int) -> float:
     """Room [cells] between a body centred in a cell and what is nearest, walls and discs; negative inside a blocked zone."""
     margin = np.sqrt(float(limit - closeness[row, column])) * 0.5 - radius
     for k in range(len(discs)):
         distance = np.sqrt((row - discs[k, 0]) ** 2 + (column - discs[k, 1]) ** 2)
         margin = min(margin, distance - discs[k, 2])
-    return margin
+    return float(margin)
 
 
 @kernel
@@ -107,10 +127,10 @@ def _step_is_open(
     free_beside = log_odds[to_row, column] < 0
     free_abeam = log_odds[row, to_column] < 0
     if max(closeness[row, column], closeness[to_row, to_column]) <= roomy:
-        return free_beside or free_abeam
+        return bool(free_beside or free_abeam)
     if not (free_beside and free_abeam):
         return False
-    return half_costs[0, closeness[to_row, column]] > 0 and half_costs[0, closeness[row, to_column]] > 0
+    return bool(half_costs[0, closeness[to_row, column]] > 0 and half_costs[0, closeness[row, to_column]] > 0)
 
 
 @kernel
@@ -176,6 +196,106 @@ def _leave(
 
 
 @kernel
+def _expand_band(
+    log_odds: NDArray[np.int8],
+    closeness: NDArray[np.uint16],
+    limit: int,
+    half_costs: NDArray[np.int32],
+    roomy: int,
+    radius: float,
+    discs: NDArray[np.float64],
+    remaining: NDArray[np.int32],
+    parent: NDArray[np.uint8],
+    touched: NDArray[np.int32],
+    buckets: NDArray[np.int32],
+    sizes: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    current: int,
+    first: int,
+    budget: int,
+    goal_row: int,
+    goal_column: int,
+    guided: bool,
+    mask: NDArray[np.uint8],
+    near: NDArray[np.uint8],
+    spans: NDArray[np.int64],
+    wanted: int,
+    hits: NDArray[np.int32],
+) -> int:
+    """Expand the cells of one band of costs from number ``first`` on; return where the buckets were too full, or the end.
+
+    ``counts`` holds the numbers of touched cells, of hits, of waiting entries, and of entries in the fullest bucket.
+    """
+    rows, columns = log_odds.shape
+    slots = buckets.shape[0] - 1
+    slot = current & slots
+    touched_count, hit_count, pending, fullest = counts
+    log_odds_at = log_odds.reshape(-1)
+    closeness_at = closeness.reshape(-1)
+    remaining_at = remaining.reshape(-1)
+    parent_at = parent.reshape(-1)
+    i = first
+    while i < sizes[slot] and fullest + 8 <= buckets.shape[1]:
+        cell = buckets[slot, i]
+        i += 1
+        row = cell >> 16
+        column = cell & 0xFFFF
+        here = np.uintp(row * columns + column)
+        left = remaining_at[here]
+        estimate = budget - left
+        if guided:
+            estimate += _estimate(row, column, goal_row, goal_column)
+        if estimate >> BUCKET_SHIFT != current:
+            continue  # reached more cheaply in the meantime
+        if parent_at[here] >= LEAVING:
+            touched_count, fullest, pushed = _leave(
+                log_odds, closeness, limit, half_costs, radius, discs, remaining, parent, touched, touched_count, buckets, sizes,
+                fullest, row, column, budget, goal_row, goal_column, guided,
+            )  # fmt: skip
+            pending += pushed
+            continue
+        if wanted > 0 and sees_target(log_odds, mask, near, spans, row, column):
+            hits[hit_count] = cell
+            hit_count += 1
+        inside = 0 < row < rows - 1 and 0 < column < columns - 1
+        own_straight = half_costs[0, closeness_at[here]]
+        own_diagonal = half_costs[1, closeness_at[here]]
+        for k in range(8):
+            to_row = row + ROW_STEPS[k]
+            to_column = column + COLUMN_STEPS[k]
+            if not inside and (to_row < 0 or to_row >= rows or to_column < 0 or to_column >= columns):
+                continue
+            there = np.uintp(to_row * columns + to_column)
+            before = remaining_at[there]
+            if before >= left - (DIAGONAL if k >= 4 else STRAIGHT) or log_odds_at[there] >= 0:
+                continue
+            half = half_costs[1 if k >= 4 else 0, closeness_at[there]]
+            after = left - half - (own_diagonal if k >= 4 else own_straight)
+            if half == 0 or after <= before or (before > 0 and parent_at[there] >= LEAVING):
+                continue
+            if k >= 4 and not _step_is_open(log_odds, closeness, half_costs, roomy, row, column, to_row, to_column):
+                continue
+            to_cell = (to_row << 16) | to_column
+            if before == 0:
+                touched[np.uintp(touched_count)] = to_cell
+                touched_count += 1
+            remaining_at[there] = after
+            parent_at[there] = k
+            ahead = _estimate(to_row, to_column, goal_row, goal_column) if guided else 0
+            bucket = (budget - after + ahead) >> BUCKET_SHIFT
+            if before > 0 and bucket != current and (budget - before + ahead) >> BUCKET_SHIFT == bucket:
+                continue  # it waits there already
+            to_slot = np.uintp(bucket & slots)
+            size = sizes[to_slot]
+            buckets[to_slot, np.uintp(size)] = to_cell
+            sizes[to_slot] = size + 1
+            fullest = max(fullest, size + 1)
+            pending += 1
+    counts[:] = touched_count, hit_count, pending, fullest
+    return i
+
+
+@kernel
 def spread(
     log_odds: NDArray[np.int8],
     closeness: NDArray[np.uint16],
@@ -206,102 +326,34 @@ def spread(
     Returns the number of touched cells, of targets hit, the last band of costs that is final, and the buckets (grown
     where they were too small).
     """
-    rows, columns = log_odds.shape
-    slots = buckets.shape[0] - 1
     sizes = np.zeros(buckets.shape[0], np.int64)
-    capacity = buckets.shape[1]
-    fullest = 1
-    hit_count = 0
-    log_odds_at = log_odds.reshape(-1)
-    closeness_at = closeness.reshape(-1)
-    remaining_at = remaining.reshape(-1)
-    parent_at = parent.reshape(-1)
-
     start_is_open = log_odds[start_row, start_column] < 0 and half_costs[0, closeness[start_row, start_column]] > 0
     start_is_open = start_is_open and remaining[start_row, start_column] == 0
     remaining[start_row, start_column] = budget
     parent[start_row, start_column] = 0 if start_is_open else LEAVING
     touched[touched_count] = (start_row << 16) | start_column
-    touched_count += 1
-    current = 0
-    if guided:
-        current = _estimate(start_row, start_column, goal_row, goal_column) >> BUCKET_SHIFT
-    buckets[current & slots, 0] = (start_row << 16) | start_column
-    sizes[current & slots] = 1
-    pending = 1
-    while pending > 0:
-        slot = current & slots
+    current = _estimate(start_row, start_column, goal_row, goal_column) >> BUCKET_SHIFT if guided else 0
+    slot = current & (buckets.shape[0] - 1)
+    buckets[slot, 0] = (start_row << 16) | start_column
+    sizes[slot] = 1
+    counts = np.array([touched_count + 1, 0, 1, 1])
+    while counts[2] > 0:
+        slot = current & (buckets.shape[0] - 1)
         i = 0
         while i < sizes[slot]:
-            cell = buckets[slot, i]
-            i += 1
-            row = cell >> 16
-            column = cell & 0xFFFF
-            left = remaining[row, column]
-            estimate = budget - left
-            if guided:
-                estimate += _estimate(row, column, goal_row, goal_column)
-            if estimate >> BUCKET_SHIFT != current:
-                continue  # reached more cheaply in the meantime
-            if fullest + 8 > capacity:
-                capacity *= 2
-                wider = np.empty((slots + 1, capacity), np.int32)
-                for k in range(slots + 1):
-                    wider[k, : sizes[k]] = buckets[k, : sizes[k]]
+            i = _expand_band(
+                log_odds, closeness, limit, half_costs, roomy, radius, discs, remaining, parent, touched, buckets, sizes, counts,
+                current, i, budget, goal_row, goal_column, guided, mask, near, spans, wanted, hits,
+            )  # fmt: skip
+            if counts[3] + 8 > buckets.shape[1]:
+                wider = np.empty((buckets.shape[0], 2 * buckets.shape[1]), np.int32)
+                wider[:, : buckets.shape[1]] = buckets
                 buckets = wider
-            leaving = parent[row, column] >= LEAVING
-            if wanted > 0 and not leaving and sees_target(log_odds, mask, near, spans, row, column):
-                hits[hit_count] = cell
-                hit_count += 1
-            if leaving:
-                touched_count, fullest, added = _leave(
-                    log_odds, closeness, limit, half_costs, radius, discs, remaining, parent, touched, touched_count, buckets, sizes,
-                    fullest, row, column, budget, goal_row, goal_column, guided,
-                )  # fmt: skip
-                pending += added
-                continue
-            here = np.uintp(row * columns + column)
-            inside = 0 < row < rows - 1 and 0 < column < columns - 1
-            own_straight = half_costs[0, closeness_at[here]]
-            own_diagonal = half_costs[1, closeness_at[here]]
-            for k in range(8):
-                to_row = row + ROW_STEPS[k]
-                to_column = column + COLUMN_STEPS[k]
-                if not inside and (to_row < 0 or to_row >= rows or to_column < 0 or to_column >= columns):
-                    continue
-                there = np.uintp(to_row * columns + to_column)
-                before = remaining_at[there]
-                if before >= left - (DIAGONAL if k >= 4 else STRAIGHT) or log_odds_at[there] >= 0:
-                    continue
-                half = half_costs[1 if k >= 4 else 0, closeness_at[there]]
-                after = left - half - (own_diagonal if k >= 4 else own_straight)
-                if half == 0 or after <= before or (before > 0 and parent_at[there] >= LEAVING):
-                    continue
-                if k >= 4 and not _step_is_open(log_odds, closeness, half_costs, roomy, row, column, to_row, to_column):
-                    continue
-                to_cell = (to_row << 16) | to_column
-                if before == 0:
-                    touched[np.uintp(touched_count)] = to_cell
-                    touched_count += 1
-                remaining_at[there] = after
-                parent_at[there] = k
-                ahead = _estimate(to_row, to_column, goal_row, goal_column) if guided else 0
-                bucket = (budget - after + ahead) >> BUCKET_SHIFT
-                if before > 0 and bucket != current and (budget - before + ahead) >> BUCKET_SHIFT == bucket:
-                    continue  # it waits there already
-                to_slot = np.uintp(bucket & slots)
-                size = sizes[to_slot]
-                buckets[to_slot, np.uintp(size)] = to_cell
-                sizes[to_slot] = size + 1
-                fullest = max(fullest, size + 1)
-                pending += 1
-        pending -= sizes[slot]
+        counts[2] -= sizes[slot]
         sizes[slot] = 0
-        if goal_row >= 0 and remaining[goal_row, goal_column] > 0:
-            estimate = budget - remaining[goal_row, goal_column]
-            if estimate >> BUCKET_SHIFT <= current:
-                break
-        if wanted > 0 and hit_count >= wanted:
+        if goal_row >= 0 and (budget - remaining[goal_row, goal_column]) >> BUCKET_SHIFT <= current:
+            break
+        if 0 < wanted <= counts[1]:
             break
         current += 1
-    return touched_count, hit_count, current, buckets
+    return counts[0], counts[1], current, buckets

@@ -17,9 +17,7 @@ from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.furnishing import Furnished, furnish
 from lidarium.envs.floors.layouts import Proportions, apartment_layout, corridor_layout, office_layout
 from lidarium.envs.floors.plans import (
-    HALL,
     OUTSIDE,
-    Door,
     Labels,
     Rectangle,
     cells,
@@ -43,6 +41,8 @@ START_CLEARANCE = 0.5
 """Least distance of a start from everything that stands [m]."""
 
 STARTS = 3
+
+_ATTEMPTS = 8
 
 _CHECK_RESOLUTION = 0.05
 _AREAS = {"apartment": (40.0, 120.0), "office": (150.0, 600.0), "corridors": (80.0, 250.0)}
@@ -69,8 +69,8 @@ class BuildingSettings:
         Share of the possible openings beyond those that join all rooms, 0 (a tree of rooms, but for ring corridors of
         offices) to 1. Drawn: 0 to 0.5.
     clutter : float or None
-        Share of that area under furniture, 0 to 0.4; what finds no place is left out, so above 0.25 or so (0.1 in corridors) less is
-        reached. Drawn: 0.08 to 0.24; 0 to 0.1 for corridors.
+        Share of that area under furniture, 0 to 0.3. What finds no place is left out, so that about 0.2 is reached where
+        more is asked for. Drawn: 0.08 to 0.24; 0 to 0.1 for corridors.
     door_width : float
         Clear width of doors [m], 0.8 to 1.0.
     corridor_width : float or None
@@ -109,7 +109,7 @@ class BuildingSettings:
         for name, low, high, unit in (
             ("area_m2", 30.0, 1500.0, " m²"),
             ("loops", 0.0, 1.0, ""),
-            ("clutter", 0.0, 0.4, ""),
+            ("clutter", 0.0, 0.3, ""),
             ("door_width", 0.8, 1.0, " m"),
             ("corridor_width", 1.2, 4.0, " m"),
             ("wall_thickness", 0.05, 0.3, " m"),
@@ -119,7 +119,7 @@ class BuildingSettings:
             if value is not None and not low <= value <= high:
                 raise ValueError(f"{name} is {value}; want {low:g} to {high:g}{unit}")
         small, large = self.room_size
-        if not (2.0 <= small and 1.5 * small <= large <= 20.0):
+        if not (small >= 2.0 and 1.5 * small <= large <= 20.0):
             raise ValueError(f"room_size is {self.room_size}; want 2 m or more and a largest of at least 1.5 times that, 20 m at most")
         if not math.isfinite(self.rotation):
             raise ValueError(f"rotation is {self.rotation}; want a finite angle in radians")
@@ -150,17 +150,33 @@ def generate_building(seed: int, settings: BuildingSettings | None = None) -> Fl
         raise ValueError(f"seed is {seed}; want zero or more")
     settings = settings or BuildingSettings()
     # One generator per stage, so that the knob of one stage leaves the draws of the others alone.
-    shape, layout_seed, doors_seed, clutter_seed, starts_seed = np.random.SeedSequence(seed).spawn(5)
+    shape, *stages = np.random.SeedSequence(seed).spawn(1 + 4 * _ATTEMPTS)
     kind, proportions, clutter = _drawn(settings, np.random.default_rng(shape))
-    labels = _layout(kind, proportions, settings, layout_seed)
-    doors = choose_doors(labels, settings.door_width, proportions.loops, np.random.default_rng(doors_seed))
+    for attempt in range(_ATTEMPTS):
+        floor = _attempt(f"{kind}:{seed}", kind, proportions, clutter, settings, stages[4 * attempt : 4 * attempt + 4])
+        if floor is not None:
+            return _rotated(floor, settings.rotation)
+    raise ValueError(f"no passable {kind} came out of seed {seed} and {settings}; try another seed, wider corridors or larger rooms")
+
+
+def _attempt(
+    name: str, kind: str, proportions: Proportions, clutter: float, settings: BuildingSettings, stages: list[np.random.SeedSequence]
+) -> Floor | None:
+    """Draw one floor; None where its plan has a room without a door or a neck too narrow for the robot."""
+    layout, openings, pieces, places = stages
+    labels = _layout(kind, proportions, settings, layout)
+    doors = choose_doors(labels, settings.door_width, proportions.loops, np.random.default_rng(openings))
+    if doors is None:
+        return None
     walls = tuple(_solid(r) for r in outside_rectangles(labels) + wall_rectangles(labels, doors, settings.wall_thickness))
     bounds = (0.0, 0.0, metres(labels.shape[1]), metres(labels.shape[0]))
-    furniture = furnish(kind, labels, doors, clutter, settings.wall_thickness, np.random.default_rng(clutter_seed))
-    furniture, space, origin = _passable(bounds, walls, furniture, labels)
-    starts = _starts(space, origin, np.random.default_rng(starts_seed))
-    solids = walls + tuple(solid for piece in furniture for solid in piece.solids)
-    return _rotated(Floor(f"{kind}:{seed}", bounds, solids, starts=starts), settings.rotation)
+    furniture = furnish(kind, labels, doors, clutter, settings.wall_thickness, np.random.default_rng(pieces))
+    passable = _passable(bounds, walls, furniture, labels)
+    if passable is None:
+        return None
+    furniture, clear, origin = passable
+    starts = _starts(clear, origin, np.random.default_rng(places))
+    return Floor(name, bounds, walls + tuple(solid for piece in furniture for solid in piece.solids), starts=starts)
 
 
 def _drawn(settings: BuildingSettings, generator: np.random.Generator) -> tuple[str, Proportions, float]:
@@ -200,8 +216,11 @@ def _layout(kind: str, proportions: Proportions, settings: BuildingSettings, see
 
 def _passable(
     bounds: Rectangle, walls: tuple[Solid, ...], furniture: list[Furnished], labels: Labels
-) -> tuple[list[Furnished], NDArray[np.float64], tuple[float, float]]:
-    """Leave out furniture until a disc can go everywhere; also the distance of each cell it can reach from what stands."""
+) -> tuple[list[Furnished], NDArray[np.bool_], tuple[float, float]] | None:
+    """Leave out furniture until a disc can go everywhere; also where a start may be.
+
+    None where furniture is not what is in the way.
+    """
     resolution = _CHECK_RESOLUTION
     while True:
         blocks = walls + tuple(_solid(piece.footprint, 1.0) for piece in furniture)
@@ -213,25 +232,24 @@ def _passable(
         reached = np.bincount(room[(parts == largest) & (room >= 0)], minlength=int(labels.max()) + 1) > 0
         missed = {k for k, area in enumerate(room_areas(labels)) if area > 0 and not reached[k]}
         stray = (parts > 0) & (parts != largest)
-        guilty = _guilty(furniture, stray, missed, raster.origin)
         if not missed and not stray.any():
-            distance = cv2.distanceTransform(1 - raster.solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * resolution
-            return furniture, np.where(space, distance.astype(np.float64), 0.0), raster.origin
-        if guilty is None:
-            raise ValueError(f"no passable building of {bounds[2]:g} x {bounds[3]:g} m; try another seed, wider corridors or larger rooms")
+            clear = configuration_space(raster, START_CLEARANCE + MARGIN)
+            return furniture, clear if clear.any() else space, raster.origin
+        if not furniture:
+            return None
+        guilty = _guilty(furniture, stray, missed, raster.origin)
         furniture = furniture[:guilty] + furniture[guilty + 1 :]
 
 
-def _guilty(furniture: list[Furnished], stray: NDArray[np.bool_], missed: set[int], origin: tuple[float, float]) -> int | None:
-    """Index of the last piece that bounds a part cut off, else the last one in a room that is not reached, else the last."""
+def _guilty(furniture: list[Furnished], stray: NDArray[np.bool_], missed: set[int], origin: tuple[float, float]) -> int:
+    """Return the index of the last piece beside a part cut off or in a room that is not reached, else of the last piece."""
     reach = ROBOT_RADIUS + 3 * MARGIN
+    corner = np.tile(origin, 2) + np.array([reach, reach, -reach, -reach])
     for k in range(len(furniture) - 1, -1, -1):
-        x_low, y_low, x_high, y_high = furniture[k].footprint
-        rows = slice(max(int((y_low - reach - origin[1]) / _CHECK_RESOLUTION), 0), int((y_high + reach - origin[1]) / _CHECK_RESOLUTION) + 1)
-        columns = slice(max(int((x_low - reach - origin[0]) / _CHECK_RESOLUTION), 0), int((x_high + reach - origin[0]) / _CHECK_RESOLUTION) + 1)
-        if furniture[k].room in missed or stray[rows, columns].any():
+        left, low, right, high = np.maximum((np.array(furniture[k].footprint) - corner) / _CHECK_RESOLUTION, 0.0).astype(int)
+        if furniture[k].room in missed or stray[low : high + 1, left : right + 1].any():
             return k
-    return len(furniture) - 1 if furniture else None
+    return len(furniture) - 1
 
 
 def _room_of_cells(labels: Labels, shape: tuple[int, ...], origin: tuple[float, float], resolution: float) -> Labels:
@@ -243,12 +261,12 @@ def _room_of_cells(labels: Labels, shape: tuple[int, ...], origin: tuple[float, 
     return labels[np.ix_(index[0], index[1])]
 
 
-def _starts(distance: NDArray[np.float64], origin: tuple[float, float], generator: np.random.Generator) -> NDArray[np.float64]:
-    """Starts well off all walls, each as far as can be from the others, headings drawn."""
-    clear = START_CLEARANCE + _CHECK_RESOLUTION
-    rows, columns = np.nonzero(distance >= min(clear, float(distance.max())))
+def _starts(clear: NDArray[np.bool_], origin: tuple[float, float], generator: np.random.Generator) -> NDArray[np.float64]:
+    """Choose starts well off all walls, each as far as can be from the others; headings are drawn."""
+    rows, columns = np.nonzero(clear)
     places = (np.column_stack([columns, rows]) + 0.5) * _CHECK_RESOLUTION + origin
-    chosen = [places[int(np.argmax(((places - places[int(generator.integers(len(places)))]) ** 2).sum(axis=1)))]]
+    anywhere = places[int(generator.integers(len(places)))]
+    chosen = [places[int(np.argmax(((places - anywhere) ** 2).sum(axis=1)))]]
     while len(chosen) < STARTS:
         nearest = np.min([((places - place) ** 2).sum(axis=1) for place in chosen], axis=0)
         chosen.append(places[int(np.argmax(nearest))])
@@ -262,7 +280,7 @@ def _solid(rectangle: Rectangle, z_high: float = math.inf) -> Solid:
 
 
 def _rotated(floor: Floor, angle: float) -> Floor:
-    """The floor turned about its corner and moved back to the first quadrant; the corners that open are filled."""
+    """Turn a floor about its corner and move it back to the first quadrant; the corners that open are filled."""
     if angle == 0.0:
         return floor
     cosine, sine = math.cos(angle), math.sin(angle)
@@ -274,7 +292,7 @@ def _rotated(floor: Floor, angle: float) -> Floor:
     extent = corners.max(axis=0)
 
     def moved(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.round(points @ turn.T + shift, 4) + 0.0
+        return np.asarray(np.round(points @ turn.T + shift, 4) + 0.0)
 
     solids = [Solid(moved(solid.polygon), solid.z_low, solid.z_high) for solid in floor.solids]
     for k in range(4):

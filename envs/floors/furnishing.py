@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Solid
 from lidarium.envs.floors.furniture import PIECES, place
-from lidarium.envs.floors.plans import CELL, HALL, Boundary, Door, Labels, Rectangle, boundaries, room_areas
+from lidarium.envs.floors.plans import CELL, Boundary, Door, Labels, Rectangle, boundaries, room_areas
 
 PASSAGE = 0.75
 """Clear width before a piece and between two pieces that do not stand side by side [m]."""
@@ -30,7 +30,7 @@ FREE = frozenset({"desk group", "desk pair", "dining table", "low table", "meeti
 """Pieces that stand free in a room."""
 
 APARTMENT = {
-    "living": ("sofa", "low table", "shelf", "dining table", "cabinet", "armchair", "shelf", "plant", "cabinet", "chair", "shelf", "plant", "cabinet", "shelf"),
+    "living": ("sofa", "low table", "shelf", "dining table", "cabinet", "armchair", "shelf", "plant", "cabinet", "chair"),
     "bedroom": ("bed", "wardrobe", "cabinet", "nightstand", "desk", "shelf", "armchair", "plant", "box", "shelf", "box"),
     "child": ("single bed", "desk", "wardrobe", "shelf", "cabinet", "box", "box", "shelf", "box"),
     "kitchen": ("counter", "fridge", "table", "counter", "cabinet", "chair", "chair", "shelf"),
@@ -40,7 +40,7 @@ APARTMENT = {
 }  # fmt: skip
 OFFICE = {
     "office": ("desk", "shelf", "desk", "cabinet", "wardrobe", "desk", "plant", "shelf", "chair", "cabinet", "box", "shelf"),
-    "open office": ("desk group", "desk pair", "shelf", "desk", "cabinet", "desk", "shelf", "wardrobe", "plant", "cabinet", "desk", "shelf", "shelf", "box", "cabinet"),
+    "open office": ("desk group", "desk pair", "shelf", "desk", "cabinet", "desk", "shelf", "wardrobe", "plant", "cabinet", "desk"),
     "meeting": ("meeting table", "cabinet", "shelf", "plant", "chair", "cabinet", "box", "chair"),
     "washroom": ("toilet", "basin", "toilet", "cabinet"),
     "store": ("shelf", "shelf", "box", "cabinet", "box", "shelf"),
@@ -105,7 +105,7 @@ def furnish(
 
 
 def _wishes(kind: str, areas: NDArray[np.float64], generator: np.random.Generator) -> list[tuple[str, ...]]:
-    """What each room would like to hold, by label, from its use; the use follows from the area."""
+    """List what each room would like to hold, by label, from its use; the use follows from the area."""
     if kind == "corridors":
         return [CORRIDORS["hall"]]
     if kind == "office":
@@ -231,7 +231,7 @@ def _snapped(value: float) -> float:
 
 
 def _with_passage(rectangle: Rectangle, wall: Boundary | None, room: int, half_wall: float) -> Rectangle:
-    """The footprint and the passage that must lie in the room: before a piece at a wall, all around a free one."""
+    """Return the footprint and the passage that must lie in the room: before a piece at a wall, all around a free one."""
     x_low, y_low, x_high, y_high = rectangle
     more = PASSAGE + half_wall
     if wall is None:

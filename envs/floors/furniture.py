@@ -33,7 +33,7 @@ class Piece:
 
 
 def _block(z_high: float) -> Callable[[float, float], list[Box]]:
-    """A closed body from the floor up: wardrobe, shelf, counter."""
+    """Make a closed body from the floor up: wardrobe, shelf, counter."""
     return lambda width, depth: [(0.0, 0.0, width, depth, 0.0, z_high)]
 
 
@@ -74,7 +74,7 @@ def _office_chair(width: float, depth: float, x: float = 0.0, y: float = 0.0) ->
 
 
 def _dining(width: float, depth: float) -> list[Box]:
-    """A trestle table with chairs at its two long sides, half pushed in."""
+    """Make a trestle table with chairs at its two long sides, half pushed in."""
     out, seat = 0.25, 0.42
     middle, ends = depth / 2, 0.25 * (depth - 2 * out)
     boxes: list[Box] = [
@@ -91,13 +91,13 @@ def _dining(width: float, depth: float) -> list[Box]:
 
 
 def _office_desk(width: float, depth: float, x: float, y: float) -> list[Box]:
-    """A top on two side panels."""
+    """Make a top on two side panels."""
     sides = [(left, y, left + 0.04, y + depth, 0.0, 0.70) for left in (x, x + width - 0.04)]
     return [(x, y, x + width, y + depth, 0.70, 0.74), *sides]
 
 
 def _desk(width: float, depth: float) -> list[Box]:
-    """A desk with a drawer unit and an office chair half under it."""
+    """Make a desk with a drawer unit and an office chair half under it."""
     out, chair = 0.40, 0.56
     return [
         *_office_desk(width, depth - out, 0.0, out),
@@ -137,8 +137,12 @@ def _bench(width: float, depth: float) -> list[Box]:
 
 
 def _seats(width: float, depth: float) -> list[Box]:
-    """A row of waiting-room chairs on one rail."""
-    return [(0.0, 0.0, width, depth, 0.42, 0.46), (0.0, depth - 0.05, width, depth, 0.46, 0.85), *_legs(0.1, 0.05, width - 0.2, depth - 0.1, 0.05, 0.42)]
+    """Make a row of waiting-room chairs on one rail."""
+    return [
+        (0.0, 0.0, width, depth, 0.42, 0.46),
+        (0.0, depth - 0.05, width, depth, 0.46, 0.85),
+        *_legs(0.1, 0.05, width - 0.2, depth - 0.1, 0.05, 0.42),
+    ]
 
 
 def _basin(width: float, depth: float) -> list[Box]:
@@ -150,7 +154,7 @@ def _toilet(width: float, depth: float) -> list[Box]:
 
 
 def _couch(width: float, depth: float) -> list[Box]:
-    """An examination couch: a padded top on a narrower base."""
+    """Make an examination couch: a padded top on a narrower base."""
     return [(0.0, 0.0, width, depth, 0.60, 0.75), (0.15, 0.10, width - 0.15, depth - 0.10, 0.0, 0.60)]
 
 
@@ -187,7 +191,7 @@ PIECES: dict[str, Piece] = {
 
 
 def place(kind: str, x: float, y: float, theta: float, width: float | None = None, depth: float | None = None) -> tuple[Solid, ...]:
-    """A piece of furniture on a floor.
+    """Place a piece of furniture on a floor.
 
     Parameters
     ----------

@@ -5,10 +5,14 @@ Every function here paints rooms into a plan whose inner extent follows from the
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.envs.floors.plans import HALL, OUTSIDE, Labels, cells, metres
+
+LatticeEdge = tuple[tuple[int, int], tuple[int, int]]
 
 LOBBY_CHANCE = 0.12
 """Share of office rooms that are open bays of the corridor: waiting areas, kitchenettes, lift lobbies."""
@@ -55,7 +59,7 @@ def apartment_layout(proportions: Proportions, generator: np.random.Generator) -
     narrow, wide = proportions.room_size
     for rows, least, most in ((slice(0, low), 0.75 * narrow, 0.65 * wide), (slice(high, None), 1.1 * narrow, wide)):
         edges = _split(right - left, cells(least), cells(most), generator)
-        for start, end in zip(edges[:-1], edges[1:], strict=True):
+        for start, end in pairwise(edges):
             labels[rows, left + start : left + end] = room
             room += 1
     labels[:, right:] = room
@@ -95,26 +99,29 @@ def office_layout(proportions: Proportions, generator: np.random.Generator) -> L
 
 
 def corridor_layout(proportions: Proportions, generator: np.random.Generator) -> Labels:
-    """Corridors along the edges of an irregular lattice: a random tree and a share of the further edges, some crossings widened to halls."""
+    """Corridors along the edges of an irregular lattice: a tree and a share of the other edges, some crossings widened to halls."""
     corridor = proportions.corridor_width
-    spacing = generator.uniform(4.5, 6.5)
+    spacing = max(generator.uniform(4.5, 6.5), 2.2 * corridor)
     aspect = generator.uniform(1.0, 1.8)
-    # The tree's edges and the further ones, each a corridor from crossing to crossing, make up the area.
     crossings = proportions.area_m2 / (spacing * corridor * (1.0 + 0.7 * proportions.loops))
     down = max(2, round(math.sqrt(crossings / aspect)))
     across = max(2, round(crossings / down))
-    stretch = crossings / (down * across)
-    x = _crossings(across, spacing * stretch, corridor, generator)
-    y = _crossings(down, spacing * stretch, corridor, generator)
+    edges = _lattice_edges(down, across, proportions.loops, generator)
+    halls = generator.random((down, across)) < 0.2
+    # The area is that of crossings, of halls around some of them, and of corridors whose lengths are scaled to what is left.
+    steps_y, steps_x = generator.uniform(0.5, 1.5, down - 1), generator.uniform(0.5, 1.5, across - 1)
+    steps = sum(float(steps_x[j] if i == k else steps_y[i]) for (i, j), (k, _) in edges)
+    left = proportions.area_m2 - down * across * corridor**2 - 5.0 * float(halls.sum())
+    x, y = (_crossings(part * max(left / (corridor * steps), 1.2), corridor) for part in (steps_x, steps_y))
     wide = cells(corridor)
     labels: Labels = np.full((y[-1] + wide, x[-1] + wide), OUTSIDE, dtype=np.int32)
-    for (i, j), (k, m) in _lattice_edges(down, across, proportions.loops, generator):
+    for (i, j), (k, m) in edges:
         labels[y[i] : y[k] + wide, x[j] : x[m] + wide] = HALL
-    for i in range(down):
-        for j in range(across):
-            if generator.random() < 0.2:
-                more = cells(generator.uniform(0.8, 1.6))
-                labels[max(y[i] - more, 0) : y[i] + wide + more, max(x[j] - more, 0) : x[j] + wide + more] = HALL
+    for i, j in np.argwhere(halls):
+        more = generator.uniform(0.8, 1.6)
+        low, high = _widened(y, int(i), wide, more)
+        left_edge, right_edge = _widened(x, int(j), wide, more)
+        labels[low:high, left_edge:right_edge] = HALL
     return labels
 
 
@@ -128,9 +135,7 @@ def _split(length: int, least: int, most: int, generator: np.random.Generator) -
     return [int(edge) for edge in edges[:-1]] + [length]
 
 
-def _row_of_rooms(
-    labels: Labels, rows: slice, columns: slice, room: int, proportions: Proportions, generator: np.random.Generator
-) -> int:
+def _row_of_rooms(labels: Labels, rows: slice, columns: slice, room: int, proportions: Proportions, generator: np.random.Generator) -> int:
     """Paint a row of rooms, some left to the corridor as open bays; returns the next free label."""
     first, last, _ = columns.indices(labels.shape[1])
     edges = _split(last - first, cells(proportions.room_size[0]), cells(proportions.room_size[1]), generator)
@@ -175,20 +180,26 @@ def _carve_rooms(labels: Labels, chance: float, least_m2: float, generator: np.r
             labels[high - deep : high, across] = labels.max() + 1
 
 
-def _crossings(count: int, spacing: float, corridor: float, generator: np.random.Generator) -> list[int]:
-    """Lower edges of corridors with irregular distances, at least one room's depth apart."""
-    gaps = np.maximum(spacing * generator.uniform(0.6, 1.4, count - 1), corridor + 1.2)
-    return [cells(edge) for edge in np.concatenate([[0.0], np.cumsum(gaps)])]
+def _crossings(gaps: NDArray[np.float64], corridor: float) -> list[int]:
+    """Lower edges of parallel corridors with blocks of these depths between them, 1.2 m at least."""
+    return [cells(edge) for edge in np.concatenate([[0.0], np.cumsum(np.maximum(gaps, 1.2) + corridor)])]
 
 
-def _lattice_edges(
-    down: int, across: int, loops: float, generator: np.random.Generator
-) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """A random spanning tree of a lattice and a share of the edges beyond it."""
+def _widened(edges: list[int], k: int, wide: int, more: float) -> tuple[int, int]:
+    """Range of a hall on the k-th corridor, so that blocks stay at least 0.8 m thick between it and its neighbours."""
+    below = edges[k] - edges[k - 1] - wide if k > 0 else 0
+    above = edges[k + 1] - edges[k] - wide if k + 1 < len(edges) else 0
+    low, high = (max(min(cells(more), gap // 2 - cells(0.4)), 0) for gap in (below, above))
+    return edges[k] - low, edges[k] + wide + high
+
+
+def _lattice_edges(down: int, across: int, loops: float, generator: np.random.Generator) -> list[LatticeEdge]:
+    """Draw a random spanning tree of a lattice and a share of the edges beyond it."""
     edges = [((i, j), (i, j + 1)) for i in range(down) for j in range(across - 1)]
     edges += [((i, j), (i + 1, j)) for i in range(down - 1) for j in range(across)]
     group = {(i, j): i * across + j for i in range(down) for j in range(across)}
-    tree, further = [], []
+    tree: list[LatticeEdge] = []
+    further: list[LatticeEdge] = []
     for k in generator.permutation(len(edges)):
         a, b = group[edges[k][0]], group[edges[k][1]]
         (further if a == b else tree).append(edges[k])

@@ -85,7 +85,7 @@ def _largest_part(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _containing(cells: NDArray[np.bool_], part: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Connected part of `cells` that holds `part`."""
+    """Return the connected part of `cells` that holds `part`."""
     _, parts = cv2.connectedComponents(cells.astype(np.uint8), connectivity=4)
     return np.asarray(parts == parts[part][0])
 

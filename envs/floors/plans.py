@@ -114,10 +114,10 @@ def boundaries(labels: Labels) -> list[Boundary]:
 
 def room_areas(labels: Labels) -> NDArray[np.float64]:
     """Area of each room by label [m²], up to the middle of its walls."""
-    return np.bincount(labels[labels >= 0], minlength=1) * CELL**2
+    return np.asarray(np.bincount(labels[labels >= 0], minlength=1) * CELL**2, dtype=np.float64)
 
 
-def choose_doors(labels: Labels, door_width: float, loops: float, generator: np.random.Generator) -> list[Door]:
+def choose_doors(labels: Labels, door_width: float, loops: float, generator: np.random.Generator) -> list[Door] | None:
     """Doors that join all rooms, from the hall where possible, and a share of the further possible ones.
 
     Parameters
@@ -133,12 +133,8 @@ def choose_doors(labels: Labels, door_width: float, loops: float, generator: np.
 
     Returns
     -------
-    list of Door
-
-    Raises
-    ------
-    ValueError
-        If some room has no wall long enough for a door to the others.
+    list of Door or None
+        None if some room has no wall long enough for a door to the others.
     """
     areas = room_areas(labels)
     candidates = [b for b in boundaries(labels) if b.low >= 0 and b.high >= 0 and b.length >= door_width + 2 * JAMB]
@@ -153,15 +149,14 @@ def choose_doors(labels: Labels, door_width: float, loops: float, generator: np.
             group = [a if g == b else g for g in group]
         elif min(areas[boundary.low], areas[boundary.high]) >= SMALL_ROOM_M2:
             further.append(boundary)
-    apart = {group[k] for k in range(len(areas)) if areas[k] > 0}
-    if len(apart) > 1:
-        raise ValueError(f"plan has {len(apart)} groups of rooms without a wall long enough for a door of {door_width} m between them")
+    if len({group[k] for k in range(len(areas)) if areas[k] > 0}) > 1:
+        return None
     further = [further[k] for k in generator.permutation(len(further))][: round(loops * len(further))]
     return [_door(b, door_width, generator) for b in joining + further]
 
 
 def _door(boundary: Boundary, width: float, generator: np.random.Generator) -> Door:
-    """A door near one end of the wall, as most are, or anywhere in it."""
+    """Make a door near one end of the wall, as most are, or anywhere in it."""
     slack = boundary.length - width - 2 * JAMB
     near_end = min(slack, 0.1 * int(generator.integers(0, 4)))
     offset = (near_end, slack - near_end, 0.05 * int(generator.uniform(0.0, slack) / 0.05))[int(generator.choice(3, p=(0.4, 0.4, 0.2)))]

@@ -164,7 +164,9 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
                 raise ValueError(f"starts of robots {other} and {robot} are {apart:.3f} m apart; want at least {2.0 * radius} m")
 
 
-def _fitting(raster: Raster, labels: NDArray[np.int32], radius: float, count: int, proposed: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _fitting(
+    raster: Raster, labels: NDArray[np.int32], radius: float, count: int, proposed: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
     taken: list[NDArray[np.float64]] = []
     for start in proposed:
         cell = _cell(raster, start)
@@ -212,7 +214,10 @@ def _without_discs(raster: Raster, allowed: NDArray[np.bool_], placed: list[NDAr
     reach = math.ceil(apart / raster.resolution) + 1
     for x, y, _ in placed:
         i, j = _cell(raster, np.array([x, y]))
-        rows, columns = np.arange(max(i - reach, 0), min(i + reach + 1, left.shape[0])), np.arange(max(j - reach, 0), min(j + reach + 1, left.shape[1]))
+        rows, columns = (
+            np.arange(max(i - reach, 0), min(i + reach + 1, left.shape[0])),
+            np.arange(max(j - reach, 0), min(j + reach + 1, left.shape[1])),
+        )
         dy = raster.origin[1] + (rows + 0.5) * raster.resolution - y
         dx = raster.origin[0] + (columns + 0.5) * raster.resolution - x
         left[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] &= np.hypot(dx[None, :], dy[:, None]) >= apart - 1e-9
@@ -250,7 +255,7 @@ def _label_near(raster: Raster, labels: NDArray[np.int32], start: NDArray[np.flo
 
 
 def _labels(space: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Number the 4-connected components from 1; 0 elsewhere."""
+    """Return the number of the 4-connected component of each cell, from 1; 0 elsewhere."""
     _, labels = cv2.connectedComponents(space.view(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     return np.asarray(labels, dtype=np.int32)
 

@@ -54,6 +54,10 @@ class FloorTables:
             laser = body
         return cls(laser, body, RayTables(laser.solid), distance_bound(body.solid))
 
+    def __deepcopy__(self, memo: dict[int, object]) -> "FloorTables":
+        """Tables are never written after they are made: copies share them."""
+        return self
+
     @property
     def row(self) -> NDArray[np.int64]:
         """Row of the kernels' table of floors, shape (10,): the rays' 8 numbers, the bound's and the solid cells' addresses."""

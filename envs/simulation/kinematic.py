@@ -6,6 +6,7 @@ pose is the true one, its map and its mask agree to the cell.
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numba
 import numpy as np
@@ -84,6 +85,7 @@ class KinematicWorld:
         self.ranges = np.full((rows, lidar.beams), np.inf, np.float32)
         self.bumpers, self.contacts = np.zeros((rows, 3), np.int8), np.zeros(rows, np.uint8)
         self.moves, self.flags = np.ones(rows, np.uint8), np.zeros(rows, np.int64)
+        self.travelled, self.collisions = np.zeros(rows), np.zeros(rows, np.int64)
         self.gains, self.seen = np.zeros(rows), np.zeros(rows, np.int64)
         self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
         self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
@@ -94,7 +96,7 @@ class KinematicWorld:
         self.counted_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes
         self.floors: list[FloorTables | None] = [None] * episodes
         self._floor_rows, self._frames = np.zeros((episodes, 10), np.int64), np.zeros((episodes, 3))
-        self._belief_rows, self.origins = np.zeros((rows, 3), np.int64), np.zeros((rows, 2))
+        self.belief_rows, self.origins = np.zeros((rows, 3), np.int64), np.zeros((rows, 2))
         self._mask_rows = np.zeros((rows, 5), np.int64)
         reach = lidar.range_max / occupancy.resolution
         self._news = np.zeros((rows, window_rows(reach) * window_words(reach), ENTRY), np.uint64)
@@ -114,10 +116,8 @@ class KinematicWorld:
                 time_step,
             ]
         )
-        is_parallel = threads > 1 and rows >= ROWS_FOR_THREADS
         self._threads = min(threads, numba.config.NUMBA_NUM_THREADS)
-        self._step = step_parallel if is_parallel else step_serial
-        self._perceive = perceive_parallel if is_parallel else perceive_serial
+        self._choose_kernels()
 
     def place(self, episode: int, floor: FloorTables, starts: NDArray[np.float64], seed: int, known_starts: bool = True) -> None:
         """Start an episode: robots at ``starts`` (robots, 3) of a floor, blank maps and masks, noise from ``seed``.
@@ -136,28 +136,53 @@ class KinematicWorld:
         counted = pack_bits(counted_cells(free, multiple))
         rows, words = counted.shape
         self.floors[episode] = floor
-        self._floor_rows[episode], self._frames[episode] = floor.row, floor.frame
+        self._frames[episode] = floor.frame
         self.counted_masks[episode], self.team_masks[episode] = counted, np.zeros_like(counted)
         self.counted[episode] = int(np.bitwise_count(counted).sum())
-        self.team_seen[episode], self.seeds[episode], self.steps[episode] = 0, seed, 0
+        self.team_seen[episode], self.seeds[episode] = 0, seed
+        # The scan at the start is taken before step 0.
+        self.steps[episode] = -1
         self.poses[first:last], self.velocities[first:last] = starts, 0.0
         self.bumpers[first:last], self.contacts[first:last], self.moves[first:last] = 0, 0, 1
         self.ranges[first:last], self.seen[first:last], self.gains[first:last] = np.inf, 0, 0.0
+        self.travelled[first:last], self.collisions[first:last] = 0.0, 0
         for row in range(first, last):
             self.masks[row] = np.zeros_like(counted)
-            self._mask_rows[row] = (
-                self.masks[row].ctypes.data, self.team_masks[episode].ctypes.data, counted.ctypes.data, rows, words
-            )  # fmt: skip
             if known_starts:
                 self.believed[row], self.origins[row] = starts[row - first], floor.laser.origin
                 self.log_odds[row] = np.zeros((rows, words * WORD), np.int8)
             else:
                 self.believed[row] = 0.0
                 self.log_odds[row], self.origins[row] = self._blank_map_around(floor, starts[row - first])
-            self._belief_rows[row] = (self.log_odds[row].ctypes.data, *self.log_odds[row].shape)
+        self._point_at(episode)
         self.starts[first:last] = starts
         self.flags[first:last] = TRUE_POSE | (KNOWN_MATES if known_starts else OWN_FRAME)
         self.forget_changes(first, last)
+
+    def _point_at(self, episode: int) -> None:
+        """Fill the kernels' tables of addresses with where the episode's arrays lie."""
+        floor = self.floors[episode]
+        if floor is None:
+            return
+        self._floor_rows[episode] = floor.row
+        counted, team = self.counted_masks[episode], self.team_masks[episode]
+        for row in range(episode * self.robots, (episode + 1) * self.robots):
+            self._mask_rows[row] = (self.masks[row].ctypes.data, team.ctypes.data, counted.ctypes.data, *counted.shape)
+            self.belief_rows[row] = (self.log_odds[row].ctypes.data, *self.log_odds[row].shape)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_perceive")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._choose_kernels()
+        for episode in range(self.episodes):
+            self._point_at(episode)
+
+    def _choose_kernels(self) -> None:
+        is_parallel = self._threads > 1 and self.robots * self.episodes >= ROWS_FOR_THREADS
+        self._step = step_parallel if is_parallel else step_serial
+        self._perceive = perceive_parallel if is_parallel else perceive_serial
 
     def _blank_map_around(self, floor: FloorTables, start: NDArray[np.float64]) -> tuple[NDArray[np.int8], tuple[float, float]]:
         """Return a map in the start's own frame that holds the whole floor, however it is turned (memory is touched where seen)."""
@@ -195,9 +220,9 @@ class KinematicWorld:
             numba.set_num_threads(self._threads)
         self._step(
             self.robots, self._floor_rows, self._frames, self.bodies, self.moves, self.poses, self.velocities, self.starts, self.believed, commands,
-            self._sensor, self._unit_vectors, self.seeds, self.steps, GAUSSIAN_TABLE, self.flags, self.ranges, self._belief_rows,
+            self._sensor, self._unit_vectors, self.seeds, self.steps, GAUSSIAN_TABLE, self.flags, self.ranges, self.belief_rows,
             self.origins, self.windows, self._increments, BYTE_MASKS, self._mask_rows, self._news, self._entries, self.seen, self.gains,
-            self.team_seen, self.bumpers, self.contacts, moves_bodies, perceives,
+            self.team_seen, self.bumpers, self.contacts, self.travelled, self.collisions, moves_bodies, perceives,
         )  # fmt: skip
         self.steps += 1
 
@@ -210,7 +235,7 @@ class KinematicWorld:
     def perceive(self) -> None:
         """Run stage two alone: update the maps from ``ranges`` at the believed poses."""
         self._perceive(
-            self.robots, self.bodies, self.believed, self._sensor, self._unit_vectors, self.flags, self.ranges, self._belief_rows,
+            self.robots, self.bodies, self.believed, self._sensor, self._unit_vectors, self.flags, self.ranges, self.belief_rows,
             self.origins, self.windows, self._increments, BYTE_MASKS,
         )  # fmt: skip
 

@@ -11,7 +11,6 @@ in x first.
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,7 +157,7 @@ class RayTables:
         self.faces = np.empty((max(int(self.face_starts[-1]), 1), 3), np.int32)
         _count_or_list_faces(solid, self.tile_columns, self.face_starts[:-1].copy(), self.faces, True)
 
-    @cached_property
+    @property
     def addresses(self) -> NDArray[np.int64]:
         """Row of the kernels' table of floors: where the arrays lie, and their sizes."""
         return np.array(

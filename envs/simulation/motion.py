@@ -165,7 +165,7 @@ def _along_arc(x, y, heading, speed, turn_rate, duration):  # noqa: ANN001, ANN2
 
 
 @kernel
-def move_robots(bound_address, solid_address, rows, columns, frame, bodies, moves, poses, velocities, commands, duration, bumpers, contacts):  # noqa: ANN001, ANN201, E501
+def move_robots(bound_address, solid_address, rows, columns, frame, bodies, moves, poses, velocities, commands, duration, bumpers, contacts, travelled, collisions):  # noqa: ANN001, ANN201, E501
     """Drive the robots of one episode for one step, in their order; each meets the others where they are by then.
 
     Parameters
@@ -188,11 +188,16 @@ def move_robots(bound_address, solid_address, rows, columns, frame, bodies, move
         Left, centre, right; 1 where pressed in this step.
     contacts : (robots,) uint8
         Whether the robot touched anything in this step.
+    travelled : (robots,) float64
+        Length of each robot's path, added to [m].
+    collisions : (robots,) int64
+        How often each robot came into contact, added to where a contact begins.
     """
     bound = uint8_grid_at(bound_address, rows, columns)
     solid = uint8_grid_at(solid_address, rows, columns)
     for robot in range(poses.shape[0]):
         bumpers[robot, 0] = bumpers[robot, 1] = bumpers[robot, 2] = 0
+        was_in_contact = contacts[robot] != 0
         contacts[robot] = 0
         if moves[robot] == 0:
             velocities[robot, 0] = velocities[robot, 1] = 0.0
@@ -224,5 +229,7 @@ def move_robots(bound_address, solid_address, rows, columns, frame, bodies, move
                 # What the body could not do, the wheels did not do either.
                 advance = (x - start_x) * math.cos(heading) + (y - start_y) * math.sin(heading)
                 speed = min(max(advance / duration, -abs(speed)), abs(speed))
+                collisions[robot] += 0 if was_in_contact else 1
+        travelled[robot] += math.hypot(x - start_x, y - start_y)
         poses[robot, 0], poses[robot, 1], poses[robot, 2] = x, y, _wrapped(heading)
         velocities[robot, 0], velocities[robot, 1] = speed, turn_rate

@@ -196,7 +196,7 @@ def _believe_truth(pose, start, is_relative, believed):  # noqa: ANN001, ANN202
     believed[2] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
 
 
-def _step(robots, floors, frames, bodies, moves, poses, velocities, starts, believed, commands, sensor, unit_vectors, seeds, steps, noise_table, flags, ranges, beliefs, origins, windows, increments, byte_masks, masks, news, entries, seen, gains, team_seen, bumpers, contacts, moves_bodies, perceives):  # noqa: ANN001, ANN202, E501
+def _step(robots, floors, frames, bodies, moves, poses, velocities, starts, believed, commands, sensor, unit_vectors, seeds, steps, noise_table, flags, ranges, beliefs, origins, windows, increments, byte_masks, masks, news, entries, seen, gains, team_seen, bumpers, contacts, travelled, collisions, moves_bodies, perceives):  # noqa: ANN001, ANN202, E501
     """Move, sense, score and (where ``perceives``) map, for all episodes.
 
     ``flags`` of a row: 1 where the localizer knows the true pose, 2 where teammates' poses are known, 4 where the robot has
@@ -210,6 +210,7 @@ def _step(robots, floors, frames, bodies, moves, poses, velocities, starts, beli
             move_robots(
                 table[8], table[9], table[1], table[2], frames[episode], bodies, moves[first:last], poses[first:last],
                 velocities[first:last], commands[first:last], sensor[TIME_STEP], bumpers[first:last], contacts[first:last],
+                travelled[first:last], collisions[first:last],
             )  # fmt: skip
     for row in range(episodes * robots):
         if flags[row] & 1:

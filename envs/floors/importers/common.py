@@ -1,6 +1,7 @@
 """What several importers share: reading text, free areas of pixel floors, walls around line drawings."""
 
 import gzip
+import itertools
 import zlib
 from pathlib import Path
 
@@ -15,8 +16,8 @@ from lidarium.envs.floors.floor import Floor, Raster, Solid
 WALL_THICKNESS = 0.1
 
 # Gaps in the outer wall of a drawing that are tried until it is closed [m], and the share of the largest area wanted.
-_GAPS = (0.0, 0.2, 0.5, 1.0, 2.0, 3.0)
-_CLOSED_SHARE = 0.8
+_GAPS = (0.0, 0.2, 0.5, 1.0, 2.0)
+_CLOSED_SHARE = 0.85
 _OUTLINE_RESOLUTION = 0.02
 _MAX_OUTLINE_CELLS = 50_000_000
 
@@ -81,7 +82,7 @@ def floor_of_cells(
     ValueError
         If no cell, or all, are free, or the seed cell is not.
     """
-    if not free.any() or (free.all() and free.size > 1):
+    if not free.any() or free.all():
         raise ValueError(f"{path} is {'all free' if free.any() else 'all solid'}; want a floor with free space and walls")
     count, labels, statistics, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     label = int(labels[seed_cell]) if seed_cell is not None else 1 + int(np.argmax(statistics[1:count, cv2.CC_STAT_AREA]))
@@ -120,11 +121,13 @@ def _box(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.floa
     return np.array([low, (high[0], low[1]), high, (low[0], high[1])])
 
 
-def _enclosed(path: Path, lines: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+def _enclosed(
+    path: Path, lines: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], ...]:
     """Return the outlines of what the lines enclose, along the middle of the outer walls.
 
-    Drawings have gaps in the outer wall. They are closed by the smallest widening of the lines that encloses nearly as
-    much as the largest does; the outline is moved back by it.
+    Drawings have gaps in the outer wall. They are closed by widening the lines, step by step, until nearly as much is
+    enclosed as with the widest. What a smaller widening encloses keeps its finer outline.
     """
     widest = max(_GAPS) + WALL_THICKNESS
     size = high - low + 2.0 * widest
@@ -133,11 +136,11 @@ def _enclosed(path: Path, lines: NDArray[np.float64], low: NDArray[np.float64], 
     drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
     fill_shapes(drawn, origin, resolution, [ring_edges(strip(line, WALL_THICKNESS, WALL_THICKNESS / 2.0)) for line in lines], 1)
     distance = cv2.distanceTransform(1 - drawn, cv2.DIST_L2, 5) * resolution
-    insides = [_inside(distance, gap / 2.0, resolution) for gap in _GAPS]
+    insides = list(itertools.accumulate((_inside(distance, gap / 2.0, resolution) for gap in _GAPS), np.maximum))
     areas = [int(inside.sum()) for inside in insides]
-    if max(areas) == 0:
+    if areas[-1] == 0:
         raise ValueError(f"{path} has no walls that enclose a space; want a floor plan")
-    inside = next(inside for inside, area in zip(insides, areas, strict=True) if area >= _CLOSED_SHARE * max(areas))
+    inside = next(inside for inside, area in zip(insides, areas, strict=True) if area >= _CLOSED_SHARE * areas[-1])
     contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     rings = [contour[:, 0, :].astype(np.float64) for contour in contours if len(contour) >= 3]
     return tuple((ring + 0.5) * resolution + origin for ring in rings)
@@ -149,4 +152,4 @@ def _inside(distance: NDArray[np.float32], widening: float, resolution: float) -
     _, labels = cv2.connectedComponents(passable, connectivity=4, ltype=cv2.CV_32S)
     kept = (labels != labels[0, 0]).astype(np.uint8)
     to_outside = cv2.distanceTransform(kept, cv2.DIST_L2, 5) * resolution
-    return (to_outside > widening + WALL_THICKNESS / 2.0).astype(np.uint8)
+    return np.asarray(to_outside > widening + WALL_THICKNESS / 2.0, dtype=np.uint8)

@@ -28,7 +28,7 @@ RESOLUTION = 0.025
 _THIN_WALL = 0.05
 
 # Facing portals belong together up to this distance, and a portal that faces none opens a wall up to this thickness [m].
-_THICKEST_WALL = 1.0
+_THICKEST_WALL = 1.5
 _DEEPEST_BREACH = 0.6
 _PARALLEL = 0.9
 _MARGIN = 0.5
@@ -104,11 +104,14 @@ def _scale(path: Path, root: ElementTree.Element) -> float:
 def _space(path: Path, element: ElementTree.Element, scale: float) -> _Space:
     name = element.get("name", "")
     lines = list(element.iter("linesegment"))
+    to_metres = np.array([scale, -scale, scale, -scale])  # y of the drawing points down
     try:
-        segments = np.array([[float(line.attrib[key]) for key in ("x1", "y1", "x2", "y2")] for line in lines]) * scale
+        segments = np.array([[float(line.attrib[key]) for key in ("x1", "y1", "x2", "y2")] for line in lines]).reshape(-1, 4)
     except (KeyError, ValueError):
-        raise ValueError(f"{path}: space {name!r} has a linesegment without numbers x1, y1, x2, y2") from None
-    return _Space(segments.reshape(-1, 4), tuple(line.get("type", "Wall") for line in lines))
+        segments = np.full((1, 4), np.nan)
+    if not np.isfinite(segments).all():
+        raise ValueError(f"{path}: space {name!r} has a linesegment without numbers x1, y1, x2, y2")
+    return _Space(segments * to_metres, tuple(line.get("type", "Wall") for line in lines))
 
 
 def _doorways(spaces: list[_Space], is_free: Callable[[NDArray[np.float64]], bool]) -> list[NDArray[np.float64]]:
@@ -122,10 +125,12 @@ def _doorways(spaces: list[_Space], is_free: Callable[[NDArray[np.float64]], boo
         for segment, kind in zip(space.segments, space.types, strict=True)
         if kind == "Portal" and not np.array_equal(segment[:2], segment[2:])
     ]
+    middles = np.array([(segment[:2] + segment[2:]) / 2.0 for _, segment in portals]).reshape(-1, 2)
     doorways = []
-    for number, segment in portals:
+    for k, (number, segment) in enumerate(portals):
         doorways.append(strip(segment, 2.0 * _THIN_WALL))
-        facing = [other for owner, other in portals if owner != number and _face(segment, other)]
+        near = np.flatnonzero(np.hypot(*(middles - middles[k]).T) <= _THICKEST_WALL)
+        facing = [portals[n][1] for n in near if portals[n][0] != number and _face(segment, portals[n][1])]
         if facing:
             other = min(facing, key=lambda candidate: _apart(segment, candidate))
             corners = np.concatenate([segment, other]).reshape(-1, 2)
@@ -142,7 +147,7 @@ def _face(segment: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     between = (other[:2] + other[2:] - segment[:2] - segment[2:]) / 2.0
     parallel = abs(float(along @ along_other)) > _PARALLEL * length * length_other
     beside = abs(float(between @ along)) / length > max(length, length_other) / 2.0
-    return parallel and not beside and float(np.hypot(*between)) <= _THICKEST_WALL
+    return parallel and not beside
 
 
 def _breaches(segment: NDArray[np.float64], is_free: Callable[[NDArray[np.float64]], bool]) -> list[NDArray[np.float64]]:

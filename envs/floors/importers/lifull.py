@@ -68,11 +68,11 @@ def _without_doors(wall: NDArray[np.float64], doors: NDArray[np.float64]) -> lis
     for door in doors.reshape(-1, 2, 2):
         offsets = (door - start) @ across
         if np.abs(offsets).max() <= WALL_THICKNESS:
-            first, last = sorted(((door - start) @ along).tolist())
+            first, last = sorted(np.clip((door - start) @ along, 0.0, length).tolist())
             gaps.append((first, last))
     pieces, reached = [], 0.0
     for first, last in [*sorted(gaps), (length, length)]:
         if first - reached > _SLIP:
-            pieces.append(np.concatenate([start + along * reached, start + along * min(first, length)]))
+            pieces.append(np.concatenate([start + along * reached, start + along * first]))
         reached = max(reached, last)
     return pieces

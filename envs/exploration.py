@@ -1,0 +1,311 @@
+"""The environment: a team of lidar robots explores a floor (PettingZoo parallel API)."""
+
+import copy
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from lidarium.envs.floors.catalogue import load_floor
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.starts import check_starts, draw_starts
+from lidarium.envs.observations import ObservationWriter, action_space, observation_space
+from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.options import FloorChoice, read_options
+from lidarium.envs.scorer import Scorer
+from lidarium.envs.settings import ExplorationSettings
+from lidarium.envs.simulation.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic import ENDED, KinematicWorld
+
+Observation = dict[str, NDArray[Any]]
+
+
+@lru_cache(maxsize=16)
+def floor_tables(floor: str | Floor, image_resolution: float | None, raster_resolution: float, laser: float, body: float) -> FloorTables:
+    """Return the kernels' tables of a floor; the last ones used are kept and shared."""
+    return FloorTables.of_floor(load_floor(floor, image_resolution), raster_resolution, laser, body)
+
+
+class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
+    """A team of lidar robots explores a floor.
+
+    Parameters
+    ----------
+    floor : str, Path or Floor
+        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor. Of a set, each reset
+        draws one.
+    settings : ExplorationSettings
+        Every knob.
+    render_mode : str or None
+        ``human`` (a window), ``rgb_array`` or None.
+    image_resolution : float or None
+        Side of a pixel [m] where the floor is a plain image.
+
+    Notes
+    -----
+    Observations, actions, infos and endings are described in docs/reference/environments.md. ``reset`` takes the options
+    ``floor``, ``starts`` (robots, 3) and ``goal`` (2,).
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        Where the floor or an option cannot be used.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 (PettingZoo's contract)
+        "name": "lidarium_exploration_v0",
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        floor: str | Path | Floor = "apartment",
+        settings: ExplorationSettings | None = None,
+        render_mode: str | None = None,
+        image_resolution: float | None = None,
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode is {render_mode!r}; want human, rgb_array or None")
+        self.settings = settings or ExplorationSettings()
+        self.render_mode = render_mode
+        self.possible_agents = self.settings.agents
+        self.agents: list[str] = []
+        self._image_resolution = image_resolution
+        self._choice = FloorChoice(floor, image_resolution)
+        self.has_goal = self._choice.has_goal
+        space = observation_space(self.settings, self.has_goal)
+        self.observation_spaces = {agent: copy.deepcopy(space) for agent in self.possible_agents}
+        self.action_spaces = {agent: action_space() for agent in self.possible_agents}
+        self._rows = {agent: row for row, agent in enumerate(self.possible_agents)}
+        team = [self.settings.robot] * self.settings.robots
+        self.world = KinematicWorld(
+            team, self.settings.lidar, self.settings.occupancy, self.settings.time_step, threads=self.settings.threads
+        )
+        self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
+        self._writer = ObservationWriter(self.settings)
+        self._generator: np.random.Generator | None = None
+        self._offsets = np.zeros((self.settings.robots, 2))
+        self._commands = np.zeros((self.settings.robots, 2))
+        self._window: Any = None
+        self.floor: Floor | None = None
+        self.goal: tuple[float, float] | None = None
+        self.seed: int | None = None
+        self.scorer = Scorer(self.world, self.settings)
+        self.perception = Perception(self.world, self.settings, self._offsets)
+        self._stopping: dict[str, str] = {}
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's observations, the same object at each call."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's actions, the same object at each call."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Start an episode.
+
+        Parameters
+        ----------
+        seed : int or None
+            Where all draws of this and the later episodes come from; None goes on with the generator of the last seed.
+        options : dict or None
+            ``floor``, ``starts`` (robots, 3) in the floor's frame [m, rad], ``goal`` (2,) [m]; others are ignored.
+        """
+        chosen = read_options(options, self.settings.robots)
+        if seed is not None or self._generator is None:
+            self._generator = np.random.default_rng(seed)
+        choice = self._choice if chosen.floor is None else FloorChoice(chosen.floor, self._image_resolution)
+        spec = choice.draw(self._generator)
+        floor = load_floor(spec, self._image_resolution)
+        if isinstance(spec, Path):
+            spec = str(spec)
+        settings, radius = self.settings, self.settings.robot.radius
+        tables = floor_tables(
+            spec, self._image_resolution, settings.raster_resolution, settings.lidar.height, settings.robot.height
+        )
+        if chosen.starts is not None:
+            check_starts(tables.body, radius, chosen.starts)
+            starts = chosen.starts
+        else:
+            starts = draw_starts(tables.body, radius, settings.robots, self._generator, floor.starts)
+        self.seed = int(self._generator.integers(2**63))
+        self.floor = floor
+        self.goal = (chosen.goal or floor.goal) if self.has_goal else None
+        self.world.place(0, tables, starts, self.seed, settings.known_starts)
+        if settings.known_starts:
+            # The map frame begins at the corner of the cell in which the robot starts.
+            cell = settings.occupancy.resolution
+            origin = np.asarray(tables.laser.origin)
+            self._offsets[:] = origin + np.floor((starts[:, :2] - origin) / cell) * cell
+        else:
+            self._offsets[:] = 0.0
+        self._commands[:] = 0.0
+        self._stopping.clear()
+        self.agents = self.possible_agents[:]
+        self.world.step(self._commands, moves_bodies=False)
+        self.scorer.start()
+        self.perception.start(self.goal)
+        infos = {agent: {"truth": self._truth(row)} for agent, row in self._rows.items()}
+        if self.render_mode == "human":
+            self.render()
+        return self._observations(self.agents), infos
+
+    def step(
+        self, actions: dict[str, Any]
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Drive for one time step.
+
+        Parameters
+        ----------
+        actions : dict
+            For each live agent speed and turn rate as shares of its limits, within [-1, 1].
+
+        Returns
+        -------
+        observations, rewards, terminations, truncations, infos : dict
+            By agent. ``infos[agent]["truth"]`` is for scoring only; ``infos[agent]["ended_because"]`` says why an agent ended.
+        """
+        if not self.agents:
+            if self.floor is None:
+                raise RuntimeError("the environment was not reset; call reset() before step()")
+            return {}, {}, {}, {}, {}
+        self.drive(actions)
+        return self.outcome()
+
+    def drive(self, actions: dict[str, Any]) -> None:
+        """Run one time step of the world without building observations; ``outcome`` tells what came of it."""
+        for agent in self.agents:
+            action = actions.get(agent)
+            if action is None:
+                if agent in self._stopping:
+                    self._commands[self._rows[agent]] = 0.0
+                    continue
+                raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
+            self._commands[self._rows[agent]] = action
+        np.clip(self._commands, -1.0, 1.0, out=self._commands)
+        if np.isnan(self._commands).any():
+            raise ValueError(f"an action is nan ({actions}); want two numbers within [-1, 1] for each agent")
+        self.world.step(self._commands * self._limits)
+        self.scorer.advance()
+
+    def outcome(
+        self,
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Return what ``step`` returns for the time since the last outcome, and let ended agents leave."""
+        live = self.agents
+        observations = self._observations(live)
+        rewards_of_rows = self.scorer.take_rewards()
+        endings, is_truncated = self._endings(live)
+        rewards, terminations, truncations, infos = {}, {}, {}, {}
+        for agent in live:
+            row = self._rows[agent]
+            reason = endings.get(agent)
+            info: dict[str, Any] = {"truth": self._truth(row)}
+            if reason is not None:
+                info["ended_because"] = reason
+            elif is_truncated:
+                info["ended_because"] = "horizon"
+            rewards[agent] = rewards_of_rows[row]
+            terminations[agent] = reason is not None
+            truncations[agent] = is_truncated and reason is None
+            infos[agent] = info
+        if endings or is_truncated:
+            for agent in live:
+                if agent in endings or is_truncated:
+                    self.world.moves[self._rows[agent]] = 0
+                    self.world.flags[self._rows[agent]] |= ENDED
+                    self.scorer.ended_because[agent] = infos[agent]["ended_because"]
+            self.agents = [] if is_truncated else [agent for agent in live if agent not in endings]
+        if self.render_mode == "human":
+            self.render()
+        return observations, rewards, terminations, truncations, infos
+
+    def is_over(self) -> bool:
+        """Whether the next outcome ends all agents (covered or at the horizon)."""
+        horizon, cover = self.settings.horizon_steps, self.settings.stop_coverage
+        steps = int(self.world.steps[0])
+        return (horizon is not None and steps >= horizon) or (cover is not None and self.scorer.coverage >= cover)
+
+    def stop(self, agent: str, reason: str) -> None:
+        """End an agent at its next step, with a reason that its policy gives (such as ``no_frontier``)."""
+        if agent not in self.agents:
+            raise ValueError(f"{agent} is not among the live agents {self.agents}")
+        self._stopping[agent] = reason
+
+    def _endings(self, live: Sequence[str]) -> tuple[dict[str, str], bool]:
+        """Return why agents end now, and whether the horizon cuts the episode."""
+        settings = self.settings
+        if settings.stop_coverage is not None and self.scorer.coverage >= settings.stop_coverage:
+            return dict.fromkeys(live, "covered"), False
+        endings = {agent: reason for agent, reason in self._stopping.items() if agent in live} if self._stopping else {}
+        self._stopping.clear()
+        if self.goal is not None:
+            for agent in live:
+                if np.hypot(*(self.world.poses[self._rows[agent], :2] - self.goal)) <= settings.goal_radius:
+                    endings[agent] = "reached"
+        if settings.stop_on_contact and self.scorer.touched.any():
+            endings |= {agent: "collision" for agent in live if self.scorer.touched[self._rows[agent]]}
+        horizon = settings.horizon_steps
+        return endings, horizon is not None and int(self.world.steps[0]) >= horizon
+
+    def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:
+        arrays = self._writer.write(self.world, self._offsets)
+        scans, poses, motions, presses, maps = (arrays[name] for name in ("scan", "pose", "velocity", "bumper", "map"))
+        rows = self._rows
+        observations: dict[str, Observation] = {
+            agent: {
+                "scan": scans[rows[agent]],
+                "pose": poses[rows[agent]],
+                "velocity": motions[rows[agent]],
+                "bumper": presses[rows[agent]],
+                "map": maps[rows[agent]],
+            }
+            for agent in agents
+        }
+        if self.has_goal:
+            for agent in agents:
+                observations[agent]["goal"] = self.perception.goal_in_frame(rows[agent])
+        return observations
+
+    def _truth(self, row: int) -> dict[str, Any]:
+        world = self.world
+        return {"pose": world.poses[row].copy(), "coverage": self.scorer.coverage, "seen_cells": int(world.seen[row])}
+
+    def state(self) -> NDArray[np.float64]:
+        """Return the true state of the team: x, y, theta, speed and turn rate of each robot, shape (robots * 5,)."""
+        return np.concatenate([self.world.poses, self.world.velocities], axis=1).ravel()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draw the floor, what is explored, the robots and their scans: an image (rows, columns, 3), or the window."""
+        from lidarium.envs.rendering import FrameWindow, draw_frame  # noqa: PLC0415 (matplotlib and OpenCV only where used)
+
+        if self.render_mode is None:
+            return None
+        if self.floor is None:
+            raise RuntimeError("the environment was not reset; call reset() before render()")
+        frame = draw_frame(self)
+        if self.render_mode == "rgb_array":
+            return frame
+        if self._window is None:
+            self._window = FrameWindow(f"lidarium: {self.floor.name}")
+        self._window.show(frame)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one; closing again does nothing."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_window": None}

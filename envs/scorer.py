@@ -1,0 +1,94 @@
+"""The scorer: how much the team has really seen, when, and at what cost. Beside ``evaluation`` the only one to see the truth."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.settings import ExplorationSettings
+from lidarium.envs.simulation.kinematic import KinematicWorld
+
+THRESHOLDS = (0.85, 0.90, 0.95, 0.99)
+
+
+class Scorer:
+    """Tally of one episode.
+
+    Parameters
+    ----------
+    world : KinematicWorld
+        The world that is scored.
+    settings : ExplorationSettings
+        Weights of the reward and the length of a step.
+
+    Attributes
+    ----------
+    coverage : float
+        ``C_free``: share of F that any robot has sensed.
+    times : dict
+        Simulated time at which each threshold of coverage was reached [s].
+    curve : list of (time [s], coverage)
+        Coverage over time, at every change.
+    touched : (robots,) bool
+        Whether each robot touched something in the last step.
+    ended_because : dict
+        Why each ended agent ended.
+    """
+
+    def __init__(self, world: KinematicWorld, settings: ExplorationSettings) -> None:
+        self._world, self._settings = world, settings
+        self._cell_area = settings.occupancy.resolution**2
+        self._rewards = np.zeros(settings.robots)
+        self._travelled = np.zeros(settings.robots)
+        self.coverage = 0.0
+        self.times: dict[float, float] = {}
+        self.curve: list[tuple[float, float]] = []
+        self.ended_because: dict[str, str] = {}
+        self._last_seen = -1
+
+    def start(self) -> None:
+        """Begin an episode with the scan taken at the start."""
+        self._rewards[:] = 0.0
+        self._travelled[:] = 0.0
+        self.times, self.curve, self.ended_because = {}, [], {}
+        self._last_seen = -1
+        self._note()
+
+    def advance(self) -> None:
+        """Take in one step of the world."""
+        world, weights = self._world, self._settings.reward
+        self._rewards += (
+            (weights.area * self._cell_area) * world.gains
+            - weights.time * self._settings.time_step
+            - weights.contact * world.contacts
+            - weights.energy * (world.travelled - self._travelled)
+        )
+        self._travelled[:] = world.travelled
+        self._note()
+
+    def _note(self) -> None:
+        seen = int(self._world.team_seen[0])
+        if seen == self._last_seen:
+            return
+        self._last_seen = seen
+        time = self.time
+        self.coverage = seen / max(int(self._world.counted[0]), 1)
+        self.curve.append((time, self.coverage))
+        for threshold in THRESHOLDS[len(self.times) :]:
+            if self.coverage < threshold:
+                break
+            self.times[threshold] = time
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._world.steps[0]) * self._settings.time_step
+
+    @property
+    def touched(self) -> NDArray[np.bool_]:
+        """Whether each robot touched something in the last step."""
+        return self._world.contacts != 0
+
+    def take_rewards(self) -> list[float]:
+        """Return each robot's reward since the last call, and begin anew."""
+        rewards: list[float] = self._rewards.tolist()
+        self._rewards[:] = 0.0
+        return rewards

@@ -1,0 +1,206 @@
+"""Every knob of the exploration environments, with its unit and default."""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.robots import ROBOTS, Robot
+from lidarium.mapping.occupancy import OccupancySettings
+
+MAX_ROBOTS = 64
+
+NOISE: dict[str, tuple[float, float]] = {"none": (0.0, 0.0), "datasheet": (0.01, 0.01), "thesis": (0.03, 0.0)}
+"""Names of the range noise: floor [m] and share of the range of its standard deviation."""
+
+LIDARS: dict[str, Lidar] = {
+    "urg": Lidar(),
+    "lidar_360_6m": Lidar(beams=180, field_of_view=2.0 * math.pi, range_max=6.0),
+    "lidar_360_20m": Lidar(beams=720, field_of_view=2.0 * math.pi, range_min=0.1, range_max=20.0),
+}
+"""Lasers by name: the URG-04LX-UG01 as simulated in the theses, and two that look all around."""
+
+LOCALIZATIONS = ("truth",)
+BACKENDS = ("kinematic",)
+LEVELS = ("velocity", "waypoint", "frontier")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RewardSettings:
+    """What a robot earns and pays.
+
+    Attributes
+    ----------
+    area : float
+        Per square metre of F that the team had not sensed, shared among the robots that sense it first [1/m2].
+    time : float
+        Price of a second [1/s].
+    contact : float
+        Price of a step in contact [1].
+    energy : float
+        Price of a metre driven [1/m].
+    """
+
+    area: float = 1.0
+    time: float = 0.01
+    contact: float = 0.1
+    energy: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name in ("area", "time", "contact", "energy"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"weight {name} of the reward is {getattr(self, name)}; want a finite number")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExplorationSettings:
+    """A team on a floor.
+
+    Attributes
+    ----------
+    robots : int
+        Number of robots, 1 to 64.
+    robot : Robot
+        The body of each.
+    lidar : Lidar
+        The laser of each.
+    occupancy : OccupancySettings
+        Their maps.
+    reward : RewardSettings
+        Weights of the reward.
+    known_starts : bool
+        Whether the robots know where they start; otherwise each believes to start at (0, 0, 0).
+    localization : str
+        Who says where the robot is: ``truth``.
+    backend : str
+        The world: ``kinematic``.
+    time_step : float
+        Simulated time of a step [s].
+    horizon_s : float or None
+        Simulated time after which the episode is truncated [s]; None for no horizon.
+    stop_coverage : float or None
+        Share of F at which all robots end as ``covered``; None for off.
+    stop_on_contact : bool
+        Whether a robot that touches anything ends as ``collision``.
+    goal_radius : float
+        Distance to the goal, where the floor has one, at which a robot ends as ``reached`` [m].
+    map_cells : int
+        Side of the map in the observation [cells], a multiple of 2.
+    raster_resolution : float
+        Side of a cell of the world's raster [m]; the maps' cell is a whole multiple of it.
+    decision_period_s : float
+        How long a waypoint or a frontier holds [s].
+    threads : int
+        Threads of the kernels; the result does not depend on it.
+    """
+
+    robots: int = 3
+    robot: Robot = field(default_factory=lambda: ROBOTS["kobuki"])
+    lidar: Lidar = field(default_factory=lambda: LIDARS["urg"])
+    occupancy: OccupancySettings = field(default_factory=OccupancySettings)
+    reward: RewardSettings = field(default_factory=RewardSettings)
+    known_starts: bool = True
+    localization: str = "truth"
+    backend: str = "kinematic"
+    time_step: float = 0.1
+    horizon_s: float | None = 600.0
+    stop_coverage: float | None = 0.99
+    stop_on_contact: bool = False
+    goal_radius: float = 0.3
+    map_cells: int = 256
+    raster_resolution: float = 0.025
+    decision_period_s: float = 2.0
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.robots, int) or not 1 <= self.robots <= MAX_ROBOTS:
+            raise ValueError(f"robots is {self.robots}; a team has 1 to {MAX_ROBOTS}")
+        if self.localization not in LOCALIZATIONS:
+            raise ValueError(f"localization is {self.localization!r}; want one of {', '.join(LOCALIZATIONS)}")
+        if self.backend not in BACKENDS:
+            raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(BACKENDS)}")
+        if not (math.isfinite(self.time_step) and self.time_step > 0.0):
+            raise ValueError(f"time_step is {self.time_step} s; want more than 0")
+        if self.horizon_s is not None and not self.horizon_s > 0.0:
+            raise ValueError(f"horizon_s is {self.horizon_s}; want more than 0 s, or None for no horizon")
+        if self.stop_coverage is not None and not 0.0 < self.stop_coverage <= 1.0:
+            raise ValueError(f"stop_coverage is {self.stop_coverage}; want a share in (0, 1], or None for off")
+        if self.map_cells < 2 or self.map_cells % 2:
+            raise ValueError(f"map_cells is {self.map_cells}; want an even number of at least 2")
+        if not (math.isfinite(self.raster_resolution) and self.raster_resolution > 0.0):
+            raise ValueError(f"raster_resolution is {self.raster_resolution} m; want more than 0")
+        multiple = self.occupancy.resolution / self.raster_resolution
+        if round(multiple) < 1 or abs(multiple - round(multiple)) > 1e-6:
+            raise ValueError(
+                f"resolution of the maps is {self.occupancy.resolution} m; want a whole multiple of raster_resolution {self.raster_resolution} m"
+            )
+        if self.decision_period_s < self.time_step:
+            raise ValueError(f"decision_period_s is {self.decision_period_s} s; want at least the time step of {self.time_step} s")
+        if self.threads < 1:
+            raise ValueError(f"threads is {self.threads}; want at least 1")
+
+    @property
+    def agents(self) -> list[str]:
+        """Names of the robots."""
+        return [f"robot_{robot}" for robot in range(self.robots)]
+
+    @property
+    def horizon_steps(self) -> int | None:
+        """Steps until the horizon, or None."""
+        return None if self.horizon_s is None else max(round(self.horizon_s / self.time_step), 1)
+
+    @property
+    def decision_steps(self) -> int:
+        """Steps of a decision period."""
+        return max(round(self.decision_period_s / self.time_step), 1)
+
+
+def make_settings(settings: ExplorationSettings | None = None, **options: Any) -> ExplorationSettings:  # noqa: ANN401
+    """Fill settings from the short options of ``lidarium.parallel_env``.
+
+    Parameters
+    ----------
+    settings : ExplorationSettings or None
+        Where to start from; the defaults where None.
+    **options
+        Any attribute of ``ExplorationSettings``; ``robot`` and ``lidar`` also by name, ``noise`` (none, datasheet or thesis)
+        for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps) in place of ``horizon_s``.
+
+    Returns
+    -------
+    ExplorationSettings
+        The settings.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Where an option has a bad value or is unknown.
+    """
+    base = settings or ExplorationSettings()
+    robot, lidar = options.pop("robot", base.robot), options.pop("lidar", base.lidar)
+    options["robot"] = _named("robot", robot, ROBOTS) if isinstance(robot, str) else robot
+    lidar = _named("lidar", lidar, LIDARS) if isinstance(lidar, str) else lidar
+    noise = options.pop("noise", None)
+    if noise is not None:
+        noise_floor, noise_share = _named("noise", noise, NOISE)
+        lidar = replace(lidar, noise_floor=noise_floor, noise_share=noise_share)
+    options["lidar"] = lidar
+    resolution = options.pop("resolution", None)
+    if resolution is not None:
+        options["occupancy"] = replace(options.get("occupancy", base.occupancy), resolution=resolution)
+    max_cycles = options.pop("max_cycles", None)
+    if max_cycles is not None:
+        if max_cycles < 1:
+            raise ValueError(f"max_cycles is {max_cycles}; want at least 1 step")
+        options["horizon_s"] = max_cycles * options.get("time_step", base.time_step)
+    known = ExplorationSettings.__dataclass_fields__
+    for name in options:
+        if name not in known:
+            raise TypeError(f"unknown option {name!r}; known are {', '.join(sorted([*known, 'noise', 'resolution', 'max_cycles']))}")
+    return replace(base, **options)
+
+
+def _named(kind: str, name: str, table: dict[str, Any]) -> Any:  # noqa: ANN401
+    if name not in table:
+        raise ValueError(f"unknown {kind} {name!r}; known are {', '.join(table)}")
+    return table[name]

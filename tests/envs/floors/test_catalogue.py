@@ -1,0 +1,130 @@
+"""The catalogue finds floors by name, seed and path, and its sets stay what they are."""
+
+import cv2
+import numpy as np
+import pytest
+
+from lidarium.envs.floors.catalogue import (
+    HASHED_FLOORS,
+    SETS,
+    about_floor,
+    describe_floor,
+    floor_names,
+    hash_of_floors,
+    load_floor,
+    set_floors,
+    set_sha256,
+)
+from lidarium.envs.floors.measures import measure_building
+from lidarium.envs.floors.starts import check_starts, configuration_space
+
+SCENES = ("scene_loop", "scene_corridor", "scene_corner", "scene_room", "scene_loop_corridor", "scene_room_corner")
+
+
+def test_the_catalogue_holds_the_apartment_the_clinic_and_six_scenes():
+    assert set(floor_names()) == {"apartment", "clinic", *SCENES}
+    assert all(about_floor(name).endswith(".") for name in floor_names())
+
+
+@pytest.mark.parametrize("name", floor_names())
+def test_every_drawn_floor_is_one_piece_for_the_largest_robot_with_three_starts(name):
+    floor = load_floor(name)
+    assert floor.name == name
+    assert floor.starts.shape == (3, 3)
+    assert floor.goal is not None
+    for resolution in (0.05, 0.025):
+        for height in (0.5, 2.0):
+            raster = floor.raster(resolution, 0.0, height)
+            space = configuration_space(raster, 0.30)
+            assert cv2.connectedComponents(space.astype(np.uint8), connectivity=4)[0] - 1 == 1
+            check_starts(raster, 0.5, floor.starts)
+            check_starts(raster, 0.30, np.array([[*floor.goal, 0.0]]))
+
+
+def test_the_indoor_floors_are_as_large_as_they_say():
+    assert measure_building(load_floor("apartment")).area_m2 == pytest.approx(65.0, abs=2.0)
+    assert measure_building(load_floor("clinic")).area_m2 > 65.0
+    assert all(load_floor(name).bounds == (0.0, 0.0, 25.0, 25.0) for name in SCENES)
+
+
+def test_what_the_scenes_promise_is_measured():
+    loops = {name: measure_building(load_floor(name)).loops for name in SCENES}
+    assert loops["scene_loop"] == 1
+    assert loops["scene_loop_corridor"] >= 3
+    assert all(count >= 3 for name, count in loops.items() if name != "scene_loop")
+
+
+def test_generated_floors_are_found_by_kind_and_seed():
+    for kind in ("apartment", "office", "corridors"):
+        assert load_floor(f"{kind}:7").name == f"{kind}:7"
+    assert load_floor("building:7").name.endswith(":7")
+    assert load_floor("building:7") is load_floor("building:7")
+    assert load_floor("building:7").sha256 != load_floor("building:8").sha256
+
+
+def test_a_floor_is_returned_as_it_is():
+    floor = load_floor("scene_loop")
+    assert load_floor(floor) is floor
+
+
+def test_an_unknown_name_is_answered_with_the_nearest_one_and_the_list():
+    with pytest.raises(ValueError, match="did you mean 'apartment'") as caught:
+        load_floor("apartmant")
+    assert all(name in str(caught.value) for name in floor_names())
+    with pytest.raises(ValueError, match="no floor called"):
+        load_floor("")
+
+
+@pytest.mark.parametrize("seed", ["", "x", "-1", "1.5"])
+def test_a_seed_that_is_no_number_is_refused(seed):
+    with pytest.raises(ValueError, match="want a whole number"):
+        load_floor(f"building:{seed}")
+
+
+def test_a_set_is_refused_where_one_floor_is_wanted():
+    with pytest.raises(ValueError, match="set_floors"):
+        load_floor("set:train")
+
+
+def test_a_resolution_belongs_to_files_only():
+    with pytest.raises(ValueError, match="resolution"):
+        load_floor("apartment", resolution=0.05)
+
+
+def test_paths_go_to_the_importers(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        load_floor(str(tmp_path / "nothing.png"))
+    with pytest.raises(FileNotFoundError):
+        load_floor("nothing.yaml")
+
+
+def test_an_image_of_the_dungeons_is_loaded_by_its_path(shared_data):
+    image = next(iter(sorted(shared_data.rglob("*dungeon*/**/*.png"))), None)
+    if image is None:
+        pytest.skip("no dungeon image in the real data")
+    assert load_floor(image).cells is not None
+
+
+def test_sets_are_disjoint_and_of_the_promised_sizes():
+    specs = {name: set_floors(name) for name in SETS}
+    assert {name: len(floors) for name, floors in specs.items()} == {"train": 10_000, "validation": 200, "test": 200}
+    assert len(set().union(*specs.values())) == 10_400
+    assert set_floors("set:test") == specs["test"]
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_floors_of_a_set_are_those_whose_hash_is_kept(name):
+    assert hash_of_floors(set_floors(name)[:HASHED_FLOORS]) == set_sha256(name)
+
+
+def test_an_unknown_set_is_answered_with_the_nearest_one():
+    with pytest.raises(ValueError, match="did you mean 'validation'"):
+        set_floors("validate")
+
+
+def test_a_description_holds_the_figures_of_a_floor():
+    described = describe_floor(load_floor("apartment"))
+    assert described["size_m"] == [11.8, 8.4]
+    assert described["rooms"] == 7
+    assert described["loops"] == 2
+    assert described["sha256"] == load_floor("apartment").sha256
