@@ -195,8 +195,17 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         np.clip(self._commands, -1.0, 1.0, out=self._commands)
         if np.isnan(self._commands).any():
             raise ValueError(f"an action is nan ({actions}); want two numbers within [-1, 1] for each agent")
-        self.world.step(self._commands * self._limits)
+        self.drive_at(self._commands * self._limits)
+
+    def drive_at(self, commands: NDArray[np.float64]) -> None:
+        """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s], without building observations."""
+        self.world.step(commands)
         self.scorer.advance()
+
+    @property
+    def stopping(self) -> dict[str, str]:
+        """Agents that end at the next outcome, with the reasons that their policies gave."""
+        return dict(self._stopping)
 
     def outcome(
         self,
@@ -236,6 +245,16 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         steps = int(self.world.steps[0])
         return (horizon is not None and steps >= horizon) or (cover is not None and self.scorer.coverage >= cover)
 
+    def has_event(self) -> bool:
+        """Whether the next outcome ends some agent for what happened to it (the goal reached, a collision)."""
+        settings = self.settings
+        is_at_goal = self.goal is not None and any(self._is_at_goal(self._rows[agent]) for agent in self.agents)
+        return is_at_goal or (settings.stop_on_contact and bool(self.scorer.touched.any()))
+
+    def _is_at_goal(self, row: int) -> bool:
+        assert self.goal is not None
+        return bool(np.hypot(*(self.world.poses[row, :2] - self.goal)) <= self.settings.goal_radius)
+
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason that its policy gives (such as ``no_frontier``)."""
         if agent not in self.agents:
@@ -251,7 +270,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._stopping.clear()
         if self.goal is not None:
             for agent in live:
-                if np.hypot(*(self.world.poses[self._rows[agent], :2] - self.goal)) <= settings.goal_radius:
+                if self._is_at_goal(self._rows[agent]):
                     endings[agent] = "reached"
         if settings.stop_on_contact and self.scorer.touched.any():
             endings |= {agent: "collision" for agent in live if self.scorer.touched[self._rows[agent]]}

@@ -8,6 +8,8 @@ from lidarium.envs.simulation.kinematic import KinematicWorld
 
 THRESHOLDS = (0.85, 0.90, 0.95, 0.99)
 
+TRACK_PERIOD_S = 0.2
+
 
 class Scorer:
     """Tally of one episode.
@@ -27,6 +29,8 @@ class Scorer:
         Simulated time at which each threshold of coverage was reached [s].
     curve : list of (time [s], coverage)
         Coverage over time, at every change.
+    track : list of (time [s], (robots, 3) float64)
+        True poses, five times a second.
     touched : (robots,) bool
         Whether each robot touched something in the last step.
     ended_because : dict
@@ -41,14 +45,16 @@ class Scorer:
         self.coverage = 0.0
         self.times: dict[float, float] = {}
         self.curve: list[tuple[float, float]] = []
+        self.track: list[tuple[float, NDArray[np.float64]]] = []
         self.ended_because: dict[str, str] = {}
         self._last_seen = -1
+        self._track_steps = max(round(TRACK_PERIOD_S / settings.time_step), 1)
 
     def start(self) -> None:
         """Begin an episode with the scan taken at the start."""
         self._rewards[:] = 0.0
         self._travelled[:] = 0.0
-        self.times, self.curve, self.ended_because = {}, [], {}
+        self.times, self.curve, self.track, self.ended_because = {}, [], [], {}
         self._last_seen = -1
         self._note()
 
@@ -65,6 +71,8 @@ class Scorer:
         self._note()
 
     def _note(self) -> None:
+        if int(self._world.steps[0]) % self._track_steps == 0:
+            self.track.append((self.time, self._world.poses.copy()))
         seen = int(self._world.team_seen[0])
         if seen == self._last_seen:
             return

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.floor import Floor, Solid
+from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.floors.furnishing import Furnished, furnish
 from lidarium.envs.floors.layouts import Proportions, apartment_layout, corridor_layout, office_layout
 from lidarium.envs.floors.plans import (
@@ -225,13 +225,13 @@ def _passable(
     while True:
         blocks = walls + tuple(_solid(piece.footprint, 1.0) for piece in furniture)
         raster = Floor("check", bounds, blocks).raster(resolution, 0.0, 0.5)
-        space = configuration_space(raster, ROBOT_RADIUS + MARGIN)
-        count, parts, stats, _ = cv2.connectedComponentsWithStats(space.astype(np.uint8), connectivity=4)
-        largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])) if count > 1 else 0
+        space, reachable = _space(raster, ROBOT_RADIUS + MARGIN)
+        tight, tight_reachable = _space(raster, ROBOT_RADIUS)
         room = _room_of_cells(labels, raster.solid.shape, raster.origin, resolution)
-        reached = np.bincount(room[(parts == largest) & (room >= 0)], minlength=int(labels.max()) + 1) > 0
+        reached = np.bincount(room[reachable & (room >= 0)], minlength=int(labels.max()) + 1) > 0
         missed = {k for k, area in enumerate(room_areas(labels)) if area > 0 and not reached[k]}
-        stray = (parts > 0) & (parts != largest)
+        # With the margin passages are wide enough; without it nooks appear that are cut off.
+        stray = (space & ~reachable) | (tight & ~tight_reachable)
         if not missed and not stray.any():
             clear = configuration_space(raster, START_CLEARANCE + MARGIN)
             return furniture, clear if clear.any() else space, raster.origin
@@ -239,6 +239,14 @@ def _passable(
             return None
         guilty = _guilty(furniture, stray, missed, raster.origin)
         furniture = furniture[:guilty] + furniture[guilty + 1 :]
+
+
+def _space(raster: Raster, radius: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return where a disc fits, and the largest connected part of that."""
+    space = configuration_space(raster, radius)
+    count, parts, stats, _ = cv2.connectedComponentsWithStats(space.astype(np.uint8), connectivity=4)
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])) if count > 1 else -1
+    return space, np.asarray(parts == largest)
 
 
 def _guilty(furniture: list[Furnished], stray: NDArray[np.bool_], missed: set[int], origin: tuple[float, float]) -> int:

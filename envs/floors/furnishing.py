@@ -5,7 +5,9 @@ is covered. Two pieces stand side by side along one wall or leave room for a rob
 """
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,9 @@ ATTEMPTS = 10
 
 SMALLEST_M2 = 0.1
 """Furnishing ends when less than this is left to cover [m²]."""
+
+FULL = 4
+"""Pieces in a row without a place after which a room counts as full."""
 
 FREE = frozenset({"desk group", "desk pair", "dining table", "low table", "meeting table", "table"})
 """Pieces that stand free in a room."""
@@ -88,9 +93,10 @@ def furnish(
     places = _Places(labels, doors, wall_thickness)
     budget = clutter * float(areas.sum())
     placed: list[Furnished] = []
+    misses = [0] * len(wishes)
     for turn in range(2 * max(len(wish) for wish in wishes)):
         for room in generator.permutation(len(wishes)):
-            if areas[room] == 0.0 or budget < SMALLEST_M2:
+            if areas[room] == 0.0 or budget < SMALLEST_M2 or misses[room] == FULL:
                 continue
             first, rest = wishes[room][: len(wishes[room]) // 2], wishes[room][len(wishes[room]) // 2 :]
             name = first[turn] if turn < len(first) else rest[(turn - len(first)) % len(rest)]
@@ -98,6 +104,7 @@ def furnish(
             if width * depth / 2 > budget:
                 continue
             found = places.draw(int(room), name, width, depth, generator)
+            misses[room] = 0 if found is not None else misses[room] + 1
             if found is not None:
                 placed.append(found)
                 budget -= width * depth
@@ -191,11 +198,12 @@ class _Places:
         walls = [wall for wall in self._walls[room] if wall[0].length >= width + 0.2]
         if not walls:
             return None
-        lengths = np.array([wall[0].length for wall in walls])
-        boundary, above = walls[int(generator.choice(len(walls), p=lengths / lengths.sum()))]
+        # Longer walls are taken more often: a point is drawn on all of them laid end to end.
+        ends = list(accumulate(wall[0].length for wall in walls))
+        boundary, above = walls[bisect_left(ends, generator.random() * ends[-1])]
         offset = self._half_wall + 0.02 if boundary.low >= 0 and boundary.high >= 0 else 0.02
         slack = boundary.length - width - 2 * (self._half_wall + 0.02)
-        share = float(generator.choice((0.0, 1.0, generator.random()), p=(0.25, 0.25, 0.5)))
+        share = min(max(2.0 * generator.random() - 0.5, 0.0), 1.0)
         start = boundary.start + self._half_wall + 0.02 + slack * share
         if above:
             rectangle = boundary.rectangle(start, start + width, -offset, offset + depth)

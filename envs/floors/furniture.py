@@ -1,7 +1,8 @@
 """Furniture: pieces as solids with heights, so that a laser sees the legs of a table and a tall body meets its top.
 
 A piece is described in its own frame: x to the right of who looks at it, y from its front (0) to its back (depth), which
-stands against a wall. Parts are boxes ``(x_low, y_low, x_high, y_high, z_low, z_high)``.
+stands against a wall. Seats and low tables are closed down to the floor: what a low robot (below 0.6 m) would touch, a laser
+at 0.3 m sees; table tops, desks and basins meet taller bodies only. Parts are boxes ``(x_low, y_low, x_high, y_high, z_low, z_high)``.
 """
 
 import math
@@ -51,24 +52,20 @@ def _table(width: float, depth: float) -> list[Box]:
 
 
 def _low_table(width: float, depth: float) -> list[Box]:
-    return [(0.0, 0.0, width, depth, 0.40, 0.44), *_legs(0.02, 0.02, width - 0.04, depth - 0.04, 0.05, 0.40)]
+    return [(0.0, 0.0, width, depth, 0.0, 0.44)]
 
 
 def _chair(width: float, depth: float, x: float = 0.0, y: float = 0.0, back_high: bool = True) -> list[Box]:
     back = y + depth - 0.04 if back_high else y
     return [
-        (x, y, x + width, y + depth, 0.42, 0.46),
-        *_legs(x, y, width, depth, 0.04, 0.42),
+        (x, y, x + width, y + depth, 0.0, 0.46),
         (x, back, x + width, back + 0.04, 0.46, 0.90),
     ]
 
 
 def _office_chair(width: float, depth: float, x: float = 0.0, y: float = 0.0) -> list[Box]:
-    middle_x, middle_y = x + width / 2, y + depth / 2
     return [
-        (x, y, x + width, y + depth, 0.0, 0.08),
-        (middle_x - 0.03, middle_y - 0.03, middle_x + 0.03, middle_y + 0.03, 0.08, 0.44),
-        (x + 0.05, y + 0.05, x + width - 0.05, y + depth - 0.05, 0.44, 0.52),
+        (x, y, x + width, y + depth, 0.0, 0.52),
         (x + 0.05, y, x + width - 0.05, y + 0.06, 0.60, 1.05),
     ]
 
@@ -133,15 +130,14 @@ def _sofa(width: float, depth: float) -> list[Box]:
 
 
 def _bench(width: float, depth: float) -> list[Box]:
-    return [(0.0, 0.0, width, depth, 0.42, 0.47), *_legs(0.05, 0.03, width - 0.1, depth - 0.06, 0.05, 0.42)]
+    return [(0.0, 0.0, width, depth, 0.0, 0.47)]
 
 
 def _seats(width: float, depth: float) -> list[Box]:
     """Make a row of waiting-room chairs on one rail."""
     return [
-        (0.0, 0.0, width, depth, 0.42, 0.46),
+        (0.0, 0.0, width, depth, 0.0, 0.46),
         (0.0, depth - 0.05, width, depth, 0.46, 0.85),
-        *_legs(0.1, 0.05, width - 0.2, depth - 0.1, 0.05, 0.42),
     ]
 
 

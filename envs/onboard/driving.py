@@ -34,8 +34,11 @@ FACING = 0.1
 STANDSTILL = 0.006
 """Gap to a return at which a robot stands [m]."""
 
-MATE_GAP = 0.04
+MATE_GAP = 0.03
 """Gap that robots keep to each other [m]."""
+
+LEAST_MATE_GAP = 0.004
+"""Gap that they keep in passing where they stand nearer than that already [m]."""
 
 FORESIGHT = (0.0, 0.4, 0.8)
 """How far ahead the robot with the higher number looks where another will be [s]."""
@@ -72,7 +75,9 @@ def _gap_to_mates(robot, poses, velocities, radii, foresight, present):  # noqa:
     for other in range(poses.shape[0]):
         if other == robot or present[other] == 0:
             continue
-        reach = radii[robot] + radii[other] + MATE_GAP
+        touching = radii[robot] + radii[other]
+        distance = math.hypot(poses[other, 0] - poses[robot, 0], poses[other, 1] - poses[robot, 1])
+        reach = min(touching + MATE_GAP, max(distance - 0.002, touching + LEAST_MATE_GAP))
         for k in range(foresight.shape[0]):
             if k > 0 and other > robot:
                 break

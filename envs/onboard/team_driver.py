@@ -32,6 +32,9 @@ PREFERRED_MARGIN = 0.15
 DETOUR = 4.0
 """A robot that a teammate blocks drives round it where that costs at most this much more [m]."""
 
+MATE_DISTANCE = 0.06
+"""Paths round teammates keep this gap to them [m]."""
+
 NEAR = 0.6
 """Teammates within this gap may be what blocks a robot [m]."""
 
@@ -164,7 +167,7 @@ class TeamDriver:
     def _discs(self, row: int, others: list[int]) -> list[Disc]:
         """Return the bodies of others as discs that this robot's centre must not enter, in cells."""
         believed = self._perception.world.believed
-        discs = [(believed[other, 0], believed[other, 1], self._radii[row] + self._radii[other] + 0.03) for other in others]
+        discs = [(believed[other, 0], believed[other, 1], self._radii[row] + self._radii[other] + MATE_DISTANCE) for other in others]
         return discs_of(discs, self._origin(row), self._settings.occupancy.resolution)
 
     def _standing(self, row: int) -> list[int]:
@@ -310,7 +313,7 @@ class TeamDriver:
         others = [other for other in range(self._settings.robots) if other != row]
         cell = find_refuge(
             navigation, self._origin(row), self._cell(row), self._footprint, self._discs(row, others), self._remaining(to),
-            float(self._radii[row] + self._radii[to]) + 0.06,
+            float(self._radii[row] + self._radii[to]) + MATE_DISTANCE + 0.02,
         )  # fmt: skip
         if cell is None or not self._drive_to(row, cell, others):
             return False

@@ -1,3 +1,97 @@
-"""lidarium: teams of lidar robots explore unknown floors."""
+"""lidarium: teams of lidar robots explore unknown floors.
+
+``parallel_env`` makes the PettingZoo environment, ``env`` its turn-based form, and after ``import lidarium`` Gymnasium knows
+``lidarium/Exploration-v0``, ``lidarium/WaypointExploration-v0`` and ``lidarium/FrontierExploration-v0``.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import pettingzoo
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pettingzoo import AECEnv, ParallelEnv
+
+    from lidarium.agents.policy import Policy
+    from lidarium.envs.floors.floor import Floor
+    from lidarium.envs.settings import ExplorationSettings
 
 __version__ = "0.1.0"
+
+_LEVELS = {"Exploration": "velocity", "WaypointExploration": "waypoint", "FrontierExploration": "frontier"}
+
+for _name, _level in _LEVELS.items():
+    if f"lidarium/{_name}-v0" not in gymnasium.registry:
+        gymnasium.register(
+            id=f"lidarium/{_name}-v0", entry_point="lidarium.envs.solo:SoloExploration", kwargs={"level": _level}
+        )
+        pettingzoo.register("parallel", f"lidarium/{_name}-v0", entry_point="lidarium:parallel_env", kwargs={"level": _level})
+        pettingzoo.register("aec", f"lidarium/{_name}-v0", entry_point="lidarium:env", kwargs={"level": _level})
+
+
+def parallel_env(
+    floor: "str | Path | Floor" = "apartment",
+    *,
+    level: str = "velocity",
+    settings: "ExplorationSettings | None" = None,
+    render_mode: str | None = None,
+    image_resolution: float | None = None,
+    **options: Any,  # noqa: ANN401
+) -> "ParallelEnv[str, Any, Any]":
+    """Make a team's environment (PettingZoo parallel API).
+
+    Parameters
+    ----------
+    floor : str, Path or Floor
+        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor.
+    level : str
+        What an action is: ``velocity`` (shares of the greatest speed and turn rate), ``waypoint`` (a point of the observed
+        map) or ``frontier`` (one of the frontiers in reach).
+    settings : ExplorationSettings or None
+        Where the options start from.
+    render_mode : str or None
+        ``human``, ``rgb_array`` or None.
+    image_resolution : float or None
+        Side of a pixel [m] where the floor is a plain image.
+    **options
+        Any attribute of ``ExplorationSettings``, such as ``robots=3`` or ``horizon_s=None``; ``robot`` and ``lidar`` by name;
+        ``noise`` (none, datasheet, thesis), ``resolution`` of the maps [m], ``max_cycles`` [steps].
+
+    Returns
+    -------
+    ParallelEnv
+        The environment.
+
+    Raises
+    ------
+    ValueError, TypeError, FileNotFoundError
+        Where an option or the floor cannot be used.
+    """
+    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.settings import make_settings
+    from lidarium.envs.solo import at_level
+
+    return at_level(ExplorationEnv(floor, make_settings(settings, **options), render_mode, image_resolution), level)
+
+
+def env(floor: "str | Path | Floor" = "apartment", **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401
+    """Make a team's environment in PettingZoo's turn-based form; options as for ``parallel_env``."""
+    from pettingzoo.utils.conversions import parallel_to_aec
+
+    converted: AECEnv[str, Any, Any] = parallel_to_aec(parallel_env(floor, **options))
+    return converted
+
+
+def policy(name: str, **settings: Any) -> "Policy":  # noqa: ANN401
+    """Make a policy by name, such as ``nearest_frontier``; ``lidarium show policies`` lists them.
+
+    Raises
+    ------
+    ValueError
+        Where the name is unknown; the message suggests the nearest one.
+    """
+    from lidarium.agents import make_policy
+
+    return make_policy(name, **settings)

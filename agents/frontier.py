@@ -1,0 +1,343 @@
+"""Explorers that drive to frontiers: the nearest one, the one of greatest utility for the team, the one of least cost.
+
+They share everything but the choice. A robot keeps its target while the frontier there stands; having come near and turned
+to it, what still is frontier there cannot be seen and is given up by name. A robot without a frontier in reach stays idle
+and gives way; all stop together when none has work, each with its reason.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.policy import Action, GivenUp, Stop, Team
+from lidarium.envs.exploration import Observation
+from lidarium.envs.onboard.perception import NavigationMap
+from lidarium.envs.onboard.state import DriveState, Target
+from lidarium.envs.onboard.team_driver import footprint_of
+from lidarium.mapping.frontier_approach import approach, default_reach, nearest_frontier
+from lidarium.mapping.frontiers import FRONTIER, Clusters
+from lidarium.mapping.grid_lines import visible
+from lidarium.mapping.grid_planning import Cell, Footprint, cells_of, centres_of, search
+
+PATIENCE_S = 20.0
+"""A robot that has not moved for this long while its target stands gives the frontier there up [s]."""
+
+MOVED = 0.15
+"""What counts as having moved [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Where a robot goes: the cell to stand in, and the frontier cell to look at."""
+
+    cell: Cell
+    frontier_cell: Cell
+
+
+@dataclass(slots=True)
+class _Work:
+    """What a robot is at."""
+
+    choice: Choice | None = None
+    since_s: float = 0.0
+    place: tuple[float, float] = (math.inf, math.inf)
+
+
+class FrontierExplorer:
+    """What the frontier explorers share; a subclass chooses.
+
+    Parameters
+    ----------
+    shares_map : bool
+        Whether robots explore on the team's map, where it reaches them, or each on its own.
+    """
+
+    level = "waypoint"
+
+    def __init__(self, shares_map: bool = True) -> None:
+        self.shares_map = shares_map
+        self.given_up: list[GivenUp] = []
+
+    def reset(self, team: Team, seed: int) -> None:  # noqa: ARG002 (nothing is drawn)
+        """Begin an episode."""
+        self.team = team
+        self.given_up = []
+        self._work = {agent: _Work() for agent in team.agents}
+        radius = team.belief(team.agents[0]).radius
+        self.footprint: Footprint = footprint_of(radius)
+
+    def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
+        """Send every robot to its frontier, or to rest where it has none."""
+        agents = list(observations)
+        for agent in agents:
+            self._review(agent)
+        open_agents = [agent for agent in agents if self._work[agent].choice is None]
+        if open_agents or self.replans():
+            chosen = self.choose(agents, open_agents)
+            for agent, choice in chosen.items():
+                if choice != self._work[agent].choice:
+                    self._begin(agent, choice)
+        if all(self._work[agent].choice is None for agent in agents):
+            return {agent: Stop(self._reason(agent)) for agent in agents}
+        return {agent: self._target(agent) for agent in agents}
+
+    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
+        """Choose for the agents that need a target, or for all; the others keep theirs."""
+        raise NotImplementedError
+
+    def replans(self) -> bool:
+        """Whether all choices are reconsidered now, although every robot has one."""
+        return False
+
+    def navigation(self, agent: str) -> NavigationMap:
+        """Return the map that an agent explores on."""
+        belief = self.team.belief(agent)
+        shared = belief.shared_map if self.shares_map else None
+        return shared if shared is not None else belief.map
+
+    def start_cell(self, agent: str) -> Cell:
+        """Return the cell in which an agent believes to stand."""
+        belief = self.team.belief(agent)
+        row, column = cells_of(belief.pose[:2], belief.map_origin, self.navigation(agent).resolution)
+        return int(row), int(column)
+
+    def current(self, agent: str) -> Choice | None:
+        """Return an agent's choice."""
+        return self._work[agent].choice
+
+    def _begin(self, agent: str, choice: Choice | None) -> None:
+        pose = self.team.belief(agent).pose
+        self._work[agent] = _Work(choice, self.team.time_s, (float(pose[0]), float(pose[1])))
+
+    def _review(self, agent: str) -> None:
+        """Drop a choice whose frontier is gone, and give up what cannot be seen or reached."""
+        work = self._work[agent]
+        if work.choice is None:
+            return
+        navigation = self.navigation(agent)
+        if not self.still_stands(navigation, work.choice):
+            work.choice = None
+            return
+        state = self.team.drive_state(agent)
+        if state is DriveState.ARRIVED:
+            self._give_up_around(agent, work.choice, "unseen")
+            work.choice = None
+            return
+        if state is DriveState.NO_PATH:
+            # The map has changed since the choice: choose anew, and give up what is chosen again without a way.
+            if self.team.time_s - work.since_s > PATIENCE_S:
+                self._give_up_around(agent, work.choice, "blocked")
+            work.choice = None
+            return
+        pose = self.team.belief(agent).pose
+        if state is DriveState.GIVING_WAY or math.dist(pose[:2], work.place) > MOVED:
+            work.since_s, work.place = self.team.time_s, (float(pose[0]), float(pose[1]))
+        elif self.team.time_s - work.since_s > PATIENCE_S:
+            self._give_up_around(agent, work.choice, "no_progress")
+            work.choice = None
+
+    def still_stands(self, navigation: NavigationMap, choice: Choice) -> bool:
+        """Whether the frontier of a choice is still one."""
+        return bool(navigation.frontiers.flags[choice.frontier_cell] == FRONTIER)
+
+    def _give_up_around(self, agent: str, choice: Choice, reason: str) -> None:
+        """Ignore the frontier cells near the one looked at, and say so."""
+        navigation, belief = self.navigation(agent), self.team.belief(agent)
+        cells = navigation.frontiers.cells()
+        reach = default_reach(self.footprint, navigation.resolution) / navigation.resolution
+        gaps = np.hypot(*(cells - np.asarray(choice.frontier_cell)).T)
+        near = cells[gaps <= reach] if len(cells) else np.asarray([choice.frontier_cell])
+        navigation.frontiers.ignore(near)
+        x, y = centres_of(np.asarray(choice.frontier_cell), belief.map_origin, navigation.resolution)
+        self.given_up.append(GivenUp(agent, float(x), float(y), len(near) * navigation.resolution, reason))
+
+    def _target(self, agent: str) -> Target | None:
+        choice = self._work[agent].choice
+        if choice is None:
+            return None
+        belief, resolution = self.team.belief(agent), self.navigation(agent).resolution
+        x, y = centres_of(np.asarray(choice.cell), belief.map_origin, resolution)
+        return Target(float(x), float(y), self._heading(agent, choice))
+
+    def _heading(self, agent: str, choice: Choice) -> float:
+        """Return the heading from where a robot will stand to what is unknown beside the frontier cell."""
+        row, column = choice.frontier_cell
+        log_odds = self.navigation(agent).log_odds
+        beside = [
+            (row + i, column + j)
+            for i, j in ((0, 1), (1, 0), (0, -1), (-1, 0))
+            if 0 <= row + i < log_odds.shape[0] and 0 <= column + j < log_odds.shape[1] and log_odds[row + i, column + j] == 0
+        ]
+        towards = np.mean(beside, axis=0) if beside else np.asarray(choice.frontier_cell)
+        return math.atan2(towards[0] - choice.cell[0], towards[1] - choice.cell[1])
+
+    def _reason(self, agent: str) -> str:
+        """Say why an agent has no work, and name what is left."""
+        navigation, belief = self.navigation(agent), self.team.belief(agent)
+        clusters = navigation.frontiers.clusters(belief.map_origin)
+        if not len(clusters):
+            return "no_frontier"
+        found = search(navigation.space, navigation.log_odds, navigation.clearance, self.start_cell(agent), self.footprint)
+        left = approach(clusters, found, navigation.log_odds, default_reach(self.footprint, navigation.resolution))
+        known = {(entry.x, entry.y) for entry in self.given_up}
+        for k, reason in enumerate(left.reasons):
+            x, y = (float(value) for value in clusters.centroids[k])
+            if (x, y) not in known and reason:
+                self.given_up.append(GivenUp(agent, x, y, float(clusters.sizes[k]), reason))
+        return "frontier_unreachable"
+
+
+class NearestFrontier(FrontierExplorer):
+    """Each robot drives to the frontier that costs it least (Yamauchi 1997; 1998 with a shared map)."""
+
+    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:  # noqa: ARG002
+        """Choose the nearest frontier for each open agent."""
+        return {agent: self._nearest(agent) for agent in open_agents}
+
+    def _nearest(self, agent: str) -> Choice | None:
+        navigation = self.navigation(agent)
+        found = nearest_frontier(
+            navigation.frontiers, navigation.space, navigation.log_odds, navigation.clearance, self.start_cell(agent), self.footprint
+        )
+        return None if found is None else Choice(found.cell, found.frontier_cell)
+
+
+def _reaches(
+    explorer: FrontierExplorer, agent: str, clusters: Clusters, navigation: NavigationMap
+) -> tuple[NDArray[np.float64], list[Choice | None]]:
+    """Return what each cluster costs an agent to come near (inf where it cannot), and where it would stand."""
+    found = search(navigation.space, navigation.log_odds, navigation.clearance, explorer.start_cell(agent), explorer.footprint)
+    near = approach(clusters, found, navigation.log_odds, default_reach(explorer.footprint, navigation.resolution))
+    costs = np.where(near.reachable, near.costs, math.inf)
+    choices = [
+        Choice((int(cell[0]), int(cell[1])), (int(seen[0]), int(seen[1]))) if ok else None
+        for cell, seen, ok in zip(near.cells, near.frontier_cells, near.reachable, strict=True)
+    ]
+    return costs, choices
+
+
+class ExploreLite(FrontierExplorer):
+    """Each robot drives to the frontier of least cost: distance less size, as explore_lite weighs them, both in metres.
+
+    Parameters
+    ----------
+    potential_scale, gain_scale : float
+        Weights of the distance to the frontier and of its size [1/m].
+    minimum_size : float
+        Frontiers shorter than this are taken only when no longer one is in reach [m].
+    period_s : float
+        Time between reconsiderations [s].
+    shares_map : bool
+        Whether robots explore on the team's map.
+    """
+
+    def __init__(
+        self,
+        potential_scale: float = 3.0,
+        gain_scale: float = 1.0,
+        minimum_size: float = 0.75,
+        period_s: float = 3.0,
+        shares_map: bool = True,
+    ) -> None:
+        super().__init__(shares_map)
+        self._potential_scale, self._gain_scale = potential_scale, gain_scale
+        self._minimum_size, self._period_s = minimum_size, period_s
+        self._last_s = -math.inf
+
+    def reset(self, team: Team, seed: int) -> None:
+        """Begin an episode."""
+        super().reset(team, seed)
+        self._last_s = -math.inf
+
+    def replans(self) -> bool:
+        """Whether the period is over."""
+        return self.team.time_s - self._last_s >= self._period_s
+
+    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
+        """Choose the frontier of least cost."""
+        if self.replans():
+            self._last_s = self.team.time_s
+            open_agents = agents
+        return {agent: self._cheapest(agent) for agent in open_agents}
+
+    def _cheapest(self, agent: str) -> Choice | None:
+        navigation = self.navigation(agent)
+        clusters = navigation.frontiers.clusters(self.team.belief(agent).map_origin)
+        if not len(clusters):
+            return None
+        distances, choices = _reaches(self, agent, clusters, navigation)
+        costs = self._potential_scale * distances - self._gain_scale * clusters.sizes
+        long_enough = np.where(clusters.sizes >= self._minimum_size, costs, math.inf)
+        ranked = long_enough if np.isfinite(long_enough).any() else costs
+        best = int(np.argmin(ranked))
+        return choices[best] if math.isfinite(ranked[best]) else None
+
+
+class UtilityFrontier(FrontierExplorer):
+    """The team shares its frontiers out by utility less cost (Burgard, Moors, Stachniss, Schneider 2005).
+
+    Every frontier has utility 1; when a robot takes one, the utility of the others falls with the chance that they are seen
+    from there: 1 less their distance over the laser's range, where there is a line of sight.
+
+    Parameters
+    ----------
+    cost_weight : float
+        Utility that a metre of way costs [1/m].
+    sensor_range : float
+        Range within which a target sees other frontiers [m].
+    minimum_size : float
+        Frontiers shorter than this are taken only when no longer one is left for a robot [m].
+    shares_map : bool
+        Whether robots explore on the team's map.
+    """
+
+    def __init__(
+        self, cost_weight: float = 0.05, sensor_range: float = 5.6, minimum_size: float = 0.2, shares_map: bool = True
+    ) -> None:
+        super().__init__(shares_map)
+        self._cost_weight, self._range, self._minimum_size = cost_weight, sensor_range, minimum_size
+
+    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
+        """Assign frontiers to all robots anew, best pair first."""
+        if not self._are_together(agents):
+            return {agent: self._assign([agent])[agent] for agent in open_agents}
+        return self._assign(agents)
+
+    def _are_together(self, agents: list[str]) -> bool:
+        first = self.navigation(agents[0])
+        return all(self.navigation(agent) is first for agent in agents)
+
+    def _assign(self, agents: list[str]) -> dict[str, Choice | None]:
+        navigation = self.navigation(agents[0])
+        origin = self.team.belief(agents[0]).map_origin
+        clusters = navigation.frontiers.clusters(origin)
+        chosen: dict[str, Choice | None] = dict.fromkeys(agents)
+        if not len(clusters):
+            return chosen
+        reaches = {agent: _reaches(self, agent, clusters, navigation) for agent in agents}
+        utility = np.where(clusters.sizes >= self._minimum_size, 1.0, 0.25)
+        waiting = list(agents)
+        while waiting:
+            values = {agent: utility - self._cost_weight * reaches[agent][0] for agent in waiting}
+            agent = max(waiting, key=lambda name: (float(values[name].max()), -waiting.index(name)))
+            best = int(np.argmax(values[agent]))
+            waiting.remove(agent)
+            if not math.isfinite(values[agent][best]):
+                continue
+            choice = reaches[agent][1][best]
+            chosen[agent] = choice
+            if choice is not None:
+                utility = utility - self._seen_share(clusters, clusters.representatives[best], navigation)
+                utility[best] = min(utility[best], -1.0)
+        return chosen
+
+    def _seen_share(self, clusters: Clusters, target: NDArray[np.int64], navigation: NavigationMap) -> NDArray[np.float64]:
+        """Return by how much each cluster's utility falls when a robot goes to a target."""
+        cells = clusters.representatives
+        place = (int(target[0]), int(target[1]))
+        seen = visible(navigation.log_odds, place, cells, self._range / navigation.resolution)
+        distances = np.hypot(*(cells - target).T) * navigation.resolution
+        return np.where(seen, np.clip(1.0 - distances / self._range, 0.0, 1.0), 0.0)

@@ -1,0 +1,208 @@
+"""What a policy is: it sees observations and beliefs, and decides. And the register of those that come with the package."""
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.exploration import Observation
+from lidarium.envs.onboard.perception import Belief
+from lidarium.envs.onboard.state import DriveState, Target
+
+LEVELS = ("velocity", "waypoint", "frontier")
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A robot ends its work, and says why.
+
+    Attributes
+    ----------
+    reason : str
+        ``no_frontier``, ``frontier_unreachable``, ``unreachable``, ``stopped`` or a policy's own word.
+    """
+
+    reason: str
+
+
+Action = NDArray[np.float32] | Target | int | Stop | None
+
+
+class Team(Protocol):
+    """What a policy may ask about its team, never the truth."""
+
+    @property
+    def agents(self) -> list[str]:
+        """Live agents."""
+        ...
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        ...
+
+    def belief(self, agent: str) -> Belief:
+        """What an agent's onboard software knows."""
+        ...
+
+    def drive_state(self, agent: str) -> DriveState:
+        """What its driving is about."""
+        ...
+
+
+class Policy(Protocol):
+    """Drives a team: one object for all of its robots.
+
+    Attributes
+    ----------
+    level : str
+        What it decides: ``velocity`` (shares of the limits, each step), ``waypoint`` (a ``Target``, None to stay, or two shares)
+        or ``frontier`` (the number of a candidate), each for a decision period.
+    shares_map : bool
+        Whether the robots plan on the team's map, where it reaches them, or on their own.
+    """
+
+    level: str
+    shares_map: bool
+
+    def reset(self, team: Team, seed: int) -> None:
+        """Begin an episode."""
+        ...
+
+    def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
+        """Decide for every agent in ``observations``."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class GivenUp:
+    """Something that a robot left unexplored, and why.
+
+    Attributes
+    ----------
+    agent : str
+        Who gave it up.
+    x, y : float
+        Where, in that robot's map frame [m].
+    size_m : float
+        How long the frontier is [m].
+    reason : str
+        ``unseen`` (nothing new is seen from as near as the body comes), ``hidden`` (behind something occupied), ``narrow`` or
+        ``blocked`` (no way for the body), ``no_progress`` (the way is there, but the robot does not get on).
+    """
+
+    agent: str
+    x: float
+    y: float
+    size_m: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyEntry:
+    """A registered policy: how to make it, and what it is in one line."""
+
+    make: Callable[..., Policy]
+    summary: str
+
+
+_POLICIES: dict[str, PolicyEntry] = {}
+
+
+def register_policy(name: str, make: Callable[..., Policy], summary: str) -> None:
+    """Register a policy by name.
+
+    Parameters
+    ----------
+    name : str
+        What users call it.
+    make : callable
+        Returns a new policy; keyword arguments are its settings.
+    summary : str
+        One line that says what it does.
+
+    Raises
+    ------
+    ValueError
+        Where the name is taken.
+    """
+    if name in _POLICIES:
+        raise ValueError(f"policy {name!r} is registered already")
+    _POLICIES[name] = PolicyEntry(make, summary)
+
+
+def policy_names() -> dict[str, str]:
+    """Return the names of all policies with their summaries."""
+    return {name: entry.summary for name, entry in sorted(_POLICIES.items())}
+
+
+def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
+    """Return a new policy by name.
+
+    Raises
+    ------
+    ValueError
+        Where the name is unknown; the message suggests the nearest one.
+    """
+    if name not in _POLICIES:
+        near = difflib.get_close_matches(name, _POLICIES, n=1, cutoff=0.3)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ValueError(f"unknown policy {name!r}{hint} (known: {', '.join(sorted(_POLICIES))})")
+    return _POLICIES[name].make(**settings)
+
+
+class PerRobot:
+    """A decentralised policy: one instance for each robot, which sees its own robot only.
+
+    Parameters
+    ----------
+    factory : callable
+        Returns a new policy for one robot.
+    """
+
+    def __init__(self, factory: Callable[[], Policy]) -> None:
+        self._factory = factory
+        probe = factory()
+        self.level, self.shares_map = probe.level, probe.shares_map
+        self._policies: dict[str, Policy] = {}
+
+    def reset(self, team: Team, seed: int) -> None:
+        """Begin an episode with a new instance for each robot, each with a seed of its own."""
+        seeds = np.random.SeedSequence(seed).generate_state(len(team.agents), np.uint64)
+        self._policies = {}
+        for agent, own_seed in zip(team.agents, seeds, strict=True):
+            self._policies[agent] = self._factory()
+            self._policies[agent].reset(_Alone(team, agent), int(own_seed))
+
+    def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
+        """Let each robot's instance decide on its own observation."""
+        actions: dict[str, Action] = {}
+        for agent, observation in observations.items():
+            actions |= self._policies[agent].act({agent: observation})
+        return actions
+
+
+class _Alone:
+    """A team as one robot sees it: itself."""
+
+    def __init__(self, team: Team, agent: str) -> None:
+        self._team, self._agent = team, agent
+
+    @property
+    def agents(self) -> list[str]:
+        return [agent for agent in self._team.agents if agent == self._agent]
+
+    @property
+    def time_s(self) -> float:
+        return self._team.time_s
+
+    def belief(self, agent: str) -> Belief:
+        if agent != self._agent:
+            raise ValueError(f"{self._agent} asked for the belief of {agent}; a decentralised policy sees its own robot only")
+        return self._team.belief(agent)
+
+    def drive_state(self, agent: str) -> DriveState:
+        return self._team.drive_state(agent)

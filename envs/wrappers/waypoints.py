@@ -1,0 +1,127 @@
+"""Decisions by waypoints: the onboard driving takes a robot there, a decision holds for a period or until a robot is done."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.onboard.state import DriveState, Target
+from lidarium.envs.onboard.team_driver import TeamDriver
+
+Order = Target | NDArray[np.float32] | None
+
+
+class WaypointExploration(ParallelEnv[str, Observation, Any]):
+    """Turns targets into driving.
+
+    An action is a point within the observed map: two numbers within [-1, 1], the position along the axes of the robot's map
+    frame from where it believes to be, as a share of half the map's side. A ``Target`` gives a position in the map frame
+    directly, and None lets the robot stay and give way. The onboard driving plans a path over what the robot knows, so a point
+    that is not known to be free is approached as near as planning can come: where there is no path, the robot stays.
+
+    A decision lasts ``decision_period_s``; it ends earlier when any robot with a target has arrived or found no path, or the
+    episode ends.
+
+    Parameters
+    ----------
+    env : ExplorationEnv
+        The environment to drive in.
+    shares_map : bool
+        Whether robots plan on the team's map, where it reaches them.
+    """
+
+    def __init__(self, env: ExplorationEnv, shares_map: bool = True) -> None:
+        self.env = env
+        self.metadata = {**env.metadata, "name": "lidarium_waypoint_exploration_v0", "render_fps": 1.0 / env.settings.decision_period_s}
+        self.possible_agents = env.possible_agents
+        self.render_mode = env.render_mode
+        self.settings = env.settings
+        self._half_side = 0.5 * env.settings.map_cells * env.settings.occupancy.resolution
+        self._action_spaces = {agent: spaces.Box(-1.0, 1.0, (2,), np.float32) for agent in self.possible_agents}
+        self._shares_map = shares_map
+        self.driver = TeamDriver(env.perception, env.settings, shares_map)
+
+    @property
+    def agents(self) -> list[str]:  # type: ignore[override]
+        """Live agents."""
+        return self.env.agents
+
+    @property
+    def unwrapped(self) -> ExplorationEnv:  # type: ignore[override]
+        """The environment below."""
+        return self.env
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's observations."""
+        return self.env.observation_space(agent)
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's actions."""
+        return self._action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Start an episode; see ``ExplorationEnv.reset``."""
+        outcome = self.env.reset(seed, options)
+        self.driver.start()
+        return outcome
+
+    def step(
+        self, actions: dict[str, Order]
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Drive to the targets for one decision; rewards are summed over its steps, ``infos[agent]["drive"]`` is a ``DriveState``."""
+        env, driver = self.env, self.driver
+        if not env.agents:
+            return env.step({})
+        rows = {agent: env.possible_agents.index(agent) for agent in env.agents}
+        stopping = env.stopping
+        for agent, row in rows.items():
+            if agent not in actions and agent not in stopping:
+                raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
+            driver.assign(row, self._target(row, actions.get(agent)))
+        driver.prepare()
+        if not stopping:
+            waiting = {row for row in rows.values() if driver.is_done(row)}
+            for _ in range(env.settings.decision_steps):
+                env.drive_at(driver.commands())
+                if env.is_over() or env.has_event() or any(driver.is_done(row) and row not in waiting for row in rows.values()):
+                    break
+        else:
+            env.drive_at(np.zeros((env.settings.robots, 2)))
+        outcome = env.outcome()
+        for agent, info in outcome[4].items():
+            info["drive"] = driver.state(rows[agent])
+        return outcome
+
+    def _target(self, row: int, order: Order) -> Target | None:
+        if order is None or isinstance(order, Target):
+            return order
+        share = np.asarray(order, np.float64)
+        if share.shape != (2,) or not np.isfinite(share).all():
+            raise ValueError(f"waypoint is {order}; want two finite numbers within [-1, 1], a Target or None")
+        x, y = self.env.perception.pose_in_frame(row, row)[:2] + np.clip(share, -1.0, 1.0) * self._half_side
+        return Target(float(x), float(y))
+
+    def drive_state(self, agent: str) -> DriveState:
+        """Return what an agent's driving is about."""
+        return self.driver.state(self.env.possible_agents.index(agent))
+
+    def stop(self, agent: str, reason: str) -> None:
+        """End an agent at its next step, with a reason."""
+        self.env.stop(agent, reason)
+
+    def state(self) -> NDArray[np.float64]:
+        """Return the true state of the team."""
+        return self.env.state()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draw the environment."""
+        return self.env.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self.env.close()

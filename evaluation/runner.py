@@ -1,0 +1,144 @@
+"""Runs a policy through an episode."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.policy import GivenUp, Policy, Stop
+from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.onboard.perception import Belief
+from lidarium.envs.onboard.state import DriveState
+from lidarium.envs.wrappers.waypoints import WaypointExploration
+
+Progress = Callable[[ExplorationEnv], None]
+
+
+@dataclass(slots=True)
+class Episode:
+    """What an episode left, beside the environment itself.
+
+    Attributes
+    ----------
+    env : ExplorationEnv
+        The environment at the end of the episode.
+    policy : Policy
+        The policy.
+    seed : int
+        The seed of the episode.
+    decision_seconds : list of float
+        Wall time of each call of the policy and of planning [s].
+    wall_seconds : float
+        Wall time of the whole episode [s].
+    given_up : list of GivenUp
+        What the policy left unexplored, and why.
+    is_interrupted : bool
+        Whether the user broke it off.
+    """
+
+    env: ExplorationEnv
+    policy: Policy
+    seed: int
+    decision_seconds: list[float] = field(default_factory=list)
+    wall_seconds: float = 0.0
+    given_up: list[GivenUp] = field(default_factory=list)
+    is_interrupted: bool = False
+
+
+class RunningTeam:
+    """What a policy may ask about its team in a running episode."""
+
+    def __init__(self, env: ExplorationEnv, driver: WaypointExploration | None) -> None:
+        self._env, self._driver = env, driver
+
+    @property
+    def agents(self) -> list[str]:
+        """Live agents."""
+        return list(self._env.agents)
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        return self._env.scorer.time
+
+    def belief(self, agent: str) -> Belief:
+        """What an agent's onboard software knows."""
+        return self._env.perception.belief(agent)
+
+    def drive_state(self, agent: str) -> DriveState:
+        """What its driving is about."""
+        return DriveState.IDLE if self._driver is None else self._driver.drive_state(agent)
+
+
+def run_episode(
+    policy: Policy,
+    env: ExplorationEnv,
+    seed: int,
+    options: Mapping[str, Any] | None = None,
+    on_decision: Progress | None = None,
+    raise_interrupt: bool = True,
+) -> Episode:
+    """Run a policy from reset until every robot has ended.
+
+    Parameters
+    ----------
+    policy : Policy
+        What decides; its ``Stop`` ends a robot at its next step.
+    env : ExplorationEnv
+        Where; the wrapper of the policy's level is put around it.
+    seed : int
+        Where all draws come from: of the environment, and of the policy.
+    options : mapping or None
+        Options of ``reset``.
+    on_decision : callable or None
+        Called with the environment after the reset and after every decision, for progress, pictures and records.
+    raise_interrupt : bool
+        Whether ``KeyboardInterrupt`` is passed on; otherwise the episode so far is returned.
+
+    Returns
+    -------
+    Episode
+        What it left.
+    """
+    if policy.level not in ("velocity", "waypoint"):
+        raise ValueError(f"level of the policy is {policy.level!r}; want velocity or waypoint")
+    wrapper = WaypointExploration(env, policy.shares_map) if policy.level == "waypoint" else None
+    world: ExplorationEnv | WaypointExploration = env if wrapper is None else wrapper
+    episode = Episode(env, policy, seed)
+    began = time.perf_counter()
+    try:
+        observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))
+        policy.reset(RunningTeam(env, wrapper), seed)
+        if on_decision is not None:
+            on_decision(env)
+        while env.agents:
+            decided = time.perf_counter()
+            actions = decide(policy, world, observations)
+            episode.decision_seconds.append(time.perf_counter() - decided)
+            observations = world.step(actions)[0]
+            observations = {agent: observations[agent] for agent in env.agents}
+            if on_decision is not None:
+                on_decision(env)
+    except KeyboardInterrupt:
+        if raise_interrupt:
+            raise
+        episode.is_interrupted = True
+    episode.wall_seconds = time.perf_counter() - began
+    episode.given_up = list(getattr(policy, "given_up", []))
+    return episode
+
+
+def decide(
+    policy: Policy, world: ExplorationEnv | WaypointExploration, observations: Mapping[str, Observation]
+) -> dict[str, NDArray[np.float32] | Any]:
+    """Ask a policy, and turn each ``Stop`` into an order to the environment."""
+    actions: dict[str, Any] = {}
+    for agent, action in policy.act(observations).items():
+        if isinstance(action, Stop):
+            world.stop(agent, action.reason)
+        else:
+            actions[agent] = action
+    return actions
