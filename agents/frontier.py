@@ -25,6 +25,9 @@ from lidarium.mapping.grid_planning import Cell, Footprint, cells_of, centres_of
 PATIENCE_S = 20.0
 """A robot that has not moved for this long while its target stands gives the frontier there up [s]."""
 
+MOST_UTILITY_LOST = 2.0
+"""A frontier whose way costs more utility than this above the cheapest one's is not considered."""
+
 MOVED = 0.15
 """What counts as having moved [m]."""
 
@@ -44,6 +47,7 @@ class _Work:
     choice: Choice | None = None
     since_s: float = 0.0
     place: tuple[float, float] = (math.inf, math.inf)
+    failed_at: Cell | None = None
 
 
 class FrontierExplorer:
@@ -110,7 +114,8 @@ class FrontierExplorer:
 
     def _begin(self, agent: str, choice: Choice | None) -> None:
         pose = self.team.belief(agent).pose
-        self._work[agent] = _Work(choice, self.team.time_s, (float(pose[0]), float(pose[1])))
+        failed_at = self._work[agent].failed_at
+        self._work[agent] = _Work(choice, self.team.time_s, (float(pose[0]), float(pose[1])), failed_at)
 
     def _review(self, agent: str) -> None:
         """Drop a choice whose frontier is gone, and give up what cannot be seen or reached."""
@@ -127,10 +132,10 @@ class FrontierExplorer:
             work.choice = None
             return
         if state is DriveState.NO_PATH:
-            # The map has changed since the choice: choose anew, and give up what is chosen again without a way.
-            if self.team.time_s - work.since_s > PATIENCE_S:
+            # The map may have changed since the choice: choose anew, and give up what is chosen again without a way.
+            if work.failed_at == work.choice.frontier_cell:
                 self._give_up_around(agent, work.choice, "blocked")
-            work.choice = None
+            self._work[agent] = _Work(failed_at=work.choice.frontier_cell)
             return
         pose = self.team.belief(agent).pose
         if state is DriveState.GIVING_WAY or math.dist(pose[:2], work.place) > MOVED:
@@ -191,25 +196,59 @@ class FrontierExplorer:
 
 
 class NearestFrontier(FrontierExplorer):
-    """Each robot drives to the frontier that costs it least (Yamauchi 1997; 1998 with a shared map)."""
+    """Each robot drives to the frontier that costs it least (Yamauchi 1997; 1998 with a shared map).
+
+    Parameters
+    ----------
+    minimum_size : float
+        Frontiers shorter than this are taken only when no longer one is in reach [m].
+    shares_map : bool
+        Whether robots explore on the team's map.
+    """
+
+    def __init__(self, minimum_size: float = 0.5, shares_map: bool = True) -> None:
+        super().__init__(shares_map)
+        self._minimum_size = minimum_size
 
     def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:  # noqa: ARG002
         """Choose the nearest frontier for each open agent."""
         return {agent: self._nearest(agent) for agent in open_agents}
 
     def _nearest(self, agent: str) -> Choice | None:
-        navigation = self.navigation(agent)
-        found = nearest_frontier(
-            navigation.frontiers, navigation.space, navigation.log_odds, navigation.clearance, self.start_cell(agent), self.footprint
-        )
-        return None if found is None else Choice(found.cell, found.frontier_cell)
+        navigation, start = self.navigation(agent), self.start_cell(agent)
+        for frontiers in (navigation.long_frontiers(self._minimum_size), navigation.frontiers):
+            if not len(frontiers):
+                continue
+            found = nearest_frontier(
+                frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, self.footprint
+            )
+            if found is not None:
+                return Choice(found.cell, found.frontier_cell)
+        return None
 
 
 def _reaches(
-    explorer: FrontierExplorer, agent: str, clusters: Clusters, navigation: NavigationMap
+    explorer: FrontierExplorer, agent: str, clusters: Clusters, navigation: NavigationMap, minimum_size: float, slack: float
 ) -> tuple[NDArray[np.float64], list[Choice | None]]:
-    """Return what each cluster costs an agent to come near (inf where it cannot), and where it would stand."""
-    found = search(navigation.space, navigation.log_odds, navigation.clearance, explorer.start_cell(agent), explorer.footprint)
+    """Return what each cluster costs an agent to come near, and where it would stand.
+
+    Clusters that cost more than ``slack`` [m] above the cheapest one of at least ``minimum_size`` (of any size, where there
+    is none) count as out of reach, so that the search need not spread over the whole floor; inf where out of reach.
+    """
+    start = explorer.start_cell(agent)
+    least = math.inf
+    for frontiers in (navigation.long_frontiers(minimum_size), navigation.frontiers):
+        cheapest = nearest_frontier(
+            frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, explorer.footprint
+        )
+        if cheapest is not None:
+            least = cheapest.cost
+            break
+    if math.isinf(least):
+        return np.full(len(clusters), math.inf), [None] * len(clusters)
+    found = search(
+        navigation.space, navigation.log_odds, navigation.clearance, start, explorer.footprint, maximum_cost=least + slack
+    )
     near = approach(clusters, found, navigation.log_odds, default_reach(explorer.footprint, navigation.resolution))
     costs = np.where(near.reachable, near.costs, math.inf)
     choices = [
@@ -268,7 +307,9 @@ class ExploreLite(FrontierExplorer):
         clusters = navigation.frontiers.clusters(self.team.belief(agent).map_origin)
         if not len(clusters):
             return None
-        distances, choices = _reaches(self, agent, clusters, navigation)
+        # Beyond this no frontier can make up for the way by its size.
+        slack = self._gain_scale * float(clusters.sizes.max()) / self._potential_scale + 0.1
+        distances, choices = _reaches(self, agent, clusters, navigation, self._minimum_size, slack)
         costs = self._potential_scale * distances - self._gain_scale * clusters.sizes
         long_enough = np.where(clusters.sizes >= self._minimum_size, costs, math.inf)
         ranked = long_enough if np.isfinite(long_enough).any() else costs
@@ -295,7 +336,7 @@ class UtilityFrontier(FrontierExplorer):
     """
 
     def __init__(
-        self, cost_weight: float = 0.05, sensor_range: float = 5.6, minimum_size: float = 0.2, shares_map: bool = True
+        self, cost_weight: float = 0.05, sensor_range: float = 5.6, minimum_size: float = 0.5, shares_map: bool = True
     ) -> None:
         super().__init__(shares_map)
         self._cost_weight, self._range, self._minimum_size = cost_weight, sensor_range, minimum_size
@@ -317,7 +358,8 @@ class UtilityFrontier(FrontierExplorer):
         chosen: dict[str, Choice | None] = dict.fromkeys(agents)
         if not len(clusters):
             return chosen
-        reaches = {agent: _reaches(self, agent, clusters, navigation) for agent in agents}
+        slack = MOST_UTILITY_LOST / self._cost_weight
+        reaches = {agent: _reaches(self, agent, clusters, navigation, self._minimum_size, slack) for agent in agents}
         utility = np.where(clusters.sizes >= self._minimum_size, 1.0, 0.25)
         waiting = list(agents)
         while waiting:

@@ -106,6 +106,16 @@ class FrontierMap:
         self.flags[chosen[:, 0], chosen[:, 1]] = IGNORED
         np.subtract.at(self.tiles, (chosen[:, 0] // TILE, chosen[:, 1] // TILE), 1)
 
+    def add(self, cells: NDArray[np.integer]) -> None:
+        """Flag distinct cells (N, 2) that are not flagged yet; for a map that holds a choice of another's frontier cells."""
+        self.flags[cells[:, 0], cells[:, 1]] = FRONTIER
+        np.add.at(self.tiles, (cells[:, 0] // TILE, cells[:, 1] // TILE), 1)
+
+    def remove(self, cells: NDArray[np.integer]) -> None:
+        """Take back what ``add`` flagged."""
+        self.flags[cells[:, 0], cells[:, 1]] = 0
+        np.subtract.at(self.tiles, (cells[:, 0] // TILE, cells[:, 1] // TILE), 1)
+
     def clusters(self, origin: tuple[float, float] = (0.0, 0.0), minimum_cells: int = 1) -> Clusters:
         """8-connected clusters of at least ``minimum_cells`` cells; ``origin`` is the lower left corner of the grid [m]."""
         cells, starts = _clustered(self.flags, self.cells(), minimum_cells)

@@ -19,8 +19,8 @@ IDLE, DRIVING, ARRIVED, BLOCKED = range(4)
 MAX_POINTS = 512
 """Most points of a path."""
 
-LOOKAHEAD = 0.25
-"""How far ahead on its line a robot aims [m]."""
+LOOKAHEAD = (0.08, 0.25)
+"""How far ahead on its line a robot aims where it is tight, and where there is room [m]."""
 
 TURN_GAIN = 3.0
 """Turn rate per radian of heading error [1/s]."""
@@ -37,11 +37,14 @@ STANDSTILL = 0.006
 MATE_GAP = 0.03
 """Gap that robots keep to each other [m]."""
 
-LEAST_MATE_GAP = 0.004
-"""Gap that they keep in passing where they stand nearer than that already [m]."""
+SIDE_GAP = 0.0003
+"""The swath that must be clear of returns is this much wider than the body on each side [m]."""
 
 FORESIGHT = (0.0, 0.4, 0.8)
 """How far ahead the robot with the higher number looks where another will be [s]."""
+
+BACKING_SPEED = 0.05
+"""A robot that a wall blocks backs out the way it came at this speed [m/s]."""
 
 BLOCKED_STEPS = 10
 """A robot that wants to drive and has stood this many steps is blocked."""
@@ -75,9 +78,7 @@ def _gap_to_mates(robot, poses, velocities, radii, foresight, present):  # noqa:
     for other in range(poses.shape[0]):
         if other == robot or present[other] == 0:
             continue
-        touching = radii[robot] + radii[other]
-        distance = math.hypot(poses[other, 0] - poses[robot, 0], poses[other, 1] - poses[robot, 1])
-        reach = min(touching + MATE_GAP, max(distance - 0.002, touching + LEAST_MATE_GAP))
+        reach = radii[robot] + radii[other] + MATE_GAP
         for k in range(foresight.shape[0]):
             if k > 0 and other > robot:
                 break
@@ -85,13 +86,17 @@ def _gap_to_mates(robot, poses, velocities, radii, foresight, present):  # noqa:
             gap_x = poses[other, 0] + drift * math.cos(poses[other, 2]) - poses[robot, 0]
             gap_y = poses[other, 1] + drift * math.sin(poses[other, 2]) - poses[robot, 1]
             x, y = cosine * gap_x + sine * gap_y, cosine * gap_y - sine * gap_x
-            if x > 0.0 and -reach < y < reach:
+            if x * x + y * y <= reach * reach:
+                # Nearer than robots should be: the only way is apart.
+                if x > 0.0:
+                    gap = 0.0
+            elif x > 0.0 and -reach < y < reach:
                 gap = min(gap, x - math.sqrt(reach * reach - y * y))
     return gap
 
 
 @kernel
-def follow_paths(poses, velocities, ranges, unit_vectors, radii, limits, paths, margins, counts, places, headings, states, stood, knows_mates, present, foresight, commands):  # noqa: ANN001, ANN201, E501
+def follow_paths(poses, velocities, ranges, unit_vectors, radii, limits, paths, margins, counts, places, headings, states, stood, backing, knows_mates, present, foresight, commands):  # noqa: ANN001, ANN201, E501
     """Give each robot the speed and turn rate that follow its path.
 
     Parameters
@@ -114,6 +119,8 @@ def follow_paths(poses, velocities, ranges, unit_vectors, radii, limits, paths, 
         Wanted heading at the end [rad], nan for any.
     states, stood : (robots,) int64
         State of the drive, and steps for which the robot has stood although it wanted to drive (updated).
+    backing : (robots,) int64
+        Steps for which the robot still backs out (updated).
     knows_mates : bool
         Whether teammates' poses are known (and comparable).
     present : (robots,) uint8
@@ -127,7 +134,11 @@ def follow_paths(poses, velocities, ranges, unit_vectors, radii, limits, paths, 
     for robot in range(poses.shape[0]):
         commands[robot, 0] = commands[robot, 1] = 0.0
         if states[robot] != DRIVING and states[robot] != BLOCKED:
-            stood[robot] = 0
+            stood[robot] = backing[robot] = 0
+            continue
+        if backing[robot] > 0:
+            backing[robot] -= 1
+            commands[robot, 0] = -BACKING_SPEED
             continue
         x, y, heading = poses[robot, 0], poses[robot, 1], poses[robot, 2]
         last = counts[robot] - 1
@@ -156,11 +167,11 @@ def follow_paths(poses, velocities, ranges, unit_vectors, radii, limits, paths, 
         aim_x, aim_y = end_x, end_y
         if length > 1e-9:
             foot = ((x - from_x) * along_x + (y - from_y) * along_y) / length
-            ahead = min(max(foot, 0.0) + LOOKAHEAD, length)
+            ahead = min(max(foot, 0.0) + min(max(LOOKAHEAD[0] + 2.0 * margins[robot, place], LOOKAHEAD[0]), LOOKAHEAD[1]), length)
             aim_x, aim_y = from_x + along_x * ahead / length, from_y + along_y * ahead / length
         error = _wrap(math.atan2(aim_y - y, aim_x - x) - heading)
         margin = margins[robot, place]
-        tolerance = min(max(0.04 + 2.0 * margin, 0.04), 0.6)
+        tolerance = min(max(0.01 + 2.0 * margin, 0.01), 0.6)
         commands[robot, 1] = min(max(TURN_GAIN * error, -turn_limit), turn_limit)
         if abs(error) > tolerance:
             continue
@@ -174,7 +185,7 @@ def follow_paths(poses, velocities, ranges, unit_vectors, radii, limits, paths, 
             through = 0.0
         speed = min(speed, math.sqrt(through * through + 2.0 * braking * remaining) if through > 0.0 else math.sqrt(2.0 * braking * remaining))
         speed = min(speed, max(remaining / 0.1, 0.02)) if place == last else speed
-        gap = _gap_in_scan(ranges[robot], unit_vectors, radii[robot])
+        gap = _gap_in_scan(ranges[robot], unit_vectors, radii[robot] + SIDE_GAP)
         allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.05 * velocities[robot, 0], 0.0))
         if knows_mates:
             mate_gap = _gap_to_mates(robot, poses, velocities, radii, foresight, present)

@@ -4,6 +4,7 @@ With known starts and the ideal radio all robots share one map, the sum of their
 what planning needs (clearance and frontiers), brought up to date only where the map has changed.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,11 +38,22 @@ class NavigationMap:
         self.clearance = ClearanceField((rows, columns), resolution, CLEARANCE_LIMIT)
         self.frontiers = FrontierMap((rows, columns), resolution)
         self.space = SearchSpace((rows, columns), resolution)
+        self._long: FrontierMap | None = None
+        self._long_cells: NDArray[np.int64] = np.zeros((0, 2), np.int64)
 
     def changed(self, window: tuple[int, int, int, int]) -> None:
         """Bring clearance and frontiers up to date in a window (row_low, row_high, column_low, column_high)."""
         self.clearance.update(self.log_odds, window)
         self.frontiers.update(self.log_odds, window)
+
+    def long_frontiers(self, minimum_size: float) -> FrontierMap:
+        """Return the frontiers without those shorter than ``minimum_size`` [m]; valid until the next call."""
+        if self._long is None:
+            self._long = FrontierMap(self.log_odds.shape, self.resolution)
+        self._long.remove(self._long_cells)
+        self._long_cells = self.frontiers.clusters(minimum_cells=max(math.ceil(minimum_size / self.resolution - 1e-9), 1)).cells
+        self._long.add(self._long_cells)
+        return self._long
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,9 @@ MATE_DISTANCE = 0.06
 NEAR = 0.6
 """Teammates within this gap may be what blocks a robot [m]."""
 
+BACKING_STEPS = 10
+"""How many steps a robot backs out where a wall blocks it."""
+
 REFUGE_STAY_S = 15.0
 """Longest time that a robot waits aside [s]."""
 
@@ -89,6 +92,7 @@ class TeamDriver:
         self._counts, self._places = np.zeros(robots, np.int64), np.zeros(robots, np.int64)
         self._headings = np.full(robots, math.nan)
         self._states, self._stood = np.zeros(robots, np.int64), np.zeros(robots, np.int64)
+        self._backing = np.zeros(robots, np.int64)
         self._commands = np.zeros((robots, 2))
         self._present = np.ones(robots, np.uint8)
 
@@ -97,7 +101,7 @@ class TeamDriver:
         for row in range(self._settings.robots):
             self._targets[row], self._refuges[row] = None, None
         self._has_path[:] = False
-        self._states[:], self._stood[:], self._counts[:] = IDLE, 0, 0
+        self._states[:], self._stood[:], self._counts[:], self._backing[:] = IDLE, 0, 0, 0
 
     def assign(self, row: int, target: Target | None) -> None:
         """Give a robot its target in its map frame, or None to stay where it is and give way."""
@@ -141,7 +145,7 @@ class TeamDriver:
         world = self._perception.world
         follow_paths(
             world.believed, world.velocities, world.ranges, self._unit_vectors, self._radii, self._limits, self._paths, self._room,
-            self._counts, self._places, self._headings, self._states, self._stood, self._settings.known_starts, self._present,
+            self._counts, self._places, self._headings, self._states, self._stood, self._backing, self._settings.known_starts, self._present,
             FORESIGHT_TIMES, self._commands,
         )  # fmt: skip
         return self._commands
@@ -285,13 +289,13 @@ class TeamDriver:
             for other in range(self._settings.robots)
             if other != row and math.dist(world.believed[row, :2], world.believed[other, :2]) < reach + self._radii[other]
         ]
-        if not near:
-            # A wall, not a robot: plan anew from here.
-            if self._refuges[row] is None:
-                self._drop_path(row)
-            return
         cells = self._cells[row]
         goal = (int(cells[-1][0]), int(cells[-1][1]))
+        if not near:
+            # A wall, not a robot: back out a little the way it came, and plan anew.
+            self._drive_to(row, goal, [], float(self._headings[row]))
+            self._backing[row] = BACKING_STEPS
+            return
         left = self._remaining(row)
         length = float(np.hypot(*np.diff(left, axis=0).T).sum())
         if self._drive_to(row, goal, near, float(self._headings[row]), 1.5 * length + DETOUR):

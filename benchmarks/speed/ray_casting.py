@@ -1,0 +1,84 @@
+"""Exact ranges alone, beside sphere tracing in the manner of f1tenth and PyBullet's rayTestBatch."""
+
+import itertools
+import math
+
+import numpy as np
+from floors import BenchFloor, free_poses, straight_floor, turned_floor
+from peers.bullet_rays import bullet_scan
+from peers.sphere_tracing import SphereTracer
+from report import Line, faster, faster_than_quoted, run_alone
+from teams import BEAMS, LIDAR, RANGE_MAX
+from timing import Contender, Effort, interleaved, repeated
+
+from lidarium.envs.simulation.lidar import cast_scans
+
+POSES = 32
+F1TENTH_RAYS = 10e6
+"""Rays per second of f1tenth's scan simulator, measured on an AMD Zen 5 core on floors like these (9 to 12 M)."""
+
+NOTES = (
+    "*Rays alone*: `cast_scans` of the package on 32 poses, 720 beams over 240 deg to 5.6 m, no noise, no map. The larger floor has "
+    "2000 x 2000 cells of 2.5 cm.",
+    "*Sphere tracing* is code of our own in the manner of f1tenth's scan simulator, which is not on PyPI; the same poses, one call a scan. "
+    "*f1tenth's scan simulator (quoted)* is the original's rate, about 10 M rays/s, measured on a Zen 5 core on floors like these.",
+    "*PyBullet* casts the same scans with `rayTestBatch` on the floor's boxes, one thread.",
+)
+
+
+def all_floors() -> dict[str, BenchFloor]:
+    """Return the small and the large floor, straight and turned."""
+    small, large = straight_floor(512, 512), straight_floor(2000, 2000)
+    floors = (small, turned_floor(small), large, turned_floor(large))
+    return {floor.name: floor for floor in floors}
+
+
+def our_scans(floor: BenchFloor) -> Contender:
+    """Cast the scans of all poses in one call; a unit is a ray."""
+    tables = floor.tables()
+    poses = free_poses(floor, POSES) / [floor.resolution, floor.resolution, 1.0]
+    ranges = np.empty((POSES, BEAMS))
+    reach = RANGE_MAX / floor.resolution
+
+    def cast() -> None:
+        cast_scans(tables.rays.addresses, poses, LIDAR.unit_vectors, LIDAR.angle_first, LIDAR.angle_increment, reach, ranges)
+
+    cast()
+    return repeated(cast, POSES * BEAMS)
+
+
+def traced_scans(floor: BenchFloor) -> Contender:
+    """Trace the scans of all poses in turn; a unit is a ray."""
+    tracer = SphereTracer(floor, BEAMS, math.radians(240.0), RANGE_MAX)
+    poses = itertools.cycle(free_poses(floor, POSES))
+    tracer.scan(next(poses))
+    return repeated(lambda: tracer.scan(next(poses)), BEAMS)
+
+
+def measure(effort: Effort) -> list[Line]:
+    """Compare the ray casters."""
+    floors = all_floors()
+    contenders: dict[str, Contender] = {}
+    for name, floor in floors.items():
+        contenders[name], contenders[f"traced {name}"] = our_scans(floor), traced_scans(floor)
+    small = next(iter(floors.values()))
+    scan = bullet_scan(small.boxes, free_poses(small, POSES), BEAMS, RANGE_MAX)
+    if scan is not None:
+        contenders["bullet"] = repeated(scan, BEAMS)
+    seconds = interleaved(contenders, effort)
+    lines = []
+    for name, floor in floors.items():
+        wanted = 15.0 if len(floor.boxes) else 2.5
+        line = f"rays alone, exact, {name} cells" if len(floor.boxes) else f"rays alone, exact, {name}"
+        lines.append(faster(line, seconds[name], "sphere tracing", seconds[f"traced {name}"], wanted, "rays/s"))
+        lines.append(faster_than_quoted(line, seconds[name], "f1tenth's scan simulator", F1TENTH_RAYS, wanted, "rays/s"))
+    lines.append(
+        faster(
+            f"rays alone, exact, {small.name} cells", seconds[small.name], "PyBullet rayTestBatch", seconds.get("bullet"), 60.0, "rays/s"
+        )
+    )
+    return lines
+
+
+if __name__ == "__main__":
+    run_alone(measure, "Exact ranges beside sphere tracing and PyBullet.")

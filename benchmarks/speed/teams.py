@@ -1,0 +1,60 @@
+"""Our side of the comparisons: a team in the kinematic world, driven by drawn commands."""
+
+import math
+
+import numpy as np
+from floors import BenchFloor, free_poses
+
+from lidarium.envs.simulation.kinematic import KinematicWorld
+from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.robots import ROBOTS
+from lidarium.mapping.occupancy import OccupancySettings
+
+BEAMS, RANGE_MAX = 720, 5.6
+LIDAR = Lidar(beams=BEAMS, range_max=RANGE_MAX, noise_floor=0.01, noise_share=0.01)
+
+_HOLD = 20
+_DRAWS = 50
+
+
+class DrivenTeam:
+    """Robots that drive at drawn speeds and turn rates, each pair held for 2 s, into walls and each other as it comes.
+
+    Parameters
+    ----------
+    floor : BenchFloor
+        Where they drive; the maps have its cells.
+    robots : int
+        How many.
+    lidar : Lidar
+        The laser of each.
+    """
+
+    def __init__(self, floor: BenchFloor, robots: int, lidar: Lidar = LIDAR) -> None:
+        self.robots = robots
+        self._floor, self._tables = floor, floor.tables()
+        self.world = KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, OccupancySettings(resolution=floor.resolution))
+        self._count, self._starts = 0, 0
+        self.start()
+
+    def start(self) -> None:
+        """Begin anew: blank maps, other places."""
+        generator = np.random.default_rng(self._starts)
+        poses = free_poses(self._floor, self.robots, seed=self._starts)
+        self.world.place(0, self._tables, poses, seed=self._starts)
+        speeds = generator.uniform(0.2, 0.7, (_DRAWS, self.robots))
+        turns = generator.uniform(-1.0, 1.0, (_DRAWS, self.robots))
+        self._commands = np.stack([speeds, turns], axis=2)
+        self.world.step(self._commands[0], moves_bodies=False)
+        self._count = 0
+        self._starts = (self._starts + 1) % 8
+
+    def step(self) -> None:
+        """Move, sense, score and map, for all robots."""
+        self.world.step(self._commands[self._count // _HOLD % _DRAWS])
+        self._count += 1
+
+
+def full_circle(beams: int, reach: float) -> Lidar:
+    """Return a noise-free laser that looks all around."""
+    return Lidar(beams=beams, field_of_view=2.0 * math.pi, range_max=reach)

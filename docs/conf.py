@@ -1,0 +1,19 @@
+"""Sphinx: the documentation of lidarium."""
+
+import lidarium
+
+project = "lidarium"
+author = "the authors of lidarium"
+version = release = lidarium.__version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+html_theme = "furo"
+html_title = f"lidarium {release}"
+exclude_patterns = ["_build"]
+
+myst_heading_anchors = 3
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"

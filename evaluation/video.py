@@ -1,0 +1,97 @@
+"""Films of a run: frames at equal simulated time, as an mp4 that is there whole or not at all."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import imageio.v2 as imageio
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.rendering import draw_frame
+from lidarium.evaluation.output import whole_file
+
+FRAMES_PER_SECOND = 20
+_LAST_FRAME_S = 1.5
+
+
+class FilmedExploration(ExplorationEnv):
+    """An exploration environment that tells of every step, whatever drives it.
+
+    Attributes
+    ----------
+    on_step : callable or None
+        Called with the environment after every time step of the world.
+    """
+
+    on_step: Callable[[ExplorationEnv], None] | None = None
+
+    def drive_at(self, commands: NDArray[np.float64]) -> None:
+        """Run one time step, then tell of it."""
+        super().drive_at(commands)
+        if self.on_step is not None:
+            self.on_step(self)
+
+
+class Film:
+    """Takes frames of an environment at equal simulated time.
+
+    Parameters
+    ----------
+    writer : object
+        With ``append_data(frame)``, as imageio's writers have it.
+    period_s : float
+        Simulated time between frames [s].
+    size : int
+        Longer side of the floor in a frame [pixels].
+    """
+
+    def __init__(self, writer: Any, period_s: float, size: int) -> None:  # noqa: ANN401
+        self._writer, self._period_s, self._size = writer, period_s, size
+        self._next_s = 0.0
+
+    def take(self, env: ExplorationEnv) -> None:
+        """Take a frame where it is time for one."""
+        if env.scorer.time + 1e-9 >= self._next_s:
+            self._writer.append_data(draw_frame(env, self._size))
+            self._next_s += self._period_s
+
+    def end(self, env: ExplorationEnv) -> None:
+        """Hold the last picture for a moment."""
+        frame = draw_frame(env, self._size)
+        for _ in range(round(_LAST_FRAME_S * FRAMES_PER_SECOND)):
+            self._writer.append_data(frame)
+
+
+@contextmanager
+def film(path: Path, speed: float = 10.0, size: int = 960) -> Iterator[Film]:
+    """Film a run into an mp4 (H.264).
+
+    Parameters
+    ----------
+    path : Path
+        The mp4 file; it appears when the film is finished, also where the run was interrupted.
+    speed : float
+        Simulated seconds per second of the film, above 0.
+    size : int
+        Longer side of the floor in a frame [pixels].
+
+    Raises
+    ------
+    ValueError
+        Where the speed is not positive.
+    """
+    if not 0.0 < speed < float("inf"):
+        raise ValueError(f"speed of the film is {speed}; want more than 0 simulated seconds per second")
+    # Frames of one size throughout: no rescaling to multiples of 16, the frames' sides are even.
+    options: dict[str, Any] = {
+        "fps": FRAMES_PER_SECOND,
+        "codec": "libx264",
+        "quality": 7,
+        "macro_block_size": 2,
+        "output_params": ["-preset", "veryfast"],
+    }
+    with whole_file(path) as beside, imageio.get_writer(str(beside), **options) as writer:
+        yield Film(writer, speed / FRAMES_PER_SECOND, size)

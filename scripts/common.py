@@ -1,0 +1,115 @@
+"""What all commands share: their common options, what they answer, and how they tell of progress."""
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lidarium.envs.exploration import ExplorationEnv
+
+DONE, BAD_INPUT, NO, INTERRUPTED, DEFECT = 0, 2, 3, 130, 1
+"""Exit codes."""
+
+LINE_PERIOD_S = 5.0
+"""Wall time between lines of progress where there is no terminal [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """Options of every command."""
+
+    seed: int = 0
+    """where all draws come from, zero or more; commands without chance ignore it"""
+    out: Path | None = None
+    """folder for the files that the command writes"""
+    json: bool = False
+    """print the result as JSON on standard output, and nothing else there"""
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ValueError(f"seed is {self.seed}; want zero or more")
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a command found.
+
+    Attributes
+    ----------
+    result : dict
+        For ``--json``.
+    text : str
+        The same for people.
+    code : int
+        Exit code.
+    """
+
+    result: dict[str, Any] = field(default_factory=dict)
+    text: str = ""
+    code: int = DONE
+
+
+def tell(message: str) -> None:
+    """Print a message on standard error."""
+    print(message, file=sys.stderr, flush=True)
+
+
+def table(rows: Iterable[Sequence[object]], header: Sequence[str] = (), indent: str = "  ") -> str:
+    """Return lines of aligned columns; columns of numbers to the right."""
+    lines = [[str(cell) for cell in row] for row in ([header, *rows] if header else rows)]
+    if not lines:
+        return ""
+    body = lines[1:] if header else lines
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    is_number = [all(line[k][:1].isdigit() for line in body if line[k]) for k in range(len(widths))]
+    return "\n".join(indent + "  ".join(map(_aligned, line, widths, is_number)).rstrip() for line in lines)
+
+
+def _aligned(cell: str, width: int, is_number: bool) -> str:
+    return cell.rjust(width) if is_number else cell.ljust(width)
+
+
+def file_name(name: str) -> str:
+    """Return a name with what does not belong in a file's name replaced."""
+    return "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-") or "floor"
+
+
+class Progress:
+    """Tells how far an episode is: a bar on a terminal, else a line every few seconds, on standard error.
+
+    Parameters
+    ----------
+    is_quiet : bool
+        No bar, lines only.
+    clock : callable
+        Wall time [s].
+    """
+
+    def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock, self._last = clock, -math.inf
+        self._bar: Any = None
+        if not is_quiet and sys.stderr.isatty():
+            from tqdm import tqdm
+
+            bar_format = "explored {percentage:5.1f} %|{bar:40}| {desc} [{elapsed}]"
+            self._bar = tqdm(total=100.0, file=sys.stderr, bar_format=bar_format, leave=False, dynamic_ncols=True)
+
+    def tell(self, env: "ExplorationEnv") -> None:
+        """Tell where the episode is."""
+        scorer = env.scorer
+        if self._bar is not None:
+            self._bar.set_description_str(f"simulated {scorer.time:.0f} s", refresh=False)
+            self._bar.update(100.0 * scorer.coverage - self._bar.n)
+        elif (now := self._clock()) - self._last >= LINE_PERIOD_S:
+            self._last = now
+            tell(f"explored {100.0 * scorer.coverage:.1f} %, simulated {scorer.time:.0f} s")
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None

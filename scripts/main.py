@@ -1,0 +1,96 @@
+"""The command line: reads what is asked for, runs it, and turns what happens into exit codes."""
+
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+from tyro.conf import subcommand
+
+from lidarium.scripts import bench, floors, run, show
+from lidarium.scripts.bench import Bench
+from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
+from lidarium.scripts.floors import Floors
+from lidarium.scripts.run import Run
+from lidarium.scripts.show import Show
+
+Choice = (
+    Annotated[Run, subcommand("run")]
+    | Annotated[Floors, subcommand("floors")]
+    | Annotated[Bench, subcommand("bench")]
+    | Annotated[Show, subcommand("show")]
+)
+
+_EXECUTE: dict[type, Callable[[Any], Answer]] = {
+    Run: run.execute,
+    floors.List: floors.list_floors,
+    floors.Show: floors.show_floor,
+    floors.Generate: floors.generate_floor,
+    floors.Import: floors.import_floor,
+    Bench: bench.execute,
+    Show: show.execute,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    arguments : sequence of str or None
+        Those of the process where None.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 2 bad input, 3 the answer is no, 130 interrupted (finished parts are kept), 1 a defect of ours.
+    """
+    try:
+        return _answered(_command(arguments))
+    except SystemExit as leaving:  # tyro, having printed help (0) or what is wrong with the options (2)
+        return leaving.code if isinstance(leaving.code, int) else BAD_INPUT
+    except KeyboardInterrupt:
+        tell("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output has left: nobody is there to be told, and Python shall not complain at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except (ValueError, OSError) as error:
+        tell(f"lidarium: {_message(error)}")
+        return BAD_INPUT
+    except MemoryError:
+        tell("lidarium: this needs more memory than there is; try a smaller floor, a coarser --resolution or --map-resolution")
+        return BAD_INPUT
+    except Exception:
+        tell("lidarium: this is a defect of lidarium, not of your input. Please report it with the command line and the lines below.\n")
+        traceback.print_exc()
+        return DEFECT
+
+
+def _command(arguments: Sequence[str] | None) -> Command:
+    import tyro
+
+    config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
+    description = "Teams of lidar robots explore unknown floors. Begin with `lidarium run`."
+    chosen: Any = tyro.cli(Choice, prog="lidarium", description=description, args=arguments, config=config)
+    command: Command = chosen.command if isinstance(chosen, Floors) else chosen
+    return command
+
+
+def _answered(command: Command) -> int:
+    from lidarium.evaluation.output import as_json
+
+    answer = _EXECUTE[type(command)](command)
+    text = as_json(answer.result) if command.json else answer.text + "\n"
+    if answer.result:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    return answer.code
+
+
+def _message(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return str(error) or type(error).__name__

@@ -1,0 +1,232 @@
+"""`lidarium run`: a team explores a floor, and writes what it found."""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lidarium.scripts.common import INTERRUPTED, Answer, Command, Progress, file_name, table, tell
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.settings import ExplorationSettings
+    from lidarium.evaluation.runner import Episode
+
+DEFAULT_FOLDER = Path("runs")
+
+NAMED_GIVEN_UP = 5
+"""How many of the frontiers given up are named in the summary; result.json has all."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(Command):
+    """Let a team explore a floor; writes its figures, its map, a picture and, if asked for, a film."""
+
+    floor: str = "apartment"
+    """name in the catalogue, building:SEED, set:NAME, or a file of any format that the importers know"""
+    robots: int = 3
+    """number of robots"""
+    policy: str = "nearest_frontier"
+    """who decides; `lidarium show policies` lists them"""
+    robot: str = "kobuki"
+    """body of the robots; `lidarium show robots` lists them"""
+    lidar: str = "urg"
+    """laser of the robots; `lidarium show lidars` lists them"""
+    noise: str = "none"
+    """noise of the laser's ranges: none, datasheet or thesis"""
+    resolution: float | None = None
+    """metres per pixel, where the floor is a plain image"""
+    map_resolution: float = 0.025
+    """side of a cell of the maps, a whole multiple of 0.025 [m]"""
+    horizon_s: float | None = None
+    """simulated time after which the run is cut [s]; without it the run ends when the explorers do"""
+    stop_coverage: float = 0.99
+    """share of the floor at which the run ends"""
+    starts: str | None = None
+    """where the robots start: x,y,theta of each in metres and radians, separated by semicolons"""
+    video: bool = False
+    """write a film of the run, run.mp4"""
+    video_speed: float = 10.0
+    """simulated seconds per second of the film"""
+
+
+def execute(command: Run) -> Answer:
+    """Run one episode and write what it left.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError, OSError
+        Where the input or ``--out`` is no good; nothing is written then.
+    """
+    import lidarium
+    from lidarium.evaluation.output import check_writable
+
+    check_writable(command.out or DEFAULT_FOLDER)
+    policy = lidarium.policy(command.policy)
+    env = _environment(command)
+    starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
+    if starts is not None:
+        _check_connected(env, command, starts)
+    episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
+    if env.floor is None or not env.scorer.track:
+        tell("interrupted before the run began; nothing was written")
+        return Answer({}, "", INTERRUPTED)
+    folder = _folder(command, env.floor.name)
+    from lidarium.evaluation.result import result_of
+
+    result = result_of(episode, command.policy)
+    files = _write(command, episode, result, folder)
+    return Answer(result, _summary(command, episode, result, folder, files), INTERRUPTED if episode.is_interrupted else 0)
+
+
+def _settings(command: Run) -> "ExplorationSettings":
+    from lidarium.envs.settings import make_settings
+
+    return make_settings(
+        robots=command.robots,
+        robot=command.robot,
+        lidar=command.lidar,
+        noise=command.noise,
+        resolution=command.map_resolution,
+        horizon_s=command.horizon_s,
+        stop_coverage=command.stop_coverage,
+    )
+
+
+def _environment(command: Run) -> "ExplorationEnv":
+    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.evaluation.video import FilmedExploration
+
+    kind = FilmedExploration if command.video else ExplorationEnv
+    return kind(command.floor, _settings(command), image_resolution=command.resolution)
+
+
+def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
+    import numpy as np
+
+    try:
+        starts = np.array([[float(value) for value in start.split(",")] for start in text.strip("; ").split(";")])
+    except ValueError:
+        starts = np.zeros((0, 0))
+    if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():
+        raise ValueError(f"--starts is {text!r}; want x,y,theta of each robot, separated by semicolons, as in '1.0,2.5,0;4,2,1.57'")
+    if len(starts) != robots:
+        raise ValueError(f"--starts has {len(starts)} starts for {robots} robots; want one for each")
+    return starts
+
+
+def _check_connected(env: "ExplorationEnv", command: Run, starts: "NDArray[np.float64]") -> None:
+    """Refuse starts of which one cannot be reached from another."""
+    from lidarium.envs.exploration import floor_tables
+    from lidarium.envs.floors.starts import check_starts, swept_free_space
+    from lidarium.mapping.grid_planning import cells_of
+
+    if command.floor.startswith("set:"):
+        return
+    settings = env.settings
+    heights = settings.lidar.height, settings.robot.height
+    body = floor_tables(command.floor, command.resolution, settings.raster_resolution, *heights).body
+    check_starts(body, settings.robot.radius, starts)
+    swept = swept_free_space(body, settings.robot.radius, starts[:1])
+    for robot, start in enumerate(starts):
+        row, column = cells_of(start[:2], body.origin, body.resolution)
+        if not swept[row, column]:
+            radius = settings.robot.radius
+            raise ValueError(
+                f"starts of robots 0 and {robot} are disconnected for a robot of radius {radius} m; want starts in one room system"
+            )
+
+
+def _explore(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, Any]) -> "Episode":  # noqa: ANN401
+    """Run the episode under a progress bar and, if asked for, a camera."""
+    from lidarium.evaluation.runner import run_episode
+
+    progress = Progress(is_quiet=command.json)
+    try:
+        if not command.video:
+            return run_episode(policy, env, command.seed, options, progress.tell, raise_interrupt=False)
+        return _film(command, policy, env, options, progress)
+    finally:
+        progress.close()
+
+
+def _film(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
+    from lidarium.evaluation.runner import run_episode
+    from lidarium.evaluation.video import Film, FilmedExploration, film
+
+    assert isinstance(env, FilmedExploration)
+    with ExitStack() as stack:
+        camera: list[Film] = []
+
+        def on_decision(current: "ExplorationEnv") -> None:
+            # The folder is named by the floor, which a set draws at the reset; nothing is written before that.
+            if not camera:
+                assert current.floor is not None
+                path = _folder(command, current.floor.name) / "run.mp4"
+                camera.append(stack.enter_context(film(path, command.video_speed)))
+                camera[0].take(current)
+                env.on_step = camera[0].take
+            progress.tell(current)
+
+        episode = run_episode(policy, env, command.seed, options, on_decision, raise_interrupt=False)
+        env.on_step = None
+        if camera and not episode.is_interrupted:
+            camera[0].end(env)
+        return episode
+
+
+def _folder(command: Run, floor: str) -> Path:
+    return command.out or DEFAULT_FOLDER / file_name(f"{floor}-{command.policy}-{command.seed}")
+
+
+def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Path) -> list[str]:
+    """Write the figures first, then the map, then the picture; return the files' names."""
+    import numpy as np
+
+    from lidarium.evaluation.output import write_json
+    from lidarium.evaluation.pictures import save_run_picture
+    from lidarium.evaluation.result import team_log_odds
+    from lidarium.mapping.map_files import write_ros_map
+    from lidarium.mapping.occupancy import three_levels
+
+    write_json(folder / "result.json", result)
+    log_odds, (x, y) = team_log_odds(episode.env)
+    write_ros_map(folder, "map", three_levels(np.sign(log_odds).astype(np.int8)), (x, y, 0.0), command.map_resolution)
+    save_run_picture(folder / "run.png", episode, command.policy)
+    return ["result.json", "map.yaml", "map.pgm", "run.png", *(["run.mp4"] if command.video else [])]
+
+
+def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]) -> str:
+    env = episode.env
+    area = float(env.world.counted[0]) * env.settings.occupancy.resolution**2
+    thresholds = [f"{share} % at {result[f't{share}_s']:.1f} s" for share in (85, 90, 95, 99) if result[f"t{share}_s"] is not None]
+    counted = max(int(env.world.counted[0]), 1)
+    ended = [
+        (agent, reason or "still at work", f"{length:.1f} m", f"{100.0 * seen / counted:.1f} %")
+        for (agent, reason), length, seen in zip(result["ended_because"].items(), result["path_m"], env.world.seen, strict=True)
+    ]
+    facts = [
+        ("explored", f"{100.0 * result['coverage_final']:.2f} % of {area:.1f} m2 in {result['time_s']:.1f} s of simulated time"),
+        ("reached", ", ".join(thresholds) or "not 85 %"),
+        ("together", f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions"),
+        ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
+        ("given up", _given_up(result["given_up"])),
+        ("speed", f"{episode.wall_seconds:.1f} s, {result['steps_per_s'] or 0.0:,.0f} steps/s"),
+        ("files", f"{folder}: {', '.join(files)}"),
+    ]
+    how = " (interrupted)" if episode.is_interrupted else ""
+    title = f"{result['floor']}: {command.policy}, seed {command.seed}, realism {result['realism']}{how}"
+    return "\n".join([title, table(facts), "", table(ended, ("robot", "ended because", "drove", "saw"))])
+
+
+def _given_up(entries: list[dict[str, Any]]) -> str:
+    """Name the longest frontiers that were given up, with reason and place."""
+    if not entries:
+        return "nothing"
+    longest = sorted(entries, key=lambda entry: -float(entry["size_m"]))[:NAMED_GIVEN_UP]
+    named = ", ".join(f"{entry['reason']} at ({entry['x']:.1f}, {entry['y']:.1f}) {entry['size_m']:.2f} m" for entry in longest)
+    more = len(entries) - len(longest)
+    return f"{len(entries)} on the way: {named}{f', and {more} shorter' if more else ''}"

@@ -1,0 +1,76 @@
+import json
+
+import cv2
+import pytest
+
+from lidarium.envs.floors.catalogue import load_floor
+from lidarium.mapping.map_files import read_ros_map
+from lidarium.scripts.main import main
+
+
+def test_the_list_names_floors_kinds_and_sets(capsys):
+    assert main(["floors", "list"]) == 0
+    told = capsys.readouterr().out
+    assert all(word in told for word in ("apartment", "clinic", "scene_loop_corridor", "office:SEED", "set:validation", "200"))
+
+
+def test_the_list_is_json_too(capsys, tmp_path):
+    assert main(["floors", "list", "--json", "--out", str(tmp_path)]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["sets"]["train"]["floors"] == 10_000
+    assert result == json.loads((tmp_path / "floors.json").read_text())
+
+
+def test_a_floor_is_told_in_figures_and_drawn(capsys, tmp_path):
+    assert main(["floors", "show", "apartment"]) == 0
+    assert "free area" in capsys.readouterr().out
+    assert main(["floors", "show", "apartment", "--json", "--out", str(tmp_path)]) == 0
+    assert json.loads(capsys.readouterr().out)["sha256"] == load_floor("apartment").sha256
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["apartment.json", "apartment.png"]
+
+
+def test_a_generated_floor_is_a_ros_map_that_can_be_explored(tmp_path, capsys):
+    arguments = ["floors", "generate", "--kind", "apartment", "--area", "45", "--loops", "0.2", "--clutter", "0.1", "--seed", "7"]
+    assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["name"] == "apartment:7"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"apartment-7.{kind}" for kind in ("json", "pgm", "png", "yaml")]
+    assert cv2.imread(str(tmp_path / "apartment-7.png")) is not None
+    assert (
+        main(["run", "--floor", str(tmp_path / "apartment-7.yaml"), "--robots", "1", "--horizon-s", "5", "--out", str(tmp_path / "run")])
+        == 0
+    )
+
+
+def test_the_ros_map_of_a_floor_has_its_free_cells(tmp_path):
+    assert main(["floors", "generate", "--kind", "corridors", "--seed", "2", "--out", str(tmp_path), "--map-resolution", "0.05"]) == 0
+    found = read_ros_map(tmp_path / "corridors-2.yaml")
+    raster = load_floor("corridors:2").raster(0.05, 0.3, 0.3)
+    assert ((found.levels == 255) == (raster.solid == 0)).all()
+    assert found.origin[:2] == raster.origin
+
+
+def test_a_dungeon_is_imported(shared_data, tmp_path, capsys):
+    path = sorted((shared_data / "floorplans" / "synthetic_dungeon").glob("*.png"))[0]
+    assert main(["floors", "import", str(path), "--out", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["area_m2"] > 10.0
+    assert (tmp_path / f"{path.stem}.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["generate", "--kind", "castle"], "castle"),
+        (["generate", "--area", "5"], "area_m2 is 5"),
+        (["generate", "--loops", "2"], "loops is 2"),
+        (["generate", "--map-resolution", "0"], "resolution is 0"),
+        (["show", "apartmnt"], "did you mean 'apartment'?"),
+        (["show", "set:train"], "is a set"),
+    ],
+)
+def test_floors_that_cannot_be_are_refused(arguments, word, tmp_path, capsys):
+    assert main(["floors", *arguments, "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr()
+    assert word in told.err
+    assert told.out == ""
+    assert not (tmp_path / "out").exists()
