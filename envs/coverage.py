@@ -38,7 +38,7 @@ def count_bits(value):  # noqa: ANN001, ANN201
 
 
 @kernel
-def mark_seen(own, team, counted, bits, row_low, row_high, row_offset, word_offset, news):  # noqa: ANN001, ANN201
+def mark_seen(own, team, counted, bits, box, row_offset, word_offset, news):  # noqa: ANN001, ANN201
     """Add a scan's seen cells to a robot's mask and list what is new to the team.
 
     Parameters
@@ -47,8 +47,8 @@ def mark_seen(own, team, counted, bits, row_low, row_high, row_offset, word_offs
         What the robot has seen (updated), what any robot had seen before the step, and F.
     bits : (window rows, words) uint64
         The seen area.
-    row_low, row_high : int
-        Rows of the window that may hold bits.
+    box : tuple of int
+        row_low, row_high, word_low, word_high of the window that may hold bits.
     row_offset, word_offset : int
         Place of the window in the masks.
     news : (entries, 3) uint64
@@ -61,13 +61,11 @@ def mark_seen(own, team, counted, bits, row_low, row_high, row_offset, word_offs
     """
     rows, words = own.shape
     new_own, entries = 0, 0
-    for row in range(max(row_low, -row_offset), min(row_high, rows - row_offset)):
-        for word in range(max(0, -word_offset), min(bits.shape[1], words - word_offset)):
-            value = bits[row, word]
-            if value == np.uint64(0):
-                continue
+    word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
+    for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
+        for word in range(word_low, word_high):
             i, j = row + row_offset, word + word_offset
-            value &= counted[i, j] & ~own[i, j]
+            value = bits[row, word] & counted[i, j] & ~own[i, j]
             if value == np.uint64(0):
                 continue
             own[i, j] |= value

@@ -79,6 +79,8 @@ class View:
         Pixels per metre.
     height, width : int
         Size of the picture [pixels].
+    block : int
+        Side of the blocks of cells that are drawn as one, where there are more cells than pixels.
     """
 
     rows: slice
@@ -87,6 +89,7 @@ class View:
     scale: float
     height: int
     width: int
+    block: int
 
     def pixels(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
         """Return points (..., 2) as x, y [m] in OpenCV's pixels with `_SHIFT` fractional bits."""
@@ -103,7 +106,8 @@ def view_of(tables: FloorTables, size: int) -> View:
     tall, wide = ((span.stop - span.start) * raster.resolution for span in (rows, columns))
     scale = size / max(tall, wide)
     origin = (raster.origin[0] + columns.start * raster.resolution, raster.origin[1] + rows.start * raster.resolution)
-    return View(rows, columns, origin, scale, max(round(tall * scale), 1), max(round(wide * scale), 1))
+    block = max(max(rows.stop - rows.start, columns.stop - columns.start) // size, 1)
+    return View(rows, columns, origin, scale, max(round(tall * scale), 1), max(round(wide * scale), 1), block)
 
 
 def _span(is_used: NDArray[np.bool_], margin: int) -> slice:
@@ -153,12 +157,12 @@ def draw_frame(env: "ExplorationEnv", size: int = SIZE) -> Frame:
 def _draw_floor(env: "ExplorationEnv", tables: FloorTables, view: View) -> Frame:
     raster = tables.laser
     multiple = round(env.settings.occupancy.resolution / raster.resolution)
+    solid = _shrunk(raster.solid[view.rows, view.columns], view.block)
     seen, counted = (
-        _on_raster(mask, raster.solid.shape, multiple)[view.rows, view.columns]
+        _shrunk(_on_raster(mask, raster.solid.shape, multiple)[view.rows, view.columns], view.block)
         for mask in (env.world.team_masks[0], env.world.counted_masks[0])
     )
-    solid = raster.solid[view.rows, view.columns]
-    picture = PALETTE[classify(solid, seen, counted, raster.resolution)]
+    picture = PALETTE[classify(solid, seen, counted, raster.resolution * view.block)]
     interpolation = cv2.INTER_NEAREST if view.height >= solid.shape[0] else cv2.INTER_AREA
     return np.ascontiguousarray(cv2.resize(picture, (view.width, view.height), interpolation=interpolation)[::-1], dtype=np.uint8)
 
@@ -169,6 +173,15 @@ def _on_raster(mask: NDArray[np.uint64], shape: tuple[int, int], multiple: int) 
     if multiple > 1:
         cells = np.repeat(np.repeat(cells, multiple, axis=0), multiple, axis=1)
     return cells[: shape[0], : shape[1]]
+
+
+def _shrunk(cells: NDArray[np.uint8], block: int) -> NDArray[np.uint8]:
+    """Return 1 for each block of ``block`` x ``block`` cells of which any is not 0."""
+    if block == 1:
+        return cells
+    rows, columns = (side // block for side in cells.shape)
+    whole = cells[: rows * block, : columns * block]
+    return np.asarray(whole.reshape(rows, block, columns * block).max(axis=1).reshape(rows, columns, block).max(axis=2))
 
 
 def classify(solid: NDArray[np.uint8], seen: NDArray[np.uint8], counted: NDArray[np.uint8], resolution: float) -> NDArray[np.uint8]:
@@ -190,8 +203,9 @@ def classify(solid: NDArray[np.uint8], seen: NDArray[np.uint8], counted: NDArray
     near_seen = cv2.dilate(seen, np.ones((side, side), np.uint8))
     beside = np.where(solid != 0, np.uint8(_WALL), np.uint8(_NOT_COUNTED))
     beyond = np.where(solid != 0, np.uint8(_SOLID), np.uint8(_UNEXPLORED))
-    classes = np.where((near_seen != 0) & (counted == 0), beside, beyond)
-    classes[seen != 0] = _EXPLORED
+    # A block of cells may hold both floor and wall: the wall shows.
+    classes = np.where((near_seen != 0) & ((counted == 0) | (solid != 0)), beside, beyond)
+    classes[(seen != 0) & (solid == 0)] = _EXPLORED
     return classes
 
 

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.rendering import team_colours
-from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.evaluation.output import whole_file
-from lidarium.evaluation.result import team_log_odds
+from lidarium.evaluation.result import occupied_in_truth, team_log_odds
 from lidarium.evaluation.runner import Episode
 from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.grid_planning import centres_of
@@ -32,6 +31,7 @@ DPI = 130
 _START_COLOUR = "#2563eb"
 _LISTED_ROBOTS = 16
 _WIDE = 2.1
+_MOST_PIXELS = 3000
 _MARGIN = 0.15
 
 
@@ -62,12 +62,11 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
         Name of the policy.
     """
     env, scorer = episode.env, episode.env.scorer
-    tables = env.world.floors[0]
-    if tables is None or env.floor is None:
+    if env.floor is None:
         raise ValueError("the episode was interrupted before it began, there is nothing to draw")
-    box = _box_of(tables)
-    figure, floor_axes, curve_axes, team_axes = _page(box.aspect)
-    _draw_maps(floor_axes, episode, tables, box)
+    x_min, y_min, x_max, y_max = env.floor.bounds
+    figure, floor_axes, curve_axes, team_axes = _page((x_max - x_min) / (y_max - y_min))
+    _draw_maps(floor_axes, episode)
     _draw_ways(floor_axes, episode)
     _draw_legend(figure, *_draw_frontiers(floor_axes, episode))
     _draw_curve(curve_axes, episode)
@@ -96,8 +95,8 @@ def save_floor_picture(path: Path, floor: Floor, height: float, resolution: floa
     box = _box_around(raster.solid == 0, raster.origin, resolution)
     figure = Figure(figsize=_floor_size(box.aspect), layout="constrained")
     axes = figure.add_subplot()
-    picture = np.where((raster.solid[box.rows, box.columns] != 0)[..., None], _rgb(INK), _rgb("#ffffff"))
-    _show(axes, picture, box, INK)
+    solid = _drawn_together((raster.solid[box.rows, box.columns] != 0).astype(np.uint8))
+    _show(axes, np.stack([_rgb("#ffffff"), _rgb(INK)])[solid], box, INK)
     for k, (x, y, theta) in enumerate(floor.starts):
         _draw_start(axes, k, float(x), float(y), _START_COLOUR)
         ahead = (x + 0.6 * math.cos(theta), y + 0.6 * math.sin(theta))
@@ -126,10 +125,6 @@ def frontiers_left(episode: Episode) -> tuple[NDArray[np.float64], NDArray[np.fl
 def _moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     return np.asarray(points @ np.array([[cosine, sine], [-sine, cosine]]) + pose[:2])
-
-
-def _box_of(tables: FloorTables) -> _Box:
-    return _box_around(tables.laser.solid == 0, tables.laser.origin, tables.laser.resolution)
 
 
 def _box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution: float) -> _Box:
@@ -191,27 +186,33 @@ def _show(axes: Axes, picture: NDArray[np.uint8], box: _Box, outside: str) -> No
         side.set_visible(False)
 
 
-def _draw_maps(axes: Axes, episode: Episode, tables: FloorTables, box: _Box) -> None:
+def _draw_maps(axes: Axes, episode: Episode) -> None:
     """Draw the truth in pale colours and the team's map over it."""
-    world = episode.env.world
-    multiple = round(episode.env.settings.occupancy.resolution / tables.laser.resolution)
-    log_odds = _enlarged(team_log_odds(episode.env)[0], multiple)
-    columns = log_odds.shape[1] // multiple
-    counted = _enlarged(unpack_bits(world.counted_masks[0], columns), multiple)
-    solid = tables.laser.solid != 0
-    rows, width = solid.shape
-    log_odds, counted = log_odds[:rows, :width], counted[:rows, :width]
-    picture = np.empty((*solid.shape, 3), np.uint8)
-    picture[:] = _rgb(UNCOUNTED_COLOUR)
-    picture[counted] = _rgb(UNSEEN_COLOUR)
-    picture[solid] = _rgb(SOLID)
-    picture[log_odds < 0] = 255
-    picture[log_odds > 0] = _rgb(INK)
-    _show(axes, picture[box.rows, box.columns], box, SOLID)
+    env = episode.env
+    log_odds, origin = team_log_odds(env)
+    solid = occupied_in_truth(env)
+    counted = unpack_bits(env.world.counted_masks[0], solid.shape[1])
+    rows, columns = np.flatnonzero(solid.any(axis=1))[-1] + 1, np.flatnonzero(solid.any(axis=0))[-1] + 1
+    solid, counted, log_odds = solid[:rows, :columns], counted[:rows, :columns], log_odds[:rows, :columns]
+    # In the order of what shows where cells are drawn together.
+    classes = np.zeros(solid.shape, np.uint8)
+    classes[solid] = 1
+    classes[counted] = 2
+    classes[log_odds < 0] = 3
+    classes[log_odds > 0] = 4
+    palette = np.stack([_rgb(colour) for colour in (UNCOUNTED_COLOUR, SOLID, UNSEEN_COLOUR, "#ffffff", INK)])
+    box = _box_around(~solid, origin, env.settings.occupancy.resolution)
+    _show(axes, palette[_drawn_together(classes[box.rows, box.columns])], box, SOLID)
 
 
-def _enlarged(cells: NDArray[Any], multiple: int) -> NDArray[Any]:
-    return cells if multiple == 1 else np.repeat(np.repeat(cells, multiple, axis=0), multiple, axis=1)
+def _drawn_together(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Draw blocks of cells as one where there are more than the picture has pixels; the highest class shows."""
+    block = -(-max(classes.shape) // _MOST_PIXELS)
+    if block == 1:
+        return classes
+    rows, columns = (-(-side // block) * block for side in classes.shape)
+    padded = np.pad(classes, ((0, rows - classes.shape[0]), (0, columns - classes.shape[1])), mode="edge")
+    return np.asarray(padded.reshape(rows // block, block, columns // block, block).max(axis=1).max(axis=2))
 
 
 def _draw_ways(axes: Axes, episode: Episode) -> None:

@@ -111,17 +111,22 @@ def team_log_odds(env: ExplorationEnv) -> tuple[NDArray[np.int16], tuple[float, 
     return total, origin
 
 
-def iou_of(env: ExplorationEnv) -> float:
-    """Return ``iou_occupied`` of the team's map; a map cell is truly occupied where any of the world's cells in it is solid."""
+def occupied_in_truth(env: ExplorationEnv) -> NDArray[np.bool_]:
+    """Return the truth on the lattice of the maps: cells of which any of the world's cells is solid; free beyond the world's raster."""
     tables = env.world.floors[0]
     assert tables is not None
-    multiple = round(env.settings.occupancy.resolution / tables.laser.resolution)
+    raster = tables.laser
+    multiple = round(env.settings.occupancy.resolution / raster.resolution)
+    rows, words = env.world.counted_masks[0].shape
+    solid = np.zeros((rows * multiple, words * 64 * multiple), np.bool_)
+    solid[: raster.solid.shape[0], : raster.solid.shape[1]] = raster.solid
+    return np.asarray(solid.reshape(rows, multiple, words * 64, multiple).any(axis=(1, 3)))
+
+
+def iou_of(env: ExplorationEnv) -> float:
+    """Return ``iou_occupied`` of the team's map."""
     believed = np.asarray(team_log_odds(env)[0] > 0)
-    rows, columns = believed.shape
-    solid = np.zeros((rows * multiple, columns * multiple), np.bool_)
-    solid[: tables.laser.solid.shape[0], : tables.laser.solid.shape[1]] = tables.laser.solid
-    occupied = np.asarray(solid.reshape(rows, multiple, columns, multiple).any(axis=(1, 3)))
-    return occupied_iou(believed, occupied, unpack_bits(env.world.team_masks[0], columns))
+    return occupied_iou(believed, occupied_in_truth(env), unpack_bits(env.world.team_masks[0], believed.shape[1]))
 
 
 def in_floor_frame(env: ExplorationEnv, agent: str, x: float, y: float) -> tuple[float, float]:

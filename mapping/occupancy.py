@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.kernels import kernel
-from lidarium.mapping.scan_polygon import fill_scan_polygon, window_rows, window_words
+from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import ScanGeometry, beam_directions
 
 LOG_ODDS_UNIT = 0.05
@@ -69,20 +69,15 @@ BYTE_MASKS = _byte_masks()
 
 
 @kernel
-def _raise_hits(log_odds, ranges, is_hit, directions, x, y, row_offset, column_offset, increments, bits, hit_bits):  # noqa: ANN001, ANN202
+def _raise_hits(log_odds, ends, is_hit, row_offset, column_offset, increments, bits, hit_bits):  # noqa: ANN001, ANN202
     """Raise the cells in which a beam ended, once each, and take them out of the seen area."""
     hit, maximum = increments[0], increments[3]
     rows, columns = log_odds.shape
-    for beam in range(ranges.shape[0]):
+    for beam in range(is_hit.shape[0]):
         if not is_hit[beam]:
             continue
-        column = int(math.floor(x + ranges[beam] * directions[0, beam]))
-        row = int(math.floor(y + ranges[beam] * directions[1, beam]))
-        if row < 0 or row >= bits.shape[0] or column < 0:
-            continue
+        column, row = int(ends[0, beam]), int(ends[1, beam])
         word = column >> 6
-        if word >= bits.shape[1]:
-            continue
         bit = np.uint64(1) << np.uint64(column & 63)
         if hit_bits[row, word] & bit:
             continue
@@ -94,7 +89,7 @@ def _raise_hits(log_odds, ranges, is_hit, directions, x, y, row_offset, column_o
 
 
 @kernel
-def _lower_seen(log_odds, bits, row_low, row_high, row_offset, column_offset, increments, byte_masks):  # noqa: ANN001, ANN202
+def _lower_seen(log_odds, bits, box, row_offset, column_offset, increments, byte_masks):  # noqa: ANN001, ANN202
     """Lower the seen cells in whole blocks of 64 under a byte mask."""
     miss, minimum = np.int8(increments[1]), np.int8(increments[2])
     threshold = np.int8(increments[1] + increments[2])
@@ -103,8 +98,9 @@ def _lower_seen(log_odds, bits, row_low, row_high, row_offset, column_offset, in
     words = log_odds.shape[1] // 64
     word_offset = column_offset // 64
     full = ~np.uint64(0)
-    for row in range(max(row_low, -row_offset), min(row_high, log_odds.shape[0] - row_offset)):
-        for word in range(max(0, -word_offset), min(bits.shape[1], words - word_offset)):
+    word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
+    for row in range(max(box[0], -row_offset), min(box[1], log_odds.shape[0] - row_offset)):
+        for word in range(word_low, word_high):
             value = bits[row, word]
             if value == np.uint64(0):
                 continue
@@ -124,23 +120,19 @@ def _lower_seen(log_odds, bits, row_low, row_high, row_offset, column_offset, in
 
 
 @kernel
-def integrate_scan(log_odds, bits, row_low, row_high, ranges, is_hit, directions, x, y, row_offset, column_offset, increments, byte_masks, hit_bits):  # noqa: ANN001, ANN201, E501
-    """Update a map by a scan whose seen area is in ``bits``; clears ``bits`` and ``hit_bits`` for the next scan.
+def integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, byte_masks, hit_bits):  # noqa: ANN001, ANN201
+    """Update a map by a scan whose seen area is in ``bits``.
 
     Parameters
     ----------
     log_odds : (rows, columns) int8
         The map; columns a multiple of 64.
     bits, hit_bits : (window rows, words) uint64
-        The seen area of ``fill_scan_polygon``; zeros.
-    row_low, row_high : int
-        Rows of the window that may hold bits.
-    ranges, is_hit : (beams,) float64 and bool
-        Length of each beam [cells] and whether something ended it.
-    directions : (2 or more, beams) float64
-        Unit vectors of the beams in the map's axes.
-    x, y : float
-        Position of the laser in the window [cells].
+        The seen area of ``fill_scan_polygon`` (the cells of hits are taken out), and zeros (the hits are noted).
+    box : tuple of int
+        The box of the window that may hold bits.
+    ends, is_hit : (2, beams) float64 and (beams,) bool
+        End points of the beams in the window [cells], and whether something ended them.
     row_offset, column_offset : int
         Place of the window's first cell in the map; column_offset a multiple of 64.
     increments : (4,) int64
@@ -148,13 +140,8 @@ def integrate_scan(log_odds, bits, row_low, row_high, ranges, is_hit, directions
     byte_masks : (256,) uint64
         ``BYTE_MASKS``.
     """
-    _raise_hits(log_odds, ranges, is_hit, directions, x, y, row_offset, column_offset, increments, bits, hit_bits)
-    _lower_seen(log_odds, bits, row_low, row_high, row_offset, column_offset, increments, byte_masks)
-    # A hit may lie one row beyond the rows of the seen area.
-    for row in range(max(row_low - 1, 0), min(row_high + 1, bits.shape[0])):
-        for word in range(bits.shape[1]):
-            bits[row, word] = np.uint64(0)
-            hit_bits[row, word] = np.uint64(0)
+    _raise_hits(log_odds, ends, is_hit, row_offset, column_offset, increments, bits, hit_bits)
+    _lower_seen(log_odds, bits, box, row_offset, column_offset, increments, byte_masks)
 
 
 @kernel
@@ -164,24 +151,22 @@ def _integrate_one(log_odds, x, y, heading, ranges, geometry, unit_vectors, incr
     beams = ranges.shape[0]
     directions = np.empty((4, beams))
     beam_directions(heading, unit_vectors, directions)
-    lengths = np.empty(beams)
+    lengths, ends = np.empty(beams), np.empty((2, beams))
     is_hit = np.empty(beams, np.bool_)
     for beam in range(beams):
         value = float(ranges[beam])
         is_hit[beam] = math.isfinite(value) and value * scale <= reach
         lengths[beam] = 0.0 if math.isnan(value) else min(value * scale, reach)
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
-    hit_bits = np.zeros_like(bits)
     margin = int(reach) + 3
     row_offset = int(math.floor(y)) - margin
     column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
     local_x, local_y = x - column_offset, y - row_offset
-    row_low, row_high = fill_scan_polygon(lengths, directions, local_x, local_y, geometry[0], geometry[3] != 0.0, bits)
-    window[0], window[1] = row_low + row_offset, row_high + row_offset
-    window[2], window[3] = column_offset, column_offset + 64 * bits.shape[1]
-    integrate_scan(
-        log_odds, bits, row_low, row_high, lengths, is_hit, directions, local_x, local_y, row_offset, column_offset, increments, byte_masks, hit_bits
-    )
+    scan_ends(lengths, directions, local_x, local_y, ends)
+    box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, geometry[0], geometry[3] != 0.0, bits)
+    window[0], window[1] = box[0] + row_offset, box[1] + row_offset
+    window[2], window[3] = 64 * box[2] + column_offset, 64 * box[3] + column_offset
+    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, byte_masks, np.zeros_like(bits))
 
 
 class OccupancyGrid:

@@ -33,15 +33,10 @@ def window_rows(reach):  # noqa: ANN001, ANN201
 
 
 @kernel(inline=True)
-def _toggle_edge(bits, from_x, from_y, to_x, to_y):  # noqa: ANN001, ANN202
+def _toggle_edge(bits, from_x, from_y, to_x, to_y, from_row, to_row):  # noqa: ANN001, ANN202
     """Toggle the cell centres right of the edge, in the rows between its ends (half open, so that corners count once)."""
-    first = int(math.ceil(from_y - 0.5))
-    last = int(math.ceil(to_y - 0.5))
-    if first == last:
-        return
     slope = (to_x - from_x) / (to_y - from_y)
-    if first > last:
-        first, last = last, first
+    first, last = min(from_row, to_row), max(from_row, to_row)
     x = from_x + (first + 0.5 - from_y) * slope + 0.5
     for row in range(first, last):
         column = int(x)
@@ -49,16 +44,53 @@ def _toggle_edge(bits, from_x, from_y, to_x, to_y):  # noqa: ANN001, ANN202
         x += slope
 
 
+@kernel(inline=True)
+def _row_of(y):  # noqa: ANN001, ANN202
+    """First row whose centre line is not below y; y is not negative."""
+    return int(y + 0.5)
+
+
 @kernel
-def fill_scan_polygon(ranges, directions, x, y, increment, is_full_circle, bits):  # noqa: ANN001, ANN201
+def scan_ends(lengths, directions, x, y, ends):  # noqa: ANN001, ANN201
+    """Fill ``ends`` (2, beams) with the end points of the beams in the window [cells].
+
+    Parameters
+    ----------
+    lengths : (beams,) float64
+        How far each beam went [cells], 0 for a beam that says nothing.
+    directions : (2 or more, beams) float64
+        Unit vectors of the beams in the grid's axes.
+    x, y : float
+        Position of the laser in the window [cells].
+    ends : (2, beams) float64
+        Result.
+    """
+    for beam in range(lengths.shape[0]):
+        ends[0, beam] = x + lengths[beam] * directions[0, beam]
+    for beam in range(lengths.shape[0]):
+        ends[1, beam] = y + lengths[beam] * directions[1, beam]
+
+
+@kernel
+def _toggle_jump(bits, lengths, directions, ends, x, y, near, far):  # noqa: ANN001, ANN202
+    """Toggle the outline between a near and a far end point: along the far beam up to the near range only."""
+    corner_x = x + lengths[near] * directions[0, far]
+    corner_y = y + lengths[near] * directions[1, far]
+    row = _row_of(corner_y)
+    for beam in (near, far):
+        end_row = _row_of(ends[1, beam])
+        if end_row != row:
+            _toggle_edge(bits, ends[0, beam], ends[1, beam], corner_x, corner_y, end_row, row)
+
+
+@kernel
+def fill_scan_polygon(lengths, directions, ends, x, y, increment, is_full_circle, bits):  # noqa: ANN001, ANN201
     """Set the bits of the cells whose centre the scan has seen.
 
     Parameters
     ----------
-    ranges : (beams,) float64
-        How far each beam went [cells], 0 for a beam that says nothing.
-    directions : (2 or more, beams) float64
-        Unit vectors of the beams in the grid's axes.
+    lengths, directions, ends : arrays
+        As for ``scan_ends``.
     x, y : float
         Position of the laser in the window [cells]; at least the longest range plus 2 from its borders.
     increment : float
@@ -70,50 +102,42 @@ def fill_scan_polygon(ranges, directions, x, y, increment, is_full_circle, bits)
 
     Returns
     -------
-    row_low, row_high : int
-        The rows that may hold bits, the second exclusive.
+    row_low, row_high, word_low, word_high : int
+        The box that may hold bits, high ends exclusive.
     """
-    beams = ranges.shape[0]
-    last_range = ranges[beams - 1]
-    last_x = x + last_range * directions[0, beams - 1]
-    last_y = y + last_range * directions[1, beams - 1]
-    low, high = min(y, last_y), max(y, last_y)
+    beams = lengths.shape[0]
     if not is_full_circle:
-        _toggle_edge(bits, last_x, last_y, x, y)
-        first_x, first_y = x + ranges[0] * directions[0, 0], y + ranges[0] * directions[1, 0]
-        _toggle_edge(bits, x, y, first_x, first_y)
-        last_range, last_x, last_y = ranges[0], first_x, first_y
-        low, high = min(low, first_y), max(high, first_y)
+        own_row = _row_of(y)
+        for beam in (0, beams - 1):
+            end_row = _row_of(ends[1, beam])
+            if end_row != own_row:
+                _toggle_edge(bits, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
     steepness = GRAZING * increment
     previous = beams - 1 if is_full_circle else 0
+    last_length, last_row = lengths[previous], _row_of(ends[1, previous])
+    low_x, high_x, low_y, high_y = x, x, y, y
+    for beam in range(beams):
+        low_x, high_x = min(low_x, ends[0, beam]), max(high_x, ends[0, beam])
+        low_y, high_y = min(low_y, ends[1, beam]), max(high_y, ends[1, beam])
     for beam in range(0 if is_full_circle else 1, beams):
-        next_range = ranges[beam]
-        direction_x, direction_y = directions[0, beam], directions[1, beam]
-        next_x, next_y = x + next_range * direction_x, y + next_range * direction_y
-        step = next_range - last_range
-        if step > 1.0 + steepness * last_range:
-            between_x, between_y = x + last_range * direction_x, y + last_range * direction_y
-            _toggle_edge(bits, last_x, last_y, between_x, between_y)
-            _toggle_edge(bits, between_x, between_y, next_x, next_y)
-        elif -step > 1.0 + steepness * next_range:
-            between_x = x + next_range * directions[0, previous]
-            between_y = y + next_range * directions[1, previous]
-            _toggle_edge(bits, last_x, last_y, between_x, between_y)
-            _toggle_edge(bits, between_x, between_y, next_x, next_y)
-        else:
-            _toggle_edge(bits, last_x, last_y, next_x, next_y)
-        low, high = min(low, next_y), max(high, next_y)
-        last_range, last_x, last_y = next_range, next_x, next_y
+        length = lengths[beam]
+        row = _row_of(ends[1, beam])
+        step = length - last_length
+        if abs(step) > 1.0 + steepness * min(length, last_length):
+            if step > 0.0:
+                _toggle_jump(bits, lengths, directions, ends, x, y, previous, beam)
+            else:
+                _toggle_jump(bits, lengths, directions, ends, x, y, beam, previous)
+        elif row != last_row:
+            _toggle_edge(bits, ends[0, previous], ends[1, previous], ends[0, beam], ends[1, beam], last_row, row)
+        last_length, last_row = length, row
         previous = beam
-    row_low = max(int(math.floor(low)) - 1, 0)
-    row_high = min(int(math.ceil(high)) + 2, bits.shape[0])
-    words = bits.shape[1]
-    for row in range(row_low, row_high):
+    row_low, row_high = max(int(low_y) - 1, 0), min(int(high_y) + 2, bits.shape[0])
+    word_low, word_high = max(int(low_x) - 1, 0) >> 6, min((int(high_x) + 2) >> 6, bits.shape[1] - 1) + 1
+    for i in range(row_low, row_high):
         carry = np.uint64(0)
-        for word in range(words):
-            value = bits[row, word]
-            if value == np.uint64(0) and carry == np.uint64(0):
-                continue
+        for word in range(word_low, word_high):
+            value = bits[i, word]
             value ^= value << np.uint64(1)
             value ^= value << np.uint64(2)
             value ^= value << np.uint64(4)
@@ -121,6 +145,6 @@ def fill_scan_polygon(ranges, directions, x, y, increment, is_full_circle, bits)
             value ^= value << np.uint64(16)
             value ^= value << np.uint64(32)
             value ^= carry
-            bits[row, word] = value
+            bits[i, word] = value
             carry = np.uint64(0) - (value >> np.uint64(63))
-    return row_low, row_high
+    return row_low, row_high, word_low, word_high

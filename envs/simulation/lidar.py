@@ -220,7 +220,8 @@ def _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges):  
             distance_x = (border_x - x) * inverse_x
             distance_y = (border_y - y) * inverse_y
             if distance_x <= distance_y:
-                distance = distance_x
+                # Along a lattice line rounding may put a border behind the ray; the ray itself never goes back.
+                distance = max(distance, distance_x)
                 if distance >= reach:
                     break
                 last_row = row + step_y * (side - 1)
@@ -229,7 +230,7 @@ def _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges):  
                 row = min(max(crossed, row), last_row) if step_y > 0 else max(min(crossed, row), last_row)
                 column += step_x * side
             else:
-                distance = distance_y
+                distance = max(distance, distance_y)
                 if distance >= reach:
                     break
                 last_column = column + step_x * (side - 1)

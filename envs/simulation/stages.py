@@ -17,7 +17,7 @@ from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
 from lidarium.mapping.kernels import int8_grid_at, kernel, word_grid_at
 from lidarium.mapping.occupancy import integrate_scan
-from lidarium.mapping.scan_polygon import fill_scan_polygon, window_rows, window_words
+from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import beam_directions, beams_towards
 
 ANGLE_FIRST, ANGLE_INCREMENT, FULL_CIRCLE, RANGE_MIN, RANGE_MAX, NOISE_FLOOR, NOISE_SHARE, LASER_HEIGHT, MAP_RESOLUTION, TIME_STEP = range(10)
@@ -66,10 +66,10 @@ def _sense_robot(row, first, robots, floor, frame, bodies, poses, sensor, unit_v
 
 
 @kernel
-def _filter_mates(row, first, robots, bodies, believed, sensor, directions, lengths, is_hit):  # noqa: ANN001, ANN202
+def _filter_mates(row, first, robots, bodies, believed, sensor, x, y, ends, is_hit):  # noqa: ANN001, ANN202
     """Take out the hits on teammates, whose believed poses are known: they are no part of the floor."""
     robot = row - first
-    beams = lengths.shape[0]
+    beams = is_hit.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
     turn = 2.0 * math.pi / sensor[ANGLE_INCREMENT]
@@ -86,100 +86,98 @@ def _filter_mates(row, first, robots, bodies, believed, sensor, directions, leng
             low = max(int(math.floor(begin - lap * turn)), 0)
             high = min(int(math.ceil(begin - lap * turn + count)), beams - 1)
             for beam in range(low, high + 1):
-                end_x, end_y = lengths[beam] * directions[0, beam] - gap_x, lengths[beam] * directions[1, beam] - gap_y
+                end_x, end_y = ends[0, beam] - x - gap_x, ends[1, beam] - y - gap_y
                 if end_x * end_x + end_y * end_y <= radius * radius:
                     is_hit[beam] = False
 
 
 @kernel
-def _update_map(row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, belief, origin, window, increments, byte_masks, bits, hit_bits, row_low, row_high, is_filled):  # noqa: ANN001, ANN202, E501
-    """Update one robot's map from its scan; ``bits`` holds the seen area already where ``is_filled``."""
+def _update_map(row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments, byte_masks, bits, box, is_filled):  # noqa: ANN001, ANN202, E501
+    """Update one robot's map from its scan; ``bits``, ``ends`` and ``box`` hold the seen area already where ``is_filled``."""
     beams = ranges.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
     x, y = (believed[row, 0] - origin[0]) * scale, (believed[row, 1] - origin[1]) * scale
     is_hit = np.empty(beams, np.bool_)
     for beam in range(beams):
-        value = ranges[beam]
-        is_hit[beam] = value <= sensor[RANGE_MAX]
-        if not is_filled:
-            lengths[beam] = 0.0 if math.isnan(value) else min(value * scale, reach)
-    if flags[row] & 2:
-        _filter_mates(row, first, robots, bodies, believed, sensor, directions, lengths, is_hit)
+        is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
     margin = int(reach) + 3
     row_offset = int(math.floor(y)) - margin
     column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
     local_x, local_y = x - column_offset, y - row_offset
     if not is_filled:
-        row_low, row_high = fill_scan_polygon(
-            lengths, directions, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits
-        )
+        for beam in range(beams):
+            value = ranges[beam]
+            lengths[beam] = min(value * scale, reach) if value == value else 0.0
+        scan_ends(lengths, directions, local_x, local_y, ends)
+        box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits)
+    if flags[row] & 2:
+        _filter_mates(row, first, robots, bodies, believed, sensor, local_x, local_y, ends, is_hit)
     log_odds = int8_grid_at(belief[0], belief[1], belief[2])
-    integrate_scan(
-        log_odds, bits, row_low, row_high, lengths, is_hit, directions, local_x, local_y, row_offset, column_offset, increments, byte_masks, hit_bits
-    )
-    window[0] = max(min(window[0], row_low + row_offset - 1), 0)
-    window[1] = min(max(window[1], row_high + row_offset + 1), belief[1])
-    window[2] = max(min(window[2], column_offset), 0)
-    window[3] = min(max(window[3], column_offset + 64 * bits.shape[1]), belief[2])
+    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, byte_masks, np.zeros_like(bits))
+    # A hit may lie one cell beyond the seen area.
+    window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
+    window[1] = min(max(window[1], box[1] + row_offset + 1), belief[1])
+    window[2] = max(min(window[2], 64 * box[2] + column_offset - 1), 0)
+    window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[2])
 
 
 @kernel
 def _perceive_robot(row, first, robots, bodies, believed, sensor, unit_vectors, flags, ranges, belief, origin, window, increments, byte_masks):  # noqa: ANN001, ANN202, E501
     """Stage two alone: update one robot's map from its ranges at its believed pose."""
     beams = ranges.shape[0]
-    directions, lengths = np.empty((4, beams)), np.empty(beams)
+    directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
     beam_directions(believed[row, 2], unit_vectors, directions)
     reach = sensor[RANGE_MAX] / sensor[MAP_RESOLUTION]
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
     _update_map(
-        row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, belief, origin, window, increments, byte_masks,
-        bits, np.zeros_like(bits), 0, 0, False,
+        row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments,
+        byte_masks, bits, (0, 0, 0, 0), False,
     )  # fmt: skip
 
 
 @kernel
-def _score_robot(row, poses, frame, sensor, lengths, directions, masks, bits, news, entries, seen):  # noqa: ANN001, ANN202
-    """Fill the area that the true beams have seen and add it to the robot's mask; returns the rows that hold bits."""
+def _score_robot(row, poses, frame, sensor, lengths, directions, ends, masks, bits, news, entries, seen):  # noqa: ANN001, ANN202
+    """Fill the area that the true beams have seen and add it to the robot's mask; returns the box that holds bits."""
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
     x, y = (poses[row, 0] - frame[0]) * scale, (poses[row, 1] - frame[1]) * scale
     margin = int(reach) + 3
     row_offset = int(math.floor(y)) - margin
     column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
-    row_low, row_high = fill_scan_polygon(
-        lengths, directions, x - column_offset, y - row_offset, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits
-    )
+    local_x, local_y = x - column_offset, y - row_offset
+    scan_ends(lengths, directions, local_x, local_y, ends)
+    box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits)
     own = word_grid_at(masks[0], masks[3], masks[4])
     team = word_grid_at(masks[1], masks[3], masks[4])
     counted = word_grid_at(masks[2], masks[3], masks[4])
-    new_own, count = mark_seen(own, team, counted, bits, row_low, row_high, row_offset, column_offset >> 6, news)
+    new_own, count = mark_seen(own, team, counted, bits, box, row_offset, column_offset >> 6, news)
     seen[row] += new_own
     entries[row] = count
-    return row_low, row_high
+    return box
 
 
 @kernel
 def _sense_and_perceive(row, first, robots, floor, frame, bodies, poses, believed, sensor, unit_vectors, seed, step, noise_table, flags, ranges, belief, origin, window, increments, byte_masks, masks, news, entries, seen, perceives):  # noqa: ANN001, ANN202, E501
     """Both stages for one robot (or the first alone, where not ``perceives``)."""
     beams = ranges.shape[0]
-    directions, lengths = np.empty((4, beams)), np.empty(beams)
+    directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
     _sense_robot(
         row, first, robots, floor, frame, bodies, poses, sensor, unit_vectors, seed, step, noise_table, directions, ranges, lengths
     )
     reach = sensor[RANGE_MAX] / sensor[MAP_RESOLUTION]
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
-    row_low, row_high = _score_robot(row, poses, frame, sensor, lengths, directions, masks, bits, news, entries, seen)
+    box = _score_robot(row, poses, frame, sensor, lengths, directions, ends, masks, bits, news, entries, seen)
     if not perceives:
         return
     is_noisy = sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0
     is_same = flags[row] & 9 == 1 and not is_noisy
     if not is_same:
-        bits[row_low:row_high] = np.uint64(0)
+        bits[box[0] : box[1], box[2] : box[3]] = np.uint64(0)
         beam_directions(believed[row, 2], unit_vectors, directions)
     _update_map(
-        row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, belief, origin, window, increments, byte_masks,
-        bits, np.zeros_like(bits), row_low, row_high, is_same,
+        row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments,
+        byte_masks, bits, box, is_same,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@ import warnings
 
 import numpy as np
 import pytest
+from matplotlib import pyplot
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
@@ -71,6 +72,15 @@ def test_maps_of_coarser_cells_lie_on_the_same_floor():
     assert np.abs(fine.astype(int) - coarse).mean() < 12.0
 
 
+def test_a_floor_of_more_cells_than_pixels_keeps_its_walls_and_what_is_explored():
+    env = started("apartment")
+    small, large = (draw_frame(env, size)[60:] for size in (150, 900))
+    for colour in PALETTE:
+        shares = [(np.abs(frame.astype(int) - colour).sum(axis=2) < 12).mean() for frame in (small, large)]
+        assert shares[0] > 0.0
+        assert shares[1] > 0.0
+
+
 def test_the_whole_team_has_colours_of_its_own():
     colours = team_colours(64)
     assert len(set(colours)) == 64
@@ -84,9 +94,8 @@ def test_a_frame_needs_a_reset_and_room():
         draw_frame(started(), 10)
 
 
-def test_a_window_without_a_display_says_so_once(monkeypatch):
-    monkeypatch.setattr("matplotlib.rcParams", {**__import__("matplotlib").rcParams, "backend": "agg"})
-    __import__("matplotlib.pyplot").pyplot.switch_backend("agg")
+def test_a_window_without_a_display_says_so_once():
+    pyplot.switch_backend("agg")
     window = FrameWindow("title")
     frame = np.zeros((60, 80, 3), np.uint8)
     with pytest.warns(UserWarning, match="no display"):

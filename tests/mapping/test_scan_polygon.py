@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.scan_polygon import GRAZING, fill_scan_polygon, window_rows, window_words
+from lidarium.mapping.scan_polygon import GRAZING, fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import ScanGeometry, beam_directions
 
 
@@ -16,8 +16,10 @@ def fill(ranges, geometry, heading, x, y, reach):
     directions = np.empty((4, geometry.beams))
     beam_directions(heading, geometry.unit_vectors, directions)
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
-    rows = fill_scan_polygon(np.asarray(ranges, np.float64), directions, x, y, geometry.angle_increment, geometry.is_full_circle, bits)
-    return np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little").astype(bool), rows, directions
+    lengths, ends = np.asarray(ranges, np.float64), np.empty((2, geometry.beams))
+    scan_ends(lengths, directions, x, y, ends)
+    box = fill_scan_polygon(lengths, directions, ends, x, y, geometry.angle_increment, geometry.is_full_circle, bits)
+    return np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little").astype(bool), box[:2], directions
 
 
 def outline(ranges, geometry, directions, x, y):

@@ -3,7 +3,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import cv2
@@ -63,16 +62,15 @@ def test_help_names_the_commands(capsys):
 
 
 def test_help_comes_without_loading_the_kernels():
-    code = "import sys; from lidarium.scripts.main import main; main(['--help']); print([m for m in ('numba', 'cv2', 'matplotlib') if m in sys.modules])"
+    slow = ("numba", "cv2", "matplotlib")
+    code = f"import sys; from lidarium.scripts.main import main; main(['--help']); print([name for name in {slow} if name in sys.modules])"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert told.splitlines()[-1] == "[]"
 
 
-@pytest.mark.parametrize(
-    "command", [["run"], ["floors", "list"], ["floors", "show"], ["floors", "generate"], ["floors", "import"], ["bench"], ["show"]]
-)
+@pytest.mark.parametrize("command", ["run", "floors list", "floors show", "floors generate", "floors import", "bench", "show"])
 def test_every_command_has_seed_out_and_json(command, capsys):
-    assert main([*command, "--help"]) == 0
+    assert main([*command.split(), "--help"]) == 0
     told = capsys.readouterr().out
     assert all(option in told for option in ("--seed", "--out", "--json"))
 
@@ -194,7 +192,10 @@ def test_a_floor_larger_than_memory_is_refused(tmp_path, capsys):
 
 
 def test_memory_that_runs_out_is_told_without_a_traceback(tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(command_line._EXECUTE, command_line.Run, lambda command: np.zeros(2**60))
+    def fail(command):
+        raise MemoryError
+
+    monkeypatch.setitem(command_line._EXECUTE, command_line.Run, fail)
     refused(["run"], capsys, tmp_path, "memory")
 
 
@@ -213,20 +214,16 @@ def test_unknown_options_are_refused(arguments, capsys, tmp_path):
     assert capsys.readouterr().out == ""
 
 
-@pytest.mark.parametrize(
-    "option", [("--seed", "-1"), ("--horizon-s", "0"), ("--stop-coverage", "0"), ("--stop-coverage", "1.5"), ("--video-speed", "0")]
-)
+@pytest.mark.parametrize("option", ["--seed -1", "--horizon-s 0", "--stop-coverage 0", "--stop-coverage 1.5", "--video-speed 0"])
 def test_numbers_out_of_range_are_refused(option, tmp_path, capsys):
-    refused(["run", "--video", *option], capsys, tmp_path, option[1])
+    refused(["run", "--video", *option.split()], capsys, tmp_path, option.split()[1])
 
 
-@pytest.mark.parametrize(
-    "command", [["run"], ["floors", "list"], ["floors", "show", "apartment"], ["floors", "generate"], ["show", "robots"], ["bench"]]
-)
-def test_an_out_that_cannot_be_written_is_refused_before_the_work(command, tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize("command", ["run", "floors list", "floors show apartment", "floors generate", "show robots", "bench"])
+def test_an_out_that_cannot_be_written_is_refused_before_the_work(command, tmp_path, capsys):
     (tmp_path / "file").write_text("mine")
     for place in (tmp_path / "file", tmp_path / "file" / "below"):
-        refused([*command, "--out", str(place)], capsys, tmp_path, "cannot write to")
+        refused([*command.split(), "--out", str(place)], capsys, tmp_path, "cannot write to")
     assert (tmp_path / "file").read_text() == "mine"
 
 
@@ -242,23 +239,10 @@ def test_a_defect_of_ours_asks_for_a_report(capsys, monkeypatch):
     assert "a wheel came off" in told.err
 
 
-def start_long_run(folder: Path, *options: str) -> "subprocess.Popen[str]":
-    arguments = [
-        "run",
-        "--floor",
-        "scene_loop",
-        "--policy",
-        "random_walk",
-        "--stop-coverage",
-        "1",
-        "--robots",
-        "2",
-        "--out",
-        str(folder),
-        *options,
-    ]
+def start_endless_run(folder: Path, *options: str) -> "subprocess.Popen[str]":
+    arguments = ["run", "--floor", "office:3", "--policy", "random_walk", "--stop-coverage", "1", "--robots", "1", *options]
     return subprocess.Popen(
-        [sys.executable, "-c", "import sys; from lidarium.scripts.main import main; sys.exit(main())", *arguments],
+        [sys.executable, "-c", "import sys; from lidarium.scripts.main import main; sys.exit(main())", *arguments, "--out", str(folder)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -271,7 +255,7 @@ def start_long_run(folder: Path, *options: str) -> "subprocess.Popen[str]":
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for one process there")
 def test_an_interrupted_run_keeps_its_finished_parts(tmp_path):
     folder = tmp_path / "out"
-    with start_long_run(folder, "--json") as process:
+    with start_endless_run(folder, "--json") as process:
         assert process.stderr is not None
         assert "explored" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
@@ -280,7 +264,7 @@ def test_an_interrupted_run_keeps_its_finished_parts(tmp_path):
     result = json.loads(told)
     assert result == json.loads((folder / "result.json").read_text())
     assert result["interrupted"] is True
-    assert result["ended_because"] == {"robot_0": None, "robot_1": None}
+    assert result["ended_because"] == {"robot_0": None}
     assert sorted(path.name for path in folder.iterdir()) == ["map.pgm", "map.yaml", "result.json", "run.png"]
     assert "Traceback" not in errors
 
@@ -328,10 +312,10 @@ def test_progress_is_a_line_every_few_seconds_where_there_is_no_terminal(capsys)
 
     from lidarium.scripts.common import Progress
 
-    times = iter([0.0, 1.0, 6.0, 6.0, 7.0, time.time()])
+    times = iter([0.0, 1.0, 6.0])
     progress = Progress(is_quiet=False, clock=lambda: next(times))
     env = SimpleNamespace(scorer=SimpleNamespace(coverage=0.5, time=12.0))
     for _ in range(3):
         progress.tell(env)
     progress.close()
-    assert capsys.readouterr().err == "explored 50.0 %, simulated 12 s\n"
+    assert capsys.readouterr().err == "explored 50.0 %, simulated 12 s\n" * 2

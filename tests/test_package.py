@@ -1,0 +1,147 @@
+"""The package as a whole: light to import, layered, typed, documented."""
+
+import ast
+import importlib
+import inspect
+import json
+import os
+import pkgutil
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import lidarium
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = ("mapping", "envs", "agents", "evaluation", "scripts")
+SOURCES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))}
+HEAVY = ("matplotlib", "numba", "cv2", "scipy", "imageio", "tyro", "tqdm", "torch", "pandas")
+
+
+def modules_after(code):
+    """Names of the modules loaded after some code in a fresh interpreter."""
+    result = subprocess.run(
+        [sys.executable, "-c", f"{code}\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))"], capture_output=True, text=True, check=True
+    )
+    return set(json.loads(result.stdout.splitlines()[-1]))
+
+
+def test_importing_lidarium_loads_nothing_heavy():
+    loaded = modules_after("import lidarium")
+    assert not loaded & set(HEAVY)
+    assert not {name for name in loaded if name.startswith("lidarium.")}
+
+
+def test_stepping_an_environment_loads_no_plotting():
+    loaded = modules_after("import lidarium\nenv = lidarium.parallel_env(robots=1)\nenv.reset(seed=0)")
+    assert "numba" in loaded
+    assert not loaded & {"matplotlib", "imageio", "tyro"}
+
+
+def test_the_version_is_that_of_the_distribution():
+    from importlib.metadata import version
+
+    assert lidarium.__version__ == version("lidarium")
+
+
+def test_type_hints_are_shipped():
+    folder = Path(lidarium.__file__).parent
+    assert (folder / "py.typed").is_file()
+
+
+def test_layers_import_downwards_only():
+    """The contract of .importlinter, read from the sources themselves."""
+    rank = {folder: place for place, folder in enumerate(FOLDERS)}
+    for path, source in SOURCES.items():
+        own = rank[path.split("/")[0]]
+        for node in ast.walk(ast.parse(source)):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            assert not (isinstance(node, ast.ImportFrom) and node.level), f"{path}: relative import"
+            for name in names:
+                parts = name.split(".")
+                assert parts[0] not in FOLDERS, f"{path}: imports {name} without the package's name"
+                if parts[0] == "lidarium" and len(parts) > 1 and parts[1] in rank:
+                    assert rank[parts[1]] <= own, f"{path}: imports {name}"
+
+
+def test_the_import_linter_keeps_its_contract(tmp_path):
+    """On the package as it is installed, made of links: the linter looks for folders, not for editable installs."""
+    command = shutil.which("lint-imports", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
+    if command is None:
+        pytest.skip("import-linter is not installed")
+    shutil.copytree(ROOT / "src" / "lidarium", tmp_path / "lidarium", copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in FOLDERS:
+        shutil.copytree(ROOT / folder, tmp_path / "lidarium" / folder, copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__"))
+    result = subprocess.run(
+        [command, "--config", str(ROOT / ".importlinter"), "--no-cache"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "1 kept, 0 broken" in result.stdout
+
+
+def modules():
+    for folder in FOLDERS:
+        package = importlib.import_module(f"lidarium.{folder}")
+        yield package
+        for found in pkgutil.walk_packages(package.__path__, f"lidarium.{folder}."):
+            yield importlib.import_module(found.name)
+
+
+def test_every_public_function_and_class_is_documented():
+    missing = []
+    for module in modules():
+        if not module.__doc__:
+            missing.append(module.__name__)
+        for name, member in vars(module).items():
+            if name.startswith("_") or getattr(member, "__module__", None) != module.__name__:
+                continue
+            plain = getattr(member, "py_func", member)
+            if not (inspect.isfunction(plain) or inspect.isclass(plain)):
+                continue
+            if not inspect.getdoc(plain):
+                missing.append(f"{module.__name__}.{name}")
+            if inspect.isclass(plain):
+                missing += [
+                    f"{module.__name__}.{name}.{attribute}"
+                    for attribute, value in vars(plain).items()
+                    if not attribute.startswith("_")
+                    and (inspect.isfunction(value) or isinstance(value, (property, classmethod, staticmethod)))
+                    and not inspect.getdoc(getattr(value, "__func__", value))
+                ]
+    assert not missing
+
+
+def test_every_public_function_outside_of_kernels_has_type_hints():
+    bare = []
+    for path, source in SOURCES.items():
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.FunctionDef) and not any("kernel" in ast.unparse(each) for each in node.decorator_list):
+                arguments = [each for each in (*node.args.args, *node.args.kwonlyargs) if each.arg not in ("self", "cls")]
+                if not node.name.startswith("_") and (node.returns is None or any(each.annotation is None for each in arguments)):
+                    bare.append(f"{path}: {node.name}")
+    assert not bare
+
+
+def test_modules_stay_small():
+    assert not {path: source.count("\n") for path, source in SOURCES.items() if source.count("\n") >= 400}
+
+
+def test_nothing_is_left_undone_in_the_sources():
+    words = re.compile(r"\b(TODO|FIXME|XXX|HACK|NotImplemented\b(?!Error))")
+    assert not [path for path, source in SOURCES.items() if words.search(source)]
+
+
+def test_no_module_draws_from_the_global_random_state():
+    names = re.compile(r"np\.random\.(?!default_rng|Generator|SeedSequence|BitGenerator)\w+|^import random|^from random", re.MULTILINE)
+    assert not [path for path, source in SOURCES.items() if names.search(source)]
+
+
+def test_policies_are_made_by_name_from_the_top():
+    assert lidarium.policy("nearest_frontier").level == "waypoint"
+    with pytest.raises(ValueError, match="did you mean 'nearest_frontier'"):
+        lidarium.policy("nearest_frontir")
