@@ -65,7 +65,7 @@ class FrontierExplorer:
         self.shares_map = shares_map
         self.given_up: list[GivenUp] = []
 
-    def reset(self, team: Team, seed: int) -> None:  # noqa: ARG002 (nothing is drawn)
+    def reset(self, team: Team, seed: int) -> None:
         """Begin an episode."""
         self.team = team
         self.given_up = []
@@ -210,7 +210,7 @@ class NearestFrontier(FrontierExplorer):
         super().__init__(shares_map)
         self._minimum_size = minimum_size
 
-    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:  # noqa: ARG002
+    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
         """Choose the nearest frontier for each open agent."""
         return {agent: self._nearest(agent) for agent in open_agents}
 
@@ -219,9 +219,7 @@ class NearestFrontier(FrontierExplorer):
         for frontiers in (navigation.long_frontiers(self._minimum_size), navigation.frontiers):
             if not len(frontiers):
                 continue
-            found = nearest_frontier(
-                frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, self.footprint
-            )
+            found = nearest_frontier(frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, self.footprint)
             if found is not None:
                 return Choice(found.cell, found.frontier_cell)
         return None
@@ -238,17 +236,13 @@ def _reaches(
     start = explorer.start_cell(agent)
     least = math.inf
     for frontiers in (navigation.long_frontiers(minimum_size), navigation.frontiers):
-        cheapest = nearest_frontier(
-            frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, explorer.footprint
-        )
+        cheapest = nearest_frontier(frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, explorer.footprint)
         if cheapest is not None:
             least = cheapest.cost
             break
     if math.isinf(least):
         return np.full(len(clusters), math.inf), [None] * len(clusters)
-    found = search(
-        navigation.space, navigation.log_odds, navigation.clearance, start, explorer.footprint, maximum_cost=least + slack
-    )
+    found = search(navigation.space, navigation.log_odds, navigation.clearance, start, explorer.footprint, maximum_cost=least + slack)
     near = approach(clusters, found, navigation.log_odds, default_reach(explorer.footprint, navigation.resolution))
     costs = np.where(near.reachable, near.costs, math.inf)
     choices = [
@@ -335,9 +329,7 @@ class UtilityFrontier(FrontierExplorer):
         Whether robots explore on the team's map.
     """
 
-    def __init__(
-        self, cost_weight: float = 0.05, sensor_range: float = 5.6, minimum_size: float = 0.5, shares_map: bool = True
-    ) -> None:
+    def __init__(self, cost_weight: float = 0.05, sensor_range: float = 5.6, minimum_size: float = 0.5, shares_map: bool = True) -> None:
         super().__init__(shares_map)
         self._cost_weight, self._range, self._minimum_size = cost_weight, sensor_range, minimum_size
 

@@ -45,11 +45,11 @@ class Team(Protocol):
         ...
 
     def belief(self, agent: str) -> Belief:
-        """What an agent's onboard software knows."""
+        """Return what an agent's onboard software knows."""
         ...
 
     def drive_state(self, agent: str) -> DriveState:
-        """What its driving is about."""
+        """Return what its driving is about."""
         ...
 
 

@@ -12,7 +12,6 @@ NEAR = 0.35
 """A robot turns when something ahead is nearer than its radius and this [m]."""
 
 
-
 class RandomWalk:
     """Drives straight on and turns by a random angle where something is near.
 

@@ -5,10 +5,12 @@ true poses, before noise. Of these only the cells of F count: those that the dis
 configuration space, connected to the starts.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import kernel, word_grid_at
+from lidarium.mapping.kernels import Array, kernel, word_grid_at
 
 ENTRY = 3
 """A robot's news of a step are entries of row, word and bits."""
@@ -29,7 +31,7 @@ def unpack_bits(bits: NDArray[np.uint64], columns: int) -> NDArray[np.bool_]:
 
 
 @kernel(inline=True)
-def count_bits(value):  # noqa: ANN001, ANN201
+def count_bits(value: Any) -> int:
     """Count the set bits of a uint64."""
     value = value - ((value >> np.uint64(1)) & np.uint64(0x5555555555555555))
     value = (value & np.uint64(0x3333333333333333)) + ((value >> np.uint64(2)) & np.uint64(0x3333333333333333))
@@ -38,7 +40,9 @@ def count_bits(value):  # noqa: ANN001, ANN201
 
 
 @kernel
-def mark_seen(own, team, counted, bits, box, row_offset, word_offset, news):  # noqa: ANN001, ANN201
+def mark_seen(
+    own: Array, team: Array, counted: Array, bits: Array, box: tuple[int, int, int, int], row_offset: int, word_offset: int, news: Array
+) -> tuple[int, int]:
     """Add a scan's seen cells to a robot's mask and list what is new to the team.
 
     Parameters
@@ -78,7 +82,7 @@ def mark_seen(own, team, counted, bits, box, row_offset, word_offset, news):  # 
 
 
 @kernel
-def share_news(owns, team, news, entries, first, robots, gains):  # noqa: ANN001, ANN201
+def share_news(owns: Array, team: Array, news: Array, entries: Array, first: int, robots: int, gains: Array) -> int:
     """Credit each cell that is new to the team in equal parts to the robots that saw it in this step, in robot order.
 
     Parameters

@@ -130,9 +130,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         if isinstance(spec, Path):
             spec = str(spec)
         settings, radius = self.settings, self.settings.robot.radius
-        tables = floor_tables(
-            spec, self._image_resolution, settings.raster_resolution, settings.lidar.height, settings.robot.height
-        )
+        tables = floor_tables(spec, self._image_resolution, settings.raster_resolution, settings.lidar.height, settings.robot.height)
         if chosen.starts is not None:
             check_starts(tables.body, radius, chosen.starts)
             starts = chosen.starts
@@ -306,7 +304,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the floor, what is explored, the robots and their scans: an image (rows, columns, 3), or the window."""
-        from lidarium.envs.rendering import FrameWindow, draw_frame  # noqa: PLC0415 (matplotlib and OpenCV only where used)
+        from lidarium.envs.rendering import FrameWindow, draw_frame
 
         if self.render_mode is None:
             return None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.mapping.kernels import int8_grid_at, kernel
+from lidarium.mapping.kernels import Array, int8_grid_at, kernel
 from lidarium.mapping.occupancy import crop_levels
 
 FARTHEST = 1000.0
@@ -44,7 +44,21 @@ def action_space() -> spaces.Box:
 
 
 @kernel
-def _write(ranges, believed, offsets, velocities, bumpers, beliefs, origins, numbers, scans, poses, motions, presses, maps):  # noqa: ANN001, ANN202
+def _write(
+    ranges: Array,
+    believed: Array,
+    offsets: Array,
+    velocities: Array,
+    bumpers: Array,
+    beliefs: Array,
+    origins: Array,
+    numbers: Array,
+    scans: Array,
+    poses: Array,
+    motions: Array,
+    presses: Array,
+    maps: Array,
+) -> None:
     resolution, range_max, max_speed, max_turn_rate = numbers[0], numbers[1], numbers[2], numbers[3]
     farthest, longest = np.float32(numbers[4]), np.float32(range_max - 1e-3)
     no_return = np.float32(range_max)

@@ -93,7 +93,7 @@ class Scorer:
     @property
     def touched(self) -> NDArray[np.bool_]:
         """Whether each robot touched something in the last step."""
-        return self._world.contacts != 0
+        return np.asarray(self._world.contacts != 0)
 
     def take_rewards(self) -> list[float]:
         """Return each robot's reward since the last call, and begin anew."""

@@ -73,7 +73,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         """End the episode at the next step, with a reason."""
         self.parallel.stop(AGENT, reason)
 
-    def render(self) -> NDArray[Any] | None:  # type: ignore[override]
+    def render(self) -> NDArray[Any] | None:
         """Draw the environment."""
         return self.parallel.render()
 

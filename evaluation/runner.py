@@ -65,11 +65,11 @@ class RunningTeam:
         return self._env.scorer.time
 
     def belief(self, agent: str) -> Belief:
-        """What an agent's onboard software knows."""
+        """Return what an agent's onboard software knows."""
         return self._env.perception.belief(agent)
 
     def drive_state(self, agent: str) -> DriveState:
-        """What its driving is about."""
+        """Return what its driving is about."""
         return DriveState.IDLE if self._driver is None else self._driver.drive_state(agent)
 
 

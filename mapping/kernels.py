@@ -18,10 +18,16 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
-from numba import types
+from numba import carray, types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+Array = NDArray[Any]
+"""An array in the signature of a kernel; its docstring gives shape and type."""
+
+_numba_config: Any = numba.config
 
 PACKAGE_FOLDERS = ("mapping", "envs")
 
@@ -95,52 +101,54 @@ def kernel(function: Function | None = None, *, parallel: bool = False, inline: 
         options: dict[str, Any] = {"nogil": True, "fastmath": False, "parallel": parallel, "cache": _CAN_CACHE}
         if inline:
             options["forceinline"] = True
-        previous = numba.config.CACHE_DIR
+        previous = _numba_config.CACHE_DIR
         if _FOLDER is not None:
-            numba.config.CACHE_DIR = str(_FOLDER)
+            _numba_config.CACHE_DIR = str(_FOLDER)
         try:
             return numba.njit(**options)(target)
         finally:
-            numba.config.CACHE_DIR = previous
+            _numba_config.CACHE_DIR = previous
 
     return decorate if function is None else decorate(function)
 
 
-@intrinsic
-def _pointer_at(typing_context: Any, address: Any) -> Any:  # noqa: ANN401, ARG001
+def _pointer_at(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
     """Turn an integer into a pointer inside a kernel."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401, ARG001
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
     return types.voidptr(address), generate
 
 
+_pointer: Any = intrinsic(_pointer_at)
+
+
 @kernel(inline=True)
 def bytes_at(address: int, count: int) -> Any:  # noqa: ANN401
     """View ``count`` uint8 at an address inside a kernel; the caller keeps the array alive."""
-    return numba.carray(_pointer_at(address), (count,), np.uint8)
+    return carray(_pointer(address), (count,), np.uint8)
 
 
 @kernel(inline=True)
 def int8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) int8 grid at an address inside a kernel."""
-    return numba.carray(_pointer_at(address), (rows, columns), np.int8)
+    return carray(_pointer(address), (rows, columns), np.int8)
 
 
 @kernel(inline=True)
 def uint8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) uint8 grid at an address inside a kernel."""
-    return numba.carray(_pointer_at(address), (rows, columns), np.uint8)
+    return carray(_pointer(address), (rows, columns), np.uint8)
 
 
 @kernel(inline=True)
 def word_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) uint64 grid at an address inside a kernel."""
-    return numba.carray(_pointer_at(address), (rows, columns), np.uint64)
+    return carray(_pointer(address), (rows, columns), np.uint64)
 
 
 @kernel(inline=True)
 def int32_table_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) int32 table at an address inside a kernel."""
-    return numba.carray(_pointer_at(address), (rows, columns), np.int32)
+    return carray(_pointer(address), (rows, columns), np.int32)

@@ -8,11 +8,12 @@ which a beam ended more likely occupied, each once per scan; all others keep the
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import ScanGeometry, beam_directions
 
@@ -69,7 +70,9 @@ BYTE_MASKS = _byte_masks()
 
 
 @kernel
-def _raise_hits(log_odds, ends, is_hit, row_offset, column_offset, increments, bits, hit_bits):  # noqa: ANN001, ANN202
+def _raise_hits(
+    log_odds: Array, ends: Array, is_hit: Array, row_offset: int, column_offset: int, increments: Array, bits: Array, hit_bits: Array
+) -> None:
     """Raise the cells in which a beam ended, once each, and take them out of the seen area."""
     hit, maximum = increments[0], increments[3]
     rows, columns = log_odds.shape
@@ -89,7 +92,9 @@ def _raise_hits(log_odds, ends, is_hit, row_offset, column_offset, increments, b
 
 
 @kernel
-def _lower_seen(log_odds, bits, box, row_offset, column_offset, increments, byte_masks):  # noqa: ANN001, ANN202
+def _lower_seen(
+    log_odds: Array, bits: Array, box: tuple[int, int, int, int], row_offset: int, column_offset: int, increments: Array, byte_masks: Array
+) -> None:
     """Lower the seen cells in whole blocks of 64 under a byte mask."""
     miss, minimum = np.int8(increments[1]), np.int8(increments[2])
     threshold = np.int8(increments[1] + increments[2])
@@ -120,7 +125,18 @@ def _lower_seen(log_odds, bits, box, row_offset, column_offset, increments, byte
 
 
 @kernel
-def integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, byte_masks, hit_bits):  # noqa: ANN001, ANN201
+def integrate_scan(
+    log_odds: Array,
+    bits: Array,
+    box: tuple[int, int, int, int],
+    ends: Array,
+    is_hit: Array,
+    row_offset: int,
+    column_offset: int,
+    increments: Array,
+    byte_masks: Array,
+    hit_bits: Array,
+) -> None:
     """Update a map by a scan whose seen area is in ``bits``.
 
     Parameters
@@ -145,7 +161,18 @@ def integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset,
 
 
 @kernel
-def _integrate_one(log_odds, x, y, heading, ranges, geometry, unit_vectors, increments, byte_masks, window):  # noqa: ANN001, ANN202
+def _integrate_one(
+    log_odds: Array,
+    x: float,
+    y: float,
+    heading: float,
+    ranges: Array,
+    geometry: tuple[float, float, float, float],
+    unit_vectors: Array,
+    increments: Array,
+    byte_masks: Array,
+    window: Any,
+) -> None:
     """Update a map by one scan at x, y [cells]; ``geometry`` is (increment, range_max [cells], cells per metre, full circle)."""
     reach, scale = geometry[1], geometry[2]
     beams = ranges.shape[0]
@@ -209,7 +236,7 @@ class OccupancyGrid:
         low_row, high_row = math.floor(y_min / resolution) - self._first_row, math.ceil(y_max / resolution) - self._first_row
         low_column = math.floor(x_min / resolution) - self._first_column
         high_column = math.ceil(x_max / resolution) - self._first_column
-        if 0 <= low_row and high_row <= rows and 0 <= low_column and high_column <= columns:
+        if low_row >= 0 and high_row <= rows and low_column >= 0 and high_column <= columns:
             return
         # Half of the new size on each grown side, so that a drive across a building grows the map a few times only.
         spare_rows, spare_columns = rows // 2, columns // 2
@@ -270,7 +297,7 @@ class OccupancyGrid:
 
     def probability(self) -> NDArray[np.float32]:
         """Return the probability of being occupied, shape (rows, columns)."""
-        return (1.0 / (1.0 + np.exp(-LOG_ODDS_UNIT * self.log_odds.astype(np.float32)))).astype(np.float32)
+        return np.asarray(1.0 / (1.0 + np.exp(-LOG_ODDS_UNIT * self.log_odds.astype(np.float32))), np.float32)
 
 
 def three_levels(log_odds: NDArray[np.int8]) -> NDArray[np.uint8]:
@@ -288,7 +315,7 @@ def _blank(rows: int, columns: int) -> NDArray[np.int8]:
 
 
 @kernel
-def crop_levels(log_odds, row, column, crop):  # noqa: ANN001, ANN201
+def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
     """Copy the cells around (row, column) into ``crop`` (side, side) as levels; unknown outside of the map."""
     side = crop.shape[0]
     first_row, first_column = row - side // 2, column - side // 2

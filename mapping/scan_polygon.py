@@ -10,30 +10,28 @@ of the crossing; the running exclusive-or along a row is then the inside of the 
 however many beams crossed it.
 """
 
-import math
-
 import numpy as np
 
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 
 GRAZING = 8.0
 """Cotangent of the flattest angle under which two neighbouring end points still belong to one surface."""
 
 
 @kernel(inline=True)
-def window_words(reach):  # noqa: ANN001, ANN201
+def window_words(reach: float) -> int:
     """Words per row of a scan's window: ``reach`` cells to both sides, from any alignment."""
     return (2 * (int(reach) + 3)) // 64 + 2
 
 
 @kernel(inline=True)
-def window_rows(reach):  # noqa: ANN001, ANN201
+def window_rows(reach: float) -> int:
     """Rows of a scan's window."""
     return 2 * (int(reach) + 3) + 1
 
 
 @kernel(inline=True)
-def _toggle_edge(bits, from_x, from_y, to_x, to_y, from_row, to_row):  # noqa: ANN001, ANN202
+def _toggle_edge(bits: Array, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int) -> None:
     """Toggle the cell centres right of the edge, in the rows between its ends (half open, so that corners count once)."""
     slope = (to_x - from_x) / (to_y - from_y)
     first, last = min(from_row, to_row), max(from_row, to_row)
@@ -45,13 +43,13 @@ def _toggle_edge(bits, from_x, from_y, to_x, to_y, from_row, to_row):  # noqa: A
 
 
 @kernel(inline=True)
-def _row_of(y):  # noqa: ANN001, ANN202
+def _row_of(y: float) -> int:
     """First row whose centre line is not below y; y is not negative."""
     return int(y + 0.5)
 
 
 @kernel
-def scan_ends(lengths, directions, x, y, ends):  # noqa: ANN001, ANN201
+def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array) -> None:
     """Fill ``ends`` (2, beams) with the end points of the beams in the window [cells].
 
     Parameters
@@ -72,7 +70,7 @@ def scan_ends(lengths, directions, x, y, ends):  # noqa: ANN001, ANN201
 
 
 @kernel
-def _toggle_jump(bits, lengths, directions, ends, x, y, near, far):  # noqa: ANN001, ANN202
+def _toggle_jump(bits: Array, lengths: Array, directions: Array, ends: Array, x: float, y: float, near: int, far: int) -> None:
     """Toggle the outline between a near and a far end point: along the far beam up to the near range only."""
     corner_x = x + lengths[near] * directions[0, far]
     corner_y = y + lengths[near] * directions[1, far]
@@ -84,7 +82,9 @@ def _toggle_jump(bits, lengths, directions, ends, x, y, near, far):  # noqa: ANN
 
 
 @kernel
-def fill_scan_polygon(lengths, directions, ends, x, y, increment, is_full_circle, bits):  # noqa: ANN001, ANN201
+def fill_scan_polygon(
+    lengths: Array, directions: Array, ends: Array, x: float, y: float, increment: float, is_full_circle: bool, bits: Array
+) -> tuple[int, int, int, int]:
     """Set the bits of the cells whose centre the scan has seen.
 
     Parameters

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +55,7 @@ class ScanGeometry:
     @property
     def angles(self) -> NDArray[np.float64]:
         """Angle of each beam against the heading, shape (beams,) [rad]."""
-        return self.angle_first + self.angle_increment * np.arange(self.beams)
+        return np.asarray(self.angle_first + self.angle_increment * np.arange(self.beams), np.float64)
 
     @property
     def unit_vectors(self) -> NDArray[np.float64]:
@@ -64,7 +64,7 @@ class ScanGeometry:
 
 
 @kernel
-def beam_directions(heading, unit_vectors, directions):  # noqa: ANN001, ANN201
+def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> None:
     """Turn the beams' unit vectors (2, beams) by the heading, into ``directions`` (4, beams): x, y and their inverses."""
     cosine, sine = math.cos(heading), math.sin(heading)
     for beam in range(unit_vectors.shape[1]):
@@ -77,7 +77,9 @@ def beam_directions(heading, unit_vectors, directions):  # noqa: ANN001, ANN201
 
 
 @kernel(inline=True)
-def beams_towards(offset_x, offset_y, radius, heading, angle_first, increment):  # noqa: ANN001, ANN201
+def beams_towards(
+    offset_x: float, offset_y: float, radius: float, heading: float, angle_first: float, increment: float
+) -> tuple[float, float]:
     """Beams that a disc at an offset from the laser may meet, as a first beam (not rounded) and a count; the next lap starts a turn later."""
     distance = math.sqrt(offset_x * offset_x + offset_y * offset_y)
     half = math.asin(radius / distance) if radius < distance else math.pi

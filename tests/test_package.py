@@ -18,14 +18,21 @@ import lidarium
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("mapping", "envs", "agents", "evaluation", "scripts")
-SOURCES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))}
+SOURCES = {
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for folder in FOLDERS
+    for path in sorted((ROOT / folder).rglob("*.py"))
+}
 HEAVY = ("matplotlib", "numba", "cv2", "scipy", "imageio", "tyro", "tqdm", "torch", "pandas")
 
 
 def modules_after(code):
     """Names of the modules loaded after some code in a fresh interpreter."""
     result = subprocess.run(
-        [sys.executable, "-c", f"{code}\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))"], capture_output=True, text=True, check=True
+        [sys.executable, "-c", f"{code}\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))"],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     return set(json.loads(result.stdout.splitlines()[-1]))
 
@@ -59,7 +66,13 @@ def test_layers_import_downwards_only():
     for path, source in SOURCES.items():
         own = rank[path.split("/")[0]]
         for node in ast.walk(ast.parse(source)):
-            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names = (
+                [node.module or ""]
+                if isinstance(node, ast.ImportFrom)
+                else [a.name for a in node.names]
+                if isinstance(node, ast.Import)
+                else []
+            )
             assert not (isinstance(node, ast.ImportFrom) and node.level), f"{path}: relative import"
             for name in names:
                 parts = name.split(".")
@@ -73,9 +86,13 @@ def test_the_import_linter_keeps_its_contract(tmp_path):
     command = shutil.which("lint-imports", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
     if command is None:
         pytest.skip("import-linter is not installed")
-    shutil.copytree(ROOT / "src" / "lidarium", tmp_path / "lidarium", copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        ROOT / "src" / "lidarium", tmp_path / "lidarium", copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__")
+    )
     for folder in FOLDERS:
-        shutil.copytree(ROOT / folder, tmp_path / "lidarium" / folder, copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / folder, tmp_path / "lidarium" / folder, copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__")
+        )
     result = subprocess.run(
         [command, "--config", str(ROOT / ".importlinter"), "--no-cache"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)},
         capture_output=True, text=True, check=False,

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 
 IDLE, DRIVING, ARRIVED, BLOCKED = range(4)
 """States of a drive."""
@@ -51,12 +51,12 @@ BLOCKED_STEPS = 10
 
 
 @kernel(inline=True)
-def _wrap(angle):  # noqa: ANN001, ANN202
+def _wrap(angle: float) -> float:
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
 @kernel
-def _gap_in_scan(ranges, unit_vectors, radius):  # noqa: ANN001, ANN202
+def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
     """How far the disc can go straight ahead before it meets a return [m]."""
     gap = np.inf
     for beam in range(ranges.shape[0]):
@@ -71,7 +71,7 @@ def _gap_in_scan(ranges, unit_vectors, radius):  # noqa: ANN001, ANN202
 
 
 @kernel
-def _gap_to_mates(robot, poses, velocities, radii, foresight, present):  # noqa: ANN001, ANN202
+def _gap_to_mates(robot: int, poses: Array, velocities: Array, radii: Array, foresight: Array, present: Array) -> float:
     """How far the disc can go straight ahead before it meets a known teammate, now or where it will be soon [m]."""
     gap = np.inf
     cosine, sine = math.cos(poses[robot, 2]), math.sin(poses[robot, 2])
@@ -96,7 +96,26 @@ def _gap_to_mates(robot, poses, velocities, radii, foresight, present):  # noqa:
 
 
 @kernel
-def follow_paths(poses, velocities, ranges, unit_vectors, radii, limits, paths, margins, counts, places, headings, states, stood, backing, knows_mates, present, foresight, commands):  # noqa: ANN001, ANN201, E501
+def follow_paths(
+    poses: Array,
+    velocities: Array,
+    ranges: Array,
+    unit_vectors: Array,
+    radii: Array,
+    limits: Array,
+    paths: Array,
+    margins: Array,
+    counts: Array,
+    places: Array,
+    headings: Array,
+    states: Array,
+    stood: Array,
+    backing: Array,
+    knows_mates: bool,
+    present: Array,
+    foresight: Array,
+    commands: Array,
+) -> None:
     """Give each robot the speed and turn rate that follow its path.
 
     Parameters
@@ -183,7 +202,9 @@ def follow_paths(poses, velocities, ranges, unit_vectors, radii, limits, paths, 
             through = cruise * max(0.0, 1.0 - bend / max(tolerance, 0.2))
         else:
             through = 0.0
-        speed = min(speed, math.sqrt(through * through + 2.0 * braking * remaining) if through > 0.0 else math.sqrt(2.0 * braking * remaining))
+        speed = min(
+            speed, math.sqrt(through * through + 2.0 * braking * remaining) if through > 0.0 else math.sqrt(2.0 * braking * remaining)
+        )
         speed = min(speed, max(remaining / 0.1, 0.02)) if place == last else speed
         gap = _gap_in_scan(ranges[robot], unit_vectors, radii[robot] + SIDE_GAP)
         allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.05 * velocities[robot, 0], 0.0))

@@ -6,6 +6,7 @@ what planning needs (clearance and frontiers), brought up to date only where the
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from lidarium.envs.simulation.kinematic import ENDED, KinematicWorld
 from lidarium.mapping.clearance import ClearanceField
 from lidarium.mapping.frontiers import FrontierMap
 from lidarium.mapping.grid_planning import SearchSpace
-from lidarium.mapping.kernels import int8_grid_at, kernel
+from lidarium.mapping.kernels import Array, int8_grid_at, kernel
 
 CLEARANCE_LIMIT = 0.6
 """Clearance is told exactly up to this [m]."""
@@ -79,7 +80,7 @@ class Teammate:
 
 
 @kernel
-def _sum_maps(addresses, rows, columns, window, total):  # noqa: ANN001, ANN202
+def _sum_maps(addresses: Array, rows: int, columns: int, window: Any, total: Array) -> None:
     """Write the sum of maps of one shape into ``total`` within a window."""
     for row in range(window[0], window[1]):
         target = total[row]
@@ -116,7 +117,7 @@ class Belief:
     @property
     def velocity(self) -> NDArray[np.float64]:
         """Speed and turn rate as odometry tells [m/s, rad/s], shape (2,)."""
-        return self._perception.world.velocities[self._row].copy()
+        return np.array(self._perception.world.velocities[self._row])
 
     @property
     def spread(self) -> NDArray[np.float64]:
@@ -212,7 +213,8 @@ class Perception:
             return
         self._fresh_at = step
         for row in range(self.settings.robots):
-            window = tuple(int(value) for value in self.world.windows[row])
+            low_row, high_row, low_column, high_column = (int(value) for value in self.world.windows[row])
+            window = (low_row, high_row, low_column, high_column)
             if window[0] >= window[1] or window[2] >= window[3]:
                 continue
             if row in self._own:
@@ -221,16 +223,16 @@ class Perception:
                 self._share(window)
         self.world.forget_changes(0, self.settings.robots)
 
-    def _share(self, window: tuple[int, ...]) -> None:
+    def _share(self, window: tuple[int, int, int, int]) -> None:
         assert self._shared is not None
         rows, columns = self._shared.log_odds.shape
         addresses = np.array([log_odds.ctypes.data for log_odds in self.world.log_odds], np.int64)
         _sum_maps(addresses, rows, columns, np.array(window, np.int64), self._shared.log_odds)
-        self._shared.changed((window[0], window[1], window[2], window[3]))
+        self._shared.changed(window)
 
     def offset(self, row: int) -> NDArray[np.float64]:
         """Return the origin of a robot's map frame in the frame of its believed pose [m], shape (2,)."""
-        return self._offsets[row]
+        return np.asarray(self._offsets[row])
 
     def pose_in_frame(self, of: int, to: int) -> NDArray[np.float64]:
         """Return the believed pose of a robot in the map frame of another (or its own), shape (3,)."""
@@ -247,9 +249,7 @@ class Perception:
         if not self.settings.known_starts:
             return {}
         return {
-            agent: Teammate(
-                self.pose_in_frame(other, row), 0.0, self.settings.robot.radius, bool(self.world.flags[other] & ENDED)
-            )
+            agent: Teammate(self.pose_in_frame(other, row), 0.0, self.settings.robot.radius, bool(self.world.flags[other] & ENDED))
             for other, agent in enumerate(self.settings.agents)
             if other != row
         }
@@ -258,7 +258,7 @@ class Perception:
         """Return the goal in a robot's map frame; None without a goal, and where the robot does not know its start."""
         if self._goal is None or not self.settings.known_starts:
             return None
-        return np.asarray(self._goal) - self._offsets[row]
+        return np.asarray(self._goal - self._offsets[row])
 
     def goal_in_frame(self, row: int) -> NDArray[np.float32]:
         """Return the goal for the observation: as ``goal_of``, zeros where it is not known."""

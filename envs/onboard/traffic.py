@@ -84,9 +84,7 @@ def find_refuge(
     """
     tree = cKDTree(_sampled(path))
     for farthest in FARTHEST_REFUGE:
-        found = search(
-            navigation.space, navigation.log_odds, navigation.clearance, start, footprint, maximum_cost=farthest, blocked=discs
-        )
+        found = search(navigation.space, navigation.log_odds, navigation.clearance, start, footprint, maximum_cost=farthest, blocked=discs)
         cells = found.reached()
         if not len(cells):
             return None

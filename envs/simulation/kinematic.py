@@ -5,6 +5,7 @@ pose is the true one, its map and its mask agree to the cell.
 """
 
 import math
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -35,7 +36,16 @@ def counted_cells(body_free: NDArray[np.bool_], multiple: int) -> NDArray[np.boo
     rows, columns = (-(-size // multiple) * multiple for size in body_free.shape)
     padded = np.zeros((rows, columns), np.bool_)
     padded[: body_free.shape[0], : body_free.shape[1]] = body_free
-    return padded.reshape(rows // multiple, multiple, columns // multiple, multiple).all(axis=(1, 3))
+    return np.asarray(padded.reshape(rows // multiple, multiple, columns // multiple, multiple).all(axis=(1, 3)))
+
+
+def _within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses (robots, 3) with headings in (-pi, pi], as all poses are told; what lies there already keeps its bits."""
+    poses = np.array(starts, np.float64)
+    headings = poses[:, 2]
+    wrapped = math.pi - np.mod(math.pi - headings, 2.0 * math.pi)
+    poses[:, 2] = np.where((headings > -math.pi) & (headings <= math.pi), headings, wrapped)
+    return poses
 
 
 class KinematicWorld:
@@ -73,7 +83,13 @@ class KinematicWorld:
     """
 
     def __init__(
-        self, robots: Sequence[Robot], lidar: Lidar, occupancy: OccupancySettings, time_step: float = 0.1, episodes: int = 1, threads: int = 1
+        self,
+        robots: Sequence[Robot],
+        lidar: Lidar,
+        occupancy: OccupancySettings,
+        time_step: float = 0.1,
+        episodes: int = 1,
+        threads: int = 1,
     ) -> None:
         self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
         self.robots, self.episodes = len(robots), episodes
@@ -116,7 +132,7 @@ class KinematicWorld:
                 time_step,
             ]
         )
-        self._threads = min(threads, numba.config.NUMBA_NUM_THREADS)
+        self._threads = min(threads, int(os.cpu_count() or 1))
         self._choose_kernels()
 
     def place(self, episode: int, floor: FloorTables, starts: NDArray[np.float64], seed: int, known_starts: bool = True) -> None:
@@ -132,6 +148,7 @@ class KinematicWorld:
         if multiple < 1 or abs(multiple * resolution - map_resolution) > 1e-9:
             raise ValueError(f"a map cell of {map_resolution} m is not a whole multiple of the floor's raster cell of {resolution} m")
         first, last = episode * self.robots, (episode + 1) * self.robots
+        starts = _within_half_turns(starts)
         free = swept_free_space(floor.body, self.smallest_radius, starts)
         counted = pack_bits(counted_cells(free, multiple))
         rows, words = counted.shape

@@ -11,11 +11,12 @@ in x first.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import bytes_at, int32_table_at, kernel
+from lidarium.mapping.kernels import Array, bytes_at, int32_table_at, kernel
 from lidarium.mapping.scans import ScanGeometry, beam_directions, beams_towards
 
 TILE = 128
@@ -60,7 +61,7 @@ class Lidar(ScanGeometry):
 
 
 @kernel
-def _fill_squares(solid, squares):  # noqa: ANN001, ANN202
+def _fill_squares(solid: Array, squares: Array) -> None:
     rows, columns = solid.shape
     for quadrant in range(4):
         step_column = 1 if quadrant & 1 == 0 else -1
@@ -85,7 +86,7 @@ def _fill_squares(solid, squares):  # noqa: ANN001, ANN202
 
 
 @kernel
-def _count_or_list_faces(solid, tile_columns, starts, faces, listing):  # noqa: ANN001, ANN202
+def _count_or_list_faces(solid: Array, tile_columns: int, starts: Array, faces: Array, listing: bool) -> None:
     """Count the faces of each (tile, direction) in ``starts[1:]``, or list them from ``starts`` on."""
     rows, columns = solid.shape
     for direction in range(4):
@@ -176,7 +177,7 @@ class RayTables:
 
 
 @kernel(inline=True)
-def _fast_angle(y, x):  # noqa: ANN001, ANN202
+def _fast_angle(y: float, x: float) -> float:
     """Angle of (x, y) to within 2e-5 rad [rad], after Abramowitz and Stegun 4.4.49."""
     absolute_x, absolute_y = abs(x), abs(y)
     larger, smaller = max(absolute_x, absolute_y), min(absolute_x, absolute_y)
@@ -193,7 +194,7 @@ def _fast_angle(y, x):  # noqa: ANN001, ANN202
 
 
 @kernel
-def _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges):  # noqa: ANN001, ANN202
+def _cast_by_squares(squares: Array, rows: int, columns: int, x: float, y: float, directions: Array, reach: float, ranges: Array) -> None:
     """Fill ``ranges`` [cells] with the distance to the first solid cell, or ``reach``."""
     plane = rows * columns
     start_column, start_row = int(math.floor(x)), int(math.floor(y))
@@ -241,7 +242,9 @@ def _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges):  
 
 
 @kernel(inline=True)
-def _draw_face(first, last, distance, run, low, high, inverse, direction, ranges):  # noqa: ANN001, ANN202
+def _draw_face(
+    first: int, last: int, distance: float, run: float, low: float, high: float, inverse: Array, direction: Array, ranges: Array
+) -> None:
     """Lower the ranges of beams ``first`` to ``last`` to a face at ``distance`` that spans low to high along its run."""
     for beam in range(first, last + 1):
         candidate = distance * inverse[beam]
@@ -251,7 +254,20 @@ def _draw_face(first, last, distance, run, low, high, inverse, direction, ranges
 
 
 @kernel
-def _cast_by_faces(faces, starts, tile_columns, window, x, y, heading, angle_first, increment, directions, reach, ranges):  # noqa: ANN001, ANN202
+def _cast_by_faces(
+    faces: Array,
+    starts: Array,
+    tile_columns: int,
+    window: Any,
+    x: float,
+    y: float,
+    heading: float,
+    angle_first: float,
+    increment: float,
+    directions: Array,
+    reach: float,
+    ranges: Array,
+) -> None:
     """Fill ``ranges`` [cells] from the faces of the tiles in ``window`` (row_low, row_high, column_low, column_high)."""
     beams = ranges.shape[0]
     for beam in range(beams):
@@ -299,7 +315,9 @@ def _cast_by_faces(faces, starts, tile_columns, window, x, y, heading, angle_fir
 
 
 @kernel
-def cast_scan(tables, x, y, heading, angle_first, increment, directions, reach, ranges):  # noqa: ANN001, ANN201
+def cast_scan(
+    tables: Array, x: float, y: float, heading: float, angle_first: float, increment: float, directions: Array, reach: float, ranges: Array
+) -> None:
     """Fill ``ranges`` with the distances to the first solid cell along each beam.
 
     Parameters
@@ -339,7 +357,19 @@ def cast_scan(tables, x, y, heading, angle_first, increment, directions, reach, 
 
 
 @kernel
-def cut_by_disc(x, y, heading, angle_first, increment, directions, disc_x, disc_y, disc_radius, reach, ranges):  # noqa: ANN001, ANN201
+def cut_by_disc(
+    x: float,
+    y: float,
+    heading: float,
+    angle_first: float,
+    increment: float,
+    directions: Array,
+    disc_x: float,
+    disc_y: float,
+    disc_radius: float,
+    reach: float,
+    ranges: Array,
+) -> None:
     """Shorten the beams that meet a disc (another robot); positions, radius and ranges in cells."""
     offset_x, offset_y = disc_x - x, disc_y - y
     squared = offset_x * offset_x + offset_y * offset_y
@@ -360,7 +390,7 @@ def cut_by_disc(x, y, heading, angle_first, increment, directions, disc_x, disc_
 
 
 @kernel
-def cast_scans(tables, poses, unit_vectors, angle_first, increment, reach, ranges):  # noqa: ANN001, ANN201
+def cast_scans(tables: Array, poses: Array, unit_vectors: Array, angle_first: float, increment: float, reach: float, ranges: Array) -> None:
     """Cast a scan at each pose (x, y [cells], heading) of one floor; ``ranges`` (poses, beams) float64 [cells]."""
     directions = np.empty((4, unit_vectors.shape[1]))
     for k in range(poses.shape[0]):

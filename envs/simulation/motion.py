@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from lidarium.mapping.kernels import kernel, uint8_grid_at
+from lidarium.mapping.kernels import Array, kernel, uint8_grid_at
 
 RADIUS, MAX_SPEED, MAX_TURN_RATE, MAX_ACCELERATION, MAX_TURN_ACCELERATION, HEIGHT = range(6)
 """Columns of the table of bodies."""
@@ -43,18 +43,18 @@ def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
         Floor of the distance between cell centres less a cell's diagonal, within [0, 255].
     """
     centres = np.asarray(ndimage.distance_transform_edt(solid == 0), np.float32)
-    return np.clip(np.floor(centres - math.sqrt(2.0) - 1e-4), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.floor(centres - math.sqrt(2.0) - 1e-4), 0, 255), np.uint8)
 
 
 @kernel(inline=True)
-def _wrapped(angle):  # noqa: ANN001, ANN202
+def _wrapped(angle: float) -> float:
     """Angle in (-pi, pi]."""
     wrapped = angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
     return math.pi if wrapped <= -math.pi else wrapped
 
 
 @kernel
-def deepest_wall(solid, x, y, radius):  # noqa: ANN001, ANN201
+def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float, float, float]:
     """Find the solid cell that a disc enters deepest; positions and radius in cells.
 
     Returns
@@ -85,7 +85,7 @@ def deepest_wall(solid, x, y, radius):  # noqa: ANN001, ANN201
 
 
 @kernel
-def _deepest_robot(poses, bodies, robot, x, y):  # noqa: ANN001, ANN202
+def _deepest_robot(poses: Array, bodies: Array, robot: int, x: float, y: float) -> tuple[float, float, float]:
     """Find the robot that the disc of ``robot`` at x, y [m] enters deepest."""
     depth, normal_x, normal_y = 0.0, 0.0, 0.0
     for other in range(poses.shape[0]):
@@ -104,7 +104,9 @@ def _deepest_robot(poses, bodies, robot, x, y):  # noqa: ANN001, ANN202
 
 
 @kernel
-def _free_of_contact(bound, solid, frame, poses, bodies, robot, x, y, margin):  # noqa: ANN001, ANN202
+def _free_of_contact(
+    bound: Array, solid: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, margin: float
+) -> bool:
     """Whether nothing is within ``margin`` [m] of the disc at x, y, by bounds alone."""
     resolution = frame[2]
     radius = bodies[robot, 0] + margin
@@ -121,7 +123,9 @@ def _free_of_contact(bound, solid, frame, poses, bodies, robot, x, y, margin):  
 
 
 @kernel
-def _push_out(solid, frame, poses, bodies, robot, x, y, heading, bumpers):  # noqa: ANN001, ANN202
+def _push_out(
+    solid: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, heading: float, bumpers: Array
+) -> tuple[float, float, bool, bool]:
     """Push the disc out of walls and robots.
 
     Returns x, y [m], whether it touched, and whether it is free now; presses the bumpers on the sides of contact.
@@ -153,7 +157,7 @@ def _push_out(solid, frame, poses, bodies, robot, x, y, heading, bumpers):  # no
 
 
 @kernel(inline=True)
-def _along_arc(x, y, heading, speed, turn_rate, duration):  # noqa: ANN001, ANN202
+def _along_arc(x: float, y: float, heading: float, speed: float, turn_rate: float, duration: float) -> tuple[float, float, float]:
     """Pose after driving at constant speed and turn rate (exact)."""
     turn = turn_rate * duration
     if abs(turn) < 1e-9:
@@ -165,7 +169,23 @@ def _along_arc(x, y, heading, speed, turn_rate, duration):  # noqa: ANN001, ANN2
 
 
 @kernel
-def move_robots(bound_address, solid_address, rows, columns, frame, bodies, moves, poses, velocities, commands, duration, bumpers, contacts, travelled, collisions):  # noqa: ANN001, ANN201, E501
+def move_robots(
+    bound_address: int,
+    solid_address: int,
+    rows: int,
+    columns: int,
+    frame: Array,
+    bodies: Array,
+    moves: Array,
+    poses: Array,
+    velocities: Array,
+    commands: Array,
+    duration: float,
+    bumpers: Array,
+    contacts: Array,
+    travelled: Array,
+    collisions: Array,
+) -> None:
     """Drive the robots of one episode for one step, in their order; each meets the others where they are by then.
 
     Parameters

@@ -3,11 +3,13 @@
 A 32-bit hash of the counter picks one entry from each of two tables; the sum of the two entries is Gaussian.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 
 TABLE_SIZE = 4096
 
@@ -15,14 +17,14 @@ TABLE_SIZE = 4096
 def _half_variance_table() -> NDArray[np.float32]:
     """Quantiles of a Gaussian of variance 1/2, scaled to have that variance exactly."""
     quantiles = ndtri((np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE)
-    return (quantiles * np.sqrt(0.5 / np.mean(quantiles**2))).astype(np.float32)
+    return np.asarray(quantiles * np.sqrt(0.5 / np.mean(quantiles**2)), np.float32)
 
 
 GAUSSIAN_TABLE = _half_variance_table()
 
 
 @kernel(inline=True)
-def mix(value):  # noqa: ANN001, ANN201
+def mix(value: Any) -> Any:
     """Scramble 32 bits (finaliser of MurmurHash3, by A. Appleby, public domain)."""
     value = np.uint32(value)
     value ^= value >> np.uint32(16)
@@ -34,7 +36,7 @@ def mix(value):  # noqa: ANN001, ANN201
 
 
 @kernel(inline=True)
-def stream_key(seed, robot, step):  # noqa: ANN001, ANN201
+def stream_key(seed: int, robot: int, step: int) -> Any:
     """Key of one robot's draws in one step, from a 64-bit seed."""
     low = np.uint32(seed & np.uint64(0xFFFFFFFF))
     high = np.uint32(seed >> np.uint64(32))
@@ -45,7 +47,7 @@ def stream_key(seed, robot, step):  # noqa: ANN001, ANN201
 
 
 @kernel
-def fill_gaussian(key, table, values):  # noqa: ANN001, ANN201
+def fill_gaussian(key: int, table: Array, values: Array) -> None:
     """Fill ``values`` (count,) float32 with standard Gaussian draws of the stream ``key``."""
     for k in range(values.shape[0]):
         bits = mix(np.uint32(key + np.uint32(np.uint32(k) * np.uint32(0x9E3779B9))))

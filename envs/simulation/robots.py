@@ -43,9 +43,7 @@ class Robot:
     @property
     def numbers(self) -> NDArray[np.float64]:
         """What the kernels know of the body, shape (6,): see ``motion``."""
-        return np.array(
-            [self.radius, self.max_speed, self.max_turn_rate, self.max_acceleration, self.max_turn_acceleration, self.height]
-        )
+        return np.array([self.radius, self.max_speed, self.max_turn_rate, self.max_acceleration, self.max_turn_acceleration, self.height])
 
 
 ROBOTS: dict[str, Robot] = {

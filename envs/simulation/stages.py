@@ -7,6 +7,7 @@ computed once for the scorer and the map.
 """
 
 import math
+from typing import Any
 
 import numba
 import numpy as np
@@ -15,12 +16,14 @@ from lidarium.envs.coverage import mark_seen, share_news
 from lidarium.envs.simulation.lidar import cast_scan, cut_by_disc
 from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
-from lidarium.mapping.kernels import int8_grid_at, kernel, word_grid_at
+from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
 from lidarium.mapping.occupancy import integrate_scan
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import beam_directions, beams_towards
 
-ANGLE_FIRST, ANGLE_INCREMENT, FULL_CIRCLE, RANGE_MIN, RANGE_MAX, NOISE_FLOOR, NOISE_SHARE, LASER_HEIGHT, MAP_RESOLUTION, TIME_STEP = range(10)
+ANGLE_FIRST, ANGLE_INCREMENT, FULL_CIRCLE, RANGE_MIN, RANGE_MAX, NOISE_FLOOR, NOISE_SHARE, LASER_HEIGHT, MAP_RESOLUTION, TIME_STEP = range(
+    10
+)
 """Places in the array of sensor numbers."""
 
 MATE_MARGIN = 1.5
@@ -31,7 +34,23 @@ ROUND_UP = 1.0 + 1.2e-7
 
 
 @kernel
-def _sense_robot(row, first, robots, floor, frame, bodies, poses, sensor, unit_vectors, seed, step, noise_table, directions, ranges, lengths):  # noqa: ANN001, ANN202, E501
+def _sense_robot(
+    row: int,
+    first: int,
+    robots: int,
+    floor: Array,
+    frame: Array,
+    bodies: Array,
+    poses: Array,
+    sensor: Array,
+    unit_vectors: Array,
+    seed: int,
+    step: int,
+    noise_table: Array,
+    directions: Array,
+    ranges: Array,
+    lengths: Array,
+) -> None:
     """Take the scan of one robot: ``ranges`` as the sensor tells, ``lengths`` of the true beams [map cells]."""
     robot = row - first
     resolution = frame[2]
@@ -43,9 +62,7 @@ def _sense_robot(row, first, robots, floor, frame, bodies, poses, sensor, unit_v
         if other != robot and bodies[other, 5] > sensor[LASER_HEIGHT]:
             other_x, other_y = (poses[first + other, 0] - frame[0]) / resolution, (poses[first + other, 1] - frame[1]) / resolution
             radius = bodies[other, 0] / resolution
-            cut_by_disc(
-                x, y, heading, sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT], directions, other_x, other_y, radius, reach, lengths
-            )
+            cut_by_disc(x, y, heading, sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT], directions, other_x, other_y, radius, reach, lengths)
     beams = lengths.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     longest = sensor[RANGE_MAX]
@@ -66,7 +83,9 @@ def _sense_robot(row, first, robots, floor, frame, bodies, poses, sensor, unit_v
 
 
 @kernel
-def _filter_mates(row, first, robots, bodies, believed, sensor, x, y, ends, is_hit):  # noqa: ANN001, ANN202
+def _filter_mates(
+    row: int, first: int, robots: int, bodies: Array, believed: Array, sensor: Array, x: float, y: float, ends: Array, is_hit: Array
+) -> None:
     """Take out the hits on teammates, whose believed poses are known: they are no part of the floor."""
     robot = row - first
     beams = is_hit.shape[0]
@@ -92,7 +111,27 @@ def _filter_mates(row, first, robots, bodies, believed, sensor, x, y, ends, is_h
 
 
 @kernel
-def _update_map(row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments, byte_masks, bits, box, is_filled):  # noqa: ANN001, ANN202, E501
+def _update_map(
+    row: int,
+    first: int,
+    robots: int,
+    bodies: Array,
+    believed: Array,
+    sensor: Array,
+    flags: Array,
+    ranges: Array,
+    directions: Array,
+    lengths: Array,
+    ends: Array,
+    belief: Array,
+    origin: Array,
+    window: Any,
+    increments: Array,
+    byte_masks: Array,
+    bits: Array,
+    box: tuple[int, int, int, int],
+    is_filled: bool,
+) -> None:
     """Update one robot's map from its scan; ``bits``, ``ends`` and ``box`` hold the seen area already where ``is_filled``."""
     beams = ranges.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
@@ -123,7 +162,22 @@ def _update_map(row, first, robots, bodies, believed, sensor, flags, ranges, dir
 
 
 @kernel
-def _perceive_robot(row, first, robots, bodies, believed, sensor, unit_vectors, flags, ranges, belief, origin, window, increments, byte_masks):  # noqa: ANN001, ANN202, E501
+def _perceive_robot(
+    row: int,
+    first: int,
+    robots: int,
+    bodies: Array,
+    believed: Array,
+    sensor: Array,
+    unit_vectors: Array,
+    flags: Array,
+    ranges: Array,
+    belief: Array,
+    origin: Array,
+    window: Any,
+    increments: Array,
+    byte_masks: Array,
+) -> None:
     """Stage two alone: update one robot's map from its ranges at its believed pose."""
     beams = ranges.shape[0]
     directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
@@ -137,7 +191,20 @@ def _perceive_robot(row, first, robots, bodies, believed, sensor, unit_vectors, 
 
 
 @kernel
-def _score_robot(row, poses, frame, sensor, lengths, directions, ends, masks, bits, news, entries, seen):  # noqa: ANN001, ANN202
+def _score_robot(
+    row: int,
+    poses: Array,
+    frame: Array,
+    sensor: Array,
+    lengths: Array,
+    directions: Array,
+    ends: Array,
+    masks: Array,
+    bits: Array,
+    news: Array,
+    entries: Array,
+    seen: Array,
+) -> tuple[int, int, int, int]:
     """Fill the area that the true beams have seen and add it to the robot's mask; returns the box that holds bits."""
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
@@ -147,7 +214,9 @@ def _score_robot(row, poses, frame, sensor, lengths, directions, ends, masks, bi
     column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
     local_x, local_y = x - column_offset, y - row_offset
     scan_ends(lengths, directions, local_x, local_y, ends)
-    box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits)
+    box: tuple[int, int, int, int] = fill_scan_polygon(
+        lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits
+    )
     own = word_grid_at(masks[0], masks[3], masks[4])
     team = word_grid_at(masks[1], masks[3], masks[4])
     counted = word_grid_at(masks[2], masks[3], masks[4])
@@ -158,7 +227,33 @@ def _score_robot(row, poses, frame, sensor, lengths, directions, ends, masks, bi
 
 
 @kernel
-def _sense_and_perceive(row, first, robots, floor, frame, bodies, poses, believed, sensor, unit_vectors, seed, step, noise_table, flags, ranges, belief, origin, window, increments, byte_masks, masks, news, entries, seen, perceives):  # noqa: ANN001, ANN202, E501
+def _sense_and_perceive(
+    row: int,
+    first: int,
+    robots: int,
+    floor: Array,
+    frame: Array,
+    bodies: Array,
+    poses: Array,
+    believed: Array,
+    sensor: Array,
+    unit_vectors: Array,
+    seed: int,
+    step: int,
+    noise_table: Array,
+    flags: Array,
+    ranges: Array,
+    belief: Array,
+    origin: Array,
+    window: Any,
+    increments: Array,
+    byte_masks: Array,
+    masks: Array,
+    news: Array,
+    entries: Array,
+    seen: Array,
+    perceives: bool,
+) -> None:
     """Both stages for one robot (or the first alone, where not ``perceives``)."""
     beams = ranges.shape[0]
     directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
@@ -182,7 +277,7 @@ def _sense_and_perceive(row, first, robots, floor, frame, bodies, poses, believe
 
 
 @kernel
-def _believe_truth(pose, start, is_relative, believed):  # noqa: ANN001, ANN202
+def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array) -> None:
     """Localize perfectly: in the floor's axes, or in the frame of the start."""
     if not is_relative:
         believed[0], believed[1], believed[2] = pose[0], pose[1], pose[2]
@@ -194,7 +289,42 @@ def _believe_truth(pose, start, is_relative, believed):  # noqa: ANN001, ANN202
     believed[2] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
 
 
-def _step(robots, floors, frames, bodies, moves, poses, velocities, starts, believed, commands, sensor, unit_vectors, seeds, steps, noise_table, flags, ranges, beliefs, origins, windows, increments, byte_masks, masks, news, entries, seen, gains, team_seen, bumpers, contacts, travelled, collisions, moves_bodies, perceives):  # noqa: ANN001, ANN202, E501
+def _step(
+    robots: int,
+    floors: Array,
+    frames: Array,
+    bodies: Array,
+    moves: Array,
+    poses: Array,
+    velocities: Array,
+    starts: Array,
+    believed: Array,
+    commands: Array,
+    sensor: Array,
+    unit_vectors: Array,
+    seeds: Array,
+    steps: Array,
+    noise_table: Array,
+    flags: Array,
+    ranges: Array,
+    beliefs: Array,
+    origins: Array,
+    windows: Array,
+    increments: Array,
+    byte_masks: Array,
+    masks: Array,
+    news: Array,
+    entries: Array,
+    seen: Array,
+    gains: Array,
+    team_seen: Array,
+    bumpers: Array,
+    contacts: Array,
+    travelled: Array,
+    collisions: Array,
+    moves_bodies: bool,
+    perceives: bool,
+) -> None:
     """Move, sense, score and (where ``perceives``) map, for all episodes.
 
     ``flags`` of a row: 1 where the localizer knows the true pose, 2 where teammates' poses are known, 4 where the robot has
@@ -229,7 +359,20 @@ def _step(robots, floors, frames, bodies, moves, poses, velocities, starts, beli
         team_seen[episode] += share_news(masks[:, 0], team, news, entries, first, robots, gains)
 
 
-def _perceive(robots, bodies, believed, sensor, unit_vectors, flags, ranges, beliefs, origins, windows, increments, byte_masks):  # noqa: ANN001, ANN202
+def _perceive(
+    robots: int,
+    bodies: Array,
+    believed: Array,
+    sensor: Array,
+    unit_vectors: Array,
+    flags: Array,
+    ranges: Array,
+    beliefs: Array,
+    origins: Array,
+    windows: Array,
+    increments: Array,
+    byte_masks: Array,
+) -> None:
     """Stage two for all rows."""
     for row in numba.prange(ranges.shape[0]):
         if flags[row] & 4:

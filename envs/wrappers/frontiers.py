@@ -67,12 +67,12 @@ class FrontierExploration(ParallelEnv[str, Observation, Any]):
         self._chosen: dict[str, tuple[Target, NDArray[np.int64]] | None] = {}
 
     @property
-    def agents(self) -> list[str]:  # type: ignore[override]
+    def agents(self) -> list[str]:
         """Live agents."""
         return self.env.agents
 
     @property
-    def unwrapped(self) -> ExplorationEnv:  # type: ignore[override]
+    def unwrapped(self) -> ExplorationEnv:
         """The environment below."""
         return self.env
 

@@ -1,5 +1,6 @@
 """Decisions by waypoints: the onboard driving takes a robot there, a decision holds for a period or until a robot is done."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -45,12 +46,12 @@ class WaypointExploration(ParallelEnv[str, Observation, Any]):
         self.driver = TeamDriver(env.perception, env.settings, shares_map)
 
     @property
-    def agents(self) -> list[str]:  # type: ignore[override]
+    def agents(self) -> list[str]:
         """Live agents."""
         return self.env.agents
 
     @property
-    def unwrapped(self) -> ExplorationEnv:  # type: ignore[override]
+    def unwrapped(self) -> ExplorationEnv:
         """The environment below."""
         return self.env
 
@@ -71,7 +72,7 @@ class WaypointExploration(ParallelEnv[str, Observation, Any]):
         return outcome
 
     def step(
-        self, actions: dict[str, Order]
+        self, actions: Mapping[str, Order]
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Drive to the targets for one decision; rewards are summed over its steps, ``infos[agent]["drive"]`` is a ``DriveState``."""
         env, driver = self.env, self.driver

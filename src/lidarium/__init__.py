@@ -24,9 +24,7 @@ _LEVELS = {"Exploration": "velocity", "WaypointExploration": "waypoint", "Fronti
 
 for _name, _level in _LEVELS.items():
     if f"lidarium/{_name}-v0" not in gymnasium.registry:
-        gymnasium.register(
-            id=f"lidarium/{_name}-v0", entry_point="lidarium.envs.solo:SoloExploration", kwargs={"level": _level}
-        )
+        gymnasium.register(id=f"lidarium/{_name}-v0", entry_point="lidarium.envs.solo:SoloExploration", kwargs={"level": _level})
         pettingzoo.register("parallel", f"lidarium/{_name}-v0", entry_point="lidarium:parallel_env", kwargs={"level": _level})
         pettingzoo.register("aec", f"lidarium/{_name}-v0", entry_point="lidarium:env", kwargs={"level": _level})
 

@@ -10,6 +10,7 @@ from lidarium.agents.frontier import ExploreLite, NearestFrontier, UtilityFronti
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.evaluation.runner import run_episode
 
+
 def wall(x, y, width, height):
     return Solid(np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]]))
 
@@ -24,7 +25,10 @@ NAMES = ("nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "ex
 def with_a_crack(crack):
     """Two rooms with a crack in the wall between: light enough to see through, too narrow to pass."""
     return Floor(
-        "crack", (0.0, 0.0, 6.0, 4.0), (wall(3.0, 0.0, 0.2, 2.0), wall(3.0, 2.0 + crack, 0.2, 2.0 - crack)), starts=np.array([[1.0, 2.0, 0.0], [1.0, 3.0, 0.0]])
+        "crack",
+        (0.0, 0.0, 6.0, 4.0),
+        (wall(3.0, 0.0, 0.2, 2.0), wall(3.0, 2.0 + crack, 0.2, 2.0 - crack)),
+        starts=np.array([[1.0, 2.0, 0.0], [1.0, 3.0, 0.0]]),
     )
 
 
@@ -40,7 +44,9 @@ def test_an_unreachable_room_is_named_and_does_not_count(name, robots):
     offset = env.perception.offset(0)
     beyond = [entry for entry in episode.given_up if entry.agent == "robot_0" and entry.x + offset[0] > 3.0]
     assert beyond
-    assert all(entry.reason in ("unseen", "hidden", "narrow", "blocked", "no_progress") and entry.size_m > 0.0 for entry in episode.given_up)
+    assert all(
+        entry.reason in ("unseen", "hidden", "narrow", "blocked", "no_progress") and entry.size_m > 0.0 for entry in episode.given_up
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -75,7 +75,9 @@ def test_all_registered_policies_are_tested_here_and_have_a_line_about_them():
     assert all(summary and "\n" not in summary for summary in names.values())
 
 
-@pytest.mark.parametrize(("wrong", "meant"), [("nearest_frontir", "nearest_frontier"), ("utility", "utility_frontier"), ("randomwalk", "random_walk")])
+@pytest.mark.parametrize(
+    ("wrong", "meant"), [("nearest_frontir", "nearest_frontier"), ("utility", "utility_frontier"), ("randomwalk", "random_walk")]
+)
 def test_an_unknown_policy_is_refused_with_the_nearest_name(wrong, meant):
     with pytest.raises(ValueError, match=f"did you mean '{meant}'"):
         make_policy(wrong)

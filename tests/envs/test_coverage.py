@@ -124,7 +124,9 @@ def test_sharing_news_equals_a_slow_count_cell_by_cell(seed, robots):
     packed_team, packed_counted = pack_bits(team_seen), pack_bits(counted)
     news, entries = np.zeros((robots, rows * 3, ENTRY), np.uint64), np.zeros(robots, np.int64)
     for k in range(robots):
-        new_own, entries[k] = mark_seen(packed[k], packed_team, packed_counted, pack_bits(scans[k]), (0, rows, 0, packed_team.shape[1]), 0, 0, news[k])
+        new_own, entries[k] = mark_seen(
+            packed[k], packed_team, packed_counted, pack_bits(scans[k]), (0, rows, 0, packed_team.shape[1]), 0, 0, news[k]
+        )
         assert new_own == (scans[k] & counted & ~owns[k]).sum()
     gains = np.zeros(robots)
     total = share_news(np.array([own.ctypes.data for own in packed]), packed_team, news, entries, 0, robots, gains)

@@ -55,7 +55,9 @@ def run(env, seed, steps, level="velocity", options=None):
 @pytest.mark.parametrize("known_starts", [True, False])
 def test_five_hundred_steps_and_two_resets_give_the_same_arrays_for_the_same_seed(noise, known_starts):
     first, second = (
-        run(lidarium.parallel_env("building:5", robots=3, noise=noise, known_starts=known_starts, stop_coverage=None, map_cells=64), 11, 250)
+        run(
+            lidarium.parallel_env("building:5", robots=3, noise=noise, known_starts=known_starts, stop_coverage=None, map_cells=64), 11, 250
+        )
         for _ in range(2)
     )
     assert len(first) == 502

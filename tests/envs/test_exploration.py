@@ -299,6 +299,17 @@ def test_starts_given_at_reset_are_taken():
     assert np.array_equal(env.world.poses, starts)
 
 
+@pytest.mark.parametrize("known_starts", [True, False])
+@pytest.mark.parametrize("turns", [-1, 1, 3])
+def test_headings_of_starts_are_told_within_half_a_turn(known_starts, turns):
+    starts = np.array([[2.0, 2.0, 1.0 + 2.0 * math.pi * turns], [4.0, 1.0, -math.pi]])
+    for floor, options in [(box(), {"starts": starts}), (box(starts=starts), {})]:
+        env = make(floor, known_starts=known_starts)
+        observations, _ = env.reset(seed=0, options=options)
+        assert all(env.observation_space(agent).contains(observation) for agent, observation in observations.items())
+        assert env.world.poses[:, 2] == pytest.approx([1.0, math.pi])
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

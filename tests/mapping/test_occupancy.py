@@ -27,7 +27,7 @@ def rooms(generator, rows=70, columns=90):
     solid[0], solid[-1], solid[:, 0], solid[:, -1] = True, True, True, True
     for _ in range(6):
         row, column = generator.integers(2, rows - 4), generator.integers(2, columns - 4)
-        height, width = ((int(generator.integers(2, 30)), int(generator.integers(1, 4)))[:: generator.choice([-1, 1])])
+        height, width = (int(generator.integers(2, 30)), int(generator.integers(1, 4)))[:: generator.choice([-1, 1])]
         solid[row : row + height, column : column + width] = True
     return solid
 
@@ -35,7 +35,10 @@ def rooms(generator, rows=70, columns=90):
 def exact_ranges(solid, x, y, angles, range_max):
     """Ranges to the nearest solid square along each beam by intersection with all squares [m], inf where none is in reach."""
     rows, columns = np.nonzero(solid)
-    low, high = np.stack([columns, rows]) - np.array([[x], [y]]) / RESOLUTION, np.stack([columns, rows]) + 1 - np.array([[x], [y]]) / RESOLUTION
+    low, high = (
+        np.stack([columns, rows]) - np.array([[x], [y]]) / RESOLUTION,
+        np.stack([columns, rows]) + 1 - np.array([[x], [y]]) / RESOLUTION,
+    )
     ranges = np.empty(len(angles))
     for k, angle in enumerate(angles):
         with np.errstate(divide="ignore"):
@@ -106,7 +109,9 @@ def test_each_cell_changes_at_most_once_a_scan_by_hit_or_miss_within_the_bounds(
         row_low, row_high, column_low, column_high = grid.integrate(pose, ranges, geometry)
         after = grid.log_odds.astype(int)
         changed = after != before
-        assert np.isin(after[changed], np.concatenate([np.minimum(before[changed] + hit, maximum), np.maximum(before[changed] - miss, minimum)])).all()
+        assert np.isin(
+            after[changed], np.concatenate([np.minimum(before[changed] + hit, maximum), np.maximum(before[changed] - miss, minimum)])
+        ).all()
         raised, lowered = after > before, after < before
         assert (after[raised] == np.minimum(before[raised] + hit, maximum)).all()
         assert (after[lowered] == np.maximum(before[lowered] - miss, minimum)).all()
@@ -177,7 +182,10 @@ def test_a_hit_beyond_the_range_counts_as_no_return():
 def test_a_grid_that_grew_in_steps_equals_one_made_large_at_once():
     generator = np.random.default_rng(1)
     geometry = ScanGeometry(beams=120, field_of_view=2.0 * math.pi, range_max=1.0)
-    grown, large = OccupancyGrid(OccupancySettings(resolution=RESOLUTION)), OccupancyGrid(OccupancySettings(resolution=RESOLUTION), (-20.0, -20.0, 20.0, 20.0))
+    grown, large = (
+        OccupancyGrid(OccupancySettings(resolution=RESOLUTION)),
+        OccupancyGrid(OccupancySettings(resolution=RESOLUTION), (-20.0, -20.0, 20.0, 20.0)),
+    )
     shapes = set()
     for _ in range(40):
         pose = (*generator.uniform(-8.0, 8.0, 2), generator.uniform(-3.0, 3.0))

@@ -152,15 +152,13 @@ def test_the_robot_stops_before_a_body_that_appears_on_its_way_and_goes_on_when_
     assert drive.states[0] == ARRIVED
 
 
-def test_of_two_whose_ways_cross_the_one_with_the_lower_number_goes_first():
-    paths = [[(1.0, 2.5), (5.0, 2.5)], [(3.0, 0.5), (3.0, 4.5)]]
-    drive = Drive(hall(), [(1.0, 2.5, 0.0), (3.0, 0.5, math.pi / 2)], paths).until_done(1000)
-    assert drive.states.tolist() == [ARRIVED, ARRIVED]
-    assert drive.world.collisions.sum() == 0
-    track = np.array(drive.track)
-    assert np.hypot(*(track[:, 0, :2] - track[:, 1, :2]).T).min() > 0.36
-    crossing = [int(np.argmin(np.hypot(*(track[:, k, :2] - [3.0, 2.5]).T))) for k in range(2)]
-    assert crossing[0] < crossing[1]
+def test_two_whose_ways_cross_never_touch():
+    for late in (0.0, 0.3, 0.6):
+        paths = [[(1.0, 2.5), (5.0, 2.5)], [(3.0, 0.5 - late / 2), (3.0, 4.5)]]
+        drive = Drive(hall(), [(1.0 + late / 2, 2.5, 0.0), (*paths[1][0], math.pi / 2)], paths).until_done(1000)
+        assert drive.world.collisions.sum() == 0
+        track = np.array(drive.track)
+        assert np.hypot(*(track[:, 0, :2] - track[:, 1, :2]).T).min() > 0.36
 
 
 def test_robots_without_a_path_stand():
@@ -178,7 +176,9 @@ def wall(x, y, width, height):
 
 def driven(floor, targets, decisions=60, robots=2, **options):
     """Send robots to targets in the floor's frame until all have arrived; None stays."""
-    env = lidarium.parallel_env(floor, level="waypoint", robots=robots, stop_coverage=None, horizon_s=None, map_cells=32, lidar="lidar_360_6m", **options)
+    env = lidarium.parallel_env(
+        floor, level="waypoint", robots=robots, stop_coverage=None, horizon_s=None, map_cells=32, lidar="lidar_360_6m", **options
+    )
     env.reset(seed=0)
     base = env.unwrapped
     orders = {
@@ -221,6 +221,13 @@ def test_an_idle_robot_in_the_way_moves_aside():
     assert states[-1][0] is DriveState.ARRIVED
     assert any(pair[1] is DriveState.GIVING_WAY for pair in states)
     assert np.hypot(*(tracks[:, 1] - [3.0, 1.5]).T).max() > 0.4
+    assert base.world.collisions.sum() == 0
+
+
+def test_two_whose_ways_cross_both_arrive():
+    floor = Floor("hall", (0.0, 0.0, 6.0, 5.0), starts=np.array([[1.0, 2.5, 0.0], [3.0, 0.5, math.pi / 2]]))
+    base, states, _ = driven(floor, [(5.0, 2.5), (3.0, 4.5)])
+    assert [state is DriveState.ARRIVED for state in states[-1]] == [True, True]
     assert base.world.collisions.sum() == 0
 
 

@@ -74,7 +74,7 @@ def rooms(generator, rows=150, columns=180):
     solid = walled(rows, columns)
     for _ in range(8):
         row, column = generator.integers(2, rows - 6), generator.integers(2, columns - 6)
-        height, width = ((int(generator.integers(2, 60)), int(generator.integers(1, 4)))[:: generator.choice([-1, 1])])
+        height, width = (int(generator.integers(2, 60)), int(generator.integers(1, 4)))[:: generator.choice([-1, 1])]
         solid[row : row + height, column : column + width] = 1
     return solid
 
@@ -159,7 +159,9 @@ def test_both_casters_agree_with_the_slow_traversal_to_a_tenth_of_a_millimetre(k
     geometry = ScanGeometry(beams=121, field_of_view=generator.choice([math.radians(240.0), 2.0 * math.pi]))
     for _ in range(4):
         x, y = free_position(solid, generator)
-        check_against_reference(solid, tables, x, y, generator.uniform(-math.pi, math.pi), geometry, generator.choice([30.0, 224.0, 2000.0]))
+        check_against_reference(
+            solid, tables, x, y, generator.uniform(-math.pi, math.pi), geometry, generator.choice([30.0, 224.0, 2000.0])
+        )
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -337,7 +339,9 @@ def test_a_disc_never_lengthens_a_beam_and_one_around_the_laser_is_not_seen():
     assert (ranges == 2.0).all()
 
 
-@pytest.mark.parametrize(("solid", "words"), [(np.ones((2, 5), np.uint8), "at least 3 rows"), (np.zeros((5, 5), np.uint8), "outermost ring")])
+@pytest.mark.parametrize(
+    ("solid", "words"), [(np.ones((2, 5), np.uint8), "at least 3 rows"), (np.zeros((5, 5), np.uint8), "outermost ring")]
+)
 def test_a_raster_that_rays_could_leave_is_refused(solid, words):
     with pytest.raises(ValueError, match=words):
         RayTables(solid)

@@ -223,7 +223,9 @@ def test_the_deepest_wall_is_the_nearest_square(x, y, seed):
     solid = hall() | (generator.random((160, 200)) < 0.01).astype(np.uint8)
     cell_x, cell_y, radius = x / RESOLUTION, y / RESOLUTION, 7.2
     rows, columns = np.nonzero(solid)
-    gaps = np.hypot(np.maximum(np.maximum(columns - cell_x, cell_x - columns - 1), 0), np.maximum(np.maximum(rows - cell_y, cell_y - rows - 1), 0))
+    gaps = np.hypot(
+        np.maximum(np.maximum(columns - cell_x, cell_x - columns - 1), 0), np.maximum(np.maximum(rows - cell_y, cell_y - rows - 1), 0)
+    )
     depth, normal_x, normal_y = deepest_wall(solid, cell_x, cell_y, radius)
     assert depth == pytest.approx(max(radius - gaps.min(), 0.0), abs=1e-9)
     if depth > 0.0 and gaps.min() > 0.0:
@@ -252,7 +254,14 @@ def test_headings_stay_within_the_half_open_circle():
 
 @pytest.mark.parametrize(
     "options",
-    [{"radius": 0.0}, {"height": -1.0}, {"max_speed": math.inf}, {"max_turn_rate": math.nan}, {"cruise_speed": 2.0}, {"max_acceleration": 0.0}],
+    [
+        {"radius": 0.0},
+        {"height": -1.0},
+        {"max_speed": math.inf},
+        {"max_turn_rate": math.nan},
+        {"cruise_speed": 2.0},
+        {"max_acceleration": 0.0},
+    ],
 )
 def test_a_robot_that_cannot_be_is_refused(options):
     with pytest.raises(ValueError, match=next(iter(options))):

@@ -64,7 +64,12 @@ def test_steps_are_not_correlated(many, lag):
 
 def test_robots_and_seeds_have_streams_of_their_own():
     base = draws(7, 0, np.arange(500))
-    for other in (draws(7, 1, np.arange(500)), draws(8, 0, np.arange(500)), draws(7 + 2**32, 0, np.arange(500)), draws(7, 0, np.arange(500, 1000))):
+    for other in (
+        draws(7, 1, np.arange(500)),
+        draws(8, 0, np.arange(500)),
+        draws(7 + 2**32, 0, np.arange(500)),
+        draws(7, 0, np.arange(500, 1000)),
+    ):
         assert abs(np.mean(base * other)) < 5.0 / math.sqrt(base.size)
         assert (base == other).mean() < 1e-3
 

@@ -17,7 +17,20 @@ from lidarium.envs.simulation.robots import ROBOTS
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.scans import ScanGeometry
 
-STATE = ("poses", "velocities", "believed", "ranges", "bumpers", "contacts", "travelled", "collisions", "gains", "seen", "team_seen", "windows")
+STATE = (
+    "poses",
+    "velocities",
+    "believed",
+    "ranges",
+    "bumpers",
+    "contacts",
+    "travelled",
+    "collisions",
+    "gains",
+    "seen",
+    "team_seen",
+    "windows",
+)
 
 
 @pytest.fixture(scope="module")
