@@ -116,9 +116,11 @@ def report(arguments: argparse.Namespace) -> None:
         "",
         f"`python benchmarks/floors.py --workers {arguments.workers}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, "
         f"Python {platform.python_version()}: policy `{arguments.policy}`, Kobuki (radius 0.18 m), URG-04LX (727 beams, 240 degrees, "
-        "5.6 m), true poses, no noise, world and maps at 0.025 m, no horizon, seed 0. A run ends as `covered` when 0.99 of `C_free` is sensed.",
+        "5.6 m), true poses, no noise, world and maps at 0.025 m, no horizon, seed 0. A run "
+        "ends as `covered` when 0.99 of `C_free` is sensed.",
         "",
-        "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, median s | path, median m | wall, median s |",
+        "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, median s | path, median m "
+        "| wall, median s |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for kind, title in KINDS.items():

@@ -5,8 +5,6 @@ true poses, before noise. Of these only the cells of F count: those that the dis
 configuration space, connected to the starts.
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,7 +29,7 @@ def unpack_bits(bits: NDArray[np.uint64], columns: int) -> NDArray[np.bool_]:
 
 
 @kernel(inline=True)
-def count_bits(value: Any) -> int:
+def count_bits(value: np.uint64) -> int:
     """Count the set bits of a uint64."""
     value = value - ((value >> np.uint64(1)) & np.uint64(0x5555555555555555))
     value = (value & np.uint64(0x3333333333333333)) + ((value >> np.uint64(2)) & np.uint64(0x3333333333333333))

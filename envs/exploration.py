@@ -81,8 +81,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._choice = FloorChoice(floor, image_resolution)
         self.has_goal = self._choice.has_goal
         space = observation_space(self.settings, self.has_goal)
-        self.observation_spaces = {agent: copy.deepcopy(space) for agent in self.possible_agents}
-        self.action_spaces = {agent: action_space() for agent in self.possible_agents}
+        self.observation_spaces: dict[str, spaces.Space[Any]] = {agent: copy.deepcopy(space) for agent in self.possible_agents}
+        self.action_spaces: dict[str, spaces.Space[Any]] = {agent: action_space() for agent in self.possible_agents}
         self._rows = {agent: row for row, agent in enumerate(self.possible_agents)}
         team = [self.settings.robot] * self.settings.robots
         self.world = KinematicWorld(

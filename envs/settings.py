@@ -132,7 +132,8 @@ class ExplorationSettings:
         multiple = self.occupancy.resolution / self.raster_resolution
         if round(multiple) < 1 or abs(multiple - round(multiple)) > 1e-6:
             raise ValueError(
-                f"resolution of the maps is {self.occupancy.resolution} m; want a whole multiple of raster_resolution {self.raster_resolution} m"
+                f"resolution of the maps is {self.occupancy.resolution} m; "
+                f"want a whole multiple of raster_resolution {self.raster_resolution} m"
             )
         if self.decision_period_s < self.time_step:
             raise ValueError(f"decision_period_s is {self.decision_period_s} s; want at least the time step of {self.time_step} s")

@@ -293,8 +293,9 @@ def _list_robots(axes: Axes, episode: Episode) -> None:
     lines = max(shown + 5, 9)
     axes.set_ylim(lines, -0.6)
     style: dict[str, Any] = {"fontsize": 9, "va": "center", "color": INK}
+    heading: dict[str, Any] = {**style, "color": FAINT}
     for x, text, side in ((0.0, "robot", "left"), (0.74, "drove", "right"), (1.0, "saw", "right")):
-        axes.text(x, 0.0, text, ha=side, **(style | {"color": FAINT}))
+        axes.text(x, 0.0, text, ha=side, **heading)
     for robot, colour in enumerate(_hex_colours(env.settings.robots)[:shown]):
         agent, line = env.possible_agents[robot], robot + 1.0
         reason = env.scorer.ended_because.get(agent, "still at work")

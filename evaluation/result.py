@@ -96,7 +96,7 @@ def team_log_odds(env: ExplorationEnv) -> tuple[NDArray[np.int16], tuple[float, 
     assert tables is not None
     origin, resolution = tables.laser.origin, settings.occupancy.resolution
     if settings.known_starts:
-        return np.sum(world.log_odds, axis=0, dtype=np.int16), origin
+        return np.asarray(np.sum(world.log_odds, axis=0, dtype=np.int16)), origin
     rows, words = world.counted_masks[0].shape
     total = np.zeros((rows, words * 64), np.int16)
     y, x = np.meshgrid(*((np.arange(size) + 0.5) * resolution for size in total.shape), indexing="ij")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.grid_lines import line_is_open
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 
 STRAIGHT = 4756
 DIAGONAL = 6726
@@ -52,12 +52,12 @@ def clear(remaining: NDArray[np.int32], touched: NDArray[np.int32], count: int) 
 
 
 @kernel
-def trace(parent: NDArray[np.uint8], start_row: int, start_column: int, row: int, column: int) -> NDArray[np.int64]:
+def trace(parent: Array, start_row: int, start_column: int, row: int, column: int) -> NDArray[np.int64]:
     """Follow the parents from a cell back to the start; return the cells from the start on (kernel)."""
     end_row, end_column = row, column
     count = 1
     while row != start_row or column != start_column:
-        direction = parent[row, column] % LEAVING
+        direction: int = parent[row, column] % LEAVING
         row -= ROW_STEPS[direction]
         column -= COLUMN_STEPS[direction]
         count += 1
@@ -146,7 +146,7 @@ def _leave(
     touched: NDArray[np.int32],
     touched_count: int,
     buckets: NDArray[np.int32],
-    sizes: NDArray[np.int64],
+    sizes: Array,
     fullest: int,
     row: int,
     column: int,
@@ -187,7 +187,7 @@ def _leave(
         remaining[to_row, to_column] = after
         parent[to_row, to_column] = k | mark
         ahead = _estimate(to_row, to_column, goal_row, goal_column) if guided else 0
-        slot = ((budget - after + ahead) >> BUCKET_SHIFT) & (buckets.shape[0] - 1)
+        slot: int = ((budget - after + ahead) >> BUCKET_SHIFT) & (buckets.shape[0] - 1)
         buckets[slot, sizes[slot]] = to_cell
         sizes[slot] += 1
         fullest = max(fullest, sizes[slot])
@@ -208,7 +208,7 @@ def _expand_band(
     parent: NDArray[np.uint8],
     touched: NDArray[np.int32],
     buckets: NDArray[np.int32],
-    sizes: NDArray[np.int64],
+    sizes: Array,
     counts: NDArray[np.int64],
     current: int,
     first: int,

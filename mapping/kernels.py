@@ -14,20 +14,20 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
 import numpy as np
-from numba import carray, types
+from numba import types
+from numba.core import config
 from numba.extending import intrinsic
+from numba.np.numpy_support import carray
 from numpy.typing import NDArray
-
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 Array = NDArray[Any]
 """An array in the signature of a kernel; its docstring gives shape and type."""
 
-_numba_config: Any = numba.config
+_numba_config: Any = config
 
 PACKAGE_FOLDERS = ("mapping", "envs")
 
@@ -78,7 +78,7 @@ _FOLDER = None if _CHOSEN_BY_USER else _cache_folder()
 _CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
 
 
-def kernel(function: Function | None = None, *, parallel: bool = False, inline: bool = False) -> Any:  # noqa: ANN401
+def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False, inline: bool = False) -> Any:  # noqa: ANN401
     """Compile a function of arrays with numba: nopython, exact floating point, no GIL, cached.
 
     Parameters
@@ -97,7 +97,7 @@ def kernel(function: Function | None = None, *, parallel: bool = False, inline: 
         The compiled function.
     """
 
-    def decorate(target: Function) -> Any:  # noqa: ANN401
+    def decorate(target: Callable[..., Any]) -> Any:  # noqa: ANN401
         options: dict[str, Any] = {"nogil": True, "fastmath": False, "parallel": parallel, "cache": _CAN_CACHE}
         if inline:
             options["forceinline"] = True

@@ -8,7 +8,6 @@ which a beam ended more likely occupied, each once per scan; all others keep the
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,7 +50,8 @@ class OccupancySettings:
         largest = 127 * LOG_ODDS_UNIT
         if not (-largest <= self.minimum <= -self.miss and self.hit <= self.maximum <= largest):
             raise ValueError(
-                f"log-odds are bounded to [{self.minimum}, {self.maximum}]; want minimum in [{-largest}, -miss] and maximum in [hit, {largest}]"
+                f"log-odds are bounded to [{self.minimum}, {self.maximum}]; "
+                f"want minimum in [{-largest}, -miss] and maximum in [hit, {largest}]"
             )
 
     @property
@@ -80,15 +80,16 @@ def _raise_hits(
         if not is_hit[beam]:
             continue
         column, row = int(ends[0, beam]), int(ends[1, beam])
-        word = column >> 6
-        bit = np.uint64(1) << np.uint64(column & 63)
-        if hit_bits[row, word] & bit:
-            continue
-        hit_bits[row, word] |= bit
+        word, place = column >> 6, np.uint64(column & 63)
+        bit = np.uint64(1) << place
+        before = hit_bits[row, word]
+        hit_bits[row, word] = before | bit
         bits[row, word] &= ~bit
         map_row, map_column = row + row_offset, column + column_offset
         if 0 <= map_row < rows and 0 <= map_column < columns:
-            log_odds[map_row, map_column] = min(log_odds[map_row, map_column] + hit, maximum)
+            # Nothing is added for a second beam in the same cell; a branch on it could not be foreseen.
+            is_first = np.int64(np.uint64(1) - ((before >> place) & np.uint64(1)))
+            log_odds[map_row, map_column] = min(log_odds[map_row, map_column] + hit * is_first, maximum)
 
 
 @kernel
@@ -171,7 +172,7 @@ def _integrate_one(
     unit_vectors: Array,
     increments: Array,
     byte_masks: Array,
-    window: Any,
+    window: Array,
 ) -> None:
     """Update a map by one scan at x, y [cells]; ``geometry`` is (increment, range_max [cells], cells per metre, full circle)."""
     reach, scale = geometry[1], geometry[2]

@@ -115,25 +115,42 @@ def fill_scan_polygon(
     steepness = GRAZING * increment
     previous = beams - 1 if is_full_circle else 0
     last_length, last_row = lengths[previous], _row_of(ends[1, previous])
-    low_x, high_x, low_y, high_y = x, x, y, y
+    rows, columns = np.empty(beams, np.int32), np.empty(beams, np.int32)
     for beam in range(beams):
-        low_x, high_x = min(low_x, ends[0, beam]), max(high_x, ends[0, beam])
-        low_y, high_y = min(low_y, ends[1, beam]), max(high_y, ends[1, beam])
+        rows[beam] = _row_of(ends[1, beam])
+        columns[beam] = int(ends[0, beam])
+    low_row, high_row, low_column, high_column = np.int32(y), np.int32(y), np.int32(x), np.int32(x)
+    for beam in range(beams):
+        low_row, high_row = min(low_row, rows[beam]), max(high_row, rows[beam])
+        low_column, high_column = min(low_column, columns[beam]), max(high_column, columns[beam])
     for beam in range(0 if is_full_circle else 1, beams):
         length = lengths[beam]
-        row = _row_of(ends[1, beam])
+        row = rows[beam]
         step = length - last_length
+        climb = row - last_row
         if abs(step) > 1.0 + steepness * min(length, last_length):
             if step > 0.0:
                 _toggle_jump(bits, lengths, directions, ends, x, y, previous, beam)
             else:
                 _toggle_jump(bits, lengths, directions, ends, x, y, beam, previous)
-        elif row != last_row:
+        elif -2 <= climb <= 2:
+            # Most edges cross two rows, one or none: toggled without branches, which could not be foreseen.
+            crossed = min(row, last_row)
+            from_x, from_y = ends[0, previous], ends[1, previous]
+            rise = ends[1, beam] - from_y if climb != 0 else 1.0
+            slope = (ends[0, beam] - from_x) / rise
+            at = from_x + (crossed + 0.5 - from_y) * slope + 0.5
+            second = abs(climb) >> 1
+            column = int(at)
+            bits[crossed, column >> 6] ^= np.uint64((climb & 1) | second) << np.uint64(column & 63)
+            column = int(at + slope * second)
+            bits[crossed + second, column >> 6] ^= np.uint64(second) << np.uint64(column & 63)
+        else:
             _toggle_edge(bits, ends[0, previous], ends[1, previous], ends[0, beam], ends[1, beam], last_row, row)
         last_length, last_row = length, row
         previous = beam
-    row_low, row_high = max(int(low_y) - 1, 0), min(int(high_y) + 2, bits.shape[0])
-    word_low, word_high = max(int(low_x) - 1, 0) >> 6, min((int(high_x) + 2) >> 6, bits.shape[1] - 1) + 1
+    row_low, row_high = max(low_row - 2, 0), min(high_row + 2, bits.shape[0])
+    word_low, word_high = max(low_column - 1, 0) >> 6, min((high_column + 2) >> 6, bits.shape[1] - 1) + 1
     for i in range(row_low, row_high):
         carry = np.uint64(0)
         for word in range(word_low, word_high):

@@ -80,7 +80,7 @@ def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> N
 def beams_towards(
     offset_x: float, offset_y: float, radius: float, heading: float, angle_first: float, increment: float
 ) -> tuple[float, float]:
-    """Beams that a disc at an offset from the laser may meet, as a first beam (not rounded) and a count; the next lap starts a turn later."""
+    """Beams that a disc at an offset from the laser may meet: the first (not rounded) and how many; the next lap is a turn later."""
     distance = math.sqrt(offset_x * offset_x + offset_y * offset_y)
     half = math.asin(radius / distance) if radius < distance else math.pi
     begin = (math.atan2(offset_y, offset_x) - half - heading - angle_first) / increment

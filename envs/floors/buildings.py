@@ -311,7 +311,7 @@ def _rotated(floor: Floor, angle: float) -> Floor:
             if any(abs(corner[0] - x) < 1e-9 for x in (0.0, extent[0])) and any(abs(corner[1] - y) < 1e-9 for y in (0.0, extent[1]))
         )
         if np.abs(a - apex).max() > 1e-3 and np.abs(b - apex).max() > 1e-3:
-            solids.append(Solid(np.round(np.array([a, b, apex]), 4) + 0.0))
+            solids.append(Solid(np.asarray(np.round(np.array([a, b, apex]), 4) + 0.0, np.float64)))
     headings = np.arctan2(np.sin(floor.starts[:, 2] + angle), np.cos(floor.starts[:, 2] + angle))
-    starts = np.column_stack([moved(floor.starts[:, :2]), np.round(headings, 4)])
+    starts = np.asarray(np.column_stack([moved(floor.starts[:, :2]), np.round(headings, 4)]), np.float64)
     return Floor(floor.name, (0.0, 0.0, round(float(extent[0]), 4), round(float(extent[1]), 4)), tuple(solids), starts=starts)

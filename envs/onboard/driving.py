@@ -9,7 +9,6 @@ higher number lets the other pass.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
 
@@ -40,7 +39,7 @@ MATE_GAP = 0.03
 SIDE_GAP = 0.0003
 """The swath that must be clear of returns is this much wider than the body on each side [m]."""
 
-FORESIGHT = (0.0, 0.4, 0.8)
+FORESIGHT_TIMES = np.array([0.0, 0.4, 0.8])
 """How far ahead the robot with the higher number looks where another will be [s]."""
 
 BACKING_SPEED = 0.05
@@ -220,6 +219,3 @@ def follow_paths(
         else:
             stood[robot] = 0
             states[robot] = DRIVING
-
-
-FORESIGHT_TIMES: NDArray[np.float64] = np.array(FORESIGHT)

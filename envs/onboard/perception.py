@@ -6,7 +6,6 @@ what planning needs (clearance and frontiers), brought up to date only where the
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +79,7 @@ class Teammate:
 
 
 @kernel
-def _sum_maps(addresses: Array, rows: int, columns: int, window: Any, total: Array) -> None:
+def _sum_maps(addresses: Array, rows: int, columns: int, window: Array, total: Array) -> None:
     """Write the sum of maps of one shape into ``total`` within a window."""
     for row in range(window[0], window[1]):
         target = total[row]

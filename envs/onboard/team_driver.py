@@ -145,8 +145,8 @@ class TeamDriver:
         world = self._perception.world
         follow_paths(
             world.believed, world.velocities, world.ranges, self._unit_vectors, self._radii, self._limits, self._paths, self._room,
-            self._counts, self._places, self._headings, self._states, self._stood, self._backing, self._settings.known_starts, self._present,
-            FORESIGHT_TIMES, self._commands,
+            self._counts, self._places, self._headings, self._states, self._stood, self._backing, self._settings.known_starts,
+            self._present, FORESIGHT_TIMES, self._commands,
         )  # fmt: skip
         return self._commands
 

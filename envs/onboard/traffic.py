@@ -1,5 +1,6 @@
 """Where a robot goes to let a teammate pass."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,7 @@ class Refuge:
 def _sampled(path: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points along a path (N, 2), at most ``SAMPLE`` apart."""
     pieces = [path[:1]]
-    for first, last in zip(path[:-1], path[1:], strict=True):
+    for first, last in itertools.pairwise(path):
         count = max(int(np.ceil(np.hypot(*(last - first)) / SAMPLE)), 1)
         pieces.append(first + (last - first) * (np.arange(1, count + 1) / count)[:, None])
     return np.concatenate(pieces)

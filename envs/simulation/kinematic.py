@@ -236,8 +236,8 @@ class KinematicWorld:
         if self._threads > 1 and numba.get_num_threads() != self._threads:
             numba.set_num_threads(self._threads)
         self._step(
-            self.robots, self._floor_rows, self._frames, self.bodies, self.moves, self.poses, self.velocities, self.starts, self.believed, commands,
-            self._sensor, self._unit_vectors, self.seeds, self.steps, GAUSSIAN_TABLE, self.flags, self.ranges, self.belief_rows,
+            self.robots, self._floor_rows, self._frames, self.bodies, self.moves, self.poses, self.velocities, self.starts, self.believed,
+            commands, self._sensor, self._unit_vectors, self.seeds, self.steps, GAUSSIAN_TABLE, self.flags, self.ranges, self.belief_rows,
             self.origins, self.windows, self._increments, BYTE_MASKS, self._mask_rows, self._news, self._entries, self.seen, self.gains,
             self.team_seen, self.bumpers, self.contacts, self.travelled, self.collisions, moves_bodies, perceives,
         )  # fmt: skip

@@ -3,8 +3,6 @@
 A 32-bit hash of the counter picks one entry from each of two tables; the sum of the two entries is Gaussian.
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
@@ -24,7 +22,7 @@ GAUSSIAN_TABLE = _half_variance_table()
 
 
 @kernel(inline=True)
-def mix(value: Any) -> Any:
+def mix(value: np.uint32) -> np.uint32:
     """Scramble 32 bits (finaliser of MurmurHash3, by A. Appleby, public domain)."""
     value = np.uint32(value)
     value ^= value >> np.uint32(16)
@@ -36,18 +34,18 @@ def mix(value: Any) -> Any:
 
 
 @kernel(inline=True)
-def stream_key(seed: int, robot: int, step: int) -> Any:
+def stream_key(seed: int, robot: int, step: int) -> np.uint32:
     """Key of one robot's draws in one step, from a 64-bit seed."""
     low = np.uint32(seed & np.uint64(0xFFFFFFFF))
     high = np.uint32(seed >> np.uint64(32))
     key = mix(low ^ np.uint32(0x9E3779B9))
     key = mix(key ^ high)
     key = mix(key ^ np.uint32(robot))
-    return mix(key ^ np.uint32(step))
+    return np.uint32(mix(key ^ np.uint32(step)))
 
 
 @kernel
-def fill_gaussian(key: int, table: Array, values: Array) -> None:
+def fill_gaussian(key: np.uint32, table: Array, values: Array) -> None:
     """Fill ``values`` (count,) float32 with standard Gaussian draws of the stream ``key``."""
     for k in range(values.shape[0]):
         bits = mix(np.uint32(key + np.uint32(np.uint32(k) * np.uint32(0x9E3779B9))))

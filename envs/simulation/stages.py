@@ -7,7 +7,6 @@ computed once for the scorer and the map.
 """
 
 import math
-from typing import Any
 
 import numba
 import numpy as np
@@ -125,7 +124,7 @@ def _update_map(
     ends: Array,
     belief: Array,
     origin: Array,
-    window: Any,
+    window: Array,
     increments: Array,
     byte_masks: Array,
     bits: Array,
@@ -174,7 +173,7 @@ def _perceive_robot(
     ranges: Array,
     belief: Array,
     origin: Array,
-    window: Any,
+    window: Array,
     increments: Array,
     byte_masks: Array,
 ) -> None:
@@ -245,7 +244,7 @@ def _sense_and_perceive(
     ranges: Array,
     belief: Array,
     origin: Array,
-    window: Any,
+    window: Array,
     increments: Array,
     byte_masks: Array,
     masks: Array,
@@ -268,7 +267,7 @@ def _sense_and_perceive(
     is_noisy = sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0
     is_same = flags[row] & 9 == 1 and not is_noisy
     if not is_same:
-        bits[box[0] : box[1], box[2] : box[3]] = np.uint64(0)
+        bits = np.zeros_like(bits)
         beam_directions(believed[row, 2], unit_vectors, directions)
     _update_map(
         row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments,

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from pettingzoo import ParallelEnv
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.onboard.perception import NavigationMap
 from lidarium.envs.onboard.state import DriveState, Target
 from lidarium.envs.onboard.team_driver import footprint_of
+from lidarium.envs.wrappers.decisions import DecisionWrapper
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 from lidarium.mapping.frontier_approach import approach, default_reach
 from lidarium.mapping.grid_planning import cells_of, centres_of, search
@@ -24,7 +25,7 @@ MINIMUM_SIZE = 0.1
 FARTHEST = 1000.0
 
 
-class FrontierExploration(ParallelEnv[str, Observation, Any]):
+class FrontierExploration(DecisionWrapper):
     """Turns the choice of a frontier into driving.
 
     The observation has, beside that of the environment below, ``frontiers`` float32 (16, 4): position along the axes of the
@@ -43,11 +44,8 @@ class FrontierExploration(ParallelEnv[str, Observation, Any]):
     """
 
     def __init__(self, env: ExplorationEnv, shares_map: bool = True) -> None:
-        self.env = env
+        super().__init__(env, "lidarium_frontier_exploration_v0")
         self.waypoints = WaypointExploration(env, shares_map)
-        self.metadata = {**self.waypoints.metadata, "name": "lidarium_frontier_exploration_v0"}
-        self.possible_agents = env.possible_agents
-        self.render_mode, self.settings = env.render_mode, env.settings
         self._shares_map = shares_map
         self._footprint = footprint_of(env.settings.robot.radius)
         high = np.tile(np.array([FARTHEST, FARTHEST, FARTHEST, FARTHEST], np.float32), (CANDIDATES, 1))
@@ -66,16 +64,6 @@ class FrontierExploration(ParallelEnv[str, Observation, Any]):
         self._targets: dict[str, list[tuple[Target, NDArray[np.int64]]]] = {}
         self._chosen: dict[str, tuple[Target, NDArray[np.int64]] | None] = {}
 
-    @property
-    def agents(self) -> list[str]:
-        """Live agents."""
-        return self.env.agents
-
-    @property
-    def unwrapped(self) -> ExplorationEnv:
-        """The environment below."""
-        return self.env
-
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations."""
         return self._observation_spaces[agent]
@@ -89,6 +77,7 @@ class FrontierExploration(ParallelEnv[str, Observation, Any]):
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode; see ``ExplorationEnv.reset``."""
         observations, infos = self.waypoints.reset(seed, options)
+        self.agents = self.env.agents
         self._chosen = dict.fromkeys(self.possible_agents)
         return self._with_candidates(observations), infos
 
@@ -114,13 +103,14 @@ class FrontierExploration(ParallelEnv[str, Observation, Any]):
                 if agent not in self.env.stopping:
                     self.env.stop(agent, self._reason(agent))
         observations, rewards, terminations, truncations, infos = self.waypoints.step(orders)
+        self.agents = self.env.agents
         for agent in self.env.agents:
             chosen = self._chosen[agent]
             if chosen is not None and infos[agent]["drive"] in (DriveState.ARRIVED, DriveState.NO_PATH):
                 self._navigation(agent).frontiers.ignore(chosen[1])
         return self._with_candidates(observations), rewards, terminations, truncations, infos
 
-    def _navigation(self, agent: str) -> Any:  # noqa: ANN401
+    def _navigation(self, agent: str) -> NavigationMap:
         belief = self.env.perception.belief(agent)
         shared = belief.shared_map if self._shares_map else None
         return belief.map if shared is None else shared
@@ -159,22 +149,6 @@ class FrontierExploration(ParallelEnv[str, Observation, Any]):
             table[place] = (x - belief.pose[0], y - belief.pose[1], near.costs[k], clusters.sizes[k])
         np.clip(table, -FARTHEST, FARTHEST, out=table)
         return targets
-
-    def stop(self, agent: str, reason: str) -> None:
-        """End an agent at its next step, with a reason."""
-        self.env.stop(agent, reason)
-
-    def state(self) -> NDArray[np.float64]:
-        """Return the true state of the team."""
-        return self.env.state()
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Draw the environment."""
-        return self.env.render()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self.env.close()
 
 
 def _boxes(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:

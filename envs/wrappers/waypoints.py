@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from pettingzoo import ParallelEnv
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.onboard.state import DriveState, Target
 from lidarium.envs.onboard.team_driver import TeamDriver
+from lidarium.envs.wrappers.decisions import DecisionWrapper
 
 Order = Target | NDArray[np.float32] | None
 
 
-class WaypointExploration(ParallelEnv[str, Observation, Any]):
+class WaypointExploration(DecisionWrapper):
     """Turns targets into driving.
 
     An action is a point within the observed map: two numbers within [-1, 1], the position along the axes of the robot's map
@@ -35,25 +35,11 @@ class WaypointExploration(ParallelEnv[str, Observation, Any]):
     """
 
     def __init__(self, env: ExplorationEnv, shares_map: bool = True) -> None:
-        self.env = env
-        self.metadata = {**env.metadata, "name": "lidarium_waypoint_exploration_v0", "render_fps": 1.0 / env.settings.decision_period_s}
-        self.possible_agents = env.possible_agents
-        self.render_mode = env.render_mode
-        self.settings = env.settings
+        super().__init__(env, "lidarium_waypoint_exploration_v0")
         self._half_side = 0.5 * env.settings.map_cells * env.settings.occupancy.resolution
         self._action_spaces = {agent: spaces.Box(-1.0, 1.0, (2,), np.float32) for agent in self.possible_agents}
         self._shares_map = shares_map
         self.driver = TeamDriver(env.perception, env.settings, shares_map)
-
-    @property
-    def agents(self) -> list[str]:
-        """Live agents."""
-        return self.env.agents
-
-    @property
-    def unwrapped(self) -> ExplorationEnv:
-        """The environment below."""
-        return self.env
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations."""
@@ -69,6 +55,7 @@ class WaypointExploration(ParallelEnv[str, Observation, Any]):
         """Start an episode; see ``ExplorationEnv.reset``."""
         outcome = self.env.reset(seed, options)
         self.driver.start()
+        self.agents = self.env.agents
         return outcome
 
     def step(
@@ -94,6 +81,7 @@ class WaypointExploration(ParallelEnv[str, Observation, Any]):
         else:
             env.drive_at(np.zeros((env.settings.robots, 2)))
         outcome = env.outcome()
+        self.agents = env.agents
         for agent, info in outcome[4].items():
             info["drive"] = driver.state(rows[agent])
         return outcome
@@ -110,19 +98,3 @@ class WaypointExploration(ParallelEnv[str, Observation, Any]):
     def drive_state(self, agent: str) -> DriveState:
         """Return what an agent's driving is about."""
         return self.driver.state(self.env.possible_agents.index(agent))
-
-    def stop(self, agent: str, reason: str) -> None:
-        """End an agent at its next step, with a reason."""
-        self.env.stop(agent, reason)
-
-    def state(self) -> NDArray[np.float64]:
-        """Return the true state of the team."""
-        return self.env.state()
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Draw the environment."""
-        return self.env.render()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self.env.close()

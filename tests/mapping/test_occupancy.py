@@ -243,8 +243,9 @@ def test_three_levels_and_probabilities_tell_the_sign_of_the_log_odds():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"resolution": 0.0}, "resolution"), ({"resolution": -1.0}, "resolution"), ({"resolution": math.nan}, "resolution"), ({"hit": 0.0}, "hit"),
-        ({"miss": 0.01}, "miss"), ({"minimum": -0.1}, "minimum"), ({"maximum": 7.0}, "maximum"), ({"minimum": -7.0}, "minimum"),
+        ({"resolution": 0.0}, "resolution"), ({"resolution": -1.0}, "resolution"), ({"resolution": math.nan}, "resolution"),
+        ({"hit": 0.0}, "hit"), ({"miss": 0.01}, "miss"), ({"minimum": -0.1}, "minimum"), ({"maximum": 7.0}, "maximum"),
+        ({"minimum": -7.0}, "minimum"),
     ],
 )  # fmt: skip
 def test_settings_that_cannot_be_are_refused(options, words):

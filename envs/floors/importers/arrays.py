@@ -19,12 +19,12 @@ def load(path: Path, resolution: float | None) -> Floor:
     resolution. ``.npz`` holds ``solid`` (row 0 at the lowest y), ``origin`` (x, y) and ``resolution`` [m].
     """
     try:
-        content = np.load(path, allow_pickle=False)
-        named = {name: content[name] for name in content.files} if isinstance(content, np.lib.npyio.NpzFile) else None
+        loaded = np.load(path, allow_pickle=False)
+        content = {name: loaded[name] for name in loaded.files} if isinstance(loaded, np.lib.npyio.NpzFile) else np.asarray(loaded)
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path} is not a numpy array that can be read: {error}") from error
-    if named is not None:
-        return _load_named(path, named, resolution)
+    if isinstance(content, dict):
+        return _load_named(path, content, resolution)
     if resolution is None:
         raise ValueError(f"{path} is an array without a scale; pass --resolution with its metres per cell")
     _check_grid(path, content)

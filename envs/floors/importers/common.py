@@ -135,7 +135,7 @@ def _enclosed(
     origin = (float(low[0] - widest), float(low[1] - widest))
     drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
     fill_shapes(drawn, origin, resolution, [ring_edges(strip(line, WALL_THICKNESS, WALL_THICKNESS / 2.0)) for line in lines], 1)
-    distance = cv2.distanceTransform(1 - drawn, cv2.DIST_L2, 5) * resolution
+    distance = np.asarray(cv2.distanceTransform(1 - drawn, cv2.DIST_L2, 5) * resolution, np.float32)
     insides = list(itertools.accumulate((_inside(distance, gap / 2.0, resolution) for gap in _GAPS), np.maximum))
     areas = [int(inside.sum()) for inside in insides]
     if areas[-1] == 0:

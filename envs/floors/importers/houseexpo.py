@@ -28,7 +28,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     try:
         corners = np.asarray(house["verts"], dtype=np.float64)
     except (TypeError, ValueError):
-        corners = np.zeros(0)
+        corners = np.zeros((0, 2))
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
         raise ValueError(f"{path}: verts has shape {corners.shape}; want at least 3 points (x, y) in metres")
     if np.array_equal(corners[0], corners[-1]):

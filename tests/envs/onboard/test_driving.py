@@ -1,5 +1,6 @@
 """Path following and the safety stop, on hand-made paths in the world itself."""
 
+import itertools
 import math
 
 import numpy as np
@@ -50,9 +51,9 @@ class Drive:
         world = self.world
         for _ in range(steps):
             follow_paths(
-                world.believed, world.velocities, world.ranges, world.lidar.unit_vectors, world.bodies[:, 0].copy(), self.limits, self.paths,
-                self.margins, self.counts, self.places, self.headings, self.states, self.stood, self.backing, self.knows_mates, self.present,
-                FORESIGHT_TIMES, self.commands,
+                world.believed, world.velocities, world.ranges, world.lidar.unit_vectors, world.bodies[:, 0].copy(), self.limits,
+                self.paths, self.margins, self.counts, self.places, self.headings, self.states, self.stood, self.backing,
+                self.knows_mates, self.present, FORESIGHT_TIMES, self.commands,
             )  # fmt: skip
             world.step(self.commands)
             self.track.append(world.poses.copy())
@@ -70,7 +71,7 @@ class Drive:
 def distance_to_path(points, path):
     path = np.asarray(path, np.float64)
     nearest = np.full(len(points), math.inf)
-    for a, b in zip(path[:-1], path[1:], strict=True):
+    for a, b in itertools.pairwise(path):
         share = np.clip(((points - a) @ (b - a)) / ((b - a) @ (b - a)), 0.0, 1.0)
         nearest = np.minimum(nearest, np.hypot(*(points - a - share[:, None] * (b - a)).T))
     return nearest

@@ -40,12 +40,12 @@ def test_clearance_and_frontiers_kept_up_to_date_are_those_of_the_whole_map(know
 
 def test_maps_first_asked_for_late_are_the_same_as_those_asked_for_from_the_start():
     early, late = driven(0), driven(0)
-    early.perception.belief("robot_1").shared_map
+    assert early.perception.belief("robot_1").shared_map is not None
     generator = np.random.default_rng(1)
     for _ in range(25):
         actions = {agent: generator.uniform(-0.2, 1.0, 2).astype(np.float32) for agent in early.agents}
         early.step(actions)
-        early.perception.belief("robot_1").shared_map
+        assert early.perception.belief("robot_1").shared_map is not None
         late.step(actions)
     for get in (lambda env: env.perception.belief("robot_1").shared_map, lambda env: env.perception.belief("robot_1").map):
         one, other = get(early), get(late)

@@ -1,5 +1,7 @@
 """Places aside: off the other's path, within reach, and the nearest of them."""
 
+import itertools
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -31,7 +33,7 @@ def refuge(navigation, start, path, distance=0.45, discs=()):
 def gap_to(cell, path):
     place = centres_of(np.array(cell), ORIGIN, RESOLUTION)
     path = np.asarray(path, np.float64)
-    dense = np.concatenate([a + (b - a) * np.linspace(0, 1, 200)[:, None] for a, b in zip(path[:-1], path[1:], strict=True)])
+    dense = np.concatenate([a + (b - a) * np.linspace(0, 1, 200)[:, None] for a, b in itertools.pairwise(path)])
     return float(np.hypot(*(dense - place).T).min())
 
 

@@ -164,12 +164,12 @@ def test_both_casters_agree_with_the_slow_traversal_to_a_tenth_of_a_millimetre(k
         )
 
 
-@given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
-def test_no_random_floor_and_pose_tells_the_casters_from_the_reference(seed):
+@given(seed=st.integers(0, 2**32 - 1), beams=st.sampled_from([1, 31, 64, 200]), view=st.sampled_from([0.3, math.radians(240.0), 2.0 * math.pi]))
+@settings(max_examples=60, deadline=None)
+def test_no_random_floor_and_pose_tells_the_casters_from_the_reference(seed, beams, view):
     generator = np.random.default_rng(seed)
     solid = speckled(generator, 40, 50)
-    geometry = ScanGeometry(beams=31, field_of_view=2.0 * math.pi)
+    geometry = ScanGeometry(beams=beams, field_of_view=view)
     x, y = free_position(solid, generator)
     check_against_reference(solid, RayTables(solid), x, y, generator.uniform(-10.0, 10.0), geometry, 300.0)
 

@@ -27,7 +27,7 @@ def test_a_waypoint_is_a_share_of_half_the_maps_side_along_the_axes_of_the_frame
         info = env.step({"robot_0": np.array([0.5, 0.0], np.float32) if _ == 0 else Target(*(np.array([1.8, 0.0])))})[4]["robot_0"]
         if info["drive"] is DriveState.ARRIVED:
             break
-    assert env.unwrapped.world.poses[0, :2] == pytest.approx(start + [1.8, 0.0], abs=0.08)
+    assert env.unwrapped.world.poses[0, :2] == pytest.approx(start + np.array([1.8, 0.0]), abs=0.08)
     env = make()
     env.reset(seed=0)
     env.step({"robot_0": np.array([0.5, 0.25], np.float32)})
