@@ -18,7 +18,7 @@ from lidarium.envs.onboard.perception import NavigationMap
 from lidarium.envs.onboard.state import DriveState, Target
 from lidarium.envs.onboard.team_driver import footprint_of
 from lidarium.mapping.frontier_approach import approach, default_reach, nearest_frontier
-from lidarium.mapping.frontiers import FRONTIER, Clusters
+from lidarium.mapping.frontiers import FRONTIER, IGNORED, Clusters
 from lidarium.mapping.grid_lines import visible
 from lidarium.mapping.grid_planning import Cell, Footprint, cells_of, centres_of, search
 
@@ -63,12 +63,13 @@ class FrontierExplorer:
 
     def __init__(self, shares_map: bool = True) -> None:
         self.shares_map = shares_map
-        self.given_up: list[GivenUp] = []
+        self._given_up: list[tuple[GivenUp, NavigationMap, Cell]] = []
+        self._unreached: list[GivenUp] = []
 
     def reset(self, team: Team, seed: int) -> None:
         """Begin an episode."""
         self.team = team
-        self.given_up = []
+        self._given_up, self._unreached = [], []
         self._work = {agent: _Work() for agent in team.agents}
         radius = team.belief(team.agents[0]).radius
         self.footprint: Footprint = footprint_of(radius)
@@ -87,6 +88,12 @@ class FrontierExplorer:
         if all(self._work[agent].choice is None for agent in agents):
             return {agent: Stop(self._reason(agent)) for agent in agents}
         return {agent: self._target(agent) for agent in agents}
+
+    @property
+    def given_up(self) -> list[GivenUp]:
+        """What is left unexplored by now, and why; what was given up and seen later from elsewhere is not."""
+        still = [entry for entry, navigation, cell in self._given_up if navigation.frontiers.flags[cell] == IGNORED]
+        return still + self._unreached
 
     def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
         """Choose for the agents that need a target, or for all; the others keep theirs."""
@@ -157,7 +164,8 @@ class FrontierExplorer:
         near = cells[gaps <= reach] if len(cells) else np.asarray([choice.frontier_cell])
         navigation.frontiers.ignore(near)
         x, y = centres_of(np.asarray(choice.frontier_cell), belief.map_origin, navigation.resolution)
-        self.given_up.append(GivenUp(agent, float(x), float(y), len(near) * navigation.resolution, reason))
+        entry = GivenUp(agent, float(x), float(y), len(near) * navigation.resolution, reason)
+        self._given_up.append((entry, navigation, choice.frontier_cell))
 
     def _target(self, agent: str) -> Target | None:
         choice = self._work[agent].choice
@@ -187,11 +195,11 @@ class FrontierExplorer:
             return "no_frontier"
         found = search(navigation.space, navigation.log_odds, navigation.clearance, self.start_cell(agent), self.footprint)
         left = approach(clusters, found, navigation.log_odds, default_reach(self.footprint, navigation.resolution))
-        known = {(entry.x, entry.y) for entry in self.given_up}
-        for k, reason in enumerate(left.reasons):
-            x, y = (float(value) for value in clusters.centroids[k])
-            if (x, y) not in known and reason:
-                self.given_up.append(GivenUp(agent, x, y, float(clusters.sizes[k]), reason))
+        shares = self._unreached and navigation is self.navigation(self._unreached[0].agent)
+        if not shares:
+            for k, reason in enumerate(left.reasons):
+                x, y = (float(value) for value in clusters.centroids[k])
+                self._unreached.append(GivenUp(agent, x, y, float(clusters.sizes[k]), reason or "blocked"))
         return "frontier_unreachable"
 
 

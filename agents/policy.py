@@ -12,8 +12,6 @@ from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.perception import Belief
 from lidarium.envs.onboard.state import DriveState, Target
 
-LEVELS = ("velocity", "waypoint", "frontier")
-
 
 @dataclass(frozen=True, slots=True)
 class Stop:
@@ -168,6 +166,11 @@ class PerRobot:
         probe = factory()
         self.level, self.shares_map = probe.level, probe.shares_map
         self._policies: dict[str, Policy] = {}
+
+    @property
+    def given_up(self) -> list[GivenUp]:
+        """What the robots' instances left unexplored, robot by robot."""
+        return [entry for policy in self._policies.values() for entry in getattr(policy, "given_up", [])]
 
     def reset(self, team: Team, seed: int) -> None:
         """Begin an episode with a new instance for each robot, each with a seed of its own."""

@@ -21,6 +21,7 @@ from lidarium.envs.scorer import Scorer
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic import ENDED, KinematicWorld
+from lidarium.mapping.kernels import Array, kernel
 
 Observation = dict[str, NDArray[Any]]
 
@@ -29,6 +30,18 @@ Observation = dict[str, NDArray[Any]]
 def floor_tables(floor: str | Floor, image_resolution: float | None, raster_resolution: float, laser: float, body: float) -> FloorTables:
     """Return the kernels' tables of a floor; the last ones used are kept and shared."""
     return FloorTables.of_floor(load_floor(floor, image_resolution), raster_resolution, laser, body)
+
+
+@kernel
+def _scale(commands: Array, limits: Array) -> bool:
+    """Turn shares within [-1, 1] into speeds and turn rates; False where one is nan."""
+    for robot in range(commands.shape[0]):
+        for axis in range(2):
+            share = commands[robot, axis]
+            if share != share:
+                return False
+            commands[robot, axis] = min(max(share, -1.0), 1.0) * limits[axis]
+    return True
 
 
 class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
@@ -90,6 +103,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         )
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
         self._writer = ObservationWriter(self.settings)
+        self._horizon = self.settings.horizon_steps
         self._generator: np.random.Generator | None = None
         self._offsets = np.zeros((self.settings.robots, 2))
         self._commands = np.zeros((self.settings.robots, 2))
@@ -153,7 +167,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.world.step(self._commands, moves_bodies=False)
         self.scorer.start()
         self.perception.start(self.goal)
-        infos = {agent: {"truth": self._truth(row)} for agent, row in self._rows.items()}
+        truths = self._truths()
+        infos = {agent: {"truth": truths[row]} for agent, row in self._rows.items()}
         if self.render_mode == "human":
             self.render()
         return self._observations(self.agents), infos
@@ -190,10 +205,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     continue
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
             self._commands[self._rows[agent]] = action
-        np.clip(self._commands, -1.0, 1.0, out=self._commands)
-        if np.isnan(self._commands).any():
+        if not _scale(self._commands, self._limits):
             raise ValueError(f"an action is nan ({actions}); want two numbers within [-1, 1] for each agent")
-        self.drive_at(self._commands * self._limits)
+        self.drive_at(self._commands)
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
         """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s], without building observations."""
@@ -213,11 +227,12 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         observations = self._observations(live)
         rewards_of_rows = self.scorer.take_rewards()
         endings, is_truncated = self._endings(live)
+        truths = self._truths()
         rewards, terminations, truncations, infos = {}, {}, {}, {}
         for agent in live:
             row = self._rows[agent]
             reason = endings.get(agent)
-            info: dict[str, Any] = {"truth": self._truth(row)}
+            info: dict[str, Any] = {"truth": truths[row]}
             if reason is not None:
                 info["ended_because"] = reason
             elif is_truncated:
@@ -239,7 +254,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def is_over(self) -> bool:
         """Whether the next outcome ends all agents (covered or at the horizon)."""
-        horizon, cover = self.settings.horizon_steps, self.settings.stop_coverage
+        horizon, cover = self._horizon, self.settings.stop_coverage
         steps = int(self.world.steps[0])
         return (horizon is not None and steps >= horizon) or (cover is not None and self.scorer.coverage >= cover)
 
@@ -272,31 +287,30 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     endings[agent] = "reached"
         if settings.stop_on_contact and self.scorer.touched.any():
             endings |= {agent: "collision" for agent in live if self.scorer.touched[self._rows[agent]]}
-        horizon = settings.horizon_steps
-        return endings, horizon is not None and int(self.world.steps[0]) >= horizon
+        return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
 
     def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:
         arrays = self._writer.write(self.world, self._offsets)
         scans, poses, motions, presses, maps = (arrays[name] for name in ("scan", "pose", "velocity", "bumper", "map"))
         rows = self._rows
-        observations: dict[str, Observation] = {
-            agent: {
-                "scan": scans[rows[agent]],
-                "pose": poses[rows[agent]],
-                "velocity": motions[rows[agent]],
-                "bumper": presses[rows[agent]],
-                "map": maps[rows[agent]],
-            }
-            for agent in agents
-        }
+        observations: dict[str, Observation] = {}
+        for agent in agents:
+            row = rows[agent]
+            observations[agent] = {
+                "scan": scans[row], "pose": poses[row], "velocity": motions[row], "bumper": presses[row], "map": maps[row]
+            }  # fmt: skip
         if self.has_goal:
             for agent in agents:
                 observations[agent]["goal"] = self.perception.goal_in_frame(rows[agent])
         return observations
 
-    def _truth(self, row: int) -> dict[str, Any]:
-        world = self.world
-        return {"pose": world.poses[row].copy(), "coverage": self.scorer.coverage, "seen_cells": int(world.seen[row])}
+    def _truths(self) -> list[dict[str, Any]]:
+        """Return what a learner may not see, for every robot."""
+        coverage = self.scorer.coverage
+        return [
+            {"pose": pose, "coverage": coverage, "seen_cells": seen}
+            for pose, seen in zip(self.world.poses.copy(), self.world.seen.tolist(), strict=True)
+        ]
 
     def state(self) -> NDArray[np.float64]:
         """Return the true state of the team: x, y, theta, speed and turn rate of each robot, shape (robots * 5,)."""

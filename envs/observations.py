@@ -9,14 +9,12 @@ from numpy.typing import NDArray
 
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.kinematic import KinematicWorld
+from lidarium.envs.simulation.stages import RANGE_GAP
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel
 from lidarium.mapping.occupancy import crop_levels
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
-
-RANGE_GAP = 1e-3
-"""Hits are at least this much shorter than range_max, which means no return [m]."""
 
 
 def observation_space(settings: ExplorationSettings, has_goal: bool) -> spaces.Dict:
@@ -60,7 +58,7 @@ def _write(
     maps: Array,
 ) -> None:
     resolution, range_max, max_speed, max_turn_rate = numbers[0], numbers[1], numbers[2], numbers[3]
-    farthest, longest = np.float32(numbers[4]), np.float32(range_max - 1e-3)
+    farthest, longest = np.float32(numbers[4]), np.float32(range_max - RANGE_GAP)
     no_return = np.float32(range_max)
     for row in range(ranges.shape[0]):
         for beam in range(ranges.shape[1]):

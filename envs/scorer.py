@@ -5,10 +5,22 @@ from numpy.typing import NDArray
 
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.kinematic import KinematicWorld
+from lidarium.mapping.kernels import Array, kernel
 
 THRESHOLDS = (0.85, 0.90, 0.95, 0.99)
+"""Shares of F of which the time is noted."""
 
 TRACK_PERIOD_S = 0.2
+"""Time between two poses of the track [s]."""
+
+
+@kernel
+def _add_rewards(gains: Array, contacts: Array, travelled: Array, weights: Array, travelled_before: Array, rewards: Array) -> None:
+    """Add each robot's reward of a step: its share of the new cells less the prices of time, contact and energy."""
+    for robot in range(gains.shape[0]):
+        driven = travelled[robot] - travelled_before[robot]
+        travelled_before[robot] = travelled[robot]
+        rewards[robot] += weights[0] * gains[robot] - weights[1] - weights[2] * contacts[robot] - weights[3] * driven
 
 
 class Scorer:
@@ -39,7 +51,10 @@ class Scorer:
 
     def __init__(self, world: KinematicWorld, settings: ExplorationSettings) -> None:
         self._world, self._settings = world, settings
-        self._cell_area = settings.occupancy.resolution**2
+        weights = settings.reward
+        self._weights = np.array(
+            [weights.area * settings.occupancy.resolution**2, weights.time * settings.time_step, weights.contact, weights.energy]
+        )
         self._rewards = np.zeros(settings.robots)
         self._travelled = np.zeros(settings.robots)
         self.coverage = 0.0
@@ -60,14 +75,8 @@ class Scorer:
 
     def advance(self) -> None:
         """Take in one step of the world."""
-        world, weights = self._world, self._settings.reward
-        self._rewards += (
-            (weights.area * self._cell_area) * world.gains
-            - weights.time * self._settings.time_step
-            - weights.contact * world.contacts
-            - weights.energy * (world.travelled - self._travelled)
-        )
-        self._travelled[:] = world.travelled
+        world = self._world
+        _add_rewards(world.gains, world.contacts, world.travelled, self._weights, self._travelled, self._rewards)
         self._note()
 
     def _note(self) -> None:

@@ -22,7 +22,6 @@ LIDARS: dict[str, Lidar] = {
 
 LOCALIZATIONS = ("truth",)
 BACKENDS = ("kinematic",)
-LEVELS = ("velocity", "waypoint", "frontier")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +120,7 @@ class ExplorationSettings:
             raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(BACKENDS)}")
         if not (math.isfinite(self.time_step) and self.time_step > 0.0):
             raise ValueError(f"time_step is {self.time_step} s; want more than 0")
-        if self.horizon_s is not None and not self.horizon_s > 0.0:
+        if self.horizon_s is not None and not 0.0 < self.horizon_s < math.inf:
             raise ValueError(f"horizon_s is {self.horizon_s}; want more than 0 s, or None for no horizon")
         if self.stop_coverage is not None and not 0.0 < self.stop_coverage <= 1.0:
             raise ValueError(f"stop_coverage is {self.stop_coverage}; want a share in (0, 1], or None for off")
@@ -135,7 +134,7 @@ class ExplorationSettings:
                 f"resolution of the maps is {self.occupancy.resolution} m; "
                 f"want a whole multiple of raster_resolution {self.raster_resolution} m"
             )
-        if self.decision_period_s < self.time_step:
+        if not self.time_step <= self.decision_period_s < math.inf:
             raise ValueError(f"decision_period_s is {self.decision_period_s} s; want at least the time step of {self.time_step} s")
         if self.threads < 1:
             raise ValueError(f"threads is {self.threads}; want at least 1")

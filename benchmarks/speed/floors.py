@@ -14,8 +14,8 @@ from scipy import ndimage
 
 from lidarium.envs.floors.floor import Floor, Raster
 from lidarium.envs.simulation.floor_tables import FloorTables
-from lidarium.envs.simulation.lidar import RayTables
 from lidarium.envs.simulation.motion import distance_bound
+from lidarium.envs.simulation.ray_tables import RayTables
 
 RESOLUTION = 0.025
 TURN = math.radians(17.0)

@@ -127,8 +127,8 @@ def follow_paths(
         Which way the beams look.
     radii : (robots,) float64
         Of the bodies [m].
-    limits : (4,) float64
-        Cruise speed, greatest turn rate, braking and turn acceleration.
+    limits : (3,) float64
+        Cruise speed, greatest turn rate and braking [m/s, rad/s, m/s2].
     paths, margins : (robots, points, 2), (robots, points) float64
         Points x, y [m], and the room beside the body on the piece that leads to each [m].
     counts, places : (robots,) int64

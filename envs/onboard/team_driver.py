@@ -309,7 +309,8 @@ class TeamDriver:
 
     def _give_way(self, row: int, to: int) -> bool:
         """Send a robot out of the way of another's path; False where there is no such place."""
-        if self._refuges[to] is not None and self._refuges[to].made_way_for == row:  # type: ignore[union-attr]
+        refuge = self._refuges[to]
+        if refuge is not None and refuge.made_way_for == row:
             return False
         if self._counts[to] == 0:
             return False

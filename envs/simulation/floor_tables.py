@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.simulation.lidar import RayTables
 from lidarium.envs.simulation.motion import distance_bound
+from lidarium.envs.simulation.ray_tables import RayTables
 
 LIMITLESS_BODY = 0.05
 """The body touches what stands higher than this above the floor [m]."""

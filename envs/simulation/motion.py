@@ -13,9 +13,6 @@ from scipy import ndimage
 
 from lidarium.mapping.kernels import Array, kernel, uint8_grid_at
 
-RADIUS, MAX_SPEED, MAX_TURN_RATE, MAX_ACCELERATION, MAX_TURN_ACCELERATION, HEIGHT = range(6)
-"""Columns of the table of bodies."""
-
 CONTACT_TOLERANCE = 1e-9
 """Gap that is left when a disc is pushed out of contact [m]."""
 
@@ -25,8 +22,8 @@ PRESSED = 1e-6
 PIECE = 0.25
 """Longest piece of an arc near contact [cells]."""
 
-CENTRE_BUMPER = math.radians(30.0)
-SIDE_BUMPER = math.radians(90.0)
+CENTRE_BUMPER, SIDE_BUMPER = math.radians(30.0), math.radians(90.0)
+"""Bearings of a contact up to which it presses the centre bumper, and the one on its side [rad]."""
 
 
 def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -104,9 +101,7 @@ def _deepest_robot(poses: Array, bodies: Array, robot: int, x: float, y: float) 
 
 
 @kernel
-def _free_of_contact(
-    bound: Array, solid: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, margin: float
-) -> bool:
+def _free_of_contact(bound: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, margin: float) -> bool:
     """Whether nothing is within ``margin`` [m] of the disc at x, y, by bounds alone."""
     resolution = frame[2]
     radius = bodies[robot, 0] + margin
@@ -231,7 +226,7 @@ def move_robots(
         x, y, heading = poses[robot, 0], poses[robot, 1], poses[robot, 2]
         start_x, start_y = x, y
         length = abs(speed) * duration
-        if length == 0.0 or _free_of_contact(bound, solid, frame, poses, bodies, robot, x, y, length):
+        if length == 0.0 or _free_of_contact(bound, frame, poses, bodies, robot, x, y, length):
             x, y, heading = _along_arc(x, y, heading, speed, turn_rate, duration)
         else:
             pieces = int(math.ceil(length / (PIECE * frame[2])))

@@ -1,4 +1,4 @@
-"""The robots of the catalogue: bodies and drives (design, section 6)."""
+"""The robots of the catalogue: bodies and drives."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,7 @@ class Robot:
 
     @property
     def numbers(self) -> NDArray[np.float64]:
-        """What the kernels know of the body, shape (6,): see ``motion``."""
+        """What the kernels know of the body, shape (6,): radius, greatest speed, turn rate and their changes, height."""
         return np.array([self.radius, self.max_speed, self.max_turn_rate, self.max_acceleration, self.max_turn_acceleration, self.height])
 
 

@@ -28,6 +28,9 @@ ANGLE_FIRST, ANGLE_INCREMENT, FULL_CIRCLE, RANGE_MIN, RANGE_MAX, NOISE_FLOOR, NO
 MATE_MARGIN = 1.5
 """A beam that ends within this of a teammate's body is taken to have met it [map cells]."""
 
+RANGE_GAP = 1e-3
+"""A hit tells at least this much less than the longest range [m], which in an observation means no return."""
+
 ROUND_UP = 1.0 + 1.2e-7
 """Ranges are rounded up to float32, so that the end of a beam lies in the cell that it met."""
 
@@ -74,7 +77,7 @@ def _sense_robot(
         noise = np.empty(beams, np.float32)
         fill_gaussian(stream_key(seed, robot, step), noise_table, noise)
         floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
-        low, high = np.float32(sensor[RANGE_MIN]), np.float32(longest - 1e-3)
+        low, high = np.float32(sensor[RANGE_MIN]), np.float32(longest - RANGE_GAP)
         for beam in range(beams):
             true_range = ranges[beam]
             noisy = true_range + max(floor_deviation, share * true_range) * noise[beam]

@@ -15,8 +15,9 @@ from lidarium.envs.scorer import THRESHOLDS, Scorer
 from lidarium.envs.settings import ExplorationSettings, RewardSettings
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic import KinematicWorld, counted_cells
-from lidarium.envs.simulation.lidar import Lidar, RayTables
+from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.motion import distance_bound
+from lidarium.envs.simulation.ray_tables import RayTables
 from lidarium.envs.simulation.robots import ROBOTS
 from lidarium.mapping.kernels import kernel
 from lidarium.mapping.occupancy import OccupancySettings

@@ -12,8 +12,9 @@ from lidarium.envs.onboard.driving import ARRIVED, BLOCKED, DRIVING, FORESIGHT_T
 from lidarium.envs.onboard.state import DriveState, Target
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.envs.simulation.lidar import Lidar, RayTables
+from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.motion import distance_bound
+from lidarium.envs.simulation.ray_tables import RayTables
 from lidarium.envs.simulation.robots import ROBOTS
 from lidarium.mapping.occupancy import OccupancySettings
 

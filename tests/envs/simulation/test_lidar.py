@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.envs.simulation.lidar import Lidar, RayTables, _cast_by_faces, _cast_by_squares, cast_scan, cast_scans, cut_by_disc
+from lidarium.envs.simulation.lidar import Lidar, _cast_by_faces, _cast_by_squares, cast_scan, cast_scans, cut_by_disc
+from lidarium.envs.simulation.ray_tables import RayTables
 from lidarium.mapping.scans import ScanGeometry, beam_directions
 
 TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025
@@ -164,7 +165,9 @@ def test_both_casters_agree_with_the_slow_traversal_to_a_tenth_of_a_millimetre(k
         )
 
 
-@given(seed=st.integers(0, 2**32 - 1), beams=st.sampled_from([1, 31, 64, 200]), view=st.sampled_from([0.3, math.radians(240.0), 2.0 * math.pi]))
+@given(
+    seed=st.integers(0, 2**32 - 1), beams=st.sampled_from([1, 31, 64, 200]), view=st.sampled_from([0.3, math.radians(240.0), 2.0 * math.pi]),
+)  # fmt: skip
 @settings(max_examples=60, deadline=None)
 def test_no_random_floor_and_pose_tells_the_casters_from_the_reference(seed, beams, view):
     generator = np.random.default_rng(seed)

@@ -9,9 +9,10 @@ from scipy import stats
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.envs.simulation.lidar import Lidar, RayTables
+from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.motion import distance_bound
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE, fill_gaussian, stream_key
+from lidarium.envs.simulation.ray_tables import RayTables
 from lidarium.envs.simulation.robots import ROBOTS
 from lidarium.mapping.kernels import kernel
 from lidarium.mapping.occupancy import OccupancySettings

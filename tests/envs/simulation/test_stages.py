@@ -11,8 +11,9 @@ from lidarium.envs.exploration import floor_tables
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic import ENDED, KNOWN_MATES, KinematicWorld
-from lidarium.envs.simulation.lidar import Lidar, RayTables
+from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.motion import distance_bound
+from lidarium.envs.simulation.ray_tables import RayTables
 from lidarium.envs.simulation.robots import ROBOTS
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.scans import ScanGeometry
