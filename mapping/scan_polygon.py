@@ -149,8 +149,8 @@ def fill_scan_polygon(
             _toggle_edge(bits, ends[0, previous], ends[1, previous], ends[0, beam], ends[1, beam], last_row, row)
         last_length, last_row = length, row
         previous = beam
-    row_low, row_high = max(low_row - 2, 0), min(high_row + 2, bits.shape[0])
-    word_low, word_high = max(low_column - 1, 0) >> 6, min((high_column + 2) >> 6, bits.shape[1] - 1) + 1
+    row_low, row_high = max(int(low_row) - 2, 0), min(int(high_row) + 2, bits.shape[0])
+    word_low, word_high = max(int(low_column) - 1, 0) >> 6, min((int(high_column) + 2) >> 6, bits.shape[1] - 1) + 1
     for i in range(row_low, row_high):
         carry = np.uint64(0)
         for word in range(word_low, word_high):

@@ -128,7 +128,8 @@ def write(lines: Sequence[Line], folder: Path, command: str, effort: Effort, ext
     """Write ``speed.md`` and ``speed.json``, each beside and then renamed."""
     folder.mkdir(parents=True, exist_ok=True)
     date = datetime.datetime.now(datetime.UTC).date().isoformat()
-    about = {"command": command, "date": date, "machine": machine(), "versions": versions(extra_versions)}
+    installed = versions(extra_versions)
+    about = {"command": command, "date": date, "machine": machine(), "versions": installed}
     content = {
         **about,
         "rounds": effort.rounds,
@@ -136,7 +137,7 @@ def write(lines: Sequence[Line], folder: Path, command: str, effort: Effort, ext
         "lines": [asdict(line) | {"is_reached": line.is_reached} for line in lines],
         "notes": list(notes),
     }
-    listed = ", ".join(f"{name} {number}" for name, number in about["versions"].items())  # type: ignore[attr-defined]
+    listed = ", ".join(f"{name} {number}" for name, number in installed.items())
     text = "\n".join(
         [
             "# Speed",

@@ -85,7 +85,17 @@ def _quadrant(directions: Array, beam: int) -> int:
 
 @kernel(inline=True)
 def _travel(
-    squares: Array, offset: int, columns: int, x: float, y: float, row: int, column: int, distance: float, directions: Array, beam: int, reach: float
+    squares: Array,
+    offset: int,
+    columns: int,
+    x: float,
+    y: float,
+    row: int,
+    column: int,
+    distance: float,
+    directions: Array,
+    beam: int,
+    reach: float,
 ) -> float:
     """Distance at which one beam enters a solid cell, from a cell and a distance on its way [cells]."""
     direction_x, direction_y = directions[0, beam], directions[1, beam]
@@ -122,9 +132,9 @@ def _travel(
 
 @kernel(inline=True)
 def _travel_together(
-    squares: Array, offset: int, rows: int, columns: int, x: float, y: float, directions: Array, first: int, last: int, distance: float, reach: float
+    squares: Array, offset: int, columns: int, x: float, y: float, directions: Array, first: int, last: int, distance: float, reach: float
 ) -> float:
-    """Distance, from one on, up to which all beams from ``first`` to ``last``, of one quadrant, run through free squares that hold them all.
+    """Distance, from one on, up to which the beams ``first`` to ``last``, of one quadrant, run through squares that hold them all.
 
     The beams between the two outer ones lie within the box of these two at every distance. A square that opens from the
     box's nearest corner and holds the box is free for all, up to where the first of the outer beams leaves it.
@@ -156,9 +166,7 @@ def _travel_together(
 
 
 @kernel
-def _cast_by_squares(
-    squares: Array, rows: int, columns: int, x: float, y: float, directions: Array, reach: float, ranges: Array
-) -> None:
+def _cast_by_squares(squares: Array, rows: int, columns: int, x: float, y: float, directions: Array, reach: float, ranges: Array) -> None:
     """Fill ``ranges`` [cells] with the distance to the first solid cell, or ``reach``."""
     plane = rows * columns
     beams = ranges.shape[0]
@@ -168,14 +176,12 @@ def _cast_by_squares(
         quadrant = _quadrant(directions, first)
         is_bundle = quadrant == _quadrant(directions, last) and quadrant == _quadrant(directions, (first + last) // 2)
         if is_bundle:
-            together = _travel_together(squares, quadrant * plane, rows, columns, x, y, directions, first, last, 0.0, reach)
+            together = _travel_together(squares, quadrant * plane, columns, x, y, directions, first, last, 0.0, reach)
         for inner in range(first, last + 1, INNER_BUNDLE):
             inner_last = min(inner + INNER_BUNDLE - 1, last)
             distance = together
             if is_bundle and distance < reach:
-                distance = _travel_together(
-                    squares, quadrant * plane, rows, columns, x, y, directions, inner, inner_last, together, reach
-                )
+                distance = _travel_together(squares, quadrant * plane, columns, x, y, directions, inner, inner_last, together, reach)
             for beam in range(inner, inner_last + 1):
                 if distance >= reach:
                     ranges[beam] = reach

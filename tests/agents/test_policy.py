@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.agents import PerRobot, Stop, make_policy, policy_names, register_policy
+from lidarium.agents import GivenUp, PerRobot, Stop, make_policy, policy_names, register_policy
 from lidarium.envs.onboard.state import Target
 from lidarium.evaluation.runner import run_episode
 
@@ -100,7 +100,7 @@ class Recorder:
     shares_map = True
 
     def __init__(self):
-        self.calls = []
+        self.calls, self.given_up = [], []
 
     def reset(self, team, seed):
         self.team, self.seed = team, seed
@@ -108,6 +108,7 @@ class Recorder:
     def act(self, observations):
         self.calls.append({agent: observation["pose"].copy() for agent, observation in observations.items()})
         if self.team.time_s > 5.0:
+            self.given_up = [GivenUp(agent, 1.0, 2.0, 0.1, "unseen") for agent in observations]
             return {agent: Stop("enough") for agent in observations}
         return dict.fromkeys(observations)
 
@@ -120,13 +121,14 @@ def test_a_decentralised_policy_has_one_instance_a_robot_that_sees_its_own_robot
         return made[-1]
 
     env = lidarium.parallel_env("scene_room", robots=3, map_cells=32)
-    run_episode(PerRobot(factory), env, 3)
+    episode = run_episode(PerRobot(factory), env, 3)
     instances = made[1:]
     assert [list(instance.calls[0]) for instance in instances] == [["robot_0"], ["robot_1"], ["robot_2"]]
     assert len({instance.seed for instance in instances}) == 3
     with pytest.raises(ValueError, match="sees its own robot only"):
         instances[0].team.belief("robot_1")
     assert env.scorer.ended_because == dict.fromkeys(env.possible_agents, "enough")
+    assert [entry.agent for entry in episode.given_up] == env.possible_agents
 
 
 @pytest.mark.parametrize("name", ["nearest_frontier", "random_walk"])

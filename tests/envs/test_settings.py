@@ -20,10 +20,12 @@ from lidarium.mapping.occupancy import OccupancySettings
         ("robots", 0, "1 to 64"), ("robots", 65, "1 to 64"), ("robots", -1, "1 to 64"), ("robots", 2.0, "1 to 64"),
         ("robots", "3", "1 to 64"), ("localization", "gps", "truth"), ("backend", "gazebo", "kinematic"),
         ("time_step", 0.0, "more than 0"), ("time_step", math.inf, "more than 0"), ("time_step", math.nan, "more than 0"),
-        ("horizon_s", 0.0, "None for no horizon"), ("horizon_s", math.inf, "None for no horizon"), ("horizon_s", -5.0, "None for no horizon"),
-        ("horizon_s", math.nan, "None for no horizon"), ("stop_coverage", 0.0, "None for off"), ("stop_coverage", 1.01, "None for off"),
+        ("horizon_s", 0.0, "None for no horizon"), ("horizon_s", math.inf, "None for no horizon"),
+        ("horizon_s", -5.0, "None for no horizon"), ("horizon_s", math.nan, "None for no horizon"), ("stop_coverage", 0.0, "None for off"),
+        ("stop_coverage", 1.01, "None for off"),
         ("map_cells", 255, "even number"), ("map_cells", 0, "even number"), ("raster_resolution", 0.0, "more than 0"),
-        ("raster_resolution", 0.03, "whole multiple"), ("decision_period_s", 0.05, "time step"), ("threads", 0, "at least 1"),
+        ("raster_resolution", 0.03, "whole multiple"), ("decision_period_s", 0.05, "time step"),
+        ("decision_period_s", math.nan, "time step"), ("threads", 0, "at least 1"),
     ],
 )  # fmt: skip
 def test_a_bad_value_is_refused_with_its_name_its_value_and_the_cure(option, value, wanted):

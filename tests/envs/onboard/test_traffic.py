@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -53,10 +54,11 @@ def test_a_path_of_one_point_obstructs_only_where_it_is():
     assert not obstructing(np.array([1.3, 1.0]), path, 0.2)
 
 
-def test_the_refuge_is_off_the_path_and_the_one_that_costs_least():
-    navigation = known(40, 100)
-    path = [(0.5, 1.0), (4.5, 1.0)]
-    start = (20, 50)
+@pytest.mark.parametrize(
+    ("size", "path", "start"), [((40, 100), [(0.5, 1.0), (4.5, 1.0)], (20, 50)), ((160, 160), [(0.3, 4.0), (7.7, 4.0)], (84, 80))]
+)
+def test_the_refuge_is_off_the_path_and_the_one_that_costs_least(size, path, start):
+    navigation = known(*size)
     cell = refuge(navigation, start, path)
     assert cell is not None
     assert gap_to(cell, path) >= 0.44

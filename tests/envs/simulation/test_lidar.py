@@ -166,8 +166,10 @@ def test_both_casters_agree_with_the_slow_traversal_to_a_tenth_of_a_millimetre(k
 
 
 @given(
-    seed=st.integers(0, 2**32 - 1), beams=st.sampled_from([1, 31, 64, 200]), view=st.sampled_from([0.3, math.radians(240.0), 2.0 * math.pi]),
-)  # fmt: skip
+    seed=st.integers(0, 2**32 - 1),
+    beams=st.sampled_from([1, 31, 64, 200]),
+    view=st.sampled_from([0.3, math.radians(240.0), 2.0 * math.pi]),
+)
 @settings(max_examples=60, deadline=None)
 def test_no_random_floor_and_pose_tells_the_casters_from_the_reference(seed, beams, view):
     generator = np.random.default_rng(seed)
