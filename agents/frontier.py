@@ -158,13 +158,9 @@ class FrontierExplorer:
     def _give_up_around(self, agent: str, choice: Choice, reason: str) -> None:
         """Ignore the frontier cells near the one looked at, and say so."""
         navigation, belief = self.navigation(agent), self.team.belief(agent)
-        cells = navigation.frontiers.cells()
-        reach = default_reach(self.footprint, navigation.resolution) / navigation.resolution
-        gaps = np.hypot(*(cells - np.asarray(choice.frontier_cell)).T)
-        near = cells[gaps <= reach] if len(cells) else np.asarray([choice.frontier_cell])
-        navigation.frontiers.ignore(near)
+        count = navigation.frontiers.ignore_near(choice.frontier_cell, default_reach(self.footprint, navigation.resolution))
         x, y = centres_of(np.asarray(choice.frontier_cell), belief.map_origin, navigation.resolution)
-        entry = GivenUp(agent, float(x), float(y), len(near) * navigation.resolution, reason)
+        entry = GivenUp(agent, float(x), float(y), count * navigation.resolution, reason)
         self._given_up.append((entry, navigation, choice.frontier_cell))
 
     def _target(self, agent: str) -> Target | None:

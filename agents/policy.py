@@ -26,7 +26,7 @@ class Stop:
     reason: str
 
 
-Action = NDArray[np.float32] | Target | Stop | None
+Action = NDArray[np.float32] | Target | int | Stop | None
 
 
 class Team(Protocol):
@@ -57,8 +57,8 @@ class Policy(Protocol):
     Attributes
     ----------
     level : str
-        What it decides: ``velocity`` (shares of the limits, for a step) or ``waypoint`` (a ``Target``, None to stay, or two
-        shares, for a decision period).
+        What it decides: ``velocity`` (shares of the limits, for a step), ``waypoint`` (a ``Target``, None to stay, or two
+        shares, for a decision period) or ``frontier`` (the number of a frontier on offer, for a decision period).
     shares_map : bool
         Whether the robots plan on the team's map, where it reaches them, or on their own.
     """

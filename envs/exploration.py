@@ -27,9 +27,9 @@ Observation = dict[str, NDArray[Any]]
 
 
 @lru_cache(maxsize=16)
-def floor_tables(floor: str | Floor, image_resolution: float | None, raster_resolution: float, laser: float, body: float) -> FloorTables:
+def floor_tables(floor: Floor, raster_resolution: float, laser: float, body: float) -> FloorTables:
     """Return the kernels' tables of a floor; the last ones used are kept and shared."""
-    return FloorTables.of_floor(load_floor(floor, image_resolution), raster_resolution, laser, body)
+    return FloorTables.of_floor(floor, raster_resolution, laser, body)
 
 
 @kernel
@@ -141,10 +141,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         choice = self._choice if chosen.floor is None else FloorChoice(chosen.floor, self._image_resolution)
         spec = choice.draw(self._generator)
         floor = load_floor(spec, self._image_resolution)
-        if isinstance(spec, Path):
-            spec = str(spec)
         settings, radius = self.settings, self.settings.robot.radius
-        tables = floor_tables(spec, self._image_resolution, settings.raster_resolution, settings.lidar.height, settings.robot.height)
+        tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
         if chosen.starts is not None:
             check_starts(tables.body, radius, chosen.starts)
             starts = chosen.starts
@@ -204,7 +202,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     self._commands[self._rows[agent]] = 0.0
                     continue
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-            self._commands[self._rows[agent]] = action
+            shares = np.asarray(action, np.float64)
+            if shares.shape != (2,):
+                raise ValueError(f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and turn rate")
+            self._commands[self._rows[agent]] = shares
         if not _scale(self._commands, self._limits):
             raise ValueError(f"an action is nan ({actions}); want two numbers within [-1, 1] for each agent")
         self.drive_at(self._commands)

@@ -1,6 +1,5 @@
 """What ``reset`` may be told, and which floor an episode takes."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -66,8 +65,8 @@ def read_options(options: dict[str, Any] | None, robots: int) -> ResetOptions:
             raise ValueError(f"option starts has shape {starts.shape}; want ({robots}, 3): x, y [m] and theta [rad] of each robot")
     goal = options.get("goal")
     if goal is not None:
-        x, y = (float(value) for value in goal)
-        if not (math.isfinite(x) and math.isfinite(y)):
-            raise ValueError(f"option goal is ({x}, {y}); want finite metres")
-        goal = (x, y)
+        place = np.asarray(goal, np.float64)
+        if place.shape != (2,) or not np.isfinite(place).all():
+            raise ValueError(f"option goal is {goal!r}; want two finite numbers: x, y [m]")
+        goal = (float(place[0]), float(place[1]))
     return ResetOptions(options.get("floor"), starts, goal)

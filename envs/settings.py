@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from numbers import Integral
 from typing import Any
 
 from lidarium.envs.simulation.lidar import Lidar
@@ -9,6 +10,7 @@ from lidarium.envs.simulation.robots import ROBOTS, Robot
 from lidarium.mapping.occupancy import OccupancySettings
 
 MAX_ROBOTS = 64
+MAX_MAP_CELLS = 4096
 
 NOISE: dict[str, tuple[float, float]] = {"none": (0.0, 0.0), "datasheet": (0.01, 0.01), "thesis": (0.03, 0.0)}
 """Names of the range noise: floor [m] and share of the range of its standard deviation."""
@@ -112,8 +114,18 @@ class ExplorationSettings:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        if not isinstance(self.robots, int) or not 1 <= self.robots <= MAX_ROBOTS:
+        for name, kind in (("robots", Integral), ("map_cells", Integral), ("threads", Integral)):
+            if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), kind):
+                raise ValueError(f"{name} is {getattr(self, name)!r}; want a whole number{' from 1 to 64' if name == 'robots' else ''}")
+        for name, wanted in (("robot", Robot), ("lidar", Lidar), ("occupancy", OccupancySettings), ("reward", RewardSettings)):
+            if not isinstance(getattr(self, name), wanted):
+                raise ValueError(
+                    f"{name} is {getattr(self, name)!r}; want {wanted.__name__}{' or its name' if name in ('robot', 'lidar') else ''}"
+                )
+        if not 1 <= self.robots <= MAX_ROBOTS:
             raise ValueError(f"robots is {self.robots}; a team has 1 to {MAX_ROBOTS}")
+        if not (math.isfinite(self.goal_radius) and self.goal_radius > 0.0):
+            raise ValueError(f"goal_radius is {self.goal_radius} m; want more than 0")
         if self.localization not in LOCALIZATIONS:
             raise ValueError(f"localization is {self.localization!r}; want one of {', '.join(LOCALIZATIONS)}")
         if self.backend not in BACKENDS:
@@ -124,8 +136,8 @@ class ExplorationSettings:
             raise ValueError(f"horizon_s is {self.horizon_s}; want more than 0 s, or None for no horizon")
         if self.stop_coverage is not None and not 0.0 < self.stop_coverage <= 1.0:
             raise ValueError(f"stop_coverage is {self.stop_coverage}; want a share in (0, 1], or None for off")
-        if self.map_cells < 2 or self.map_cells % 2:
-            raise ValueError(f"map_cells is {self.map_cells}; want an even number of at least 2")
+        if not 2 <= self.map_cells <= MAX_MAP_CELLS or self.map_cells % 2:
+            raise ValueError(f"map_cells is {self.map_cells}; want an even number from 2 to {MAX_MAP_CELLS}")
         if not (math.isfinite(self.raster_resolution) and self.raster_resolution > 0.0):
             raise ValueError(f"raster_resolution is {self.raster_resolution} m; want more than 0")
         multiple = self.occupancy.resolution / self.raster_resolution

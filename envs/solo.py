@@ -82,7 +82,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         self.parallel.close()
 
 
-def at_level(env: ExplorationEnv, level: str) -> ExplorationEnv | WaypointExploration | FrontierExploration:
+def at_level(env: ExplorationEnv, level: str, shares_map: bool = True) -> ExplorationEnv | WaypointExploration | FrontierExploration:
     """Put the wrapper of a level of decision around an environment.
 
     Raises
@@ -93,7 +93,7 @@ def at_level(env: ExplorationEnv, level: str) -> ExplorationEnv | WaypointExplor
     if level == "velocity":
         return env
     if level == "waypoint":
-        return WaypointExploration(env)
+        return WaypointExploration(env, shares_map)
     if level == "frontier":
-        return FrontierExploration(env)
+        return FrontierExploration(env, shares_map)
     raise ValueError(f"level is {level!r}; want velocity, waypoint or frontier")

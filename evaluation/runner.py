@@ -12,6 +12,8 @@ from lidarium.agents.policy import GivenUp, Policy, Stop
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.onboard.perception import Belief
 from lidarium.envs.onboard.state import DriveState
+from lidarium.envs.solo import at_level
+from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 
 Progress = Callable[[ExplorationEnv], None]
@@ -103,15 +105,13 @@ def run_episode(
     Episode
         What it left.
     """
-    if policy.level not in ("velocity", "waypoint"):
-        raise ValueError(f"level of the policy is {policy.level!r}; want velocity or waypoint")
-    wrapper = WaypointExploration(env, policy.shares_map) if policy.level == "waypoint" else None
-    world: ExplorationEnv | WaypointExploration = env if wrapper is None else wrapper
+    world = at_level(env, policy.level, policy.shares_map)
+    driver = world.waypoints if isinstance(world, FrontierExploration) else world
     episode = Episode(env, policy, seed)
     began = time.perf_counter()
     try:
         observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))
-        policy.reset(RunningTeam(env, wrapper), seed)
+        policy.reset(RunningTeam(env, driver if isinstance(driver, WaypointExploration) else None), seed)
         if on_decision is not None:
             on_decision(env)
         while env.agents:
@@ -132,7 +132,7 @@ def run_episode(
 
 
 def decide(
-    policy: Policy, world: ExplorationEnv | WaypointExploration, observations: Mapping[str, Observation]
+    policy: Policy, world: ExplorationEnv | WaypointExploration | FrontierExploration, observations: Mapping[str, Observation]
 ) -> dict[str, NDArray[np.float32] | Any]:
     """Ask a policy, and turn each ``Stop`` into an order to the environment."""
     actions: dict[str, Any] = {}

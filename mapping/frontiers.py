@@ -106,6 +106,13 @@ class FrontierMap:
         self.flags[chosen[:, 0], chosen[:, 1]] = IGNORED
         np.subtract.at(self.tiles, (chosen[:, 0] // TILE, chosen[:, 1] // TILE), 1)
 
+    def ignore_near(self, cell: tuple[int, int], reach: float) -> int:
+        """Ignore the frontier cells within ``reach`` [m] of a cell, itself included; return how many."""
+        cells = self.cells()
+        near = cells[np.hypot(*(cells - np.asarray(cell)).T) * self.resolution <= reach]
+        self.ignore(near)
+        return len(near)
+
     def add(self, cells: NDArray[np.integer]) -> None:
         """Flag distinct cells (N, 2) that are not flagged yet; for a map that holds a choice of another's frontier cells."""
         self.flags[cells[:, 0], cells[:, 1]] = FRONTIER

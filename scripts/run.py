@@ -68,8 +68,6 @@ def execute(command: Run) -> Answer:
     policy = lidarium.policy(command.policy)
     env = _environment(command)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
-    if starts is not None:
-        _check_connected(env, command, starts)
     episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
     if env.floor is None or not env.scorer.track:
         tell("interrupted before the run began; nothing was written")
@@ -116,28 +114,6 @@ def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
     if len(starts) != robots:
         raise ValueError(f"--starts has {len(starts)} starts for {robots} robots; want one for each")
     return starts
-
-
-def _check_connected(env: "ExplorationEnv", command: Run, starts: "NDArray[np.float64]") -> None:
-    """Refuse starts of which one cannot be reached from another."""
-    from lidarium.envs.exploration import floor_tables
-    from lidarium.envs.floors.starts import check_starts, swept_free_space
-    from lidarium.mapping.grid_planning import cells_of
-
-    if command.floor.startswith("set:"):
-        return
-    settings = env.settings
-    heights = settings.lidar.height, settings.robot.height
-    body = floor_tables(command.floor, command.resolution, settings.raster_resolution, *heights).body
-    check_starts(body, settings.robot.radius, starts)
-    swept = swept_free_space(body, settings.robot.radius, starts[:1])
-    for robot, start in enumerate(starts):
-        row, column = cells_of(start[:2], body.origin, body.resolution)
-        if not swept[row, column]:
-            radius = settings.robot.radius
-            raise ValueError(
-                f"starts of robots 0 and {robot} are disconnected for a robot of radius {radius} m; want starts in one room system"
-            )
 
 
 def _explore(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, Any]) -> "Episode":  # noqa: ANN401

@@ -152,12 +152,19 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
     Raises
     ------
     ValueError
-        If the robot does not fit at a start, or two robots overlap.
+        If the robot does not fit at a start, two robots overlap, or a start cannot be reached from the first one.
     """
-    space = configuration_space(raster, radius)
-    labels = space.astype(np.int32)
+    labels = _labels(configuration_space(raster, radius))
+    first = 0
     for robot, start in enumerate(starts):
-        _label_near(raster, labels, start, radius)
+        label = _label_near(raster, labels, start, radius)
+        if _reaches_into_solid(raster, start, radius):
+            raise ValueError(f"start ({start[0]:.3f}, {start[1]:.3f}) m is nearer than the radius of {radius} m to a wall; want more room")
+        first = first or label
+        if label != first:
+            raise ValueError(
+                f"starts of robots 0 and {robot} are disconnected for a robot of radius {radius} m; want starts that can reach each other"
+            )
         for other in range(robot):
             apart = math.dist(start[:2], starts[other][:2])
             if apart < 2.0 * radius:
@@ -252,6 +259,18 @@ def _label_near(raster: Raster, labels: NDArray[np.int32], start: NDArray[np.flo
         if labels[near]:
             return int(labels[near])
     raise ValueError(f"a robot of radius {radius} m does not fit at start ({start[0]:.3f}, {start[1]:.3f}) m; want more room")
+
+
+def _reaches_into_solid(raster: Raster, start: NDArray[np.float64], radius: float) -> bool:
+    """Whether the disc at a start, exactly there and not at a cell's centre, enters a solid cell."""
+    reach = math.ceil(radius / raster.resolution) + 1
+    i, j = _cell(raster, start)
+    rows, columns = np.nonzero(raster.solid[max(i - reach, 0) : i + reach + 1, max(j - reach, 0) : j + reach + 1])
+    low_x = raster.origin[0] + (columns + max(j - reach, 0)) * raster.resolution
+    low_y = raster.origin[1] + (rows + max(i - reach, 0)) * raster.resolution
+    gap_x = start[0] - np.clip(start[0], low_x, low_x + raster.resolution)
+    gap_y = start[1] - np.clip(start[1], low_y, low_y + raster.resolution)
+    return bool((np.hypot(gap_x, gap_y) < radius - 1e-6).any())
 
 
 def _labels(space: NDArray[np.bool_]) -> NDArray[np.int32]:

@@ -45,8 +45,8 @@ FORESIGHT_TIMES = np.array([0.0, 0.4, 0.8])
 BACKING_SPEED = 0.05
 """A robot that a wall blocks backs out the way it came at this speed [m/s]."""
 
-BLOCKED_STEPS = 10
-"""A robot that wants to drive and has stood this many steps is blocked."""
+BLOCKED_S = 1.0
+"""A robot that wants to drive and has stood for this long is blocked [s]."""
 
 
 @kernel(inline=True)
@@ -77,10 +77,10 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, radii: Array, for
     for other in range(poses.shape[0]):
         if other == robot or present[other] == 0:
             continue
-        reach = radii[robot] + radii[other] + MATE_GAP
         for k in range(foresight.shape[0]):
             if k > 0 and other > robot:
                 break
+            reach = radii[robot] + radii[other] + MATE_GAP
             drift = velocities[other, 0] * foresight[k]
             gap_x = poses[other, 0] + drift * math.cos(poses[other, 2]) - poses[robot, 0]
             gap_y = poses[other, 1] + drift * math.sin(poses[other, 2]) - poses[robot, 1]
@@ -127,8 +127,8 @@ def follow_paths(
         Which way the beams look.
     radii : (robots,) float64
         Of the bodies [m].
-    limits : (3,) float64
-        Cruise speed, greatest turn rate and braking [m/s, rad/s, m/s2].
+    limits : (4,) float64
+        Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
     paths, margins : (robots, points, 2), (robots, points) float64
         Points x, y [m], and the room beside the body on the piece that leads to each [m].
     counts, places : (robots,) int64
@@ -148,7 +148,8 @@ def follow_paths(
     commands : (robots, 2) float64
         Result: speed and turn rate [m/s, rad/s].
     """
-    cruise, turn_limit, braking = limits[0], limits[1], limits[2]
+    gain = min(TURN_GAIN, 0.5 / limits[3])
+    cruise, turn_limit, braking, time_step = limits[0], limits[1], limits[2], limits[3]
     for robot in range(poses.shape[0]):
         commands[robot, 0] = commands[robot, 1] = 0.0
         if states[robot] != DRIVING and states[robot] != BLOCKED:
@@ -176,7 +177,7 @@ def follow_paths(
                 states[robot] = ARRIVED
                 stood[robot] = 0
             else:
-                commands[robot, 1] = min(max(TURN_GAIN * error, -turn_limit), turn_limit)
+                commands[robot, 1] = min(max(gain * error, -turn_limit), turn_limit)
             continue
         # Aim at a point on the line of this piece, a little ahead of the foot of the robot on it.
         from_x, from_y = (paths[robot, place - 1, 0], paths[robot, place - 1, 1]) if place > 0 else (x, y)
@@ -190,7 +191,7 @@ def follow_paths(
         error = _wrap(math.atan2(aim_y - y, aim_x - x) - heading)
         margin = margins[robot, place]
         tolerance = min(max(0.01 + 2.0 * margin, 0.01), 0.6)
-        commands[robot, 1] = min(max(TURN_GAIN * error, -turn_limit), turn_limit)
+        commands[robot, 1] = min(max(gain * error, -turn_limit), turn_limit)
         if abs(error) > tolerance:
             continue
         speed = cruise * (1.0 - 0.7 * abs(error) / tolerance)
@@ -204,17 +205,17 @@ def follow_paths(
         speed = min(
             speed, math.sqrt(through * through + 2.0 * braking * remaining) if through > 0.0 else math.sqrt(2.0 * braking * remaining)
         )
-        speed = min(speed, max(remaining / 0.1, 0.02)) if place == last else speed
+        speed = min(speed, max(remaining / time_step, 0.02)) if place == last else speed
         gap = _gap_in_scan(ranges[robot], unit_vectors, radii[robot] + SIDE_GAP)
-        allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.05 * velocities[robot, 0], 0.0))
+        allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * velocities[robot, 0], 0.0))
         if knows_mates:
             mate_gap = _gap_to_mates(robot, poses, velocities, radii, foresight, present)
-            allowed = min(allowed, math.sqrt(braking * max(mate_gap - 0.1 * velocities[robot, 0], 0.0)))
+            allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * velocities[robot, 0], 0.0)))
         speed = min(speed, allowed)
         commands[robot, 0] = speed
         if speed < 0.01:
             stood[robot] += 1
-            if stood[robot] >= BLOCKED_STEPS:
+            if stood[robot] * time_step >= BLOCKED_S - 1e-9:
                 states[robot] = BLOCKED
         else:
             stood[robot] = 0

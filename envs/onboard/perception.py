@@ -33,13 +33,20 @@ class NavigationMap:
     """
 
     def __init__(self, log_odds: NDArray[np.int8], resolution: float) -> None:
-        self.log_odds, self.resolution = log_odds, resolution
+        self._log_odds, self.resolution = log_odds, resolution
         rows, columns = log_odds.shape
         self.clearance = ClearanceField((rows, columns), resolution, CLEARANCE_LIMIT)
         self.frontiers = FrontierMap((rows, columns), resolution)
         self.space = SearchSpace((rows, columns), resolution)
         self._long: FrontierMap | None = None
         self._long_cells: NDArray[np.int64] = np.zeros((0, 2), np.int64)
+
+    @property
+    def log_odds(self) -> NDArray[np.int8]:
+        """The map, read-only: only its owner, who holds the array itself, writes it."""
+        view = self._log_odds.view()
+        view.flags.writeable = False
+        return view
 
     def changed(self, window: tuple[int, int, int, int]) -> None:
         """Bring clearance and frontiers up to date in a window (row_low, row_high, column_low, column_high)."""
@@ -171,6 +178,7 @@ class Perception:
         self.world, self.settings, self._offsets = world, settings, offsets
         self._own: dict[int, NavigationMap] = {}
         self._shared: NavigationMap | None = None
+        self._sum: NDArray[np.int8] = np.zeros((0, 0), np.int8)
         self._goal: tuple[float, float] | None = None
         self._fresh_at = -2
 
@@ -201,7 +209,8 @@ class Perception:
         self._refresh()
         if self._shared is None:
             shape = self.world.log_odds[0].shape
-            self._shared = NavigationMap(np.zeros(shape, np.int8), self.settings.occupancy.resolution)
+            self._sum = np.zeros(shape, np.int8)
+            self._shared = NavigationMap(self._sum, self.settings.occupancy.resolution)
             self._share((0, shape[0], 0, shape[1]))
         return self._shared
 
@@ -226,7 +235,7 @@ class Perception:
         assert self._shared is not None
         rows, columns = self._shared.log_odds.shape
         addresses = np.array([log_odds.ctypes.data for log_odds in self.world.log_odds], np.int64)
-        _sum_maps(addresses, rows, columns, np.array(window, np.int64), self._shared.log_odds)
+        _sum_maps(addresses, rows, columns, np.array(window, np.int64), self._sum)
         self._shared.changed(window)
 
     def offset(self, row: int) -> NDArray[np.float64]:

@@ -81,7 +81,7 @@ class TeamDriver:
         self._perception, self._settings, self.shares_map = perception, settings, shares_map
         robots, robot = settings.robots, settings.robot
         self._footprint = footprint_of(robot.radius)
-        self._limits = np.array([robot.cruise_speed, min(robot.max_turn_rate, 2.0), 0.8 * robot.max_acceleration])
+        self._limits = np.array([robot.cruise_speed, min(robot.max_turn_rate, 2.0), 0.8 * robot.max_acceleration, settings.time_step])
         self._radii = np.full(robots, robot.radius)
         self._unit_vectors = settings.lidar.unit_vectors
         self._targets: list[Target | None] = [None] * robots

@@ -149,7 +149,8 @@ class KinematicWorld:
             raise ValueError(f"a map cell of {map_resolution} m is not a whole multiple of the floor's raster cell of {resolution} m")
         first, last = episode * self.robots, (episode + 1) * self.robots
         starts = _within_half_turns(starts)
-        free = swept_free_space(floor.body, self.smallest_radius, starts)
+        # What the laser cannot look into does not count, even where a low body could pass below it.
+        free = swept_free_space(floor.body, self.smallest_radius, starts) & (floor.laser.solid == 0)
         counted = pack_bits(counted_cells(free, multiple))
         rows, words = counted.shape
         self.floors[episode] = floor
@@ -170,7 +171,7 @@ class KinematicWorld:
                 self.log_odds[row] = np.zeros((rows, words * WORD), np.int8)
             else:
                 self.believed[row] = 0.0
-                self.log_odds[row], self.origins[row] = self._blank_map_around(floor, starts[row - first])
+                self.log_odds[row], self.origins[row] = self._blank_map_around(floor)
         self._point_at(episode)
         self.starts[first:last] = starts
         self.flags[first:last] = TRUE_POSE | (KNOWN_MATES if known_starts else OWN_FRAME)
@@ -201,19 +202,17 @@ class KinematicWorld:
         self._step = step_parallel if is_parallel else step_serial
         self._perceive = perceive_parallel if is_parallel else perceive_serial
 
-    def _blank_map_around(self, floor: FloorTables, start: NDArray[np.float64]) -> tuple[NDArray[np.int8], tuple[float, float]]:
-        """Return a map in the start's own frame that holds the whole floor, however it is turned (memory is touched where seen)."""
+    def _blank_map_around(self, floor: FloorTables) -> tuple[NDArray[np.int8], tuple[float, float]]:
+        """Return a map in the start's own frame that holds the whole floor, however it is turned, and its origin [m].
+
+        Memory is provided by the system only where it is touched.
+        """
         rows, columns = floor.laser.solid.shape
-        size = np.array([columns, rows]) * floor.laser.resolution
-        corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size + floor.laser.origin - start[:2]
-        cosine, sine = math.cos(start[2]), math.sin(start[2])
-        turned = corners @ np.array([[cosine, -sine], [sine, cosine]])
-        resolution = self.occupancy.resolution
-        low = np.floor(turned.min(axis=0) / resolution).astype(int)
-        high = np.ceil(turned.max(axis=0) / resolution).astype(int)
-        cells = high - low
-        log_odds = np.zeros((int(cells[1]), -(-int(cells[0]) // WORD) * WORD), np.int8)
-        return log_odds, (float(low[0] * resolution), float(low[1] * resolution))
+        # A square around the start, in steps of 32 m: its size and place tell nothing of the floor's shape.
+        diagonal = math.hypot(rows, columns) * floor.laser.resolution
+        half = math.ceil(math.ceil(diagonal / 32.0) * 32.0 / self.occupancy.resolution / WORD) * WORD
+        origin = -half * self.occupancy.resolution
+        return np.zeros((2 * half, 2 * half), np.int8), (origin, origin)
 
     def forget_changes(self, first: int, last: int) -> None:
         """Start anew to note what part of the maps changes, for rows ``first`` to ``last``."""

@@ -14,7 +14,7 @@ from lidarium.envs.onboard.team_driver import footprint_of
 from lidarium.envs.wrappers.decisions import DecisionWrapper
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 from lidarium.mapping.frontier_approach import approach, default_reach
-from lidarium.mapping.grid_planning import cells_of, centres_of, search
+from lidarium.mapping.grid_planning import Cell, cells_of, centres_of, search
 
 CANDIDATES = 16
 """Most frontiers that a robot chooses among."""
@@ -32,8 +32,9 @@ class FrontierExploration(DecisionWrapper):
     map frame from where the robot believes to be [m], cost of the way [m] and size [m] of each frontier in reach, cheapest
     way first, zeros behind the last; and ``action_mask`` int8 (17,). Action k < 16 drives to frontier k, action 16 stays and
     gives way; an action that the mask rules out stays as well. A frontier to which a robot has driven and turned, and which
-    is still there, is offered no more. A decision lasts ``decision_period_s`` or until any robot is done. Robots that have no
-    frontier in reach stay idle; when none has, all end with ``no_frontier`` or ``frontier_unreachable``.
+    is still there, is offered no more, and ``infos[agent]["given_up"]`` names it with the reason. A decision lasts
+    ``decision_period_s`` or until any robot is done. Robots that have no frontier in reach stay idle; when none has, all end
+    with ``no_frontier`` or ``frontier_unreachable``.
 
     Parameters
     ----------
@@ -61,8 +62,8 @@ class FrontierExploration(DecisionWrapper):
             for agent in self.possible_agents
         }
         self._action_spaces = {agent: spaces.Discrete(CANDIDATES + 1) for agent in self.possible_agents}
-        self._targets: dict[str, list[tuple[Target, NDArray[np.int64]]]] = {}
-        self._chosen: dict[str, tuple[Target, NDArray[np.int64]] | None] = {}
+        self._targets: dict[str, list[tuple[Target, Cell]]] = {}
+        self._chosen: dict[str, tuple[Target, Cell] | None] = {}
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations."""
@@ -107,7 +108,9 @@ class FrontierExploration(DecisionWrapper):
         for agent in self.env.agents:
             chosen = self._chosen[agent]
             if chosen is not None and infos[agent]["drive"] in (DriveState.ARRIVED, DriveState.NO_PATH):
-                self._navigation(agent).frontiers.ignore(chosen[1])
+                reach = default_reach(self._footprint, self.settings.occupancy.resolution)
+                self._navigation(agent).frontiers.ignore_near(chosen[1], reach)
+                infos[agent]["given_up"] = (chosen[0], "unseen" if infos[agent]["drive"] is DriveState.ARRIVED else "blocked")
         return self._with_candidates(observations), rewards, terminations, truncations, infos
 
     def _navigation(self, agent: str) -> NavigationMap:
@@ -129,7 +132,7 @@ class FrontierExploration(DecisionWrapper):
             observation["frontiers"], observation["action_mask"] = table, mask
         return observations
 
-    def _candidates(self, agent: str, table: NDArray[np.float32]) -> list[tuple[Target, NDArray[np.int64]]]:
+    def _candidates(self, agent: str, table: NDArray[np.float32]) -> list[tuple[Target, Cell]]:
         belief, navigation = self.env.perception.belief(agent), self._navigation(agent)
         clusters = navigation.frontiers.clusters(belief.map_origin)
         if not len(clusters):
@@ -140,12 +143,13 @@ class FrontierExploration(DecisionWrapper):
         long_enough = near.reachable & (clusters.sizes >= MINIMUM_SIZE)
         wanted = long_enough if long_enough.any() else near.reachable
         ranked = [int(k) for k in np.argsort(near.costs, kind="stable") if wanted[k]][:CANDIDATES]
-        targets: list[tuple[Target, NDArray[np.int64]]] = []
+        targets: list[tuple[Target, Cell]] = []
         for place, k in enumerate(ranked):
             x, y = centres_of(near.cells[k], belief.map_origin, navigation.resolution)
             rise, run = near.frontier_cells[k] - near.cells[k]
             heading = math.atan2(rise, run) if rise or run else None
-            targets.append((Target(float(x), float(y), heading), clusters.of(k)))
+            seen = (int(near.frontier_cells[k][0]), int(near.frontier_cells[k][1]))
+            targets.append((Target(float(x), float(y), heading), seen))
             table[place] = (x - belief.pose[0], y - belief.pose[1], near.costs[k], clusters.sizes[k])
         np.clip(table, -FARTHEST, FARTHEST, out=table)
         return targets

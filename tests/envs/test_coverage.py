@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from lidarium.envs.coverage import ENTRY, count_bits, mark_seen, pack_bits, share_news, unpack_bits
 from lidarium.envs.exploration import floor_tables
+from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.floors.starts import swept_free_space
 from lidarium.envs.scorer import THRESHOLDS, Scorer
@@ -75,7 +76,7 @@ def test_counting_bits_is_exact_for_all_kinds_of_words():
 @pytest.mark.parametrize("resolution", [0.025, 0.05])
 @pytest.mark.parametrize("floor", ["apartment", "building:3"])
 def test_in_the_ideal_world_belief_and_mask_agree_to_the_cell(resolution, floor):
-    tables = floor_tables(floor, None, 0.025, 0.3, 0.52)
+    tables = floor_tables(load_floor(floor), 0.025, 0.3, 0.52)
     generator = np.random.default_rng(2)
     world = team(4, resolution)
     world.place(0, tables, starts_on(tables, 4, generator), 3)
@@ -93,7 +94,7 @@ def test_in_the_ideal_world_belief_and_mask_agree_to_the_cell(resolution, floor)
 
 @pytest.mark.parametrize("robots", [1, 2, 5])
 def test_credits_are_equal_shares_of_what_is_new_to_the_team(robots):
-    tables = floor_tables("building:3", None, 0.025, 0.3, 0.52)
+    tables = floor_tables(load_floor("building:3"), 0.025, 0.3, 0.52)
     generator = np.random.default_rng(robots)
     world = team(robots)
     world.place(0, tables, starts_on(tables, robots, generator), 3)
@@ -202,7 +203,7 @@ def test_a_coarse_cell_counts_only_where_all_its_fine_cells_do():
 
 def test_noise_changes_the_map_and_not_the_score():
     generator = np.random.default_rng(8)
-    tables = floor_tables("building:3", None, 0.025, 0.3, 0.52)
+    tables = floor_tables(load_floor("building:3"), 0.025, 0.3, 0.52)
     starts = starts_on(tables, 2, generator)
     exact, noisy = team(2), team(2, noise=0.03)
     exact.place(0, tables, starts, 1)

@@ -37,7 +37,8 @@ def test_every_drawn_floor_is_one_piece_for_the_largest_robot_with_three_starts(
             raster = floor.raster(resolution, 0.0, height)
             space = configuration_space(raster, 0.30)
             assert cv2.connectedComponents(space.astype(np.uint8), connectivity=4)[0] - 1 == 1
-            check_starts(raster, 0.5, floor.starts)
+            for start in floor.starts:
+                check_starts(raster, 0.5, start[None])
 
 
 def test_the_indoor_floors_are_as_large_as_they_say():

@@ -137,7 +137,11 @@ def test_more_robots_than_fit_are_refused_with_how_many_did():
 
 
 def test_starts_that_a_user_insists_on_must_fit_and_not_overlap():
-    check_starts(two_rooms(), 0.18, np.array([[1.0, 1.0, 0.0], [5.0, 1.0, 0.0]]))
+    check_starts(two_rooms(0.8), 0.18, np.array([[1.0, 1.0, 0.0], [5.0, 1.0, 0.0]]))
+    with pytest.raises(ValueError, match="disconnected"):
+        check_starts(two_rooms(), 0.18, np.array([[1.0, 1.0, 0.0], [5.0, 1.0, 0.0]]))
+    with pytest.raises(ValueError, match="nearer than the radius"):
+        check_starts(two_rooms(), 0.18, np.array([[0.175, 1.0, 0.0]]))
     with pytest.raises(ValueError, match="does not fit at start"):
         check_starts(two_rooms(), 0.18, np.array([[0.06, 1.0, 0.0]]))
     with pytest.raises(ValueError, match=r"robots 0 and 1 are 0\.100 m apart"):

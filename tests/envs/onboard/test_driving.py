@@ -37,7 +37,7 @@ class Drive:
         self.world.place(0, tables, np.array(starts, np.float64), 1)
         self.world.step(np.zeros((count, 2)), moves_bodies=False)
         robot = ROBOTS["kobuki"]
-        self.limits = np.array([robot.cruise_speed, 2.0, 0.8 * robot.max_acceleration])
+        self.limits = np.array([robot.cruise_speed, 2.0, 0.8 * robot.max_acceleration, 0.1])
         self.paths, self.margins = np.zeros((count, MAX_POINTS, 2)), np.full((count, MAX_POINTS), margin)
         self.counts = np.array([len(path) for path in paths])
         for k, path in enumerate(paths):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lidarium.envs.exploration import floor_tables
+from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic import ENDED, KNOWN_MATES, KinematicWorld
@@ -36,7 +37,7 @@ STATE = (
 
 @pytest.fixture(scope="module")
 def tables():
-    return floor_tables("building:3", None, 0.025, 0.3, 0.52)
+    return floor_tables(load_floor("building:3"), 0.025, 0.3, 0.52)
 
 
 def starts_on(tables, count, generator, apart=0.6):
@@ -112,7 +113,7 @@ def test_serial_and_parallel_kernels_agree_to_the_bit(tables):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_four_episodes_in_a_batch_are_four_worlds_alone(tables, threads):
     generator = np.random.default_rng(3)
-    other_floor = floor_tables("building:4", None, 0.025, 0.3, 0.52)
+    other_floor = floor_tables(load_floor("building:4"), 0.025, 0.3, 0.52)
     floors = [tables, other_floor, tables, other_floor]
     batch, alone = world(2, 4, noise=0.01, threads=threads), [world(2, noise=0.01) for _ in range(4)]
     for episode in range(4):
