@@ -27,6 +27,9 @@ BUNDLE, INNER_BUNDLE = 32, 8
 INSIDE = 1e-7
 """Beams that travel together stop this far before the border of a square [cells]."""
 
+SURE = 0.1
+"""Beams at least this far from both ends of a face's interval meet the face [beams]."""
+
 CORNER_OVERLAP = 1e-9
 """Faces reach this far beyond their corners, so that rounding leaves no gap between two of them [cells]."""
 
@@ -193,15 +196,23 @@ def _cast_by_squares(squares: Array, rows: int, columns: int, x: float, y: float
 
 
 @kernel(inline=True)
-def _draw_face(
+def _draw_end(
     first: int, last: int, distance: float, run: float, low: float, high: float, inverse: Array, direction: Array, ranges: Array
 ) -> None:
-    """Lower the ranges of beams ``first`` to ``last`` to a face at ``distance`` that spans low to high along its run."""
+    """Lower the ranges of those beams from ``first`` to ``last`` that meet a face which spans low to high along its run."""
     for beam in range(first, last + 1):
         candidate = distance * inverse[beam]
         along = run + candidate * direction[beam]
-        nearer = (along >= low) & (along <= high) & (candidate > 0.0) & (candidate < ranges[beam])
-        ranges[beam] = candidate if nearer else ranges[beam]
+        if low <= along <= high and 0.0 < candidate < ranges[beam]:
+            ranges[beam] = candidate
+
+
+@kernel(inline=True)
+def _draw_middle(first: int, last: int, distance: float, inverse: Array, ranges: Array) -> None:
+    """Lower the ranges of beams that meet a face for certain."""
+    for beam in range(first, last + 1):
+        candidate = distance * inverse[beam]
+        ranges[beam] = candidate if candidate < ranges[beam] else ranges[beam]
 
 
 @kernel
@@ -256,13 +267,18 @@ def _cast_by_faces(
                     other = 1 if along_rows else 0
                     low -= CORNER_OVERLAP
                     high += CORNER_OVERLAP
-                    # One beam more on each side: the exact test is the one along the face.
+                    # The fast angle is good to a hundredth of a beam: the beams between the ends meet the face for certain,
+                    # those at the ends are tested along it.
                     for lap in range(2):
-                        first = int(math.floor(begin - lap * turn)) - 1
-                        last = int(math.floor(begin - lap * turn + count)) + 2
-                        first, last = max(first, 0), min(last, beams - 1)
-                        if first <= last:
-                            _draw_face(first, last, distance, run_own, low, high, directions[row], directions[other], ranges)
+                        start = begin - lap * turn
+                        first, last = max(int(math.floor(start)) - 1, 0), min(int(math.floor(start + count)) + 2, beams - 1)
+                        if first > last:
+                            continue
+                        inner = min(max(int(math.ceil(start + SURE)), first), last + 1)
+                        outer = max(min(int(math.floor(start + count - SURE)), last), inner - 1)
+                        _draw_end(first, inner - 1, distance, run_own, low, high, directions[row], directions[other], ranges)
+                        _draw_middle(inner, outer, distance, directions[row], ranges)
+                        _draw_end(outer + 1, last, distance, run_own, low, high, directions[row], directions[other], ranges)
 
 
 @kernel
