@@ -36,6 +36,9 @@ STANDSTILL = 0.006
 MATE_GAP = 0.03
 """Gap that robots keep to each other [m]."""
 
+LEAST_MATE_GAP = 0.004
+"""Gap that the robot with the lower number keeps in passing where two stand nearer than that [m]."""
+
 SIDE_GAP = 0.0003
 """The swath that must be clear of returns is this much wider than the body on each side [m]."""
 
@@ -86,8 +89,9 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, radii: Array, for
             gap_y = poses[other, 1] + drift * math.sin(poses[other, 2]) - poses[robot, 1]
             x, y = cosine * gap_x + sine * gap_y, cosine * gap_y - sine * gap_x
             if x * x + y * y <= reach * reach:
-                # Nearer than robots should be: the only way is apart.
-                if x > 0.0:
+                # Nearer than robots should be: the one with the lower number may pass where it does not touch, else apart.
+                touching = radii[robot] + radii[other] + LEAST_MATE_GAP
+                if x > 0.0 and (robot > other or -touching < y < touching):
                     gap = 0.0
             elif x > 0.0 and -reach < y < reach:
                 gap = min(gap, x - math.sqrt(reach * reach - y * y))

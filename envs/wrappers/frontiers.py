@@ -1,6 +1,7 @@
 """Decisions by frontiers: a robot chooses among the frontiers that it can come near, cheapest way first."""
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,22 @@ MINIMUM_SIZE = 0.1
 """Shorter frontiers are offered only where there is no longer one [m]."""
 
 FARTHEST = 1000.0
+
+PATIENCE_S = 20.0
+"""A frontier is given up where its robot has not moved for this long [s]."""
+
+MOVED = 0.15
+"""What counts as having moved [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Effort:
+    """Where a robot stood when it last got on with a frontier, and since when [m, s]."""
+
+    cell: Cell
+    x: float
+    y: float
+    since_s: float
 
 
 class FrontierExploration(DecisionWrapper):
@@ -64,6 +81,7 @@ class FrontierExploration(DecisionWrapper):
         self._action_spaces = {agent: spaces.Discrete(CANDIDATES + 1) for agent in self.possible_agents}
         self._targets: dict[str, list[tuple[Target, Cell]]] = {}
         self._chosen: dict[str, tuple[Target, Cell] | None] = {}
+        self._efforts: dict[str, _Effort] = {}
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations."""
@@ -80,6 +98,7 @@ class FrontierExploration(DecisionWrapper):
         observations, infos = self.waypoints.reset(seed, options)
         self.agents = self.env.agents
         self._chosen = dict.fromkeys(self.possible_agents)
+        self._efforts = {}
         return self._with_candidates(observations), infos
 
     def step(
@@ -107,11 +126,27 @@ class FrontierExploration(DecisionWrapper):
         self.agents = self.env.agents
         for agent in self.env.agents:
             chosen = self._chosen[agent]
-            if chosen is not None and infos[agent]["drive"] in (DriveState.ARRIVED, DriveState.NO_PATH):
+            reason = None if chosen is None else self._why_in_vain(agent, chosen[1], infos[agent]["drive"])
+            if chosen is not None and reason is not None:
                 reach = default_reach(self._footprint, self.settings.occupancy.resolution)
                 self._navigation(agent).frontiers.ignore_near(chosen[1], reach)
-                infos[agent]["given_up"] = (chosen[0], "unseen" if infos[agent]["drive"] is DriveState.ARRIVED else "blocked")
+                infos[agent]["given_up"] = (chosen[0], reason)
         return self._with_candidates(observations), rewards, terminations, truncations, infos
+
+    def _why_in_vain(self, agent: str, cell: Cell, state: DriveState) -> str | None:
+        """Say why a chosen frontier is not worth more driving, or None."""
+        if state is DriveState.ARRIVED:
+            return "unseen"
+        if state is DriveState.NO_PATH:
+            return "blocked"
+        x, y = (float(value) for value in self.env.perception.belief(agent).pose[:2])
+        time = self.env.scorer.time
+        old = self._efforts.get(agent)
+        if old is None or old.cell != cell or math.dist((old.x, old.y), (x, y)) > MOVED or state is DriveState.GIVING_WAY:
+            self._efforts[agent] = _Effort(cell, x, y, time)
+        elif time - old.since_s > PATIENCE_S:
+            return "no_progress"
+        return None
 
     def _navigation(self, agent: str) -> NavigationMap:
         belief = self.env.perception.belief(agent)

@@ -37,7 +37,7 @@ class StopsAfter:
 def test_a_policy_that_chooses_among_frontiers_explores_the_apartment():
     env = ExplorationEnv("apartment", make_settings(robots=2, horizon_s=900.0))
     episode = run_episode(FirstFrontier(), env, seed=0)
-    assert env.scorer.coverage >= 0.97
+    assert env.scorer.coverage >= 0.98
     assert set(env.scorer.ended_because) == {"robot_0", "robot_1"}
     assert env.world.collisions.sum() == 0
     assert len(episode.decision_seconds) > 5
