@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents import make_policy
 from lidarium.envs.exploration import ExplorationEnv, floor_tables
-from lidarium.envs.floors.catalogue import floor_names
+from lidarium.envs.floors.catalogue import floor_names, load_floor
 from lidarium.envs.floors.starts import draw_starts
 from lidarium.envs.settings import make_settings
 from lidarium.evaluation.runner import run_episode
@@ -29,7 +29,7 @@ GOAL = 0.99
 def drawn_starts(env: ExplorationEnv, floor: str, seed: int) -> NDArray[np.float64]:
     """Draw where the robots start, (robots, 3) [m, rad]; the starts that come with the floor would be the same for every seed."""
     settings = env.settings
-    tables = floor_tables(floor, None, settings.raster_resolution, settings.lidar.height, settings.robot.height)
+    tables = floor_tables(load_floor(floor), settings.raster_resolution, settings.lidar.height, settings.robot.height)
     return draw_starts(tables.body, settings.robot.radius, settings.robots, np.random.default_rng(seed))
 
 

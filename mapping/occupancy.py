@@ -76,10 +76,18 @@ def _raise_hits(
     """Raise the cells in which a beam ended, once each, and take them out of the seen area."""
     hit, maximum = increments[0], increments[3]
     rows, columns = log_odds.shape
-    for beam in range(is_hit.shape[0]):
-        if not is_hit[beam]:
-            continue
-        column, row = int(ends[0, beam]), int(ends[1, beam])
+    beams = is_hit.shape[0]
+    hit_rows, hit_columns, listed = np.empty(beams + 1, np.int64), np.empty(beams + 1, np.int64), 0
+    last_row, last_column = -1, -1
+    for beam in range(beams):
+        # Neighbouring beams often end in the same cell; they are listed once, without a branch that could not be foreseen.
+        row, column = int(ends[1, beam]), int(ends[0, beam])
+        hit_rows[listed], hit_columns[listed] = row, column
+        is_new = is_hit[beam] & ((row != last_row) | (column != last_column))
+        listed += 1 if is_new else 0
+        last_row, last_column = row if is_new else last_row, column if is_new else last_column
+    for k in range(listed):
+        row, column = hit_rows[k], hit_columns[k]
         word, place = column >> 6, np.uint64(column & 63)
         bit = np.uint64(1) << place
         before = hit_bits[row, word]
@@ -87,7 +95,6 @@ def _raise_hits(
         bits[row, word] &= ~bit
         map_row, map_column = row + row_offset, column + column_offset
         if 0 <= map_row < rows and 0 <= map_column < columns:
-            # Nothing is added for a second beam in the same cell; a branch on it could not be foreseen.
             is_first = np.int64(np.uint64(1) - ((before >> place) & np.uint64(1)))
             log_odds[map_row, map_column] = min(log_odds[map_row, map_column] + hit * is_first, maximum)
 

@@ -123,6 +123,7 @@ def fill_scan_polygon(
     for beam in range(beams):
         low_row, high_row = min(low_row, rows[beam]), max(high_row, rows[beam])
         low_column, high_column = min(low_column, columns[beam]), max(high_column, columns[beam])
+    toggles, listed, width = np.empty(2 * beams + 2, np.int64), 0, 64 * bits.shape[1]
     for beam in range(0 if is_full_circle else 1, beams):
         length = lengths[beam]
         row = rows[beam]
@@ -134,21 +135,24 @@ def fill_scan_polygon(
             else:
                 _toggle_jump(bits, lengths, directions, ends, x, y, beam, previous)
         elif -2 <= climb <= 2:
-            # Most edges cross two rows, one or none: toggled without branches, which could not be foreseen.
+            # Most edges cross two rows, one or none. What they toggle is listed without branches, which could not be foreseen.
             crossed = min(row, last_row)
             from_x, from_y = ends[0, previous], ends[1, previous]
             rise = ends[1, beam] - from_y if climb != 0 else 1.0
             slope = (ends[0, beam] - from_x) / rise
             at = from_x + (crossed + 0.5 - from_y) * slope + 0.5
             second = abs(climb) >> 1
-            column = int(at)
-            bits[crossed, column >> 6] ^= np.uint64((climb & 1) | second) << np.uint64(column & 63)
-            column = int(at + slope * second)
-            bits[crossed + second, column >> 6] ^= np.uint64(second) << np.uint64(column & 63)
+            toggles[listed] = crossed * width + int(at)
+            listed += (climb & 1) | second
+            toggles[listed] = (crossed + 1) * width + int(at + slope)
+            listed += second
         else:
             _toggle_edge(bits, ends[0, previous], ends[1, previous], ends[0, beam], ends[1, beam], last_row, row)
         last_length, last_row = length, row
         previous = beam
+    flat = bits.reshape(-1)
+    for k in range(listed):
+        flat[toggles[k] >> 6] ^= np.uint64(1) << np.uint64(toggles[k] & 63)
     row_low, row_high = max(int(low_row) - 2, 0), min(int(high_row) + 2, bits.shape[0])
     word_low, word_high = max(int(low_column) - 1, 0) >> 6, min((int(high_column) + 2) >> 6, bits.shape[1] - 1) + 1
     for i in range(row_low, row_high):
