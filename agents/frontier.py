@@ -6,6 +6,7 @@ and gives way; all stop together when none has work, each with its reason.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -50,7 +51,7 @@ class _Work:
     failed_at: Cell | None = None
 
 
-class FrontierExplorer:
+class FrontierExplorer(ABC):
     """What the frontier explorers share; a subclass chooses.
 
     Parameters
@@ -95,9 +96,9 @@ class FrontierExplorer:
         still = [entry for entry, navigation, cell in self._given_up if navigation.frontiers.flags[cell] == IGNORED]
         return still + self._unreached
 
+    @abstractmethod
     def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
         """Choose for the agents that need a target, or for all; the others keep theirs."""
-        raise NotImplementedError
 
     def replans(self) -> bool:
         """Whether all choices are reconsidered now, although every robot has one."""
