@@ -202,7 +202,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     self._commands[self._rows[agent]] = 0.0
                     continue
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-            shares = np.asarray(action, np.float64)
+            shares = action if isinstance(action, np.ndarray) else np.asarray(action, np.float64)
             if shares.shape != (2,):
                 raise ValueError(f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and turn rate")
             self._commands[self._rows[agent]] = shares
