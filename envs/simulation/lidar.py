@@ -19,7 +19,10 @@ from lidarium.mapping.kernels import Array, bytes_at, int32_table_at, kernel
 from lidarium.mapping.scans import ScanGeometry, beam_directions, beams_towards
 
 FACE_LIMIT = 420
-"""Most faces in reach for which the face caster runs: estimated from the time of a face and of a scan, not swept; both casters give the same ranges."""
+"""Most faces in reach for which the face caster runs.
+
+Estimated from the time of a face and of a scan, not swept; both casters give the same ranges.
+"""
 
 BUNDLE, INNER_BUNDLE = 32, 8
 """Neighbouring beams that travel together for as long as free squares hold them all, first the more, then the fewer."""
