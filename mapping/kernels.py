@@ -98,7 +98,8 @@ def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False
     """
 
     def decorate(target: Callable[..., Any]) -> Any:  # noqa: ANN401
-        options: dict[str, Any] = {"nogil": True, "fastmath": False, "parallel": parallel, "cache": _CAN_CACHE}
+        # Division by zero gives inf or nan, as in numpy: a check before each division would keep loops off vector registers.
+        options: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "parallel": parallel, "cache": _CAN_CACHE}
         if inline:
             options["forceinline"] = True
         previous = _numba_config.CACHE_DIR

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarium.mapping.cell_blocks import update_block
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import ScanGeometry, beam_directions
@@ -60,76 +61,13 @@ class OccupancySettings:
         return np.array([round(value / LOG_ODDS_UNIT) for value in (self.hit, self.miss, self.minimum, self.maximum)], np.int64)
 
 
-def _byte_masks() -> NDArray[np.uint64]:
-    """For each byte of bits, eight bytes that are 255 where the bit is set."""
-    bits = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little")
-    return np.ascontiguousarray(bits * np.uint8(255)).view("<u8")[:, 0].astype(np.uint64)
-
-
-BYTE_MASKS = _byte_masks()
-
-
 @kernel
-def _raise_hits(
-    log_odds: Array, ends: Array, is_hit: Array, row_offset: int, column_offset: int, increments: Array, bits: Array, hit_bits: Array
-) -> None:
-    """Raise the cells in which a beam ended, once each, and take them out of the seen area."""
-    hit, maximum = increments[0], increments[3]
-    rows, columns = log_odds.shape
-    beams = is_hit.shape[0]
-    hit_rows, hit_columns, listed = np.empty(beams + 1, np.int64), np.empty(beams + 1, np.int64), 0
-    last_row, last_column = -1, -1
-    for beam in range(beams):
-        # Neighbouring beams often end in the same cell; they are listed once, without a branch that could not be foreseen.
+def _note_hits(ends: Array, is_hit: Array, hit_bits: Array) -> None:
+    """Set the bits of the cells in which beams ended."""
+    flat, words = hit_bits.reshape(-1), hit_bits.shape[1]
+    for beam in range(is_hit.shape[0]):
         row, column = int(ends[1, beam]), int(ends[0, beam])
-        hit_rows[listed], hit_columns[listed] = row, column
-        is_new = is_hit[beam] & ((row != last_row) | (column != last_column))
-        listed += 1 if is_new else 0
-        last_row, last_column = row if is_new else last_row, column if is_new else last_column
-    for k in range(listed):
-        row, column = hit_rows[k], hit_columns[k]
-        word, place = column >> 6, np.uint64(column & 63)
-        bit = np.uint64(1) << place
-        before = hit_bits[row, word]
-        hit_bits[row, word] = before | bit
-        bits[row, word] &= ~bit
-        map_row, map_column = row + row_offset, column + column_offset
-        if 0 <= map_row < rows and 0 <= map_column < columns:
-            is_first = np.int64(np.uint64(1) - ((before >> place) & np.uint64(1)))
-            log_odds[map_row, map_column] = min(log_odds[map_row, map_column] + hit * is_first, maximum)
-
-
-@kernel
-def _lower_seen(
-    log_odds: Array, bits: Array, box: tuple[int, int, int, int], row_offset: int, column_offset: int, increments: Array, byte_masks: Array
-) -> None:
-    """Lower the seen cells in whole blocks of 64 under a byte mask."""
-    miss, minimum = np.int8(increments[1]), np.int8(increments[2])
-    threshold = np.int8(increments[1] + increments[2])
-    masks = np.empty(8, np.uint64)
-    selected = masks.view(np.uint8)
-    words = log_odds.shape[1] // 64
-    word_offset = column_offset // 64
-    full = ~np.uint64(0)
-    word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
-    for row in range(max(box[0], -row_offset), min(box[1], log_odds.shape[0] - row_offset)):
-        for word in range(word_low, word_high):
-            value = bits[row, word]
-            if value == np.uint64(0):
-                continue
-            first = (word + word_offset) * 64
-            block = log_odds[row + row_offset, first : first + 64]
-            if value == full:
-                for k in range(64):
-                    old = block[k]
-                    block[k] = np.int8(old - miss) if old > threshold else minimum
-            else:
-                for k in range(8):
-                    masks[k] = byte_masks[(value >> np.uint64(8 * k)) & np.uint64(255)]
-                for k in range(64):
-                    old = block[k]
-                    new = np.int8(old - miss) if old > threshold else minimum
-                    block[k] = new if selected[k] != 0 else old
+        flat[np.uintp(row * words + (column >> 6))] |= np.uint64(is_hit[beam]) << np.uint64(column & 63)
 
 
 @kernel
@@ -142,30 +80,36 @@ def integrate_scan(
     row_offset: int,
     column_offset: int,
     increments: Array,
-    byte_masks: Array,
     hit_bits: Array,
 ) -> None:
-    """Update a map by a scan whose seen area is in ``bits``.
+    """Update a map by a scan: lower the seen cells, raise those in which beams ended, each once.
 
     Parameters
     ----------
     log_odds : (rows, columns) int8
         The map; columns a multiple of 64.
     bits, hit_bits : (window rows, words) uint64
-        The seen area of ``fill_scan_polygon`` (the cells of hits are taken out), and zeros (the hits are noted).
+        The seen area of ``fill_scan_polygon``, and zeros (the hits are noted).
     box : tuple of int
-        The box of the window that may hold bits.
+        The box of the window that may hold bits; the ends of the beams lie in it.
     ends, is_hit : (2, beams) float64 and (beams,) bool
         End points of the beams in the window [cells], and whether something ended them.
     row_offset, column_offset : int
         Place of the window's first cell in the map; column_offset a multiple of 64.
     increments : (4,) int64
         ``OccupancySettings.increments``.
-    byte_masks : (256,) uint64
-        ``BYTE_MASKS``.
     """
-    _raise_hits(log_odds, ends, is_hit, row_offset, column_offset, increments, bits, hit_bits)
-    _lower_seen(log_odds, bits, box, row_offset, column_offset, increments, byte_masks)
+    _note_hits(ends, is_hit, hit_bits)
+    hit, miss, minimum, maximum = increments[0], increments[1], increments[2], increments[3]
+    rows, columns = log_odds.shape
+    words, word_offset = columns // WORD, column_offset // WORD
+    word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
+    for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
+        address = log_odds.ctypes.data + (row + row_offset) * columns + word_offset * WORD
+        for word in range(word_low, word_high):
+            seen, hits = bits[row, word], hit_bits[row, word]
+            if seen | hits != np.uint64(0):
+                update_block(address + word * WORD, seen, hits, hit, miss, minimum, maximum)
 
 
 @kernel
@@ -178,7 +122,6 @@ def _integrate_one(
     geometry: tuple[float, float, float, float],
     unit_vectors: Array,
     increments: Array,
-    byte_masks: Array,
     window: Array,
 ) -> None:
     """Update a map by one scan at x, y [cells]; ``geometry`` is (increment, range_max [cells], cells per metre, full circle)."""
@@ -201,7 +144,7 @@ def _integrate_one(
     box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, geometry[0], geometry[3] != 0.0, bits)
     window[0], window[1] = box[0] + row_offset, box[1] + row_offset
     window[2], window[3] = 64 * box[2] + column_offset, 64 * box[3] + column_offset
-    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, byte_masks, np.zeros_like(bits))
+    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, np.zeros_like(bits))
 
 
 class OccupancyGrid:
@@ -292,9 +235,7 @@ class OccupancyGrid:
         window = np.zeros(4, np.int64)
         numbers = (geometry.angle_increment, reach / resolution, 1.0 / resolution, float(geometry.is_full_circle))
         grid_x, grid_y = x / resolution - self._first_column, y / resolution - self._first_row
-        _integrate_one(
-            self.log_odds, grid_x, grid_y, theta, scan, numbers, geometry.unit_vectors, self.settings.increments, BYTE_MASKS, window
-        )
+        _integrate_one(self.log_odds, grid_x, grid_y, theta, scan, numbers, geometry.unit_vectors, self.settings.increments, window)
         rows, columns = self.log_odds.shape
         low_row, high_row, low_column, high_column = (int(value) for value in window)
         return max(low_row - 1, 0), min(high_row + 1, rows), max(low_column, 0), min(high_column, columns)

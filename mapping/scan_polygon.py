@@ -17,6 +17,9 @@ from lidarium.mapping.kernels import Array, kernel
 GRAZING = 8.0
 """Cotangent of the flattest angle under which two neighbouring end points still belong to one surface."""
 
+LONG = np.uint8(255)
+"""Mark of an edge that is walked row by row."""
+
 
 @kernel(inline=True)
 def window_words(reach: float) -> int:
@@ -36,9 +39,10 @@ def _toggle_edge(bits: Array, from_x: float, from_y: float, to_x: float, to_y: f
     slope = (to_x - from_x) / (to_y - from_y)
     first, last = min(from_row, to_row), max(from_row, to_row)
     x = from_x + (first + 0.5 - from_y) * slope + 0.5
-    for row in range(first, last):
-        column = int(x)
-        bits[row, column >> 6] ^= np.uint64(1) << np.uint64(column & 63)
+    flat, width = bits.reshape(-1), 64 * bits.shape[1]
+    for start in range(first * width, last * width, width):
+        place = start + int(x)
+        flat[np.uintp(place >> 6)] ^= np.uint64(1) << np.uint64(place & 63)
         x += slope
 
 
@@ -82,6 +86,51 @@ def _toggle_jump(bits: Array, lengths: Array, directions: Array, ends: Array, x:
 
 
 @kernel
+def _toggle_between(
+    bits: Array, lengths: Array, directions: Array, ends: Array, x: float, y: float, previous: int, beam: int, steepness: float
+) -> None:
+    """Toggle the outline between the end points of two neighbouring beams."""
+    step = lengths[beam] - lengths[previous]
+    if abs(step) > 1.0 + steepness * min(lengths[beam], lengths[previous]):
+        near, far = (previous, beam) if step > 0.0 else (beam, previous)
+        _toggle_jump(bits, lengths, directions, ends, x, y, near, far)
+        return
+    from_row, to_row = _row_of(ends[1, previous]), _row_of(ends[1, beam])
+    if from_row != to_row:
+        _toggle_edge(bits, ends[0, previous], ends[1, previous], ends[0, beam], ends[1, beam], from_row, to_row)
+
+
+@kernel
+def _edges(lengths: Array, ends: Array, rows: Array, steepness: float, width: int) -> tuple[Array, Array, Array]:
+    """How many rows the edge from each beam to the next crosses (``LONG`` for more than two, or a jump), and the bits it toggles in them.
+
+    Loops without branches over few arrays, which LLVM runs on vectors.
+    """
+    edges = lengths.shape[0] - 1
+    from_x, to_x, from_y, to_y = ends[0, :-1], ends[0, 1:], ends[1, :-1], ends[1, 1:]
+    from_row, to_row, from_length, to_length = rows[:-1], rows[1:], lengths[:-1], lengths[1:]
+    crossed = np.empty(edges, np.uint8)
+    for k in range(edges):
+        step = abs(to_length[k] - from_length[k])
+        climb = abs(to_row[k] - from_row[k])
+        is_short = (step <= 1.0 + steepness * min(from_length[k], to_length[k])) & (climb <= 2)
+        crossed[k] = np.uint8(climb) if is_short else LONG
+    slopes, crossings = np.empty(edges), np.empty(edges)
+    for k in range(edges):
+        slopes[k] = (to_x[k] - from_x[k]) / (to_y[k] - from_y[k])
+    for k in range(edges):
+        crossings[k] = from_x[k] + (min(from_row[k], to_row[k]) + 0.5 - from_y[k]) * slopes[k] + 0.5
+    places = np.empty((2, edges), np.int32)
+    first, second = places[0], places[1]
+    stride = np.int32(width)
+    for k in range(edges):
+        first[k] = min(from_row[k], to_row[k]) * stride + np.int32(crossings[k])
+    for k in range(edges):
+        second[k] = (min(from_row[k], to_row[k]) + np.int32(1)) * stride + np.int32(crossings[k] + slopes[k])
+    return crossed, first, second
+
+
+@kernel
 def fill_scan_polygon(
     lengths: Array, directions: Array, ends: Array, x: float, y: float, increment: float, is_full_circle: bool, bits: Array
 ) -> tuple[int, int, int, int]:
@@ -112,47 +161,31 @@ def fill_scan_polygon(
             end_row = _row_of(ends[1, beam])
             if end_row != own_row:
                 _toggle_edge(bits, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
-    steepness = GRAZING * increment
-    previous = beams - 1 if is_full_circle else 0
-    last_length, last_row = lengths[previous], _row_of(ends[1, previous])
     rows, columns = np.empty(beams, np.int32), np.empty(beams, np.int32)
     for beam in range(beams):
-        rows[beam] = _row_of(ends[1, beam])
-        columns[beam] = int(ends[0, beam])
+        rows[beam], columns[beam] = np.int32(ends[1, beam] + 0.5), np.int32(ends[0, beam])
     low_row, high_row, low_column, high_column = np.int32(y), np.int32(y), np.int32(x), np.int32(x)
     for beam in range(beams):
         low_row, high_row = min(low_row, rows[beam]), max(high_row, rows[beam])
         low_column, high_column = min(low_column, columns[beam]), max(high_column, columns[beam])
-    toggles, listed, width = np.empty(2 * beams + 2, np.int64), 0, 64 * bits.shape[1]
-    for beam in range(0 if is_full_circle else 1, beams):
-        length = lengths[beam]
-        row = rows[beam]
-        step = length - last_length
-        climb = row - last_row
-        if abs(step) > 1.0 + steepness * min(length, last_length):
-            if step > 0.0:
-                _toggle_jump(bits, lengths, directions, ends, x, y, previous, beam)
-            else:
-                _toggle_jump(bits, lengths, directions, ends, x, y, beam, previous)
-        elif -2 <= climb <= 2:
-            # Most edges cross two rows, one or none. What they toggle is listed without branches, which could not be foreseen.
-            crossed = min(row, last_row)
-            from_x, from_y = ends[0, previous], ends[1, previous]
-            rise = ends[1, beam] - from_y if climb != 0 else 1.0
-            slope = (ends[0, beam] - from_x) / rise
-            at = from_x + (crossed + 0.5 - from_y) * slope + 0.5
-            second = abs(climb) >> 1
-            toggles[listed] = crossed * width + int(at)
-            listed += (climb & 1) | second
-            toggles[listed] = (crossed + 1) * width + int(at + slope)
-            listed += second
-        else:
-            _toggle_edge(bits, ends[0, previous], ends[1, previous], ends[0, beam], ends[1, beam], last_row, row)
-        last_length, last_row = length, row
-        previous = beam
+    steepness = GRAZING * increment
+    if is_full_circle:
+        _toggle_between(bits, lengths, directions, ends, x, y, beams - 1, 0, steepness)
+    crossed, first, second = _edges(lengths, ends, rows, steepness, 64 * bits.shape[1])
+    toggles, listed = np.empty(2 * beams + 2, np.int32), np.uintp(0)
+    for k in range(beams - 1):
+        count = crossed[k]
+        if count == LONG:
+            _toggle_between(bits, lengths, directions, ends, x, y, k, k + 1, steepness)
+            continue
+        # Most edges cross two rows, one or none. What they toggle is listed without branches, which could not be foreseen.
+        toggles[listed] = first[k]
+        listed += np.uintp((count + 1) >> 1)
+        toggles[listed] = second[k]
+        listed += np.uintp(count >> 1)
     flat = bits.reshape(-1)
     for k in range(listed):
-        flat[toggles[k] >> 6] ^= np.uint64(1) << np.uint64(toggles[k] & 63)
+        flat[np.uintp(toggles[k] >> 6)] ^= np.uint64(1) << np.uint64(toggles[k] & 63)
     row_low, row_high = max(int(low_row) - 2, 0), min(int(high_row) + 2, bits.shape[0])
     word_low, word_high = max(int(low_column) - 1, 0) >> 6, min((int(high_column) + 2) >> 6, bits.shape[1] - 1) + 1
     for i in range(row_low, row_high):

@@ -77,13 +77,34 @@ def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> N
 
 
 @kernel(inline=True)
+def fast_angle(y: float, x: float) -> float:
+    """Angle of (x, y) to within 2e-5 rad [rad], after Abramowitz and Stegun 4.4.49."""
+    absolute_x, absolute_y = abs(x), abs(y)
+    larger, smaller = max(absolute_x, absolute_y), min(absolute_x, absolute_y)
+    if larger == 0.0:
+        return 0.0
+    z = smaller / larger
+    square = z * z
+    angle = z * (0.9998660 + square * (-0.3302995 + square * (0.1801410 + square * (-0.0851330 + square * 0.0208351))))
+    if absolute_y > absolute_x:
+        angle = 0.5 * math.pi - angle
+    if x < 0.0:
+        angle = math.pi - angle
+    return -angle if y < 0.0 else angle
+
+
+@kernel(inline=True)
 def beams_towards(
     offset_x: float, offset_y: float, radius: float, heading: float, angle_first: float, increment: float
 ) -> tuple[float, float]:
-    """Beams that a disc at an offset from the laser may meet: the first (not rounded) and how many; the next lap is a turn later."""
-    distance = math.sqrt(offset_x * offset_x + offset_y * offset_y)
-    half = math.asin(radius / distance) if radius < distance else math.pi
-    begin = (math.atan2(offset_y, offset_x) - half - heading - angle_first) / increment
+    """Beams that a disc at an offset from the laser may meet: the first (not rounded) and how many; the next lap is a turn later.
+
+    Good to a few thousandths of a beam's gap at a third of a degree; a caller that must miss none looks one beam further.
+    """
+    squared = offset_x * offset_x + offset_y * offset_y
+    beyond = squared - radius * radius
+    half = fast_angle(radius, math.sqrt(beyond)) if beyond > 0.0 else math.pi
+    begin = (fast_angle(offset_y, offset_x) - half - heading - angle_first) / increment
     turn = 2.0 * math.pi / increment
     begin -= turn * math.floor(begin / turn)
     return begin, 2.0 * half / increment

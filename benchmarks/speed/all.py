@@ -1,7 +1,8 @@
 """Run all speed benchmarks in one go and write docs/results/speed.md and speed.json.
 
 The peers take part where they are installed: IR-SIM and PyBullet in this interpreter (``pip install ".[bench]"``), VMAS in
-this one or in the interpreter that LIDARIUM_VMAS_PYTHON names. Everything runs in turn on one core.
+this one or in the interpreter that LIDARIUM_VMAS_PYTHON names, f1tenth's scan simulator from the file that LIDARIUM_F1TENTH
+names. Everything runs in turn on one core.
 """
 
 import argparse

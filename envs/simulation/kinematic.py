@@ -21,7 +21,7 @@ from lidarium.envs.simulation.noise import GAUSSIAN_TABLE
 from lidarium.envs.simulation.robots import Robot
 from lidarium.envs.simulation.stages import perceive_parallel, perceive_serial, step_parallel, step_serial
 from lidarium.envs.simulation.world import Sensed
-from lidarium.mapping.occupancy import BYTE_MASKS, WORD, OccupancySettings
+from lidarium.mapping.occupancy import WORD, OccupancySettings
 from lidarium.mapping.scan_polygon import window_rows, window_words
 
 TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME = 1, 2, 4, 8
@@ -237,7 +237,7 @@ class KinematicWorld:
         self._step(
             self.robots, self._floor_rows, self._frames, self.bodies, self.moves, self.poses, self.velocities, self.starts, self.believed,
             commands, self._sensor, self._unit_vectors, self.seeds, self.steps, GAUSSIAN_TABLE, self.flags, self.ranges, self.belief_rows,
-            self.origins, self.windows, self._increments, BYTE_MASKS, self._mask_rows, self._news, self._entries, self.seen, self.gains,
+            self.origins, self.windows, self._increments, self._mask_rows, self._news, self._entries, self.seen, self.gains,
             self.team_seen, self.bumpers, self.contacts, self.travelled, self.collisions, moves_bodies, perceives,
         )  # fmt: skip
         self.steps += 1
@@ -252,7 +252,7 @@ class KinematicWorld:
         """Run stage two alone: update the maps from ``ranges`` at the believed poses."""
         self._perceive(
             self.robots, self.bodies, self.believed, self._sensor, self._unit_vectors, self.flags, self.ranges, self.belief_rows,
-            self.origins, self.windows, self._increments, BYTE_MASKS,
+            self.origins, self.windows, self._increments,
         )  # fmt: skip
 
     def coverage(self, episode: int) -> float:

@@ -16,12 +16,13 @@ import numpy as np
 
 from lidarium.envs.simulation.ray_tables import TILE
 from lidarium.mapping.kernels import Array, bytes_at, int32_table_at, kernel
-from lidarium.mapping.scans import ScanGeometry, beam_directions, beams_towards
+from lidarium.mapping.scans import ScanGeometry, beam_directions, beams_towards, fast_angle
 
-FACE_LIMIT = 420
-"""Most faces in reach for which the face caster runs.
+FACES, FACES_PER_BEAM = 300, 1.4
+"""Most faces in reach for which the face caster runs, alone and for each beam.
 
-Estimated from the time of a face and of a scan, not swept; both casters give the same ranges.
+A face costs the same whatever the number of beams, a beam that travels does not: the two casters took equal time at about 550
+faces with 180 beams and at 1,300 with 720, over drawn, generated and real floors. Both give the same ranges.
 """
 
 BUNDLE, INNER_BUNDLE = 32, 8
@@ -29,9 +30,6 @@ BUNDLE, INNER_BUNDLE = 32, 8
 
 INSIDE = 1e-7
 """Beams that travel together stop this far before the border of a square [cells]."""
-
-SURE = 0.1
-"""Beams at least this far from both ends of a face's interval meet the face [beams]."""
 
 CORNER_OVERLAP = 1e-9
 """Faces reach this far beyond their corners, so that rounding leaves no gap between two of them [cells]."""
@@ -64,23 +62,6 @@ class Lidar(ScanGeometry):
     def is_noisy(self) -> bool:
         """Whether ranges carry noise."""
         return self.noise_floor > 0.0 or self.noise_share > 0.0
-
-
-@kernel(inline=True)
-def _fast_angle(y: float, x: float) -> float:
-    """Angle of (x, y) to within 2e-5 rad [rad], after Abramowitz and Stegun 4.4.49."""
-    absolute_x, absolute_y = abs(x), abs(y)
-    larger, smaller = max(absolute_x, absolute_y), min(absolute_x, absolute_y)
-    if larger == 0.0:
-        return 0.0
-    z = smaller / larger
-    square = z * z
-    angle = z * (0.9998660 + square * (-0.3302995 + square * (0.1801410 + square * (-0.0851330 + square * 0.0208351))))
-    if absolute_y > absolute_x:
-        angle = 0.5 * math.pi - angle
-    if x < 0.0:
-        angle = math.pi - angle
-    return -angle if y < 0.0 else angle
 
 
 @kernel(inline=True)
@@ -199,23 +180,18 @@ def _cast_by_squares(squares: Array, rows: int, columns: int, x: float, y: float
 
 
 @kernel(inline=True)
-def _draw_end(
+def _draw_face(
     first: int, last: int, distance: float, run: float, low: float, high: float, inverse: Array, direction: Array, ranges: Array
 ) -> None:
     """Lower the ranges of those beams from ``first`` to ``last`` that meet a face which spans low to high along its run."""
-    for beam in range(first, last + 1):
-        candidate = distance * inverse[beam]
-        along = run + candidate * direction[beam]
-        if low <= along <= high and 0.0 < candidate < ranges[beam]:
-            ranges[beam] = candidate
-
-
-@kernel(inline=True)
-def _draw_middle(first: int, last: int, distance: float, inverse: Array, ranges: Array) -> None:
-    """Lower the ranges of beams that meet a face for certain."""
-    for beam in range(first, last + 1):
-        candidate = distance * inverse[beam]
-        ranges[beam] = candidate if candidate < ranges[beam] else ranges[beam]
+    if first > last:
+        return
+    inverses, directions, nearest = inverse[first : last + 1], direction[first : last + 1], ranges[first : last + 1]
+    for k in range(nearest.size):
+        candidate = distance * inverses[k]
+        along = run + candidate * directions[k]
+        is_met = (low <= along) & (along <= high) & (candidate > 0.0) & (candidate < nearest[k])
+        nearest[k] = candidate if is_met else nearest[k]
 
 
 @kernel
@@ -237,7 +213,9 @@ def _cast_by_faces(
     beams = ranges.shape[0]
     for beam in range(beams):
         ranges[beam] = reach
-    turn = 2.0 * math.pi / increment
+    beams_per_radian = 1.0 / increment
+    turn = 2.0 * math.pi * beams_per_radian
+    turns_per_beam = 1.0 / turn
     for tile_row in range(window[0], window[1] + 1):
         for tile_column in range(window[2], window[3] + 1):
             group = (tile_row * tile_columns + tile_column) * 4
@@ -245,6 +223,10 @@ def _cast_by_faces(
                 along_rows = direction < 2
                 forward = direction & 1 == 0
                 fixed_own, run_own = (x, y) if along_rows else (y, x)
+                # A tile that lies behind shows no face that looks this way.
+                border = (tile_column if along_rows else tile_row) * TILE + (TILE if forward else 0)
+                if forward != (border > fixed_own):
+                    continue
                 for k in range(starts[group + direction], starts[group + direction + 1]):
                     distance = faces[k, 0] - fixed_own
                     if forward != (distance > 0.0) or abs(distance) >= reach:
@@ -254,34 +236,29 @@ def _cast_by_faces(
                     if distance * distance + sideways * sideways >= reach * reach:
                         continue
                     if along_rows:
-                        angle_low, angle_high = _fast_angle(low - y, distance), _fast_angle(high - y, distance)
+                        angle_low, angle_high = fast_angle(low - y, distance), fast_angle(high - y, distance)
                     else:
-                        angle_low, angle_high = _fast_angle(distance, low - x), _fast_angle(distance, high - x)
+                        angle_low, angle_high = fast_angle(distance, low - x), fast_angle(distance, high - x)
                     # Seen from inside, the low end is the clockwise one on the right and below.
                     if forward != along_rows:
                         angle_low, angle_high = angle_high, angle_low
                     span = angle_high - angle_low
                     if span < 0.0:
                         span += 2.0 * math.pi
-                    begin = (angle_low - heading - angle_first) / increment
-                    begin -= turn * math.floor(begin / turn)
-                    count = span / increment
+                    begin = (angle_low - heading - angle_first) * beams_per_radian
+                    begin -= turn * math.floor(begin * turns_per_beam)
+                    count = span * beams_per_radian
                     row = 2 if along_rows else 3
                     other = 1 if along_rows else 0
                     low -= CORNER_OVERLAP
                     high += CORNER_OVERLAP
-                    # The fast angle is good to a hundredth of a beam: the beams between the ends meet the face for certain,
-                    # those at the ends are tested along it.
+                    # The fast angle is good to a hundredth of a beam: one more beam on each side holds all that meet the face.
                     for lap in range(2):
                         start = begin - lap * turn
-                        first, last = max(int(math.floor(start)) - 1, 0), min(int(math.floor(start + count)) + 2, beams - 1)
-                        if first > last:
-                            continue
-                        inner = min(max(int(math.ceil(start + SURE)), first), last + 1)
-                        outer = max(min(int(math.floor(start + count - SURE)), last), inner - 1)
-                        _draw_end(first, inner - 1, distance, run_own, low, high, directions[row], directions[other], ranges)
-                        _draw_middle(inner, outer, distance, directions[row], ranges)
-                        _draw_end(outer + 1, last, distance, run_own, low, high, directions[row], directions[other], ranges)
+                        first, last = max(int(start) - 1, 0), min(int(start + count) + 2, beams - 1)
+                        _draw_face(first, last, distance, run_own, low, high, directions[row], directions[other], ranges)
+                        if begin + count + 3.0 < turn:
+                            break
 
 
 @kernel
@@ -318,7 +295,7 @@ def cast_scan(
         first = (tile_row * tile_columns + window[2]) * 4
         last = (tile_row * tile_columns + window[3]) * 4 + 4
         in_reach += starts[last] - starts[first]
-    if in_reach <= FACE_LIMIT:
+    if in_reach <= FACES + FACES_PER_BEAM * ranges.shape[0]:
         faces = int32_table_at(tables[3], tables[4], 3)
         _cast_by_faces(faces, starts, tile_columns, window, x, y, heading, angle_first, increment, directions, reach, ranges)
     else:

@@ -104,8 +104,8 @@ def _filter_mates(
             continue
         begin, count = beams_towards(gap_x, gap_y, radius, believed[row, 2], sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT])
         for lap in range(2):
-            low = max(int(math.floor(begin - lap * turn)), 0)
-            high = min(int(math.ceil(begin - lap * turn + count)), beams - 1)
+            low = max(int(math.floor(begin - lap * turn)) - 1, 0)
+            high = min(int(math.floor(begin - lap * turn + count)) + 2, beams - 1)
             for beam in range(low, high + 1):
                 end_x, end_y = ends[0, beam] - x - gap_x, ends[1, beam] - y - gap_y
                 if end_x * end_x + end_y * end_y <= radius * radius:
@@ -129,7 +129,6 @@ def _update_map(
     origin: Array,
     window: Array,
     increments: Array,
-    byte_masks: Array,
     bits: Array,
     box: tuple[int, int, int, int],
     is_filled: bool,
@@ -155,7 +154,7 @@ def _update_map(
     if flags[row] & 2:
         _filter_mates(row, first, robots, bodies, believed, sensor, local_x, local_y, ends, is_hit)
     log_odds = int8_grid_at(belief[0], belief[1], belief[2])
-    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, byte_masks, np.zeros_like(bits))
+    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, np.zeros_like(bits))
     # A hit may lie one cell beyond the seen area.
     window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
     window[1] = min(max(window[1], box[1] + row_offset + 1), belief[1])
@@ -178,7 +177,6 @@ def _perceive_robot(
     origin: Array,
     window: Array,
     increments: Array,
-    byte_masks: Array,
 ) -> None:
     """Stage two alone: update one robot's map from its ranges at its believed pose."""
     beams = ranges.shape[0]
@@ -188,7 +186,7 @@ def _perceive_robot(
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
     _update_map(
         row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments,
-        byte_masks, bits, (0, 0, 0, 0), False,
+        bits, (0, 0, 0, 0), False,
     )  # fmt: skip
 
 
@@ -249,7 +247,6 @@ def _sense_and_perceive(
     origin: Array,
     window: Array,
     increments: Array,
-    byte_masks: Array,
     masks: Array,
     news: Array,
     entries: Array,
@@ -271,10 +268,11 @@ def _sense_and_perceive(
     is_same = flags[row] & 9 == 1 and not is_noisy
     if not is_same:
         bits = np.zeros_like(bits)
-        beam_directions(believed[row, 2], unit_vectors, directions)
+        if believed[row, 2] != poses[row, 2]:
+            beam_directions(believed[row, 2], unit_vectors, directions)
     _update_map(
         row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments,
-        byte_masks, bits, box, is_same,
+        bits, box, is_same,
     )  # fmt: skip
 
 
@@ -313,7 +311,6 @@ def _step(
     origins: Array,
     windows: Array,
     increments: Array,
-    byte_masks: Array,
     masks: Array,
     news: Array,
     entries: Array,
@@ -352,7 +349,7 @@ def _step(
             continue
         _sense_and_perceive(
             row, episode * robots, robots, floors[episode], frames[episode], bodies, poses, believed, sensor, unit_vectors, seeds[episode],
-            steps[episode], noise_table, flags, ranges[row], beliefs[row], origins[row], windows[row], increments, byte_masks, masks[row],
+            steps[episode], noise_table, flags, ranges[row], beliefs[row], origins[row], windows[row], increments, masks[row],
             news[row], entries, seen, perceives,
         )  # fmt: skip
     for episode in range(episodes):
@@ -373,7 +370,6 @@ def _perceive(
     origins: Array,
     windows: Array,
     increments: Array,
-    byte_masks: Array,
 ) -> None:
     """Stage two for all rows."""
     for row in numba.prange(ranges.shape[0]):
@@ -381,7 +377,7 @@ def _perceive(
             continue
         _perceive_robot(
             row, (row // robots) * robots, robots, bodies, believed, sensor, unit_vectors, flags, ranges[row], beliefs[row], origins[row],
-            windows[row], increments, byte_masks,
+            windows[row], increments,
         )  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """Sphere tracing on a distance transform, in the manner of f1tenth's scan simulator.
 
-That simulator is not on PyPI. This is code of our own after its published method: directions from a table of 2000 angles, and
-along each beam steps of the distance that the transform of the cell tells, until that is zero or the range is out. It stands
-in for the original, and like it passes through corners now and then.
+This is code of our own after its published method, a second yardstick beside the original: directions from a table of 2000 angles, and
+along each beam steps of the distance that the transform of the cell tells, until that is zero or the range is out. Like the
+original it passes through corners now and then.
 
 References
 ----------
