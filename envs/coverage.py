@@ -10,9 +10,6 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel, word_grid_at
 
-ENTRY = 3
-"""A robot's news of a step are entries of row, word and bits."""
-
 
 def pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
     """Pack a (rows, columns) mask into (rows, words) uint64, bit 0 of word 0 at column 0."""
@@ -39,49 +36,53 @@ def count_bits(value: np.uint64) -> int:
 
 @kernel
 def mark_seen(
-    own: Array, team: Array, counted: Array, bits: Array, box: tuple[int, int, int, int], row_offset: int, word_offset: int, news: Array
-) -> tuple[int, int]:
-    """Add a scan's seen cells to a robot's mask and list what is new to the team.
+    own: Array, counted: Array, bits: Array, box: tuple[int, int, int, int], row_offset: int, word_offset: int, news: Array
+) -> int:
+    """Add a scan's seen cells to a robot's mask.
 
     Parameters
     ----------
-    own, team, counted : (rows, words) uint64
-        What the robot has seen (updated), what any robot had seen before the step, and F.
+    own, counted : (rows, words) uint64
+        What the robot has seen (updated), and F.
     bits : (window rows, words) uint64
         The seen area.
     box : tuple of int
         row_low, row_high, word_low, word_high of the window that may hold bits.
     row_offset, word_offset : int
         Place of the window in the masks.
-    news : (entries, 3) uint64
-        Result: row, word and bits of the cells that the team had not seen.
+    news : (4,) int64
+        Result: the part of the mask that holds the cells new to the robot (row_low, row_high, word_low, word_high).
 
     Returns
     -------
-    new_own, entries : int
-        Cells new to the robot, and the number of entries.
+    int
+        Cells new to the robot.
     """
     rows, words = own.shape
-    new_own, entries = 0, 0
+    new = 0
     word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
+    row_low, row_high = rows, 0
     for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
+        i = row + row_offset
+        found = np.uint64(0)
         for word in range(word_low, word_high):
-            i, j = row + row_offset, word + word_offset
+            j = word + word_offset
             value = bits[row, word] & counted[i, j] & ~own[i, j]
-            if value == np.uint64(0):
-                continue
-            own[i, j] |= value
-            new_own += count_bits(value)
-            value &= ~team[i, j]
             if value != np.uint64(0):
-                news[entries, 0], news[entries, 1], news[entries, 2] = np.uint64(i), np.uint64(j), value
-                entries += 1
-    return new_own, entries
+                own[i, j] |= value
+                new += count_bits(value)
+                found |= value
+        if found != np.uint64(0):
+            row_low, row_high = min(row_low, i), i + 1
+    news[0], news[1], news[2], news[3] = row_low, row_high, word_low + word_offset, word_high + word_offset
+    return new
 
 
 @kernel
-def share_news(owns: Array, team: Array, news: Array, entries: Array, first: int, robots: int, gains: Array) -> int:
+def share_news(owns: Array, team: Array, news: Array, first: int, robots: int, gains: Array) -> int:
     """Credit each cell that is new to the team in equal parts to the robots that saw it in this step, in robot order.
+
+    What a robot's mask holds and the team's does not is what the robot saw in this step.
 
     Parameters
     ----------
@@ -89,8 +90,8 @@ def share_news(owns: Array, team: Array, news: Array, entries: Array, first: int
         Addresses of the robots' masks, of the shape of ``team``.
     team : (rows, words) uint64
         What the team has seen; updated.
-    news, entries : (maps, entries, 3) uint64, (maps,) int64
-        What ``mark_seen`` listed for each robot.
+    news : (maps, 4) int64
+        Where ``mark_seen`` found cells that are new to each robot.
     first, robots : int
         The episode's robots in these arrays.
     gains : (maps,) float64
@@ -105,27 +106,32 @@ def share_news(owns: Array, team: Array, news: Array, entries: Array, first: int
     total = 0
     for robot in range(first, first + robots):
         gain = 0.0
-        for k in range(entries[robot]):
-            row, word, value = int(news[robot, k, 0]), int(news[robot, k, 1]), news[robot, k, 2]
-            others = np.uint64(0)
-            for other in range(first, first + robots):
-                if other != robot and entries[other] > 0:
-                    others |= word_grid_at(owns[other], rows, words)[row, word]
-            alone = value & ~others
-            gain += count_bits(alone)
-            value &= others
-            while value != np.uint64(0):
-                bit = value & (~value + np.uint64(1))
-                value ^= bit
-                seen_by = 1
+        own = word_grid_at(owns[robot], rows, words)
+        for row in range(news[robot, 0], news[robot, 1]):
+            for word in range(news[robot, 2], news[robot, 3]):
+                value = own[row, word] & ~team[row, word]
+                if value == np.uint64(0):
+                    continue
+                others = np.uint64(0)
                 for other in range(first, first + robots):
-                    if other != robot and entries[other] > 0 and word_grid_at(owns[other], rows, words)[row, word] & bit:
-                        seen_by += 1
-                gain += 1.0 / seen_by
+                    if other != robot and news[other, 0] < news[other, 1]:
+                        others |= word_grid_at(owns[other], rows, words)[row, word]
+                gain += count_bits(value & ~others)
+                value &= others
+                while value != np.uint64(0):
+                    bit = value & (~value + np.uint64(1))
+                    value ^= bit
+                    seen_by = 1
+                    for other in range(first, first + robots):
+                        if other != robot and word_grid_at(owns[other], rows, words)[row, word] & bit:
+                            seen_by += 1
+                    gain += 1.0 / seen_by
         gains[robot] = gain
     for robot in range(first, first + robots):
-        for k in range(entries[robot]):
-            row, word, value = int(news[robot, k, 0]), int(news[robot, k, 1]), news[robot, k, 2]
-            total += count_bits(value & ~team[row, word])
-            team[row, word] |= value
+        own = word_grid_at(owns[robot], rows, words)
+        for row in range(news[robot, 0], news[robot, 1]):
+            for word in range(news[robot, 2], news[robot, 3]):
+                value = own[row, word] & ~team[row, word]
+                total += count_bits(value)
+                team[row, word] |= value
     return total

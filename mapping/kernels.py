@@ -126,6 +126,18 @@ _pointer: Any = intrinsic(_pointer_at)
 
 
 @kernel(inline=True)
+def vector_at(address: int, count: int, kind: Any) -> Any:  # noqa: ANN401
+    """View ``count`` numbers of a kind (such as np.float64) at an address inside a kernel."""
+    return carray(_pointer(address), (count,), kind)
+
+
+@kernel(inline=True)
+def grid_at(address: int, rows: int, columns: int, kind: Any) -> Any:  # noqa: ANN401
+    """View a (rows, columns) grid of a kind (such as np.float64) at an address inside a kernel."""
+    return carray(_pointer(address), (rows, columns), kind)
+
+
+@kernel(inline=True)
 def bytes_at(address: int, count: int) -> Any:  # noqa: ANN401
     """View ``count`` uint8 at an address inside a kernel; the caller keeps the array alive."""
     return carray(_pointer(address), (count,), np.uint8)

@@ -13,22 +13,22 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.coverage import ENTRY, pack_bits
+from lidarium.envs.coverage import pack_bits
 from lidarium.envs.floors.starts import swept_free_space
+from lidarium.envs.simulation.arrays import ENDED, KNOWN_MATES, OWN_FRAME, TRUE_POSE, WorldArrays, table_of  # noqa: F401
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE
 from lidarium.envs.simulation.robots import Robot
-from lidarium.envs.simulation.stages import perceive_parallel, perceive_serial, step_parallel, step_serial
+from lidarium.envs.simulation.stepping import perceive_parallel, perceive_serial, step_episodes, step_rows, step_serial
 from lidarium.envs.simulation.world import Sensed
 from lidarium.mapping.occupancy import WORD, OccupancySettings
-from lidarium.mapping.scan_polygon import window_rows, window_words
-
-TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME = 1, 2, 4, 8
-"""Flags of a row, see ``stages``."""
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""
+
+EPISODES_PER_THREAD = 4
+"""From this many episodes a thread on, threads take whole episodes; with fewer some thread would wait for another's last one."""
 
 
 def counted_cells(body_free: NDArray[np.bool_], multiple: int) -> NDArray[np.bool_]:
@@ -114,9 +114,7 @@ class KinematicWorld:
         self._floor_rows, self._frames = np.zeros((episodes, 10), np.int64), np.zeros((episodes, 3))
         self.belief_rows, self.origins = np.zeros((rows, 3), np.int64), np.zeros((rows, 2))
         self._mask_rows = np.zeros((rows, 5), np.int64)
-        reach = lidar.range_max / occupancy.resolution
-        self._news = np.zeros((rows, window_rows(reach) * window_words(reach), ENTRY), np.uint64)
-        self._entries = np.zeros(rows, np.int64)
+        self._boxes = np.zeros((rows, 4), np.int64)
         self._unit_vectors, self._increments = lidar.unit_vectors, occupancy.increments
         self._sensor = np.array(
             [
@@ -132,6 +130,7 @@ class KinematicWorld:
                 time_step,
             ]
         )
+        self._everywhere = np.ones(episodes, np.bool_)
         self._threads = min(threads, int(os.cpu_count() or 1))
         self._choose_kernels()
 
@@ -188,8 +187,23 @@ class KinematicWorld:
             self._mask_rows[row] = (self.masks[row].ctypes.data, team.ctypes.data, counted.ctypes.data, *counted.shape)
             self.belief_rows[row] = (self.log_odds[row].ctypes.data, *self.log_odds[row].shape)
 
+    @property
+    def table(self) -> NDArray[np.int64]:
+        """Where the arrays lie, as kernels take them (``arrays.world_at``); the same for the life of the world."""
+        return self._table
+
+    @property
+    def threads(self) -> int:
+        """Threads that kernels over this world's rows may use: 1 where there are too few rows to share out."""
+        return self._threads if self.robots * self.episodes >= ROWS_FOR_THREADS else 1
+
+    def use_threads(self) -> None:
+        """Let numba's parallel kernels run on this world's threads."""
+        if self.threads > 1 and numba.get_num_threads() != self.threads:
+            numba.set_num_threads(self.threads)
+
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_perceive")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_perceive", "_table")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -198,8 +212,17 @@ class KinematicWorld:
             self._point_at(episode)
 
     def _choose_kernels(self) -> None:
-        is_parallel = self._threads > 1 and self.robots * self.episodes >= ROWS_FOR_THREADS
-        self._step = step_parallel if is_parallel else step_serial
+        arrays = WorldArrays(
+            self.bodies, self._sensor, self._unit_vectors, GAUSSIAN_TABLE, self._increments, self._floor_rows, self._frames, self.seeds,
+            self.steps, self.team_seen, self.moves, self.flags, self.poses, self.velocities, self.starts, self.believed, self.ranges,
+            self.belief_rows, self.origins, self.windows, self._mask_rows, self._boxes, self.seen, self.gains, self.bumpers, self.contacts,
+            self.travelled, self.collisions,
+        )  # fmt: skip
+        self._table = table_of(arrays)
+        is_parallel = self.threads > 1
+        # Whole episodes go through a thread's cache better; few episodes are shared out robot by robot.
+        parallel_step = step_episodes if self.episodes >= EPISODES_PER_THREAD * self._threads else step_rows
+        self._step = parallel_step if is_parallel else step_serial
         self._perceive = perceive_parallel if is_parallel else perceive_serial
 
     def _blank_map_around(self, floor: FloorTables) -> tuple[NDArray[np.int8], tuple[float, float]]:
@@ -220,7 +243,14 @@ class KinematicWorld:
             map_rows, map_columns = self.log_odds[row].shape
             self.windows[row] = (map_rows, 0, map_columns, 0)
 
-    def step(self, commands: NDArray[np.float64], *, moves_bodies: bool = True, perceives: bool = True) -> None:
+    def step(
+        self,
+        commands: NDArray[np.float64],
+        *,
+        moves_bodies: bool = True,
+        perceives: bool = True,
+        runs: NDArray[np.bool_] | None = None,
+    ) -> None:
         """Run a step of all episodes, both stages in one call.
 
         Parameters
@@ -231,16 +261,11 @@ class KinematicWorld:
             False for the first scan of an episode, taken where the robots stand.
         perceives : bool
             False for stage one alone; ``perceive`` is stage two.
+        runs : (episodes,) bool or None
+            Which episodes take the step; all where None.
         """
-        if self._threads > 1 and numba.get_num_threads() != self._threads:
-            numba.set_num_threads(self._threads)
-        self._step(
-            self.robots, self._floor_rows, self._frames, self.bodies, self.moves, self.poses, self.velocities, self.starts, self.believed,
-            commands, self._sensor, self._unit_vectors, self.seeds, self.steps, GAUSSIAN_TABLE, self.flags, self.ranges, self.belief_rows,
-            self.origins, self.windows, self._increments, self._mask_rows, self._news, self._entries, self.seen, self.gains,
-            self.team_seen, self.bumpers, self.contacts, self.travelled, self.collisions, moves_bodies, perceives,
-        )  # fmt: skip
-        self.steps += 1
+        self.use_threads()
+        self._step(self._table, self.robots, commands, self._everywhere if runs is None else runs, moves_bodies, perceives)
 
     def move_and_sense(self, commands: NDArray[np.float64], step: int) -> Sensed:
         """Run stage one alone and return what it brings; the arrays are the world's own, valid until the next step."""
@@ -250,10 +275,8 @@ class KinematicWorld:
 
     def perceive(self) -> None:
         """Run stage two alone: update the maps from ``ranges`` at the believed poses."""
-        self._perceive(
-            self.robots, self.bodies, self.believed, self._sensor, self._unit_vectors, self.flags, self.ranges, self.belief_rows,
-            self.origins, self.windows, self._increments,
-        )  # fmt: skip
+        self.use_threads()
+        self._perceive(self._table, self.robots, self.robots * self.episodes)
 
     def coverage(self, episode: int) -> float:
         """Return the sensed share of F, ``C_free``."""

@@ -1,19 +1,18 @@
-"""The two stages of a step in kernels over arrays of episodes x robots: motion, scans and scorer; then maps.
+"""The two stages of a robot's step in kernels: its scan and the scorer; then its map.
 
-Stage one moves the bodies and senses; stage two updates each robot's map at the pose that its localizer believes. The
-fused step runs both in one call; both ways call the same function for each robot, so they agree to the bit. Where a
+Stage one senses, after all bodies have moved; stage two updates the robot's map at the pose that its localizer believes. The
+fused step runs both in one call; both ways call the same functions for each robot, so they agree to the bit. Where a
 robot's believed pose is the true one, its map has the floor's lattice and ranges carry no noise, the area seen is
 computed once for the scorer and the map.
 """
 
 import math
 
-import numba
 import numpy as np
 
-from lidarium.envs.coverage import mark_seen, share_news
+from lidarium.envs.coverage import mark_seen
+from lidarium.envs.simulation.arrays import KNOWN_MATES, OWN_FRAME, TRUE_POSE, WorldArrays
 from lidarium.envs.simulation.lidar import cast_scan, cut_by_disc
-from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
 from lidarium.mapping.occupancy import integrate_scan
@@ -35,36 +34,22 @@ ROUND_UP = 1.0 + 1.2e-7
 """Ranges are rounded up to float32, so that the end of a beam lies in the cell that it met."""
 
 
-@kernel
-def _sense_robot(
-    row: int,
-    first: int,
-    robots: int,
-    floor: Array,
-    frame: Array,
-    bodies: Array,
-    poses: Array,
-    sensor: Array,
-    unit_vectors: Array,
-    seed: int,
-    step: int,
-    noise_table: Array,
-    directions: Array,
-    ranges: Array,
-    lengths: Array,
-) -> None:
-    """Take the scan of one robot: ``ranges`` as the sensor tells, ``lengths`` of the true beams [map cells]."""
-    robot = row - first
+@kernel(inline=True)
+def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
+    """Take the scan of one robot: the world's ranges as the sensor tells, and ``lengths`` of the true beams [map cells]."""
+    robot, episode = row - first, first // robots
+    sensor, frame, poses, ranges = world.sensor, world.frames[episode], world.poses, world.ranges[row]
     resolution = frame[2]
     reach = sensor[RANGE_MAX] / resolution
     x, y, heading = (poses[row, 0] - frame[0]) / resolution, (poses[row, 1] - frame[1]) / resolution, poses[row, 2]
-    beam_directions(heading, unit_vectors, directions)
-    cast_scan(floor, x, y, heading, sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT], directions, reach, lengths)
+    angle_first, increment = sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
+    beam_directions(heading, world.unit_vectors, directions)
+    cast_scan(world.floors[episode], x, y, heading, angle_first, increment, directions, reach, lengths)
     for other in range(robots):
-        if other != robot and bodies[other, 5] > sensor[LASER_HEIGHT]:
+        if other != robot and world.bodies[other, 5] > sensor[LASER_HEIGHT]:
             other_x, other_y = (poses[first + other, 0] - frame[0]) / resolution, (poses[first + other, 1] - frame[1]) / resolution
-            radius = bodies[other, 0] / resolution
-            cut_by_disc(x, y, heading, sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT], directions, other_x, other_y, radius, reach, lengths)
+            radius = world.bodies[other, 0] / resolution
+            cut_by_disc(x, y, heading, angle_first, increment, directions, other_x, other_y, radius, reach, lengths)
     beams = lengths.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     longest = sensor[RANGE_MAX]
@@ -73,9 +58,9 @@ def _sense_robot(
         true_range = np.float32(lengths[beam] * resolution * ROUND_UP)
         ranges[beam] = true_range if met else np.float32(np.inf)
         lengths[beam] = min(true_range, longest) * scale if met else longest * scale
-    if sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0:
+    if _is_noisy(sensor):
         noise = np.empty(beams, np.float32)
-        fill_gaussian(stream_key(seed, robot, step), noise_table, noise)
+        fill_gaussian(stream_key(world.seeds[episode], robot, world.steps[episode]), world.noise_table, noise)
         floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
         low, high = np.float32(sensor[RANGE_MIN]), np.float32(longest - RANGE_GAP)
         for beam in range(beams):
@@ -84,22 +69,50 @@ def _sense_robot(
             ranges[beam] = min(max(noisy, low), high) if true_range < np.float32(np.inf) else true_range
 
 
-@kernel
-def _filter_mates(
-    row: int, first: int, robots: int, bodies: Array, believed: Array, sensor: Array, x: float, y: float, ends: Array, is_hit: Array
-) -> None:
+@kernel(inline=True)
+def _is_noisy(sensor: Array) -> bool:
+    return bool(sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0)
+
+
+@kernel(inline=True)
+def _window_corner(x: float, y: float, reach: float) -> tuple[int, int]:
+    """Row and column of the map at which the window of a scan from x, y begins [cells]; the column is a multiple of 64."""
+    margin = int(reach) + 3
+    return int(math.floor(y)) - margin, ((int(math.floor(x)) - margin) >> 6) << 6
+
+
+@kernel(inline=True)
+def _score(
+    world: WorldArrays, row: int, first: int, robots: int, lengths: Array, directions: Array, ends: Array, bits: Array
+) -> tuple[int, int, int, int]:
+    """Fill the area that the true beams have seen and add it to the robot's mask; returns the box that holds bits."""
+    sensor, frame, masks = world.sensor, world.frames[first // robots], world.masks[row]
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    x, y = (world.poses[row, 0] - frame[0]) * scale, (world.poses[row, 1] - frame[1]) * scale
+    row_offset, column_offset = _window_corner(x, y, sensor[RANGE_MAX] * scale)
+    local_x, local_y = x - column_offset, y - row_offset
+    scan_ends(lengths, directions, local_x, local_y, ends)
+    box: tuple[int, int, int, int] = fill_scan_polygon(
+        lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits
+    )
+    own, counted = word_grid_at(masks[0], masks[3], masks[4]), word_grid_at(masks[2], masks[3], masks[4])
+    world.seen[row] += mark_seen(own, counted, bits, box, row_offset, column_offset >> 6, world.boxes[row])
+    return box
+
+
+@kernel(inline=True)
+def _filter_mates(world: WorldArrays, row: int, first: int, robots: int, x: float, y: float, ends: Array, is_hit: Array) -> None:
     """Take out the hits on teammates, whose believed poses are known: they are no part of the floor."""
-    robot = row - first
+    sensor, believed = world.sensor, world.believed
     beams = is_hit.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
     turn = 2.0 * math.pi / sensor[ANGLE_INCREMENT]
-    for other in range(robots):
-        if other == robot:
+    for other in range(first, first + robots):
+        if other == row:
             continue
-        gap_x = (believed[first + other, 0] - believed[row, 0]) * scale
-        gap_y = (believed[first + other, 1] - believed[row, 1]) * scale
-        radius = bodies[other, 0] * scale + MATE_MARGIN
+        gap_x, gap_y = (believed[other, 0] - believed[row, 0]) * scale, (believed[other, 1] - believed[row, 1]) * scale
+        radius = world.bodies[other - first, 0] * scale + MATE_MARGIN
         if gap_x * gap_x + gap_y * gap_y > (reach + radius) ** 2:
             continue
         begin, count = beams_towards(gap_x, gap_y, radius, believed[row, 2], sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT])
@@ -112,38 +125,30 @@ def _filter_mates(
                     is_hit[beam] = False
 
 
-@kernel
+@kernel(inline=True)
 def _update_map(
+    world: WorldArrays,
     row: int,
     first: int,
     robots: int,
-    bodies: Array,
-    believed: Array,
-    sensor: Array,
-    flags: Array,
-    ranges: Array,
     directions: Array,
     lengths: Array,
     ends: Array,
-    belief: Array,
-    origin: Array,
-    window: Array,
-    increments: Array,
     bits: Array,
     box: tuple[int, int, int, int],
     is_filled: bool,
 ) -> None:
     """Update one robot's map from its scan; ``bits``, ``ends`` and ``box`` hold the seen area already where ``is_filled``."""
+    sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]
+    ranges, belief, window = world.ranges[row], world.maps[row], world.windows[row]
     beams = ranges.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
-    x, y = (believed[row, 0] - origin[0]) * scale, (believed[row, 1] - origin[1]) * scale
+    x, y = (believed[0] - origin[0]) * scale, (believed[1] - origin[1]) * scale
     is_hit = np.empty(beams, np.bool_)
     for beam in range(beams):
         is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
-    margin = int(reach) + 3
-    row_offset = int(math.floor(y)) - margin
-    column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
+    row_offset, column_offset = _window_corner(x, y, reach)
     local_x, local_y = x - column_offset, y - row_offset
     if not is_filled:
         for beam in range(beams):
@@ -151,10 +156,10 @@ def _update_map(
             lengths[beam] = min(value * scale, reach) if value == value else 0.0
         scan_ends(lengths, directions, local_x, local_y, ends)
         box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits)
-    if flags[row] & 2:
-        _filter_mates(row, first, robots, bodies, believed, sensor, local_x, local_y, ends, is_hit)
+    if world.flags[row] & KNOWN_MATES:
+        _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
     log_odds = int8_grid_at(belief[0], belief[1], belief[2])
-    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, np.zeros_like(bits))
+    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, world.increments, np.zeros_like(bits))
     # A hit may lie one cell beyond the seen area.
     window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
     window[1] = min(max(window[1], box[1] + row_offset + 1), belief[1])
@@ -162,226 +167,35 @@ def _update_map(
     window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[2])
 
 
-@kernel
-def _perceive_robot(
-    row: int,
-    first: int,
-    robots: int,
-    bodies: Array,
-    believed: Array,
-    sensor: Array,
-    unit_vectors: Array,
-    flags: Array,
-    ranges: Array,
-    belief: Array,
-    origin: Array,
-    window: Array,
-    increments: Array,
-) -> None:
-    """Stage two alone: update one robot's map from its ranges at its believed pose."""
-    beams = ranges.shape[0]
-    directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
-    beam_directions(believed[row, 2], unit_vectors, directions)
+@kernel(inline=True)
+def _blank_window(sensor: Array) -> Array:
+    """Return the bits of a scan's window, all zero."""
     reach = sensor[RANGE_MAX] / sensor[MAP_RESOLUTION]
-    bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
-    _update_map(
-        row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments,
-        bits, (0, 0, 0, 0), False,
-    )  # fmt: skip
+    return np.zeros((window_rows(reach), window_words(reach)), np.uint64)
 
 
-@kernel
-def _score_robot(
-    row: int,
-    poses: Array,
-    frame: Array,
-    sensor: Array,
-    lengths: Array,
-    directions: Array,
-    ends: Array,
-    masks: Array,
-    bits: Array,
-    news: Array,
-    entries: Array,
-    seen: Array,
-) -> tuple[int, int, int, int]:
-    """Fill the area that the true beams have seen and add it to the robot's mask; returns the box that holds bits."""
-    scale = 1.0 / sensor[MAP_RESOLUTION]
-    reach = sensor[RANGE_MAX] * scale
-    x, y = (poses[row, 0] - frame[0]) * scale, (poses[row, 1] - frame[1]) * scale
-    margin = int(reach) + 3
-    row_offset = int(math.floor(y)) - margin
-    column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
-    local_x, local_y = x - column_offset, y - row_offset
-    scan_ends(lengths, directions, local_x, local_y, ends)
-    box: tuple[int, int, int, int] = fill_scan_polygon(
-        lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits
-    )
-    own = word_grid_at(masks[0], masks[3], masks[4])
-    team = word_grid_at(masks[1], masks[3], masks[4])
-    counted = word_grid_at(masks[2], masks[3], masks[4])
-    new_own, count = mark_seen(own, team, counted, bits, box, row_offset, column_offset >> 6, news)
-    seen[row] += new_own
-    entries[row] = count
-    return box
-
-
-@kernel
-def _sense_and_perceive(
-    row: int,
-    first: int,
-    robots: int,
-    floor: Array,
-    frame: Array,
-    bodies: Array,
-    poses: Array,
-    believed: Array,
-    sensor: Array,
-    unit_vectors: Array,
-    seed: int,
-    step: int,
-    noise_table: Array,
-    flags: Array,
-    ranges: Array,
-    belief: Array,
-    origin: Array,
-    window: Array,
-    increments: Array,
-    masks: Array,
-    news: Array,
-    entries: Array,
-    seen: Array,
-    perceives: bool,
-) -> None:
-    """Both stages for one robot (or the first alone, where not ``perceives``)."""
-    beams = ranges.shape[0]
+@kernel(inline=True)
+def perceive_robot(world: WorldArrays, row: int, first: int, robots: int) -> None:
+    """Run stage two alone: update one robot's map from its ranges at its believed pose."""
+    beams = world.ranges.shape[1]
     directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
-    _sense_robot(
-        row, first, robots, floor, frame, bodies, poses, sensor, unit_vectors, seed, step, noise_table, directions, ranges, lengths
-    )
-    reach = sensor[RANGE_MAX] / sensor[MAP_RESOLUTION]
-    bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
-    box = _score_robot(row, poses, frame, sensor, lengths, directions, ends, masks, bits, news, entries, seen)
+    beam_directions(world.believed[row, 2], world.unit_vectors, directions)
+    _update_map(world, row, first, robots, directions, lengths, ends, _blank_window(world.sensor), (0, 0, 0, 0), False)
+
+
+@kernel(inline=True)
+def sense_and_perceive(world: WorldArrays, row: int, first: int, robots: int, perceives: bool) -> None:
+    """Run both stages for one robot (or the first alone, where not ``perceives``); ``first`` is the first row of its episode."""
+    beams = world.ranges.shape[1]
+    directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
+    _sense(world, row, first, robots, directions, lengths)
+    bits = _blank_window(world.sensor)
+    box = _score(world, row, first, robots, lengths, directions, ends, bits)
     if not perceives:
         return
-    is_noisy = sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0
-    is_same = flags[row] & 9 == 1 and not is_noisy
+    is_same = world.flags[row] & (TRUE_POSE | OWN_FRAME) == TRUE_POSE and not _is_noisy(world.sensor)
     if not is_same:
-        bits = np.zeros_like(bits)
-        if believed[row, 2] != poses[row, 2]:
-            beam_directions(believed[row, 2], unit_vectors, directions)
-    _update_map(
-        row, first, robots, bodies, believed, sensor, flags, ranges, directions, lengths, ends, belief, origin, window, increments,
-        bits, box, is_same,
-    )  # fmt: skip
-
-
-@kernel
-def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array) -> None:
-    """Localize perfectly: in the floor's axes, or in the frame of the start."""
-    if not is_relative:
-        believed[0], believed[1], believed[2] = pose[0], pose[1], pose[2]
-        return
-    cosine, sine = math.cos(start[2]), math.sin(start[2])
-    gap_x, gap_y = pose[0] - start[0], pose[1] - start[1]
-    believed[0], believed[1] = cosine * gap_x + sine * gap_y, cosine * gap_y - sine * gap_x
-    angle = pose[2] - start[2]
-    believed[2] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
-
-
-def _step(
-    robots: int,
-    floors: Array,
-    frames: Array,
-    bodies: Array,
-    moves: Array,
-    poses: Array,
-    velocities: Array,
-    starts: Array,
-    believed: Array,
-    commands: Array,
-    sensor: Array,
-    unit_vectors: Array,
-    seeds: Array,
-    steps: Array,
-    noise_table: Array,
-    flags: Array,
-    ranges: Array,
-    beliefs: Array,
-    origins: Array,
-    windows: Array,
-    increments: Array,
-    masks: Array,
-    news: Array,
-    entries: Array,
-    seen: Array,
-    gains: Array,
-    team_seen: Array,
-    bumpers: Array,
-    contacts: Array,
-    travelled: Array,
-    collisions: Array,
-    moves_bodies: bool,
-    perceives: bool,
-) -> None:
-    """Move, sense, score and (where ``perceives``) map, for all episodes.
-
-    ``flags`` of a row: 1 where the localizer knows the true pose, 2 where teammates' poses are known, 4 where the robot has
-    ended (its body stands there, its sensors are off), 8 where the robot believes in the frame of its own start.
-    """
-    episodes = floors.shape[0]
-    if moves_bodies:
-        for episode in range(episodes):
-            first, last = episode * robots, (episode + 1) * robots
-            table = floors[episode]
-            move_robots(
-                table[8], table[9], table[1], table[2], frames[episode], bodies, moves[first:last], poses[first:last],
-                velocities[first:last], commands[first:last], sensor[TIME_STEP], bumpers[first:last], contacts[first:last],
-                travelled[first:last], collisions[first:last],
-            )  # fmt: skip
-    for row in range(episodes * robots):
-        if flags[row] & 1:
-            _believe_truth(poses[row], starts[row], flags[row] & 8 != 0, believed[row])
-    for row in numba.prange(episodes * robots):
-        episode = row // robots
-        if flags[row] & 4:
-            entries[row] = 0
-            continue
-        _sense_and_perceive(
-            row, episode * robots, robots, floors[episode], frames[episode], bodies, poses, believed, sensor, unit_vectors, seeds[episode],
-            steps[episode], noise_table, flags, ranges[row], beliefs[row], origins[row], windows[row], increments, masks[row],
-            news[row], entries, seen, perceives,
-        )  # fmt: skip
-    for episode in range(episodes):
-        first = episode * robots
-        team = word_grid_at(masks[first, 1], masks[first, 3], masks[first, 4])
-        team_seen[episode] += share_news(masks[:, 0], team, news, entries, first, robots, gains)
-
-
-def _perceive(
-    robots: int,
-    bodies: Array,
-    believed: Array,
-    sensor: Array,
-    unit_vectors: Array,
-    flags: Array,
-    ranges: Array,
-    beliefs: Array,
-    origins: Array,
-    windows: Array,
-    increments: Array,
-) -> None:
-    """Stage two for all rows."""
-    for row in numba.prange(ranges.shape[0]):
-        if flags[row] & 4:
-            continue
-        _perceive_robot(
-            row, (row // robots) * robots, robots, bodies, believed, sensor, unit_vectors, flags, ranges[row], beliefs[row], origins[row],
-            windows[row], increments,
-        )  # fmt: skip
-
-
-step_serial = kernel(_step)
-step_parallel = kernel(parallel=True)(_step)
-perceive_serial = kernel(_perceive)
-perceive_parallel = kernel(parallel=True)(_perceive)
+        bits = _blank_window(world.sensor)
+        if world.believed[row, 2] != world.poses[row, 2]:
+            beam_directions(world.believed[row, 2], world.unit_vectors, directions)
+    _update_map(world, row, first, robots, directions, lengths, ends, bits, box, is_same)

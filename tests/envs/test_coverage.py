@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.envs.coverage import ENTRY, count_bits, mark_seen, pack_bits, share_news, unpack_bits
+from lidarium.envs.coverage import count_bits, mark_seen, pack_bits, share_news, unpack_bits
 from lidarium.envs.exploration import floor_tables
 from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Floor, Raster, Solid
@@ -124,14 +124,12 @@ def test_sharing_news_equals_a_slow_count_cell_by_cell(seed, robots):
     scans = [generator.random((rows, columns)) < 0.3 for _ in range(robots)]
     packed = [pack_bits(own) for own in owns]
     packed_team, packed_counted = pack_bits(team_seen), pack_bits(counted)
-    news, entries = np.zeros((robots, rows * 3, ENTRY), np.uint64), np.zeros(robots, np.int64)
+    news = np.zeros((robots, 4), np.int64)
     for k in range(robots):
-        new_own, entries[k] = mark_seen(
-            packed[k], packed_team, packed_counted, pack_bits(scans[k]), (0, rows, 0, packed_team.shape[1]), 0, 0, news[k]
-        )
+        new_own = mark_seen(packed[k], packed_counted, pack_bits(scans[k]), (0, rows, 0, packed_team.shape[1]), 0, 0, news[k])
         assert new_own == (scans[k] & counted & ~owns[k]).sum()
     gains = np.zeros(robots)
-    total = share_news(np.array([own.ctypes.data for own in packed]), packed_team, news, entries, 0, robots, gains)
+    total = share_news(np.array([own.ctypes.data for own in packed]), packed_team, news, 0, robots, gains)
     fresh = [scan & counted & ~team_seen for scan in scans]
     sharers = np.sum(fresh, axis=0)
     assert np.allclose(gains, [(1.0 / sharers[mine]).sum() for mine in fresh])
@@ -141,11 +139,14 @@ def test_sharing_news_equals_a_slow_count_cell_by_cell(seed, robots):
 
 def test_a_window_that_hangs_over_the_masks_is_cut():
     counted = np.ones((10, 64), bool)
-    own, all_seen = np.zeros((10, 1), np.uint64), np.zeros((10, 1), np.uint64)
+    own = np.zeros((10, 1), np.uint64)
     bits = pack_bits(np.ones((20, 192), bool))
-    news = np.zeros((60, ENTRY), np.uint64)
-    new_own, entries = mark_seen(own, all_seen, pack_bits(counted), bits, (0, 20, 0, bits.shape[1]), -5, -1, news)
-    assert (new_own, entries) == (640, 10)
+    news = np.zeros(4, np.int64)
+    assert mark_seen(own, pack_bits(counted), bits, (0, 20, 0, bits.shape[1]), -5, -1, news) == 640
+    assert news.tolist() == [0, 10, 0, 1]
+    assert unpack_bits(own, 64).all()
+    assert mark_seen(own, pack_bits(counted), bits, (0, 20, 0, bits.shape[1]), -5, -1, news) == 0
+    assert news[0] >= news[1]
 
 
 def test_coverage_never_falls_and_reaches_one_where_all_is_seen():

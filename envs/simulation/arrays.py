@@ -1,0 +1,137 @@
+"""The arrays of a world, as its kernels take them: one table of addresses in place of thirty arguments.
+
+A kernel views the arrays where they lie. Arrays handed over as arguments would be counted as references at every use, by all
+threads in the same places of memory; views are not.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import Array, grid_at, kernel, vector_at
+
+TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME = 1, 2, 4, 8
+"""Flags of a row: the localizer knows the true pose; teammates' poses are known; the robot has ended (its body stands there, its
+sensors are off); it believes in the frame of its own start."""
+
+
+class WorldArrays(NamedTuple):
+    """Arrays over episodes, robots of a team, and rows = episodes x robots.
+
+    Attributes
+    ----------
+    bodies : (robots, 6) float64
+        ``Robot.numbers`` of each robot of a team.
+    sensor : (10,) float64
+        Numbers of the laser, the maps and the step, see ``stages``.
+    unit_vectors : (2, beams) float64
+        Which way the beams look.
+    noise_table : (4096,) float32
+        ``GAUSSIAN_TABLE``.
+    increments : (4,) int64
+        ``OccupancySettings.increments``.
+    floors, frames : (episodes, 10) int64, (episodes, 3) float64
+        ``FloorTables.row`` and ``FloorTables.frame`` of each episode's floor.
+    seeds, steps : (episodes,) uint64, (episodes,) int64
+        Where the noise comes from, and the step that comes next.
+    team_seen : (episodes,) int64
+        Cells of F that the team has seen.
+    moves, flags : (rows,) uint8, (rows,) int64
+        Whether the robot drives, and its flags.
+    poses, velocities, starts, believed : (rows, 3), (rows, 2), (rows, 3), (rows, 3) float64
+        True poses and velocities, poses at the start, and poses as the localizers believe.
+    ranges : (rows, beams) float32
+        Scans [m]; inf for no return.
+    maps, origins, windows : (rows, 3) int64, (rows, 2) float64, (rows, 4) int64
+        Address, rows and columns of each robot's log-odds, where its cell (0, 0) begins, and what part of it has changed.
+    masks : (rows, 5) int64
+        Addresses of the robot's mask, the team's and F's, and their rows and words.
+    boxes : (rows, 4) int64
+        Part of the masks in which the robot saw new cells of F in this step: row_low, row_high, word_low, word_high.
+    seen, gains : (rows,) int64, (rows,) float64
+        Cells of F that each robot has seen, and those credited to it in the last step.
+    bumpers, contacts : (rows, 3) int8, (rows,) uint8
+        Left, centre, right; and whether the body touched anything.
+    travelled, collisions : (rows,) float64, (rows,) int64
+        Length of each robot's path [m], and how often it came into contact.
+    """
+
+    bodies: Array
+    sensor: Array
+    unit_vectors: Array
+    noise_table: Array
+    increments: Array
+    floors: Array
+    frames: Array
+    seeds: Array
+    steps: Array
+    team_seen: Array
+    moves: Array
+    flags: Array
+    poses: Array
+    velocities: Array
+    starts: Array
+    believed: Array
+    ranges: Array
+    maps: Array
+    origins: Array
+    windows: Array
+    masks: Array
+    boxes: Array
+    seen: Array
+    gains: Array
+    bumpers: Array
+    contacts: Array
+    travelled: Array
+    collisions: Array
+
+
+def table_of(arrays: WorldArrays) -> NDArray[np.int64]:
+    """Return where the arrays lie: address, rows and columns (1 for a vector) of each, shape (28, 3). The caller keeps them alive."""
+    return np.array([(array.ctypes.data, array.shape[0], array.size // max(array.shape[0], 1)) for array in arrays], np.int64)
+
+
+@kernel(inline=True)
+def _vector(table: Array, place: int, kind: type[np.generic]) -> Array:
+    return vector_at(table[place, 0], table[place, 1], kind)  # type: ignore[no-any-return]
+
+
+@kernel(inline=True)
+def _grid(table: Array, place: int, kind: type[np.generic]) -> Array:
+    return grid_at(table[place, 0], table[place, 1], table[place, 2], kind)  # type: ignore[no-any-return]
+
+
+@kernel(inline=True)
+def world_at(table: Array) -> WorldArrays:
+    """View the arrays of a table inside a kernel."""
+    return WorldArrays(
+        _grid(table, 0, np.float64),
+        _vector(table, 1, np.float64),
+        _grid(table, 2, np.float64),
+        _vector(table, 3, np.float32),
+        _vector(table, 4, np.int64),
+        _grid(table, 5, np.int64),
+        _grid(table, 6, np.float64),
+        _vector(table, 7, np.uint64),
+        _vector(table, 8, np.int64),
+        _vector(table, 9, np.int64),
+        _vector(table, 10, np.uint8),
+        _vector(table, 11, np.int64),
+        _grid(table, 12, np.float64),
+        _grid(table, 13, np.float64),
+        _grid(table, 14, np.float64),
+        _grid(table, 15, np.float64),
+        _grid(table, 16, np.float32),
+        _grid(table, 17, np.int64),
+        _grid(table, 18, np.float64),
+        _grid(table, 19, np.int64),
+        _grid(table, 20, np.int64),
+        _grid(table, 21, np.int64),
+        _vector(table, 22, np.int64),
+        _vector(table, 23, np.float64),
+        _grid(table, 24, np.int8),
+        _vector(table, 25, np.uint8),
+        _vector(table, 26, np.float64),
+        _vector(table, 27, np.int64),
+    )

@@ -1,0 +1,114 @@
+"""A step of the world in kernels over episodes x robots: bodies move, robots sense, the scorer shares out, maps follow.
+
+Episodes do not touch each other, and within an episode only the motion and the sharing out need the robots in their order. So
+threads may take whole episodes, or the robots of few episodes; the serial and both parallel forms run the same functions and
+agree to the bit.
+"""
+
+import math
+
+import numba
+
+from lidarium.envs.coverage import share_news
+from lidarium.envs.simulation.arrays import ENDED, OWN_FRAME, TRUE_POSE, WorldArrays, world_at
+from lidarium.envs.simulation.motion import move_robots
+from lidarium.envs.simulation.stages import TIME_STEP, perceive_robot, sense_and_perceive
+from lidarium.mapping.kernels import Array, kernel, word_grid_at
+
+
+@kernel(inline=True)
+def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array) -> None:
+    """Localize perfectly: in the floor's axes, or in the frame of the start."""
+    if not is_relative:
+        believed[0], believed[1], believed[2] = pose[0], pose[1], pose[2]
+        return
+    cosine, sine = math.cos(start[2]), math.sin(start[2])
+    gap_x, gap_y = pose[0] - start[0], pose[1] - start[1]
+    believed[0], believed[1] = cosine * gap_x + sine * gap_y, cosine * gap_y - sine * gap_x
+    angle = pose[2] - start[2]
+    believed[2] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+
+
+@kernel(inline=True)
+def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
+    """Move the bodies of an episode by ``commands`` (rows, 2), localize, and forget what was new in the step before."""
+    first, last = episode * robots, (episode + 1) * robots
+    if moves_bodies:
+        table = world.floors[episode]
+        move_robots(
+            table[8], table[9], table[1], table[2], world.frames[episode], world.bodies, world.moves[first:last], world.poses[first:last],
+            world.velocities[first:last], commands[first:last], world.sensor[TIME_STEP], world.bumpers[first:last],
+            world.contacts[first:last], world.travelled[first:last], world.collisions[first:last],
+        )  # fmt: skip
+    for row in range(first, last):
+        world.boxes[row] = 0
+        if world.flags[row] & TRUE_POSE:
+            _believe_truth(world.poses[row], world.starts[row], world.flags[row] & OWN_FRAME != 0, world.believed[row])
+
+
+@kernel(inline=True)
+def _share(world: WorldArrays, episode: int, robots: int) -> None:
+    """Credit the episode's robots with what they saw first, and count the step."""
+    first = episode * robots
+    team = word_grid_at(world.masks[first, 1], world.masks[first, 3], world.masks[first, 4])
+    world.team_seen[episode] += share_news(world.masks[:, 0], team, world.boxes, first, robots, world.gains)
+    world.steps[episode] += 1
+
+
+@kernel(inline=True)
+def step_episode(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
+    """Run a step of one episode: move, sense, score and (where ``perceives``) map."""
+    _move(world, episode, robots, commands, moves_bodies)
+    for row in range(episode * robots, (episode + 1) * robots):
+        if not world.flags[row] & ENDED:
+            sense_and_perceive(world, row, episode * robots, robots, perceives)
+    _share(world, episode, robots)
+
+
+@kernel(inline=True)
+def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
+    """Run both stages for the robot of a row, if it has not ended."""
+    world = world_at(table)
+    if not world.flags[row] & ENDED:
+        sense_and_perceive(world, row, row // robots * robots, robots, perceives)
+
+
+@kernel(inline=True)
+def _perceive_row(table: Array, row: int, robots: int) -> None:
+    world = world_at(table)
+    if not world.flags[row] & ENDED:
+        perceive_robot(world, row, row // robots * robots, robots)
+
+
+def _step_episodes(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
+    """Run a step of the episodes with ``runs`` (episodes,); threads take whole episodes."""
+    # Loops on threads take arrays from outside, but no tuples of them; each turn views the world's arrays itself.
+    for episode in numba.prange(runs.shape[0]):
+        if runs[episode]:
+            step_episode(world_at(table), episode, robots, commands, moves_bodies, perceives)
+
+
+def _step_rows(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
+    """Run a step of the episodes with ``runs``; threads take single robots."""
+    for episode in range(runs.shape[0]):
+        if runs[episode]:
+            _move(world_at(table), episode, robots, commands, moves_bodies)
+    for row in numba.prange(runs.shape[0] * robots):
+        if runs[row // robots]:
+            _step_row(table, row, robots, perceives)
+    for episode in range(runs.shape[0]):
+        if runs[episode]:
+            _share(world_at(table), episode, robots)
+
+
+def _perceive(table: Array, robots: int, rows: int) -> None:
+    """Run stage two for all rows."""
+    for row in numba.prange(rows):
+        _perceive_row(table, row, robots)
+
+
+step_serial = kernel(_step_episodes)
+step_episodes = kernel(parallel=True)(_step_episodes)
+step_rows = kernel(parallel=True)(_step_rows)
+perceive_serial = kernel(_perceive)
+perceive_parallel = kernel(parallel=True)(_perceive)
