@@ -119,7 +119,7 @@ def _store(folder: str, max_bytes: int) -> Store:
     if folder == "off":
         return Store(None, max_bytes)
     if folder:
-        return Store(Path(folder), max_bytes)
+        return Store(Path(folder).expanduser().absolute(), max_bytes)
     return Store(first_writable((user_cache_folder() / "lidarium" / "floors", Path(tempfile.gettempdir()) / "lidarium-floors")), max_bytes)
 
 

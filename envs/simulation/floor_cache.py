@@ -4,7 +4,6 @@ On disk lies what is dear to make and small: the rasters as bits and the distanc
 tables of the rays, four bytes a cell, are made from them in the time that it would take to read or unpack them.
 """
 
-import os
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import lru_cache
