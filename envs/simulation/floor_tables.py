@@ -65,7 +65,7 @@ class FloorTables:
 
     def packed(self) -> dict[str, NDArray[Any]]:
         """Return what is dear to make: the rasters as bits (``laser`` where it is not the body's), the bound and the frame."""
-        arrays = {"frame": self.frame, "bound": self.bound, "body": np.packbits(self.body.solid)}
+        arrays: dict[str, NDArray[Any]] = {"frame": self.frame, "bound": self.bound, "body": np.packbits(self.body.solid)}
         return arrays if self.laser is self.body else {**arrays, "laser": np.packbits(self.laser.solid)}
 
     @property
