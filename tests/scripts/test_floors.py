@@ -83,6 +83,8 @@ def test_floors_that_cannot_be_are_refused(arguments, word, tmp_path, capsys):
 def store(tmp_path, monkeypatch):
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "store"))
     monkeypatch.setattr(catalogue, "SETS", {"few": (5, 3)})
+    # A floor that this process has loaded before would not be stored again.
+    catalogue._load_named.cache_clear()
     return tmp_path / "store"
 
 
