@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents import make_policy
-from lidarium.envs.exploration import ExplorationEnv, floor_tables
+from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue import floor_names, load_floor
 from lidarium.envs.floors.starts import draw_starts
 from lidarium.envs.settings import make_settings
+from lidarium.envs.simulation.floor_cache import floor_tables
 from lidarium.evaluation.runner import run_episode
 
 POLICIES = ("random_walk", "nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite")

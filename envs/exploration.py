@@ -2,7 +2,6 @@
 
 import copy
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -19,17 +18,11 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.options import FloorChoice, read_options
 from lidarium.envs.scorer import Scorer
 from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.floor_tables import FloorTables
+from lidarium.envs.simulation.floor_cache import floor_tables
 from lidarium.envs.simulation.kinematic import ENDED, KinematicWorld
 from lidarium.mapping.kernels import Array, kernel
 
 Observation = dict[str, NDArray[Any]]
-
-
-@lru_cache(maxsize=16)
-def floor_tables(floor: Floor, raster_resolution: float, laser: float, body: float) -> FloorTables:
-    """Return the kernels' tables of a floor; the last ones used are kept and shared."""
-    return FloorTables.of_floor(floor, raster_resolution, laser, body)
 
 
 @kernel

@@ -24,6 +24,8 @@ from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
+from lidarium.mapping.files import first_writable, user_cache_folder
+
 Array = NDArray[Any]
 """An array in the signature of a kernel; its docstring gives shape and type."""
 
@@ -49,28 +51,14 @@ def _sources_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _is_writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
-
-
 def _cache_folder() -> Path | None:
     """Return the first writable cache folder, or None where nothing can be written."""
-    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     candidates = (
         Path(__file__).resolve().parent / "__pycache__" / "kernels",
-        user_cache / "lidarium" / "kernels",
+        user_cache_folder() / "lidarium" / "kernels",
         Path(tempfile.gettempdir()) / "lidarium-kernels",
     )
-    for candidate in candidates:
-        folder = candidate / _sources_hash()
-        if _is_writable(folder):
-            return folder
-    return None
+    return first_writable(candidate / _sources_hash() for candidate in candidates)
 
 
 _CHOSEN_BY_USER = bool(os.environ.get("NUMBA_CACHE_DIR"))

@@ -6,8 +6,6 @@ The interpretation of pixels follows ROS map_server (trinary, scale, raw), http:
 """
 
 import math
-import os
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,8 @@ import cv2
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+
+from lidarium.mapping.files import write_whole
 
 OCCUPIED, UNKNOWN, FREE = 0, 127, 255
 
@@ -132,8 +132,8 @@ def write_ros_map(folder: Path, name: str, levels: NDArray[np.uint8], origin: tu
     }
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    _write(folder / f"{name}.pgm", f"P5\n{pixels.shape[1]} {pixels.shape[0]}\n255\n".encode() + pixels.tobytes())
-    _write(folder / f"{name}.yaml", yaml.safe_dump(header, sort_keys=False).encode())
+    write_whole(folder / f"{name}.pgm", f"P5\n{pixels.shape[1]} {pixels.shape[0]}\n255\n".encode() + pixels.tobytes())
+    write_whole(folder / f"{name}.yaml", yaml.safe_dump(header, sort_keys=False).encode())
     return folder / f"{name}.yaml"
 
 
@@ -242,15 +242,3 @@ def _raw_levels(shades: NDArray[np.float64], low: float, high: float) -> NDArray
     levels[(shades > high * 100.0) & (shades <= 100.0)] = OCCUPIED
     levels[shades < low * 100.0] = FREE
     return levels
-
-
-def _write(path: Path, content: bytes) -> None:
-    handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(beside, 0o644)
-        os.replace(beside, path)
-    except BaseException:
-        Path(beside).unlink(missing_ok=True)
-        raise

@@ -3,13 +3,15 @@
 import math
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from lidarium.envs.exploration import ExplorationEnv
+
+T = TypeVar("T")
 
 DONE, BAD_INPUT, NO, INTERRUPTED, DEFECT = 0, 2, 3, 130, 1
 """Exit codes."""
@@ -76,6 +78,35 @@ def _aligned(cell: str, width: int, is_number: bool) -> str:
 def file_name(name: str) -> str:
     """Return a name with what does not belong in a file's name replaced."""
     return "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-") or "floor"
+
+
+def counted(items: Iterable[T], total: int, what: str, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> Iterator[T]:
+    """Pass items on and tell how many there were: a bar on a terminal, else a line every few seconds, on standard error.
+
+    Parameters
+    ----------
+    items : iterable
+        What is passed on.
+    total : int
+        How many there will be.
+    what : str
+        What they are.
+    is_quiet : bool
+        No bar, lines only.
+    clock : callable
+        Wall time [s].
+    """
+    if not is_quiet and sys.stderr.isatty():
+        from tqdm import tqdm
+
+        yield from tqdm(items, what, total, file=sys.stderr, leave=False, dynamic_ncols=True)
+        return
+    last = clock()
+    for count, item in enumerate(items, 1):
+        yield item
+        if (now := clock()) - last >= LINE_PERIOD_S:
+            last = now
+            tell(f"{what}: {count:,} of {total:,}")
 
 
 class Progress:

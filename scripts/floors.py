@@ -1,12 +1,18 @@
-"""`lidarium floors`: the catalogue, figures and pictures of floors, generated floors, and floors of other formats."""
+"""`lidarium floors`: the catalogue, figures and pictures of floors, generated floors, floors of other formats, and floors made ahead."""
 
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, subcommand
 
-from lidarium.scripts.common import Answer, Command, file_name, table
+from lidarium.scripts.common import INTERRUPTED, Answer, Command, counted, file_name, table
 
 if TYPE_CHECKING:
     from lidarium.envs.floors.floor import Floor
@@ -58,15 +64,37 @@ class Import(Command):
     """side of a cell of the ROS map [m]"""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Prepare(Command):
+    """Make floors and their tables ahead and keep them on disk for all processes; what is there already is passed over."""
+
+    name: Positional[str]
+    """set:NAME, or any floor"""
+    robot: str = "kobuki"
+    """body of the robots that will be there, whose height counts; `lidarium show robots` lists them"""
+    lidar: str = "urg"
+    """laser of the robots, whose height counts; `lidarium show lidars` lists them"""
+    raster_resolution: float = 0.025
+    """side of a cell of the world [m]"""
+    workers: int = 1
+    """processes at work"""
+
+    def __post_init__(self) -> None:
+        Command.__post_init__(self)
+        if self.workers < 1:
+            raise ValueError(f"workers is {self.workers}; want at least 1")
+
+
 @dataclass(frozen=True)
 class Floors:
-    """List, show, generate and import floors."""
+    """List, show, generate, import and prepare floors."""
 
     command: (
         Annotated[List, subcommand("list")]
         | Annotated[Show, subcommand("show")]
         | Annotated[Generate, subcommand("generate")]
         | Annotated[Import, subcommand("import")]
+        | Annotated[Prepare, subcommand("prepare")]
     )
 
 
@@ -120,6 +148,69 @@ def import_floor(command: Import) -> Answer:
 
     _check_out(command)
     return _written(command, load_file(command.file, command.resolution), command.map_resolution)
+
+
+def prepare_floors(command: Prepare) -> Answer:
+    """Fill the store of floors; an interrupted call keeps what it has made."""
+    from lidarium.envs.floors.catalogue import set_floors
+    from lidarium.envs.floors.store import FOLDER_VARIABLE, SIZE_VARIABLE, floor_store
+    from lidarium.envs.settings import make_settings
+    from lidarium.mapping.files import is_writable
+
+    _check_out(command)
+    store = floor_store()
+    if store.folder is None or not is_writable(store.folder):
+        raise ValueError(f"no folder to keep floors in; name one that can be written to in the environment variable {FOLDER_VARIABLE}")
+    specs = set_floors(command.name) if command.name.startswith("set:") else (command.name,)
+    settings = make_settings(robot=command.robot, lidar=command.lidar)
+    prepare = partial(
+        _prepared, resolution=command.raster_resolution, laser_height=settings.lidar.height, body_height=settings.robot.height
+    )
+    prepared, made, is_interrupted = 0, 0, False
+    with _mapped(command.workers) as mapped:
+        try:
+            for is_new in counted(mapped(prepare, specs), len(specs), "floors prepared", command.json):
+                prepared, made = prepared + 1, made + is_new
+        except KeyboardInterrupt:
+            is_interrupted = True
+    result = {
+        "name": command.name,
+        "floors": len(specs),
+        "prepared": prepared,
+        "made": made,
+        "is_interrupted": is_interrupted,
+        "folder": str(store.folder),
+        "size_mib": round(store.size() / 2**20, 1),
+        "max_mib": round(store.max_bytes / 2**20, 1),
+    }
+    _write_result(command, "prepared.json", result)
+    facts = [
+        ("prepared", f"{prepared:,} of {len(specs):,} floors, {made:,} of them made now"),
+        ("folder", f"{store.folder}"),
+        ("size", f"{result['size_mib']:,} MiB of at most {result['max_mib']:,}, which {SIZE_VARIABLE} sets"),
+    ]
+    how = " (interrupted; call again to go on)" if is_interrupted else ""
+    return Answer(result, f"{command.name}{how}\n{table(facts)}", INTERRUPTED if is_interrupted else 0)
+
+
+def _prepared(spec: str, resolution: float, laser_height: float, body_height: float) -> bool:
+    """Keep a floor and its tables; False where they were there."""
+    from lidarium.envs.floors.catalogue import load_floor
+    from lidarium.envs.floors.store import floor_store
+    from lidarium.envs.simulation.floor_cache import prepare_tables
+
+    return prepare_tables(floor_store(), load_floor(spec), resolution, laser_height, body_height)
+
+
+@contextmanager
+def _mapped(workers: int) -> Iterator[Callable[[Callable[[str], bool], Iterable[str]], Iterator[bool]]]:
+    """Lend ``map``, over processes where there is more than one worker; only this process hears interrupts."""
+    if workers == 1:
+        yield map
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
+        yield partial(pool.map, chunksize=8)
 
 
 def _written(command: Command, floor: "Floor", resolution: float) -> Answer:

@@ -28,6 +28,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,
     floors.Import: floors.import_floor,
+    floors.Prepare: floors.prepare_floors,
     Bench: bench.execute,
     Show: show.execute,
 }

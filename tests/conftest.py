@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+# Tests neither read nor fill the user's store of floors; those of the store name one of their own.
+os.environ["LIDARIUM_FLOOR_STORE"] = "off"
+
 
 def _data_folder() -> Path:
     return Path(os.environ.get("LIDARIUM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

@@ -13,6 +13,8 @@ from lidarium.envs.floors.drawn import DATA, about_drawn, drawn_names, load_draw
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import FORMATS, load_file
 from lidarium.envs.floors.measures import measure_building
+from lidarium.envs.floors.packing import packed_floor, unpacked_floor
+from lidarium.envs.floors.store import floor_store, hash_of_code
 
 SETS: dict[str, tuple[int, int]] = {"train": (1_000_000, 10_000), "validation": (2_000_000, 200), "test": (3_000_000, 200)}
 """First seed and number of floors of each set; its floors are ``building:SEED`` with the generator's default settings."""
@@ -22,6 +24,9 @@ HASHED_FLOORS = 20
 
 GENERATORS = ("building", *KINDS)
 """Prefixes of generated floors: of any kind, or of one kind."""
+
+MADE_BY = ("envs/floors", "mapping/files.py", "mapping/kernels.py")
+"""Sources that determine generated floors, and how the store holds them."""
 
 
 def floor_names() -> tuple[str, ...]:
@@ -166,8 +171,19 @@ def _load_named(spec: str) -> Floor:
     if prefix in GENERATORS and colon:
         if not (rest.isascii() and rest.isdigit()):
             raise ValueError(f"floor {spec!r} has seed {rest!r}; want a whole number of zero or more, as in {prefix}:17")
-        return generate_building(int(rest), BuildingSettings(kind="any" if prefix == "building" else prefix))
+        return _generated("any" if prefix == "building" else prefix, int(rest))
     raise ValueError(_unknown(spec))
+
+
+def _generated(kind: str, seed: int) -> Floor:
+    """Return a generated floor: that of the store, else a new one."""
+    store, key = floor_store(), f"floor {kind}:{seed} {hash_of_code(*MADE_BY)}"
+    kept = store.load(key)
+    if kept is not None:
+        return unpacked_floor(kept)
+    floor = generate_building(seed, BuildingSettings(kind=kind))
+    store.save(key, packed_floor(floor))
+    return floor
 
 
 def _looks_like_path(spec: str) -> bool:

@@ -194,6 +194,19 @@ class Floor:
         _hash_numbers(digest, "goal", self.goal or ())
         return digest.hexdigest()
 
+    @cached_property
+    def geometry_sha256(self) -> str:
+        """Hash of the bounds and of what stands there, to the bit: floors that share it have the same rasters."""
+        digest = hashlib.sha256(np.array(self.bounds, np.float64).tobytes())
+        for solid in self.solids:
+            digest.update(np.array((solid.z_low, solid.z_high, 1 + len(solid.holes)), np.float64).tobytes())
+            for ring in (solid.polygon, *solid.holes):
+                digest.update(len(ring).to_bytes(8, "little") + ring.tobytes())
+        if self.cells is not None:
+            digest.update(np.array((*self.cells.origin, self.cells.resolution, *self.cells.solid.shape), np.float64).tobytes())
+            digest.update(np.packbits(self.cells.solid != 0).tobytes())
+        return digest.hexdigest()
+
 
 def _ring(kind: str, ring: NDArray[np.float64]) -> NDArray[np.float64]:
     corners = np.ascontiguousarray(ring, dtype=np.float64)

@@ -1,6 +1,8 @@
 """What the kernels look up for one floor: rays, bodies and the cells that count; shared by all episodes on it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +54,35 @@ class FloorTables:
         laser = floor.raster(resolution, laser_height, laser_height)
         if np.array_equal(laser.solid, body.solid):
             laser = body
-        return cls(laser, body, RayTables(laser.solid), distance_bound(body.solid))
+        return cls(laser, body, RayTables(laser.solid), distance_bound(body.solid))._frozen()
+
+    @classmethod
+    def unpacked(cls, arrays: Mapping[str, NDArray[Any]]) -> "FloorTables":
+        """Make the tables of what `packed` returned."""
+        x, y, resolution = arrays["frame"].tolist()
+        rasters = [Raster(_cells(arrays[name], arrays["bound"].shape), (x, y), resolution) for name in ("body", "laser") if name in arrays]
+        return cls(rasters[-1], rasters[0], RayTables(rasters[-1].solid), arrays["bound"])._frozen()
+
+    def packed(self) -> dict[str, NDArray[Any]]:
+        """Return what is dear to make: the rasters as bits (``laser`` where it is not the body's), the bound and the frame."""
+        arrays: dict[str, NDArray[Any]] = {"frame": self.frame, "bound": self.bound, "body": np.packbits(self.body.solid)}
+        return arrays if self.laser is self.body else {**arrays, "laser": np.packbits(self.laser.solid)}
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the arrays take."""
+        return sum(array.nbytes for array in self._arrays)
+
+    @property
+    def _arrays(self) -> list[NDArray[Any]]:
+        rasters = [self.body.solid] if self.laser is self.body else [self.body.solid, self.laser.solid]
+        return [*rasters, self.rays.squares, self.rays.faces, self.rays.face_starts, self.bound]
+
+    def _frozen(self) -> "FloorTables":
+        """Make the arrays read-only: all episodes on the floor share them."""
+        for array in self._arrays:
+            array.flags.writeable = False
+        return self
 
     def __deepcopy__(self, memo: dict[int, object]) -> "FloorTables":
         """Tables are never written after they are made: copies share them."""
@@ -67,3 +97,7 @@ class FloorTables:
     def frame(self) -> NDArray[np.float64]:
         """Origin x, y [m] and resolution [m/cell], shape (3,)."""
         return np.array([*self.laser.origin, self.laser.resolution])
+
+
+def _cells(bits: NDArray[np.uint8], shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    return np.unpackbits(bits, count=shape[0] * shape[1]).reshape(shape)

@@ -15,65 +15,40 @@ MAX_SQUARE = 255
 @kernel
 def _fill_squares(solid: Array, squares: Array) -> None:
     rows, columns = solid.shape
+    beyond = np.zeros(columns, np.uint8)
     for quadrant in range(4):
-        step_column = 1 if quadrant & 1 == 0 else -1
-        step_row = 1 if quadrant & 2 == 0 else -1
         for i in range(rows):
-            row = rows - 1 - i if step_row > 0 else i
+            row = rows - 1 - i if quadrant & 2 == 0 else i
+            cells, sides = solid[row], squares[quadrant, row]
+            ahead = beyond if i == 0 else squares[quadrant, row + 1 if quadrant & 2 == 0 else row - 1]
+            side, corner = 0, 0
             for j in range(columns):
-                column = columns - 1 - j if step_column > 0 else j
-                if solid[row, column] != 0:
-                    squares[quadrant, row, column] = 0
-                    continue
-                next_row = row + step_row
-                next_column = column + step_column
-                side = 0
-                if 0 <= next_row < rows and 0 <= next_column < columns:
-                    side = min(
-                        squares[quadrant, next_row, column],
-                        squares[quadrant, row, next_column],
-                        squares[quadrant, next_row, next_column],
-                    )
-                squares[quadrant, row, column] = min(side + 1, MAX_SQUARE)
+                column = columns - 1 - j if quadrant & 1 == 0 else j
+                above = int(ahead[column])
+                smallest = min(min(above, corner), MAX_SQUARE - 1)
+                side = min(side, smallest) + 1 if cells[column] == 0 else 0
+                sides[column] = side
+                corner = above
 
 
-@kernel
-def _count_or_list_faces(solid: Array, tile_columns: int, starts: Array, faces: Array, listing: bool) -> None:
-    """Count the faces of each (tile, direction) in ``starts[1:]``, or list them from ``starts`` on."""
-    rows, columns = solid.shape
-    for direction in range(4):
-        along_rows = direction < 2
-        step = 1 if direction & 1 == 0 else -1
-        fixed_count = columns if along_rows else rows
-        run_count = rows if along_rows else columns
-        for fixed in range(fixed_count):
-            behind = fixed + step
-            if behind < 0 or behind >= fixed_count:
-                continue
-            run_start = -1
-            for k in range(run_count + 1):
-                is_face = False
-                if k < run_count:
-                    if along_rows:
-                        is_face = solid[k, fixed] == 0 and solid[k, behind] != 0
-                    else:
-                        is_face = solid[fixed, k] == 0 and solid[behind, k] != 0
-                if run_start >= 0 and (not is_face or k % TILE == 0):
-                    tile = (run_start // TILE) * tile_columns + fixed // TILE
-                    if not along_rows:
-                        tile = (fixed // TILE) * tile_columns + run_start // TILE
-                    group = tile * 4 + direction
-                    if listing:
-                        place = starts[group]
-                        faces[place, 0] = fixed + (1 if step > 0 else 0)
-                        faces[place, 1] = run_start
-                        faces[place, 2] = k
-                        starts[group] += 1
-                    else:
-                        starts[group + 1] += 1
-                    run_start = -1
-                if is_face and run_start < 0:
-                    run_start = k
+def _faces(solid: NDArray[np.uint8], direction: int, tile_columns: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the group (tile * 4 + direction) of each wall face that is met along +x, -x, +y or -y, and the faces (F, 3)."""
+    # Faces lie along lines; of those that run along y, the transposed raster holds the cells side by side.
+    is_free = np.ascontiguousarray((solid.T if direction < 2 else solid) == 0)
+    looks_up = direction % 2 == 0
+    is_face = np.zeros_like(is_free)
+    if looks_up:
+        np.greater(is_free[:-1], is_free[1:], out=is_face[:-1])
+    else:
+        np.greater(is_free[1:], is_free[:-1], out=is_face[1:])
+    cells = np.flatnonzero(is_face)
+    line, place = np.divmod(cells, solid.shape[0] if direction < 2 else solid.shape[1])
+    begins = (np.diff(cells, prepend=-2) != 1) | (place % TILE == 0)
+    ends = np.append(begins[1:], True)[: cells.size]
+    line, low, high = line[begins], place[begins], place[ends] + 1
+    row, column = (low, line) if direction < 2 else (line, low)
+    group = (row // TILE * tile_columns + column // TILE) * 4 + direction
+    return group, np.column_stack([line + looks_up, low, high])
 
 
 class RayTables:
@@ -104,11 +79,13 @@ class RayTables:
         self.squares = np.empty((4, *solid.shape), np.uint8)
         _fill_squares(solid, self.squares)
         tile_rows, self.tile_columns = -(-self.rows // TILE), -(-self.columns // TILE)
-        counts = np.zeros(tile_rows * self.tile_columns * 4 + 1, np.int32)
-        _count_or_list_faces(solid, self.tile_columns, counts, np.empty((0, 3), np.int32), False)
+        found = [_faces(solid, direction, self.tile_columns) for direction in range(4)]
+        groups = np.concatenate([group for group, _ in found])
+        counts = np.bincount(groups + 1, minlength=tile_rows * self.tile_columns * 4 + 1)
         self.face_starts = np.cumsum(counts, dtype=np.int32)
-        self.faces = np.empty((max(int(self.face_starts[-1]), 1), 3), np.int32)
-        _count_or_list_faces(solid, self.tile_columns, self.face_starts[:-1].copy(), self.faces, True)
+        faces = np.concatenate([face for _, face in found])[np.argsort(groups, kind="stable")]
+        # Never empty, so that it has an address.
+        self.faces = np.ascontiguousarray(faces if faces.size else np.zeros((1, 3)), np.int32)
 
     @property
     def addresses(self) -> NDArray[np.int64]:

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.coverage import count_bits, mark_seen, pack_bits, share_news, unpack_bits
-from lidarium.envs.exploration import floor_tables
 from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.floors.starts import swept_free_space
 from lidarium.envs.scorer import THRESHOLDS, Scorer
 from lidarium.envs.settings import ExplorationSettings, RewardSettings
+from lidarium.envs.simulation.floor_cache import floor_tables
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic import KinematicWorld, counted_cells
 from lidarium.envs.simulation.lidar import Lidar

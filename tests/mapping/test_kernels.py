@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lidarium.mapping import kernels
+from lidarium.mapping import files, kernels
 from lidarium.mapping.kernels import bytes_at, int8_grid_at, int32_table_at, kernel, uint8_grid_at, word_grid_at
 
 ROOT = Path(kernels.__file__).resolve().parents[1]
@@ -120,11 +120,11 @@ def test_kernels_are_made_by_the_one_decorator_only():
 
 
 def test_the_first_writable_folder_is_taken_and_none_where_there_is_none(monkeypatch):
-    monkeypatch.setattr(kernels, "_is_writable", lambda folder: "tmp" in str(folder) or "lidarium-kernels" in str(folder))
+    monkeypatch.setattr(files, "is_writable", lambda folder: "tmp" in str(folder) or "lidarium-kernels" in str(folder))
     folder = kernels._cache_folder()
     assert folder is not None
     assert folder.name == kernels._sources_hash()
-    monkeypatch.setattr(kernels, "_is_writable", lambda folder: False)
+    monkeypatch.setattr(files, "is_writable", lambda folder: False)
     assert kernels._cache_folder() is None
 
 

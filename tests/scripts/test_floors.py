@@ -3,8 +3,11 @@ import json
 import cv2
 import pytest
 
+from lidarium.envs.floors import catalogue
 from lidarium.envs.floors.catalogue import load_floor
+from lidarium.envs.floors.store import FOLDER_VARIABLE
 from lidarium.mapping.map_files import read_ros_map
+from lidarium.scripts import floors
 from lidarium.scripts.main import main
 
 
@@ -74,3 +77,66 @@ def test_floors_that_cannot_be_are_refused(arguments, word, tmp_path, capsys):
     assert word in told.err
     assert told.out == ""
     assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def store(tmp_path, monkeypatch):
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "store"))
+    monkeypatch.setattr(catalogue, "SETS", {"few": (5, 3)})
+    # A floor that this process has loaded before would not be stored again.
+    catalogue._load_named.cache_clear()
+    return tmp_path / "store"
+
+
+def test_a_set_is_prepared_once(store, tmp_path, capsys):
+    for made in (3, 0):
+        assert main(["floors", "prepare", "set:few", "--json", "--out", str(tmp_path / "out")]) == 0
+        result = json.loads(capsys.readouterr().out)
+        assert (result["floors"], result["prepared"], result["made"], result["is_interrupted"]) == (3, 3, made, False)
+        assert result["folder"] == str(store)
+        assert result == json.loads((tmp_path / "out" / "prepared.json").read_text())
+    assert len([path for path in store.rglob("*") if path.is_file()]) == 6
+
+
+def test_an_interrupted_preparation_keeps_what_it_has_and_goes_on(store, monkeypatch, capsys):
+    prepare = floors._prepared
+
+    def interrupted(spec, **heights):
+        if spec == "building:7":
+            raise KeyboardInterrupt
+        return prepare(spec, **heights)
+
+    monkeypatch.setattr(floors, "_prepared", interrupted)
+    assert main(["floors", "prepare", "set:few"]) == 130
+    assert "2 of 3" in capsys.readouterr().out
+    monkeypatch.setattr(floors, "_prepared", prepare)
+    assert main(["floors", "prepare", "set:few", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["made"] == 1
+
+
+def test_several_workers_prepare_the_same(store, capsys):
+    assert main(["floors", "prepare", "set:few", "--workers", "2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["made"] == 3
+    assert main(["floors", "prepare", "set:few", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["made"] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["set:fw"], "did you mean 'few'"),
+        (["apartmant"], "did you mean 'apartment'"),
+        (["apartment", "--workers", "0"], "workers is 0"),
+        (["apartment", "--lidar", "sonar"], "sonar"),
+        (["apartment", "--raster-resolution", "0"], "resolution is 0"),
+    ],
+)
+def test_preparations_that_cannot_be_are_refused(arguments, word, store, capsys):
+    assert main(["floors", "prepare", *arguments]) == 2
+    assert word in capsys.readouterr().err
+
+
+def test_without_a_store_there_is_nothing_to_prepare(monkeypatch, capsys):
+    monkeypatch.setenv(FOLDER_VARIABLE, "off")
+    assert main(["floors", "prepare", "apartment"]) == 2
+    assert FOLDER_VARIABLE in capsys.readouterr().err

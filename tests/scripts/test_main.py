@@ -68,7 +68,9 @@ def test_help_comes_without_loading_the_kernels():
     assert told.splitlines()[-1] == "[]"
 
 
-@pytest.mark.parametrize("command", ["run", "floors list", "floors show", "floors generate", "floors import", "bench", "show"])
+@pytest.mark.parametrize(
+    "command", ["run", "floors list", "floors show", "floors generate", "floors import", "floors prepare", "bench", "show"]
+)
 def test_every_command_has_seed_out_and_json(command, capsys):
     assert main([*command.split(), "--help"]) == 0
     told = capsys.readouterr().out

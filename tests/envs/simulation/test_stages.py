@@ -7,9 +7,9 @@ import pickle
 import numpy as np
 import pytest
 
-from lidarium.envs.exploration import floor_tables
 from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Raster
+from lidarium.envs.simulation.floor_cache import floor_tables
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic import ENDED, KNOWN_MATES, KinematicWorld
 from lidarium.envs.simulation.lidar import Lidar
