@@ -199,6 +199,4 @@ class ObservationWriter:
             if array is None:
                 raise ValueError(f"out has no array for {name}; want {', '.join(self.names)}")
             if array.shape != shape or array.dtype != dtype or not array.flags.carray:
-                raise ValueError(
-                    f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous and writeable"
-                )
+                raise ValueError(f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous and writeable")

@@ -25,7 +25,7 @@ HALF_STEP = 32768.0
 
 
 @kernel(inline=True)
-def _level(log_odds: int) -> int:
+def _level(log_odds: int) -> np.uint8:
     return _FREE if log_odds < 0 else (_OCCUPIED if log_odds > 0 else _UNKNOWN)
 
 

@@ -14,7 +14,6 @@ from lidarium.mapping.occupancy import (
     UNKNOWN,
     OccupancyGrid,
     OccupancySettings,
-    three_levels,
 )
 from lidarium.mapping.scans import ScanGeometry
 
