@@ -19,7 +19,6 @@ from lidarium.mapping.map_crops import crop_levels, crop_turned
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
 
-
 KEYS = (*OBSERVABLES, "goal")
 """All that is ever observed, in the order in which the kernel takes the arrays."""
 
@@ -27,10 +26,15 @@ Arrays = tuple[Array, ...]
 """Arrays that go to the kernel together; a tuple costs no more than its arrays alone, where a named one costs twice as much."""
 
 
+def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:
+    """Return the keys of an observation: what the settings choose, and the goal where there is one."""
+    return (*settings.observe, "goal") if has_goal else settings.observe
+
+
 def observation_space(settings: ExplorationSettings, has_goal: bool) -> spaces.Dict:
     """Return the space of one robot's observation; every box is bounded."""
     boxes = _boxes(settings)
-    return spaces.Dict({name: boxes[name] for name in (*settings.observe, *(("goal",) if has_goal else ()))})
+    return spaces.Dict({name: boxes[name] for name in observed_keys(settings, has_goal)})
 
 
 def _boxes(settings: ExplorationSettings) -> dict[str, spaces.Box]:
@@ -118,10 +122,15 @@ class ObservationWriter:
         What is observed; sizes, limits and threads.
     has_goal : bool
         Whether the goal is observed.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        What is observed.
     """
 
     def __init__(self, settings: ExplorationSettings, has_goal: bool = False) -> None:
-        self.names = (*settings.observe, *(("goal",) if has_goal else ()))
+        self.keys = observed_keys(settings, has_goal)
         self._kinds = {name: (box.shape, box.dtype) for name, box in _boxes(settings).items()}
         self._absent = {name: np.empty((0,) * (1 + len(shape)), dtype) for name, (shape, dtype) in self._kinds.items()}
         robot = settings.robot
@@ -136,7 +145,7 @@ class ObservationWriter:
 
     def buffers(self, rows: int) -> dict[str, NDArray[Any]]:
         """Return new arrays for the observations of ``rows`` rows, by key; what they hold is undefined until it is written."""
-        return {name: np.empty((rows, *self._kinds[name][0]), self._kinds[name][1]) for name in self.names}
+        return {name: np.empty((rows, *self._kinds[name][0]), self._kinds[name][1]) for name in self.keys}
 
     def write(
         self,
@@ -179,11 +188,11 @@ class ObservationWriter:
         if active is None:
             active = self._everyone = self._everyone if len(self._everyone) == rows else np.ones(rows, np.bool_)
         if goals is None:
-            if "goal" in self.names:
+            if "goal" in self.keys:
                 raise ValueError("goals is None; want each robot's goal (rows, 2), nan where it does not know one")
             goals = offsets
         known = (world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals)
-        observed = tuple([out[name] if name in self.names else self._absent[name] for name in KEYS])
+        observed = tuple([out[name] if name in self.keys else self._absent[name] for name in KEYS])
         if self._threads > 1 and rows >= ROWS_FOR_THREADS:
             if numba.get_num_threads() != self._threads:
                 numba.set_num_threads(self._threads)
@@ -193,10 +202,10 @@ class ObservationWriter:
         return out
 
     def _check(self, out: Mapping[str, NDArray[Any]], rows: int) -> None:
-        for name in self.names:
+        for name in self.keys:
             shape, dtype = (rows, *self._kinds[name][0]), self._kinds[name][1]
             array = out.get(name)
             if array is None:
-                raise ValueError(f"out has no array for {name}; want {', '.join(self.names)}")
+                raise ValueError(f"out has no array for {name}; want {', '.join(self.keys)}")
             if array.shape != shape or array.dtype != dtype or not array.flags.carray:
                 raise ValueError(f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous and writeable")

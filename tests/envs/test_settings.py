@@ -29,8 +29,9 @@ from lidarium.mapping.occupancy import OccupancySettings
         ("decision_period_s", math.nan, "time step"), ("threads", 0, "at least 1"),
         ("observe", (), "one or more of scan"), ("observe", "scan", "list or tuple"), ("observe", 3, "list or tuple"),
         ("observe", ("scan", "map", "scan"), "'scan' once"), ("egocentric_cells", 63, "even number"),
-        ("egocentric_cells", 0, "even number"), ("egocentric_cells", 2000, "even number"), ("egocentric_cells", 64.0, "whole number"), ("egocentric_scales", (), "one or more"),
-        ("egocentric_scales", 4, "list or tuple"), ("egocentric_scales", (1, 0), "1 to 64"), ("egocentric_scales", (65,), "1 to 64"),
+        ("egocentric_cells", 0, "even number"), ("egocentric_cells", 2000, "even number"), ("egocentric_cells", 64.0, "whole number"),
+        ("egocentric_scales", (), "one or more"), ("egocentric_scales", 4, "list or tuple"), ("egocentric_scales", (1, 0), "1 to 64"),
+        ("egocentric_scales", (65,), "1 to 64"),
         ("egocentric_scales", (1.0,), "whole numbers"), ("egocentric_scales", (True,), "whole numbers"),
     ],
 )  # fmt: skip
