@@ -11,6 +11,9 @@ from lidarium.envs.exploration import Observation
 NEAR = 0.35
 """A robot turns when something ahead is nearer than its radius and this [m]."""
 
+NEEDED = ("scan", "pose", "bumper")
+"""What a robot must observe."""
+
 
 class RandomWalk:
     """Drives straight on and turns by a random angle where something is near.
@@ -40,7 +43,16 @@ class RandomWalk:
         self._headings = dict.fromkeys(team.agents)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Drive on, or turn towards the heading that was drawn."""
+        """Drive on, or turn towards the heading that was drawn.
+
+        Raises
+        ------
+        ValueError
+            Where the observations lack what the walk looks at.
+        """
+        missing = [name for name in NEEDED if any(name not in observation for observation in observations.values())]
+        if missing:
+            raise ValueError(f"a random walk needs {', '.join(missing)}, which the robots do not observe; add to settings.observe")
         return {agent: self._decide(agent, observation) for agent, observation in observations.items()}
 
     def _decide(self, agent: str, observation: Observation) -> Action:

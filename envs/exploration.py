@@ -95,10 +95,11 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             team, self.settings.lidar, self.settings.occupancy, self.settings.time_step, threads=self.settings.threads
         )
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
-        self._writer = ObservationWriter(self.settings)
+        self._writer = ObservationWriter(self.settings, self.has_goal)
         self._horizon = self.settings.horizon_steps
         self._generator: np.random.Generator | None = None
         self._offsets = np.zeros((self.settings.robots, 2))
+        self._goals = np.full((self.settings.robots, 2), np.nan)
         self._commands = np.zeros((self.settings.robots, 2))
         self._window: Any = None
         self.floor: Floor | None = None
@@ -158,6 +159,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.world.step(self._commands, moves_bodies=False)
         self.scorer.start()
         self.perception.start(self.goal)
+        # A robot that does not know where it starts does not know where the goal is either.
+        self._goals[:] = np.nan if self.goal is None or not settings.known_starts else self.goal
         truths = self._truths()
         infos = {agent: {"truth": truths[row]} for agent, row in self._rows.items()}
         if self.render_mode == "human":
@@ -284,19 +287,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
 
     def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:
-        arrays = self._writer.write(self.world, self._offsets)
-        scans, poses, motions, presses, maps = (arrays[name] for name in ("scan", "pose", "velocity", "bumper", "map"))
+        arrays = self._writer.write(self.world, self._offsets, goals=self._goals)
         rows = self._rows
-        observations: dict[str, Observation] = {}
-        for agent in agents:
-            row = rows[agent]
-            observations[agent] = {
-                "scan": scans[row], "pose": poses[row], "velocity": motions[row], "bumper": presses[row], "map": maps[row]
-            }  # fmt: skip
-        if self.has_goal:
-            for agent in agents:
-                observations[agent]["goal"] = self.perception.goal_in_frame(rows[agent])
-        return observations
+        return {agent: {name: array[rows[agent]] for name, array in arrays.items()} for agent in agents}
 
     def _truths(self) -> list[dict[str, Any]]:
         """Return what a learner may not see, for every robot."""

@@ -1,39 +1,58 @@
-"""What a robot observes: the spaces, and the kernel that writes observations and rewards of all rows."""
+"""What a robot observes: the spaces, and the kernel that writes the observations of all rows where the caller wants them."""
 
 import math
+import os
+from collections.abc import Mapping
 from typing import Any
 
+import numba
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.kinematic import KinematicWorld
+from lidarium.envs.settings import OBSERVABLES, ExplorationSettings
+from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.envs.simulation.stages import RANGE_GAP
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel
-from lidarium.mapping.occupancy import crop_levels
+from lidarium.mapping.map_crops import crop_levels, crop_turned
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
 
+KEYS = (*OBSERVABLES, "goal")
+"""All that is ever observed, in the order in which the kernel takes the arrays."""
+
+Arrays = tuple[Array, ...]
+"""Arrays that go to the kernel together; a tuple costs no more than its arrays alone, where a named one costs twice as much."""
+
+
+def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:
+    """Return the keys of an observation: what the settings choose, and the goal where there is one."""
+    return (*settings.observe, "goal") if has_goal else settings.observe
+
 
 def observation_space(settings: ExplorationSettings, has_goal: bool) -> spaces.Dict:
     """Return the space of one robot's observation; every box is bounded."""
-    robot, cells = settings.robot, settings.map_cells
+    boxes = _boxes(settings)
+    return spaces.Dict({name: boxes[name] for name in observed_keys(settings, has_goal)})
+
+
+def _boxes(settings: ExplorationSettings) -> dict[str, spaces.Box]:
+    """Return the space of everything that can be observed."""
+    robot, cells, own_cells = settings.robot, settings.map_cells, settings.egocentric_cells
     pose_limit = np.array([FARTHEST, FARTHEST, math.pi], np.float32)
     # The largest float32 angle that is wrapped from float64 may round up to the float32 above pi.
     pose_limit[2] = np.nextafter(np.float32(math.pi), np.float32(4.0))
     velocity_limit = np.array([robot.max_speed, robot.max_turn_rate], np.float32)
-    boxes: dict[str, spaces.Space[Any]] = {
+    return {
         "scan": spaces.Box(0.0, np.float32(settings.lidar.range_max), (settings.lidar.beams,), np.float32),
         "pose": spaces.Box(-pose_limit, pose_limit, dtype=np.float32),
         "velocity": spaces.Box(-velocity_limit, velocity_limit, dtype=np.float32),
         "bumper": spaces.Box(0, 1, (3,), np.int8),
         "map": spaces.Box(0, 255, (1, cells, cells), np.uint8),
+        "egocentric_map": spaces.Box(0, 255, (len(settings.egocentric_scales), own_cells, own_cells), np.uint8),
+        "goal": spaces.Box(-FARTHEST, FARTHEST, (2,), np.float32),
     }
-    if has_goal:
-        boxes["goal"] = spaces.Box(-FARTHEST, FARTHEST, (2,), np.float32)
-    return spaces.Dict(boxes)
 
 
 def action_space() -> spaces.Box:
@@ -42,67 +61,101 @@ def action_space() -> spaces.Box:
 
 
 @kernel
-def _write(
-    ranges: Array,
-    believed: Array,
-    offsets: Array,
-    velocities: Array,
-    bumpers: Array,
-    beliefs: Array,
-    origins: Array,
-    numbers: Array,
-    scans: Array,
-    poses: Array,
-    motions: Array,
-    presses: Array,
-    maps: Array,
-) -> None:
+def _write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None:
+    """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements."""
+    ranges, believed, offsets, velocities, bumpers, beliefs, origins, goals = known
+    numbers, scales = limits
+    scans, poses, motions, presses, maps, egocentric_maps, observed_goals = observed
     resolution, range_max, max_speed, max_turn_rate = numbers[0], numbers[1], numbers[2], numbers[3]
-    farthest, longest = np.float32(numbers[4]), np.float32(range_max - RANGE_GAP)
-    no_return = np.float32(range_max)
-    for row in range(ranges.shape[0]):
+    farthest = np.float32(FARTHEST)
+    if scans.size > 0:
+        no_return, longest = np.float32(range_max), np.float32(range_max - RANGE_GAP)
         for beam in range(ranges.shape[1]):
             value = ranges[row, beam]
             hit = min(value, longest)
             scans[row, beam] = no_return if value > no_return else (hit if value == value else np.float32(0.0))
+    if poses.size > 0:
         for axis in range(2):
             local = np.float32(believed[row, axis] - offsets[row, axis])
             poses[row, axis] = min(max(local, -farthest), farthest)
         poses[row, 2] = np.float32(believed[row, 2])
+    if motions.size > 0:
         motions[row, 0] = np.float32(min(max(velocities[row, 0], -max_speed), max_speed))
         motions[row, 1] = np.float32(min(max(velocities[row, 1], -max_turn_rate), max_turn_rate))
+    if presses.size > 0:
         for side in range(3):
             presses[row, side] = bumpers[row, side]
-        column = int(math.floor((believed[row, 0] - origins[row, 0]) / resolution))
-        map_row = int(math.floor((believed[row, 1] - origins[row, 1]) / resolution))
+    if observed_goals.size > 0:
+        for axis in range(2):
+            local = np.float32(goals[row, axis] - offsets[row, axis])
+            observed_goals[row, axis] = min(max(local, -farthest), farthest) if local == local else np.float32(0.0)
+    if maps.size > 0 or egocentric_maps.size > 0:
+        x, y = (believed[row, 0] - origins[row, 0]) / resolution, (believed[row, 1] - origins[row, 1]) / resolution
         log_odds = int8_grid_at(beliefs[row, 0], beliefs[row, 1], beliefs[row, 2])
-        crop_levels(log_odds, map_row, column, maps[row, 0])
+        if maps.size > 0:
+            crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
+        if egocentric_maps.size > 0:
+            corner_row, corner_column = int(math.floor(y + 0.5)), int(math.floor(x + 0.5))
+            crop_turned(log_odds, corner_row, corner_column, believed[row, 2], scales, egocentric_maps[row])
+
+
+@kernel
+def _write_serial(active: Array, known: Arrays, limits: Arrays, observed: Arrays) -> None:
+    for row in range(active.shape[0]):
+        if active[row]:
+            _write_row(row, known, limits, observed)
+
+
+@kernel(parallel=True)
+def _write_parallel(active: Array, known: Arrays, limits: Arrays, observed: Arrays) -> None:
+    for row in numba.prange(active.shape[0]):
+        if active[row]:
+            _write_row(row, known, limits, observed)
 
 
 class ObservationWriter:
-    """Writes the observations of all rows into new arrays.
+    """Writes the observations of all rows of a world, what the settings choose and nothing else, in one kernel call.
 
     Parameters
     ----------
     settings : ExplorationSettings
-        Sizes and limits.
+        What is observed; sizes, limits and threads.
+    has_goal : bool
+        Whether the goal is observed.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        What is observed.
     """
 
-    def __init__(self, settings: ExplorationSettings) -> None:
+    def __init__(self, settings: ExplorationSettings, has_goal: bool = False) -> None:
+        self.keys = observed_keys(settings, has_goal)
+        self._kinds = {name: (box.shape, box.dtype) for name, box in _boxes(settings).items()}
+        self._absent = {name: np.empty((0,) * (1 + len(shape)), dtype) for name, (shape, dtype) in self._kinds.items()}
         robot = settings.robot
-        self._numbers = np.array(
-            [
-                settings.occupancy.resolution,
-                float(np.float32(settings.lidar.range_max)),
-                float(np.float32(robot.max_speed)),
-                float(np.float32(robot.max_turn_rate)),
-                FARTHEST,
-            ]
+        numbers = (settings.occupancy.resolution, settings.lidar.range_max, robot.max_speed, robot.max_turn_rate)
+        # The space's bounds are float32, and so are those to which values are clipped.
+        self._limits = (
+            np.array([numbers[0], *(float(np.float32(number)) for number in numbers[1:])]),
+            np.array(settings.egocentric_scales, np.int64),
         )
-        self._cells = settings.map_cells
+        self._everyone = np.ones(0, np.bool_)
+        self._threads = min(settings.threads, int(os.cpu_count() or 1))
 
-    def write(self, world: KinematicWorld, offsets: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-        """Return new arrays with one observation a row: scan, pose, velocity, bumper, map.
+    def buffers(self, rows: int) -> dict[str, NDArray[Any]]:
+        """Return new arrays for the observations of ``rows`` rows, by key; what they hold is undefined until it is written."""
+        return {name: np.empty((rows, *self._kinds[name][0]), self._kinds[name][1]) for name in self.keys}
+
+    def write(
+        self,
+        world: KinematicWorld,
+        offsets: NDArray[np.float64],
+        out: Mapping[str, NDArray[Any]] | None = None,
+        active: NDArray[np.bool_] | None = None,
+        goals: NDArray[np.float64] | None = None,
+    ) -> Mapping[str, NDArray[Any]]:
+        """Write one observation a row.
 
         Parameters
         ----------
@@ -110,17 +163,49 @@ class ObservationWriter:
             Where the robots are.
         offsets : (rows, 2) float64
             Origin of each robot's map frame in the frame of its believed pose [m].
+        out : dict of arrays or None
+            Where to write, as ``buffers`` makes it; new arrays where None.
+        active : (rows,) bool or None
+            Which rows to write, the others keep what they hold; all where None.
+        goals : (rows, 2) float64 or None
+            Each robot's goal in the frame of its believed pose [m], nan where it does not know one; needed where goals are observed.
+
+        Returns
+        -------
+        dict of arrays
+            ``out``, or the new arrays.
+
+        Raises
+        ------
+        ValueError
+            Where an array is missing or is not of the shape, type and order that is written, or the goals are missing.
         """
-        rows, beams = world.ranges.shape
-        arrays: dict[str, NDArray[Any]] = {
-            "scan": np.empty((rows, beams), np.float32),
-            "pose": np.empty((rows, 3), np.float32),
-            "velocity": np.empty((rows, 2), np.float32),
-            "bumper": np.empty((rows, 3), np.int8),
-            "map": np.empty((rows, 1, self._cells, self._cells), np.uint8),
-        }
-        _write(
-            world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, self._numbers,
-            arrays["scan"], arrays["pose"], arrays["velocity"], arrays["bumper"], arrays["map"],
-        )  # fmt: skip
-        return arrays
+        rows = len(world.believed)
+        if out is None:
+            out = self.buffers(rows)
+        else:
+            self._check(out, rows)
+        if active is None:
+            active = self._everyone = self._everyone if len(self._everyone) == rows else np.ones(rows, np.bool_)
+        if goals is None:
+            if "goal" in self.keys:
+                raise ValueError("goals is None; want each robot's goal (rows, 2), nan where it does not know one")
+            goals = offsets
+        known = (world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals)
+        observed = tuple([out[name] if name in self.keys else self._absent[name] for name in KEYS])
+        if self._threads > 1 and rows >= ROWS_FOR_THREADS:
+            if numba.get_num_threads() != self._threads:
+                numba.set_num_threads(self._threads)
+            _write_parallel(active, known, self._limits, observed)
+        else:
+            _write_serial(active, known, self._limits, observed)
+        return out
+
+    def _check(self, out: Mapping[str, NDArray[Any]], rows: int) -> None:
+        for name in self.keys:
+            shape, dtype = (rows, *self._kinds[name][0]), self._kinds[name][1]
+            array = out.get(name)
+            if array is None:
+                raise ValueError(f"out has no array for {name}; want {', '.join(self.keys)}")
+            if array.shape != shape or array.dtype != dtype or not array.flags.carray:
+                raise ValueError(f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous and writeable")

@@ -1,6 +1,8 @@
 """Every knob of the exploration environments, with its unit and default."""
 
+import difflib
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from numbers import Integral
 from typing import Any
@@ -11,6 +13,11 @@ from lidarium.mapping.occupancy import OccupancySettings
 
 MAX_ROBOTS = 64
 MAX_MAP_CELLS = 4096
+MAX_EGOCENTRIC_CELLS = 1024
+MAX_EGOCENTRIC_SCALE = 64
+
+OBSERVABLES = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
+"""What a robot can observe, in the order in which observations have it; a goal is observed wherever the floor has one."""
 
 NOISE: dict[str, tuple[float, float]] = {"none": (0.0, 0.0), "datasheet": (0.01, 0.01), "thesis": (0.03, 0.0)}
 """Names of the range noise: floor [m] and share of the range of its standard deviation."""
@@ -85,8 +92,14 @@ class ExplorationSettings:
         Whether a robot that touches anything ends as ``collision``.
     goal_radius : float
         Distance to the goal, where the floor has one, at which a robot ends as ``reached`` [m].
+    observe : tuple of str
+        What the robots observe, any of ``OBSERVABLES``; given in any order, kept in that of ``OBSERVABLES``.
     map_cells : int
-        Side of the map in the observation [cells], a multiple of 2.
+        Side of the observed ``map`` [cells], a multiple of 2; half of it is how far a waypoint of the level of waypoints can lie.
+    egocentric_cells : int
+        Side of each crop of the ``egocentric_map`` [cells of the crop], a multiple of 2.
+    egocentric_scales : tuple of int
+        Side of a cell of each crop of the ``egocentric_map`` [cells of the map].
     raster_resolution : float
         Side of a cell of the world's raster [m]; the maps' cell is a whole multiple of it.
     decision_period_s : float
@@ -108,13 +121,16 @@ class ExplorationSettings:
     stop_coverage: float | None = 0.99
     stop_on_contact: bool = False
     goal_radius: float = 0.3
+    observe: tuple[str, ...] = ("scan", "pose", "velocity", "bumper", "map")
     map_cells: int = 256
+    egocentric_cells: int = 64
+    egocentric_scales: tuple[int, ...] = (1, 4)
     raster_resolution: float = 0.025
     decision_period_s: float = 2.0
     threads: int = 1
 
     def __post_init__(self) -> None:
-        for name, kind in (("robots", Integral), ("map_cells", Integral), ("threads", Integral)):
+        for name, kind in (("robots", Integral), ("map_cells", Integral), ("egocentric_cells", Integral), ("threads", Integral)):
             if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} is {getattr(self, name)!r}; want a whole number{' from 1 to 64' if name == 'robots' else ''}")
         for name, wanted in (("robot", Robot), ("lidar", Lidar), ("occupancy", OccupancySettings), ("reward", RewardSettings)):
@@ -138,6 +154,11 @@ class ExplorationSettings:
             raise ValueError(f"stop_coverage is {self.stop_coverage}; want a share in (0, 1], or None for off")
         if not 2 <= self.map_cells <= MAX_MAP_CELLS or self.map_cells % 2:
             raise ValueError(f"map_cells is {self.map_cells}; want an even number from 2 to {MAX_MAP_CELLS}")
+        if not 2 <= self.egocentric_cells <= MAX_EGOCENTRIC_CELLS or self.egocentric_cells % 2:
+            raise ValueError(f"egocentric_cells is {self.egocentric_cells}; want an even number from 2 to {MAX_EGOCENTRIC_CELLS}")
+        # Lists, as files of settings have them, become tuples: settings can be compared and hashed.
+        object.__setattr__(self, "observe", _observed(self.observe))
+        object.__setattr__(self, "egocentric_scales", _scales(self.egocentric_scales))
         if not (math.isfinite(self.raster_resolution) and self.raster_resolution > 0.0):
             raise ValueError(f"raster_resolution is {self.raster_resolution} m; want more than 0")
         multiple = self.occupancy.resolution / self.raster_resolution
@@ -165,6 +186,38 @@ class ExplorationSettings:
     def decision_steps(self) -> int:
         """Steps of a decision period."""
         return max(round(self.decision_period_s / self.time_step), 1)
+
+
+def _observed(names: Iterable[str]) -> tuple[str, ...]:
+    """Return names of what is observed in the order of ``OBSERVABLES``, checked."""
+    wanted = f"want one or more of {', '.join(OBSERVABLES)}"
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise ValueError(f"observe is {names!r}; {wanted}, in a list or tuple")
+    names = tuple(names)
+    for name in names:
+        if name not in OBSERVABLES:
+            near = difflib.get_close_matches(str(name), OBSERVABLES, n=1, cutoff=0.3)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise ValueError(f"observe has the unknown name {name!r}{hint} (known: {', '.join(OBSERVABLES)})")
+        if names.count(name) > 1:
+            raise ValueError(f"observe is {names}; want {name!r} once")
+    if not names:
+        raise ValueError(f"observe is empty ({names}); {wanted}")
+    return tuple(name for name in OBSERVABLES if name in names)
+
+
+def _scales(scales: Iterable[int]) -> tuple[int, ...]:
+    """Return the scales of the egocentric map as a tuple, checked."""
+    wanted = f"want one or more whole numbers from 1 to {MAX_EGOCENTRIC_SCALE}, in a list or tuple"
+    if isinstance(scales, str) or not isinstance(scales, Iterable):
+        raise ValueError(f"egocentric_scales is {scales!r}; {wanted}")
+    scales = tuple(scales)
+    for scale in scales:
+        if isinstance(scale, bool) or not isinstance(scale, Integral) or not 1 <= scale <= MAX_EGOCENTRIC_SCALE:
+            raise ValueError(f"egocentric_scales is {scales}; {wanted}")
+    if not scales:
+        raise ValueError(f"egocentric_scales is empty ({scales}); {wanted}")
+    return tuple(int(scale) for scale in scales)
 
 
 def make_settings(settings: ExplorationSettings | None = None, **options: Any) -> ExplorationSettings:  # noqa: ANN401

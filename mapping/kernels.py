@@ -132,6 +132,12 @@ def bytes_at(address: int, count: int) -> Any:  # noqa: ANN401
 
 
 @kernel(inline=True)
+def int8_at(address: int, count: int) -> Any:  # noqa: ANN401
+    """View ``count`` int8 at an address inside a kernel: a part of a row at less cost than a slice."""
+    return carray(_pointer(address), (count,), np.int8)
+
+
+@kernel(inline=True)
 def int8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) int8 grid at an address inside a kernel."""
     return carray(_pointer(address), (rows, columns), np.int8)

@@ -261,25 +261,3 @@ def _blank(rows: int, columns: int) -> NDArray[np.int8]:
     if rows * columns > MAX_CELLS:
         raise ValueError(f"a map of {rows} x {columns} cells is larger than {MAX_CELLS} cells; use a coarser resolution")
     return np.zeros((rows, columns), np.int8)
-
-
-@kernel
-def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
-    """Copy the cells around (row, column) into ``crop`` (side, side) as levels; unknown outside of the map."""
-    side = crop.shape[0]
-    first_row, first_column = row - side // 2, column - side // 2
-    rows, columns = log_odds.shape
-    low, high = min(max(0, -first_column), side), max(min(side, columns - first_column), 0)
-    for i in range(side):
-        target = crop[i]
-        map_row = first_row + i
-        if map_row < 0 or map_row >= rows or low >= high:
-            target[:] = np.uint8(127)
-            continue
-        target[:low] = np.uint8(127)
-        target[high:] = np.uint8(127)
-        source = log_odds[map_row, first_column + low : first_column + high]
-        inner = target[low:high]
-        for j in range(high - low):
-            value = source[j]
-            inner[j] = np.uint8(255) if value < 0 else (np.uint8(0) if value > 0 else np.uint8(127))

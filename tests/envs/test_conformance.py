@@ -26,6 +26,7 @@ with warnings.catch_warnings():
     )
 
 LEVELS = {"Exploration": "velocity", "WaypointExploration": "waypoint", "FrontierExploration": "frontier"}
+CHOICES = (["egocentric_map"], ["egocentric_map", "velocity", "bumper"], ["scan", "pose"])
 IDS = [f"lidarium/{name}-v0" for name in LEVELS]
 
 
@@ -44,6 +45,12 @@ def no_display(monkeypatch):
 def test_the_parallel_api_is_pettingzoos(level, robots, capsys):
     env = lidarium.parallel_env(level=level, robots=robots, horizon_s=15.0 if level == "velocity" else 60.0, map_cells=64)
     parallel_api_test(env, num_cycles=200)
+    assert "Passed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("observe", CHOICES)
+def test_the_parallel_api_is_pettingzoos_whatever_is_observed(observe, capsys):
+    parallel_api_test(lidarium.parallel_env(robots=2, horizon_s=5.0, observe=observe, egocentric_cells=32), num_cycles=60)
     assert "Passed" in capsys.readouterr().out
 
 
@@ -96,6 +103,12 @@ def test_the_performance_benchmark_runs(monkeypatch, capsys):
 @pytest.mark.usefixtures("no_display")
 def test_gymnasiums_checker_finds_nothing(name, render_mode):
     check_env(gymnasium.make(name, render_mode=render_mode, map_cells=64).unwrapped)
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("observe", CHOICES)
+def test_gymnasiums_checker_finds_nothing_whatever_is_observed(name, observe):
+    check_env(gymnasium.make(name, observe=observe, egocentric_cells=40, egocentric_scales=(1, 2, 4)).unwrapped, skip_render_check=True)
 
 
 @pytest.mark.parametrize("name", IDS)

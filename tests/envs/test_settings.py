@@ -1,8 +1,9 @@
 """Every knob is checked when it is set, and the message names it, its value and what would be right."""
 
+import json
 import math
 import pickle
-from dataclasses import FrozenInstanceError, fields, replace
+from dataclasses import FrozenInstanceError, asdict, fields, replace
 
 import numpy as np
 import pytest
@@ -26,6 +27,12 @@ from lidarium.mapping.occupancy import OccupancySettings
         ("map_cells", 255, "even number"), ("map_cells", 0, "even number"), ("raster_resolution", 0.0, "more than 0"),
         ("raster_resolution", 0.03, "whole multiple"), ("decision_period_s", 0.05, "time step"),
         ("decision_period_s", math.nan, "time step"), ("threads", 0, "at least 1"),
+        ("observe", (), "one or more of scan"), ("observe", "scan", "list or tuple"), ("observe", 3, "list or tuple"),
+        ("observe", ("scan", "map", "scan"), "'scan' once"), ("egocentric_cells", 63, "even number"),
+        ("egocentric_cells", 0, "even number"), ("egocentric_cells", 2000, "even number"), ("egocentric_cells", 64.0, "whole number"),
+        ("egocentric_scales", (), "one or more"), ("egocentric_scales", 4, "list or tuple"), ("egocentric_scales", (1, 0), "1 to 64"),
+        ("egocentric_scales", (65,), "1 to 64"),
+        ("egocentric_scales", (1.0,), "whole numbers"), ("egocentric_scales", (True,), "whole numbers"),
     ],
 )  # fmt: skip
 def test_a_bad_value_is_refused_with_its_name_its_value_and_the_cure(option, value, wanted):
@@ -46,6 +53,25 @@ def test_a_bad_value_is_refused_with_its_name_its_value_and_the_cure(option, val
 def test_a_bad_short_option_is_refused_with_what_is_known(options, words):
     with pytest.raises(ValueError, match=words):
         make_settings(**options)
+
+
+@pytest.mark.parametrize(("name", "meant"), [("scann", "scan"), ("egocentric", "egocentric_map"), ("speed", "pose"), (7, None)])
+def test_an_unknown_observation_is_refused_with_the_nearest_name(name, meant):
+    with pytest.raises(ValueError, match="observe has the unknown name") as caught:
+        make_settings(observe=["pose", name])
+    assert repr(name) in str(caught.value)
+    assert ("did you mean" in str(caught.value)) == (meant is not None)
+    assert meant is None or f"did you mean {meant!r}" in str(caught.value)
+    assert "known: scan, pose, velocity, bumper, map, egocentric_map" in str(caught.value)
+
+
+def test_lists_of_names_and_scales_become_tuples():
+    made = make_settings(observe=["map", "scan"], egocentric_scales=[np.int64(2), 8])
+    assert made.observe == ("scan", "map")
+    assert made.egocentric_scales == (2, 8)
+    assert json.loads(json.dumps(asdict(made)))["egocentric_scales"] == [2, 8]
+    assert make_settings(**{name: getattr(made, name) for name in ("observe", "egocentric_scales")}) == made
+    assert hash(made) == hash(replace(made))
 
 
 def test_an_unknown_option_is_a_type_error_that_lists_the_known_ones():

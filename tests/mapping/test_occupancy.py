@@ -14,8 +14,6 @@ from lidarium.mapping.occupancy import (
     UNKNOWN,
     OccupancyGrid,
     OccupancySettings,
-    crop_levels,
-    three_levels,
 )
 from lidarium.mapping.scans import ScanGeometry
 
@@ -218,17 +216,6 @@ def test_growth_keeps_origins_on_the_lattice_and_every_known_cell_in_its_place(x
     assert grid.origin[1] <= y - 0.1 + 1e-9
     assert grid.origin[0] + columns * RESOLUTION >= x + 0.1 - 1e-9
     assert grid.origin[1] + rows * RESOLUTION >= y + 0.1 - 1e-9
-
-
-@given(row=st.integers(-40, 80), column=st.integers(-40, 170), half=st.integers(1, 32), seed=st.integers(0, 99))
-@settings(max_examples=100, deadline=None)
-def test_a_crop_is_what_numpy_cuts_out_unknown_outside(row, column, half, seed):
-    log_odds = np.random.default_rng(seed).integers(-3, 4, (40, 128)).astype(np.int8)
-    crop = np.full((2 * half, 2 * half), 99, np.uint8)
-    crop_levels(log_odds, row, column, crop)
-    padded = np.pad(log_odds, 200)
-    expected = three_levels(padded[200 + row - half : 200 + row + half, 200 + column - half : 200 + column + half])
-    assert np.array_equal(crop, expected)
 
 
 def test_three_levels_and_probabilities_tell_the_sign_of_the_log_odds():

@@ -1,0 +1,193 @@
+"""Observations: what is chosen and nothing else, written where the caller wants it, the same however it is asked for."""
+
+import math
+from itertools import combinations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import lidarium
+from lidarium.agents.random_walk import RandomWalk
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.observations import ObservationWriter, observation_space
+from lidarium.envs.settings import OBSERVABLES, make_settings
+from lidarium.evaluation.runner import run_episode
+from lidarium.mapping.map_crops import crop_turned
+
+SMALL = {"map_cells": 32, "egocentric_cells": 16, "egocentric_scales": (1, 2, 3)}
+GOAL_FLOOR = Floor("box", (0.0, 0.0, 5.0, 4.0), (), starts=np.array([[1.0, 1.0, 0.0], [1.0, 3.0, 0.5]]), goal=(4.0, 3.0))
+
+
+def driven(steps=15, floor="building:5", **options):
+    """An environment in mid-episode, and its last observations."""
+    env = lidarium.parallel_env(floor, **{"robots": 3, "stop_coverage": None, "noise": "datasheet", **SMALL, **options})
+    observations, _ = env.reset(seed=2)
+    generator = np.random.default_rng(0)
+    for _ in range(steps):
+        observations = env.step({agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents})[0]
+    return env, observations
+
+
+def writer_of(env, **options):
+    return ObservationWriter(make_settings(env.settings, **options), env.has_goal)
+
+
+OFFSETS = np.zeros((9, 2))
+
+
+def test_the_default_is_all_but_the_egocentric_map():
+    env, observations = driven(1)
+    assert list(observations["robot_0"]) == ["scan", "pose", "velocity", "bumper", "map"]
+    assert set(env.observation_space("robot_0").spaces) == set(observations["robot_0"])
+
+
+@pytest.mark.parametrize("names", [*combinations(OBSERVABLES, 1), *combinations(OBSERVABLES, 2), OBSERVABLES])
+def test_what_is_observed_does_not_depend_on_what_else_is(names):
+    env, _ = driven(8)
+    everything = writer_of(env, observe=OBSERVABLES).write(env.world, OFFSETS[:3])
+    chosen = writer_of(env, observe=names).write(env.world, OFFSETS[:3])
+    assert tuple(chosen) == names
+    for name, array in chosen.items():
+        assert np.array_equal(array, everything[name])
+        assert array.dtype == everything[name].dtype
+
+
+@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
+@pytest.mark.parametrize("observe", [["egocentric_map"], ["map", "scan"], ["bumper", "egocentric_map", "pose"]])
+@pytest.mark.parametrize("floor", ["scene_room", GOAL_FLOOR])
+def test_any_choice_is_observed_at_every_level_and_lies_in_its_space(level, observe, floor):
+    env = lidarium.parallel_env(floor, level=level, robots=2, observe=observe, stop_coverage=None, **SMALL)
+    added = {"frontiers", "action_mask"} if level == "frontier" else set()
+    goal = {"goal"} if isinstance(floor, Floor) else set()
+    observations, _ = env.reset(seed=1)
+    for _ in range(2):
+        for agent, observation in observations.items():
+            assert set(observation) == set(observe) | added | goal
+            assert env.observation_space(agent).contains(observation)
+        observations = env.step({agent: 0 if level == "frontier" else np.zeros(2, np.float32) for agent in env.agents})[0]
+
+
+def test_the_order_of_the_names_does_not_matter():
+    one, other = (make_settings(observe=names) for names in (["map", "scan"], ("scan", "map")))
+    assert one == other
+    assert hash(one) == hash(other)
+    assert list(observation_space(one, has_goal=True).spaces) == list(observation_space(other, has_goal=True).spaces)
+
+
+def test_the_egocentric_map_is_turned_about_the_corner_nearest_to_where_the_robot_believes_to_be():
+    env, observations = driven(observe=["egocentric_map"])
+    for row, agent in enumerate(env.agents):
+        place = (env.world.believed[row, :2] - env.world.origins[row]) / env.settings.occupancy.resolution
+        column, line = (math.floor(value + 0.5) for value in place)
+        expected = np.zeros((3, 16, 16), np.uint8)
+        crop_turned(env.world.log_odds[row], line, column, env.world.believed[row, 2], np.array([1, 2, 3]), expected)
+        assert np.array_equal(observations[agent]["egocentric_map"], expected)
+        assert np.unique(expected).size > 1
+
+
+def test_the_egocentric_map_does_not_tell_the_heading_on_the_floor():
+    """A robot in the middle of a square room sees the same whichever wall it looks at."""
+    crops = []
+    for quarter in range(4):
+        room = Floor("room", (0.0, 0.0, 4.0, 4.0), (), starts=np.array([[2.0, 2.0, quarter * math.pi / 2.0]]))
+        env = lidarium.parallel_env(room, robots=1, lidar="lidar_360_6m", stop_coverage=None, observe=["egocentric_map"])
+        crops.append(env.reset(seed=0)[0]["robot_0"]["egocentric_map"])
+    for crop in crops[1:]:
+        # A wall that lies on the border of cells falls to one side or the other.
+        assert (crop != crops[0]).mean() < 0.02
+
+
+def test_given_arrays_are_filled_and_returned():
+    env, observations = driven(observe=OBSERVABLES)
+    writer = writer_of(env)
+    buffers = writer.buffers(3)
+    arrays = list(buffers.values())
+    out = writer.write(env.world, env._offsets, buffers)
+    assert out is buffers
+    assert all(array is kept for array, kept in zip(out.values(), arrays, strict=True))
+    for row, agent in enumerate(env.agents):
+        for name, array in observations[agent].items():
+            assert np.array_equal(out[name][row], array)
+
+
+@pytest.mark.parametrize("observe", [OBSERVABLES, ("scan", "egocentric_map")])
+def test_rows_that_are_not_active_keep_what_they_hold(observe):
+    env, _ = driven(floor=GOAL_FLOOR, robots=2)
+    writer = ObservationWriter(make_settings(env.settings, observe=observe), has_goal=True)
+    goals, whole = np.array([[4.0, 3.0]] * 2), writer.buffers(2)
+    writer.write(env.world, env._offsets, whole, goals=goals)
+    for active in ([False, False], [True, False], [False, True]):
+        out = {name: np.full_like(array, 77) for name, array in whole.items()}
+        writer.write(env.world, env._offsets, out, np.array(active), goals)
+        for name, array in out.items():
+            for row, is_active in enumerate(active):
+                assert np.array_equal(array[row], whole[name][row] if is_active else np.full_like(array[row], 77))
+
+
+def test_threads_do_not_change_an_observation():
+    written = []
+    for threads in (1, 2):
+        env, _ = driven(5, robots=9, threads=threads, observe=OBSERVABLES)
+        active = np.arange(9) % 4 != 1
+        out = {name: np.zeros_like(array) for name, array in writer_of(env).buffers(9).items()}
+        written.append((writer_of(env).write(env.world, OFFSETS), writer_of(env).write(env.world, OFFSETS, out, active)))
+    for one, other in zip(*written, strict=True):
+        for name, array in one.items():
+            assert np.array_equal(array, other[name])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda out: out.pop("pose"), "no array for pose"), (lambda out: out.update(scan=out["scan"][:2]), r"scan is float32 \(2, 727\)"),
+        (lambda out: out.update(pose=out["pose"].astype(np.float64)), r"pose is float64 \(3, 3\); want float32 \(3, 3\)"),
+        (lambda out: out.update(pose=np.asfortranarray(out["pose"])), "contiguous"),
+        (lambda out: out["pose"].flags.__setattr__("writeable", False), "writeable"),
+    ],
+)  # fmt: skip
+def test_arrays_that_do_not_fit_are_refused(change, words):
+    env, _ = driven(1)
+    out = writer_of(env).buffers(3)
+    change(out)
+    with pytest.raises(ValueError, match=words):
+        writer_of(env).write(env.world, env._offsets, out)
+
+
+def test_a_goal_is_in_the_frame_of_the_pose_and_zero_where_it_is_not_known():
+    env, observations = driven(floor=GOAL_FLOOR, robots=2, observe=["pose"])
+    for row, agent in enumerate(env.agents):
+        assert np.array_equal(observations[agent]["goal"], (np.array([4.0, 3.0]) - env._offsets[row]).astype(np.float32))
+    _, observations = driven(floor=GOAL_FLOOR, robots=2, observe=["pose"], known_starts=False)
+    assert all(not observation["goal"].any() for observation in observations.values())
+    goals = np.array([[np.nan, np.nan], [4.0, 3.0]])
+    written = ObservationWriter(env.settings, has_goal=True).write(env.world, env._offsets, goals=goals)["goal"]
+    assert written[0].tolist() == [0.0, 0.0]
+    assert written[1].any()
+    with pytest.raises(ValueError, match="goals is None"):
+        ObservationWriter(env.settings, has_goal=True).write(env.world, env._offsets)
+
+
+def test_the_gymnasium_form_takes_the_choice():
+    env = gymnasium.make("lidarium/Exploration-v0", observe=["egocentric_map"], egocentric_cells=32, egocentric_scales=[2])
+    observation, _ = env.reset(seed=0)
+    assert {name: array.shape for name, array in observation.items()} == {"egocentric_map": (1, 32, 32)}
+    env.close()
+
+
+def test_explorers_need_no_observation_and_the_random_walk_says_which_it_needs():
+    ends = []
+    for observe in (["scan", "map"], ["egocentric_map"], ["velocity"]):
+        env = ExplorationEnv("scene_room", make_settings(robots=2, horizon_s=20.0, observe=observe, **SMALL))
+        run_episode(lidarium.policy("nearest_frontier"), env, 1)
+        assert (env.world.travelled > 0.5).all()
+        ends.append(env.world.poses)
+    assert all(np.array_equal(end, ends[0]) for end in ends)
+    with pytest.raises(ValueError, match=r"random walk needs scan, bumper, which .* observe"):
+        run_episode(RandomWalk(), ExplorationEnv("scene_room", make_settings(robots=1, observe=["pose"], **SMALL)), 1)
+
+
+def test_a_frame_is_drawn_whatever_is_observed():
+    env, _ = driven(1, floor="scene_room", observe=["velocity"], render_mode="rgb_array")
+    assert env.render().any()
