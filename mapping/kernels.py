@@ -66,7 +66,7 @@ _FOLDER = None if _CHOSEN_BY_USER else _cache_folder()
 _CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
 
 
-def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False, inline: bool = False) -> Any:  # noqa: ANN401
+def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False, inline: bool = False, spliced: bool = False) -> Any:  # noqa: ANN401
     """Compile a function of arrays with numba: nopython, exact floating point, no GIL, cached.
 
     Parameters
@@ -78,6 +78,9 @@ def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False
         so that the result does not depend on the number of threads.
     inline : bool
         Whether the function is inlined into its callers by LLVM (small helpers in hot loops).
+    spliced : bool
+        Whether numba puts the function's body into its callers before it compiles them. For thin functions around heavy ones: what
+        lies below a compiled function is compiled again with every caller.
 
     Returns
     -------
@@ -90,9 +93,12 @@ def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False
         options: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "parallel": parallel, "cache": _CAN_CACHE}
         if inline:
             options["forceinline"] = True
+        if spliced:
+            options["inline"] = "always"
         previous = _numba_config.CACHE_DIR
-        if _FOLDER is not None:
-            _numba_config.CACHE_DIR = str(_FOLDER)
+        folder = previous if _FOLDER is None else str(_FOLDER)
+        # The serial and the parallel form of one function would take each other's code from the cache, which knows no options.
+        _numba_config.CACHE_DIR = os.path.join(folder, "parallel") if parallel and folder else folder
         try:
             return numba.njit(**options)(target)
         finally:

@@ -92,17 +92,17 @@ def table_of(arrays: WorldArrays) -> NDArray[np.int64]:
     return np.array([(array.ctypes.data, array.shape[0], array.size // max(array.shape[0], 1)) for array in arrays], np.int64)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _vector(table: Array, place: int, kind: type[np.generic]) -> Array:
     return vector_at(table[place, 0], table[place, 1], kind)  # type: ignore[no-any-return]
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _grid(table: Array, place: int, kind: type[np.generic]) -> Array:
     return grid_at(table[place, 0], table[place, 1], table[place, 2], kind)  # type: ignore[no-any-return]
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def world_at(table: Array) -> WorldArrays:
     """View the arrays of a table inside a kernel."""
     return WorldArrays(

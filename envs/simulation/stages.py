@@ -34,7 +34,7 @@ ROUND_UP = 1.0 + 1.2e-7
 """Ranges are rounded up to float32, so that the end of a beam lies in the cell that it met."""
 
 
-@kernel(inline=True)
+@kernel
 def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
     """Take the scan of one robot: the world's ranges as the sensor tells, and ``lengths`` of the true beams [map cells]."""
     robot, episode = row - first, first // robots
@@ -69,19 +69,19 @@ def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Ar
             ranges[beam] = min(max(noisy, low), high) if true_range < np.float32(np.inf) else true_range
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _is_noisy(sensor: Array) -> bool:
     return bool(sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _window_corner(x: float, y: float, reach: float) -> tuple[int, int]:
     """Row and column of the map at which the window of a scan from x, y begins [cells]; the column is a multiple of 64."""
     margin = int(reach) + 3
     return int(math.floor(y)) - margin, ((int(math.floor(x)) - margin) >> 6) << 6
 
 
-@kernel(inline=True)
+@kernel
 def _score(
     world: WorldArrays, row: int, first: int, robots: int, lengths: Array, directions: Array, ends: Array, bits: Array
 ) -> tuple[int, int, int, int]:
@@ -100,7 +100,7 @@ def _score(
     return box
 
 
-@kernel(inline=True)
+@kernel
 def _filter_mates(world: WorldArrays, row: int, first: int, robots: int, x: float, y: float, ends: Array, is_hit: Array) -> None:
     """Take out the hits on teammates, whose believed poses are known: they are no part of the floor."""
     sensor, believed = world.sensor, world.believed
@@ -125,7 +125,7 @@ def _filter_mates(world: WorldArrays, row: int, first: int, robots: int, x: floa
                     is_hit[beam] = False
 
 
-@kernel(inline=True)
+@kernel
 def _update_map(
     world: WorldArrays,
     row: int,
@@ -167,14 +167,14 @@ def _update_map(
     window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[2])
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _blank_window(sensor: Array) -> Array:
     """Return the bits of a scan's window, all zero."""
     reach = sensor[RANGE_MAX] / sensor[MAP_RESOLUTION]
     return np.zeros((window_rows(reach), window_words(reach)), np.uint64)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def perceive_robot(world: WorldArrays, row: int, first: int, robots: int) -> None:
     """Run stage two alone: update one robot's map from its ranges at its believed pose."""
     beams = world.ranges.shape[1]
@@ -183,7 +183,7 @@ def perceive_robot(world: WorldArrays, row: int, first: int, robots: int) -> Non
     _update_map(world, row, first, robots, directions, lengths, ends, _blank_window(world.sensor), (0, 0, 0, 0), False)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def sense_and_perceive(world: WorldArrays, row: int, first: int, robots: int, perceives: bool) -> None:
     """Run both stages for one robot (or the first alone, where not ``perceives``); ``first`` is the first row of its episode."""
     beams = world.ranges.shape[1]

@@ -16,7 +16,7 @@ from lidarium.envs.simulation.stages import TIME_STEP, perceive_robot, sense_and
 from lidarium.mapping.kernels import Array, kernel, word_grid_at
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array) -> None:
     """Localize perfectly: in the floor's axes, or in the frame of the start."""
     if not is_relative:
@@ -29,7 +29,7 @@ def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array
     believed[2] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
     """Move the bodies of an episode by ``commands`` (rows, 2), localize, and forget what was new in the step before."""
     first, last = episode * robots, (episode + 1) * robots
@@ -46,7 +46,7 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
             _believe_truth(world.poses[row], world.starts[row], world.flags[row] & OWN_FRAME != 0, world.believed[row])
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _share(world: WorldArrays, episode: int, robots: int) -> None:
     """Credit the episode's robots with what they saw first, and count the step."""
     first = episode * robots
@@ -55,7 +55,7 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
     world.steps[episode] += 1
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def step_episode(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of one episode: move, sense, score and (where ``perceives``) map."""
     _move(world, episode, robots, commands, moves_bodies)
@@ -65,7 +65,7 @@ def step_episode(world: WorldArrays, episode: int, robots: int, commands: Array,
     _share(world, episode, robots)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
     """Run both stages for the robot of a row, if it has not ended."""
     world = world_at(table)
@@ -73,7 +73,7 @@ def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
         sense_and_perceive(world, row, row // robots * robots, robots, perceives)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def _perceive_row(table: Array, row: int, robots: int) -> None:
     world = world_at(table)
     if not world.flags[row] & ENDED:

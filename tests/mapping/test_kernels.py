@@ -144,6 +144,28 @@ def test_a_cache_folder_that_the_user_chose_is_used(tmp_path):
     assert list(chosen.rglob("*.nbi"))
 
 
+def test_the_serial_and_the_parallel_form_of_a_function_keep_their_code_apart(tmp_path):
+    script = tmp_path / "two_forms.py"
+    script.write_text(
+        "import numba, numpy as np\n"
+        "from lidarium.mapping import kernels\n"
+        "def fill(values):\n"
+        "    for k in numba.prange(values.size):\n"
+        "        values[k] = numba.get_thread_id()\n"
+        "serial = kernels.kernel(fill)\n"
+        "parallel = kernels.kernel(parallel=True)(fill)\n"
+        "values = np.zeros(64, np.int64)\n"
+        "serial(values)\n"
+        "in_serial = len(set(values.tolist()))\n"
+        "parallel(values)\n"
+        "print(in_serial, len(set(values.tolist())) == min(numba.get_num_threads(), 64))\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    for _ in range(2):
+        result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True)
+        assert result.stdout.split() == ["1", "True"]
+
+
 def test_kernels_are_compiled_anew_where_nothing_can_be_written(tmp_path):
     script = tmp_path / "one_kernel.py"
     script.write_text(
