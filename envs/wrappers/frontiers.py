@@ -9,7 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.onboard.perception import NavigationMap
+from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.state import DriveState, Target
 from lidarium.envs.onboard.team_driver import footprint_of
 from lidarium.envs.wrappers.decisions import DecisionWrapper

@@ -8,7 +8,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.onboard.state import DriveState, Target
+from lidarium.envs.onboard.state import DriveState, Orders, Target
 from lidarium.envs.onboard.team_driver import TeamDriver
 from lidarium.envs.wrappers.decisions import DecisionWrapper
 
@@ -67,10 +67,13 @@ class WaypointExploration(DecisionWrapper):
             return env.step({})
         rows = {agent: env.possible_agents.index(agent) for agent in env.agents}
         stopping = env.stopping
+        targets: list[Target | None] = [None] * env.settings.robots
         for agent, row in rows.items():
             if agent not in actions and agent not in stopping:
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-            driver.assign(row, self._target(row, actions.get(agent)))
+            targets[row] = self._target(row, actions.get(agent))
+        live = np.isin(np.arange(env.settings.robots), list(rows.values()))
+        driver.assign(live, Orders.of(targets))
         driver.prepare()
         if not stopping:
             waiting = {row for row in rows.values() if driver.is_done(row)}
