@@ -135,7 +135,7 @@ class TeamDriver:
         is_blocked = np.zeros(len(simple), np.bool_)
         if len(simple):
             rows = (simple[:, None] * robots + np.arange(robots)).ravel()
-            planning = self._planning(rows[drives.is_ordered[rows] & (self._perception.world.flags[rows] & ENDED == 0)])
+            planning = self.planning(rows[drives.is_ordered[rows] & (self._perception.world.flags[rows] & ENDED == 0)])
             threads = self._perception.threads_for(len(simple))
             prepare = prepare_teams_parallel if threads > 1 else prepare_teams_serial
             prepare(planning, drives, self._perception.maps, simple, is_blocked, threads)
@@ -170,10 +170,10 @@ class TeamDriver:
         team, flags = self._team(episode), self._perception.world.flags
         return [row for row in range(team.start, team.stop) if not flags[row] & ENDED]
 
-    def _planning(self, rows: NDArray[np.int64]) -> Planning:
-        """Return what planning needs, with the maps that the given rows plan on."""
+    def planning(self, rows: NDArray[np.int64], *, with_frontiers: bool = False) -> Planning:
+        """Return what planning needs in kernels, with the maps that the given rows plan on, if wanted with frontiers."""
         perception, settings, resolution = self._perception, self._settings, self._settings.occupancy.resolution
-        records, sharing = perception.provide_records(rows, self.shares_map)
+        records, sharing = perception.provide_records(rows, self.shares_map, with_frontiers=with_frontiers)
         world = perception.world
         return Planning(
             settings.robots, settings.known_starts, settings.robot.radius, resolution, self._footprint.radius + 2 * resolution,
@@ -184,7 +184,7 @@ class TeamDriver:
     def _fresh_planning(self, row: int) -> Planning:
         """Return what planning needs for one robot, with its map up to date."""
         self._perception.planning_map(row, self.shares_map)
-        return self._planning(np.array([row]))
+        return self.planning(np.array([row]))
 
     def _origin(self, row: int) -> tuple[float, float]:
         origin = self._perception.world.origins[row]
