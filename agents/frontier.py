@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import Action, GivenUp, Stop, Team
 from lidarium.envs.exploration import Observation
-from lidarium.envs.onboard.perception import NavigationMap
+from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.state import DriveState, Target
 from lidarium.envs.onboard.team_driver import footprint_of
 from lidarium.mapping.frontier_approach import approach, default_reach, nearest_frontier

@@ -16,12 +16,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 
 Window = tuple[int, int, int, int]
 
 LARGEST_LIMIT = 32_767  # twice the limit must fit into 16 bits
-STAMPS_PER_CELL = 1.0 / 150.0  # stamping one disc costs about as much as recomputing 150 cells
+STAMPS_PER_CELL = 1.0 / 100.0  # stamping one disc costs about as much as recomputing 100 cells
+MOST_BOXES = 16
+NEAR_BOX = 6  # cells that ceased to be occupied within this many cells of each other are recomputed together
 
 
 def limit_of(distance: float, resolution: float) -> int:
@@ -34,15 +36,11 @@ def full_window(shape: tuple[int, ...]) -> Window:
     return 0, int(shape[0]), 0, int(shape[1])
 
 
-def grown_window(window: Window, margin: int, shape: tuple[int, ...]) -> Window:
-    """Grow a window by ``margin`` cells on each side, clipped to the grid."""
+@kernel
+def grown_window(window: Window, margin: int, shape: tuple[int, int]) -> Window:
+    """Grow a window by ``margin`` cells on each side, clipped to the grid (kernel)."""
     row_low, row_high, column_low, column_high = window
-    return (
-        max(int(row_low) - margin, 0),
-        min(int(row_high) + margin, int(shape[0])),
-        max(int(column_low) - margin, 0),
-        min(int(column_high) + margin, int(shape[1])),
-    )
+    return max(row_low - margin, 0), min(row_high + margin, shape[0]), max(column_low - margin, 0), min(column_high + margin, shape[1])
 
 
 def clearance(occupied: NDArray[np.bool_], resolution: float, maximum: float = 0.6) -> NDArray[np.float32]:
@@ -84,6 +82,8 @@ class ClearanceField:
         ``limit`` minus the squared distance in half cells to the nearest occupied square; 0 = at ``maximum`` or beyond.
     limit : int
         Squared ``maximum`` in half cells, rounded up.
+    stamp : (2 k + 1, 2 k + 1) uint16
+        Closeness around one occupied cell.
     resolution, maximum : float
         Side of a cell and the largest distance that matters [m].
 
@@ -103,12 +103,12 @@ class ClearanceField:
         self.maximum = float(maximum)
         self.limit = limit
         self.closeness: NDArray[np.uint16] = np.zeros(shape, dtype=np.uint16)
-        self._stamp = _stamp_of(limit)
+        self.stamp = stamp_of(limit)
 
     @property
     def reach(self) -> int:
         """Cells, along a row or a column, over which an occupied cell is felt."""
-        return int(self._stamp.shape[0]) // 2
+        return int(self.stamp.shape[0]) // 2
 
     def update(self, log_odds: NDArray[np.int8], window: Window | None = None) -> bool:
         """Take over what became occupied, or ceased to be, inside a window of the belief.
@@ -132,18 +132,9 @@ class ClearanceField:
         """
         if log_odds.shape != self.closeness.shape:
             raise ValueError(f"log_odds has shape {log_odds.shape}; this field was made for {self.closeness.shape}")
-        inside = grown_window(full_window(log_odds.shape) if window is None else window, 0, log_odds.shape)
-        added, removed, *bounds = _changes(log_odds, self.closeness, self.limit, inside)
-        if added + removed == 0:
-            return False
-        box = (bounds[0], bounds[1], bounds[2], bounds[3])
-        target = grown_window(box, self.reach, log_odds.shape)
-        area = (target[1] - target[0]) * (target[3] - target[2])
-        if removed == 0 and added <= STAMPS_PER_CELL * area:
-            _stamp_new(log_odds, self.closeness, self.limit, self._stamp, box)
-        else:
-            _recompute(log_odds, self.closeness, self.limit, self.reach, target, grown_window(target, self.reach, log_odds.shape))
-        return True
+        row_low, row_high, column_low, column_high = full_window(log_odds.shape) if window is None else window
+        inside = (int(row_low), int(row_high), int(column_low), int(column_high))
+        return bool(update_closeness(log_odds, self.closeness, self.limit, self.stamp, inside))
 
     def metres(self, window: Window | None = None) -> NDArray[np.float32]:
         """Clearance [m] of the cells of a window (all by default), capped at ``maximum``; a new float32 array."""
@@ -157,7 +148,7 @@ class ClearanceField:
 
 
 @lru_cache(maxsize=16)
-def _stamp_of(limit: int) -> NDArray[np.uint16]:
+def stamp_of(limit: int) -> NDArray[np.uint16]:
     """Return the closeness around one occupied cell."""
     reach = 0
     while (2 * reach + 1) ** 2 < limit:
@@ -169,13 +160,41 @@ def _stamp_of(limit: int) -> NDArray[np.uint16]:
 
 
 @kernel
-def _changes(log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: int, window: Window) -> tuple[int, int, int, int, int, int]:
-    """Count cells that became occupied or free, and bound them by a box."""
+def update_closeness(log_odds: Array, closeness: Array, limit: int, stamp: Array, window: Window) -> bool:
+    """Bring closeness up to date where cells of a window became occupied or ceased to be; whether any did (kernel).
+
+    Parameters are those of :class:`ClearanceField` and its ``update``.
+    """
+    reach = stamp.shape[0] // 2
+    changed, added = _changed_cells(log_odds, closeness, limit, grown_window(window, 0, log_odds.shape))
+    count = len(changed)
+    if count == 0:
+        return False
+    area = 0
+    if added > 0:
+        target = grown_window(_box_of(log_odds, changed), reach, log_odds.shape)
+        area = (target[1] - target[0]) * (target[3] - target[2])
+    if added > STAMPS_PER_CELL * area:
+        _recompute(log_odds, closeness, limit, reach, target, grown_window(target, reach, log_odds.shape))
+        return True
+    if added < count:
+        boxes = _boxes_of_freed(log_odds, changed)
+        for k in range(len(boxes)):
+            target = grown_window((boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3]), reach, log_odds.shape)
+            _recompute(log_odds, closeness, limit, reach, target, grown_window(target, reach, log_odds.shape))
+    for k in range(count):
+        if log_odds[changed[k, 0], changed[k, 1]] > 0:
+            _stamp_at(closeness, stamp, changed[k, 0], changed[k, 1])
+    return True
+
+
+@kernel
+def _changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window) -> tuple[Array, int]:
+    """List the cells (row, column) that became occupied or free, and count those that became occupied."""
     row_low, row_high, column_low, column_high = window
+    changed = np.empty((64, 2), np.int64)
+    count = 0
     added = 0
-    removed = 0
-    first_row, last_row = row_high, row_low
-    first_column, last_column = column_high, column_low
     for row in range(row_low, row_high):
         beliefs = log_odds[row, column_low:column_high]
         known = closeness[row, column_low:column_high]
@@ -184,36 +203,67 @@ def _changes(log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: i
             differing += (beliefs[i] > 0) != (known[i] == limit)
         if differing == 0:
             continue
-        first_row = min(first_row, row)
-        last_row = row + 1
+        if count + differing > len(changed):
+            longer = np.empty((2 * (count + differing), 2), np.int64)
+            longer[:count] = changed[:count]
+            changed = longer
         for i in range(beliefs.size):
             is_occupied = beliefs[i] > 0
             if is_occupied != (known[i] == limit):
+                changed[count, 0], changed[count, 1] = row, column_low + i
+                count += 1
                 added += is_occupied
-                removed += not is_occupied
-                first_column = min(first_column, column_low + i)
-                last_column = max(last_column, column_low + i + 1)
-    return added, removed, first_row, last_row, first_column, last_column
+    return changed[:count], added
 
 
 @kernel
-def _stamp_new(log_odds: NDArray[np.int8], closeness: NDArray[np.uint16], limit: int, stamp: NDArray[np.uint16], box: Window) -> None:
-    """Raise the closeness around each newly occupied cell of the box."""
-    rows, columns = log_odds.shape
+def _box_of(log_odds: Array, cells: Array) -> Window:
+    """Bound cells by a window."""
+    row_low, row_high, column_low, column_high = log_odds.shape[0], 0, log_odds.shape[1], 0
+    for k in range(len(cells)):
+        row_low, row_high = min(row_low, cells[k, 0]), max(row_high, cells[k, 0] + 1)
+        column_low, column_high = min(column_low, cells[k, 1]), max(column_high, cells[k, 1] + 1)
+    return row_low, row_high, column_low, column_high
+
+
+@kernel
+def _boxes_of_freed(log_odds: Array, changed: Array) -> Array:
+    """Bound the cells that ceased to be occupied by a few windows, those near each other by the same one."""
+    boxes = np.empty((MOST_BOXES, 4), np.int64)
+    count = 0
+    for k in range(len(changed)):
+        row, column = changed[k, 0], changed[k, 1]
+        if log_odds[row, column] > 0:
+            continue
+        chosen = -1
+        for box in range(count):
+            is_near_row = boxes[box, 0] - NEAR_BOX <= row < boxes[box, 1] + NEAR_BOX
+            if is_near_row and boxes[box, 2] - NEAR_BOX <= column < boxes[box, 3] + NEAR_BOX:
+                chosen = box
+                break
+        if chosen < 0 and count < MOST_BOXES:
+            boxes[count, 0], boxes[count, 1], boxes[count, 2], boxes[count, 3] = row, row + 1, column, column + 1
+            count += 1
+            continue
+        chosen = max(chosen, 0)
+        boxes[chosen, 0], boxes[chosen, 1] = min(boxes[chosen, 0], row), max(boxes[chosen, 1], row + 1)
+        boxes[chosen, 2], boxes[chosen, 3] = min(boxes[chosen, 2], column), max(boxes[chosen, 3], column + 1)
+    return boxes[:count]
+
+
+@kernel
+def _stamp_at(closeness: Array, stamp: Array, row: int, column: int) -> None:
+    """Raise the closeness around an occupied cell."""
+    rows, columns = closeness.shape
     reach = stamp.shape[0] // 2
-    row_low, row_high, column_low, column_high = box
-    for row in range(row_low, row_high):
-        for column in range(column_low, column_high):
-            if log_odds[row, column] <= 0 or closeness[row, column] == limit:
-                continue
-            left = max(column - reach, 0)
-            right = min(column + reach + 1, columns)
-            shift = left - (column - reach)
-            for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
-                target = closeness[other, left:right]
-                source = stamp[other - row + reach, shift : shift + right - left]
-                for i in range(target.size):
-                    target[i] = max(target[i], source[i])
+    left = max(column - reach, 0)
+    right = min(column + reach + 1, columns)
+    shift = left - (column - reach)
+    for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
+        target = closeness[other, left:right]
+        source = stamp[other - row + reach, shift : shift + right - left]
+        for i in range(target.size):
+            target[i] = max(target[i], source[i])
 
 
 @kernel

@@ -112,7 +112,7 @@ def approach(
         raise ValueError(f"thin has {len(thin)} values; want one for each of the {len(clusters)} clusters")
     found.cost(found.start)
     space = found.space
-    places, left, in_sight = _approach(
+    places, left, in_sight = approach_places(
         clusters.cells,
         clusters.starts,
         log_odds,
@@ -167,7 +167,7 @@ def nearest_frontier(
 
 
 @kernel
-def _approach(
+def approach_places(
     cells: NDArray[np.int64],
     starts: NDArray[np.int64],
     log_odds: NDArray[np.int8],
@@ -176,7 +176,7 @@ def _approach(
     least: int,
     spans: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-    """Per cluster the place, its frontier cell, what remains there of the budget, and whether one sees the other."""
+    """Per cluster the place, its frontier cell, what remains there of the budget, and whether one sees the other (kernel)."""
     rows, columns = log_odds.shape
     reach = len(spans) // 2
     count = len(starts) - 1

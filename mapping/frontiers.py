@@ -5,6 +5,7 @@ autonomous exploration, CIRA 1997). The flags are kept up to date window by wind
 listing them, clustering them and searching the nearest never pass over the whole map.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.clearance import Window, full_window, grown_window
 from lidarium.mapping.grid_planning import centres_of
 from lidarium.mapping.grid_search import TILE_SHIFT
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.search_targets import Targets, disc_spans, near_tiles
 
 FRONTIER = 1
@@ -89,8 +90,8 @@ class FrontierMap:
         """
         if log_odds.shape != self.flags.shape:
             raise ValueError(f"log_odds has shape {log_odds.shape}; this map was made for {self.flags.shape}")
-        whole = full_window(log_odds.shape)
-        _update(log_odds, self.flags, self.tiles, grown_window(whole if window is None else window, 1, log_odds.shape))
+        row_low, row_high, column_low, column_high = full_window(log_odds.shape) if window is None else window
+        update_frontiers(log_odds, self.flags, self.tiles, (int(row_low), int(row_high), int(column_low), int(column_high)))
 
     def __len__(self) -> int:
         return int(self.tiles.sum())
@@ -108,10 +109,7 @@ class FrontierMap:
 
     def ignore_near(self, cell: tuple[int, int], reach: float) -> int:
         """Ignore the frontier cells within ``reach`` [m] of a cell, itself included; return how many."""
-        cells = self.cells()
-        near = cells[np.hypot(*(cells - np.asarray(cell)).T) * self.resolution <= reach]
-        self.ignore(near)
-        return len(near)
+        return int(ignore_frontiers_near(self.flags, self.tiles, int(cell[0]), int(cell[1]), reach / self.resolution))
 
     def add(self, cells: NDArray[np.integer]) -> None:
         """Flag distinct cells (N, 2) that are not flagged yet; for a map that holds a choice of another's frontier cells."""
@@ -125,7 +123,7 @@ class FrontierMap:
 
     def clusters(self, origin: tuple[float, float] = (0.0, 0.0), minimum_cells: int = 1) -> Clusters:
         """8-connected clusters of at least ``minimum_cells`` cells; ``origin`` is the lower left corner of the grid [m]."""
-        cells, starts = _clustered(self.flags, self.cells(), minimum_cells)
+        cells, starts = frontier_clusters(self.flags, self.tiles, minimum_cells)
         means, representatives = _centres(cells, starts)
         return Clusters(cells, starts, centres_of(means, origin, self.resolution), representatives, np.diff(starts) * self.resolution)
 
@@ -136,10 +134,10 @@ class FrontierMap:
 
 
 @kernel
-def _update(log_odds: NDArray[np.int8], flags: NDArray[np.uint8], tiles: NDArray[np.int32], window: Window) -> None:
-    """Recompute the flags of a window and the counts of its tiles."""
+def update_frontiers(log_odds: Array, flags: Array, tiles: Array, window: Window) -> None:
+    """Recompute the flags in and beside a window that changed, and the counts of its tiles; see ``FrontierMap`` (kernel)."""
     rows, columns = log_odds.shape
-    row_low, row_high, column_low, column_high = window
+    row_low, row_high, column_low, column_high = grown_window(window, 1, log_odds.shape)
     for row in range(row_low, row_high):
         here = log_odds[row, column_low:column_high]
         below = log_odds[max(row - 1, 0), column_low:column_high]
@@ -166,6 +164,27 @@ def _update(log_odds: NDArray[np.int8], flags: NDArray[np.uint8], tiles: NDArray
                 for i in range(marks.size):
                     count += marks[i] == FRONTIER
             tiles[tile_row, tile_column] = count
+
+
+@kernel
+def ignore_frontiers_near(flags: Array, tiles: Array, row: int, column: int, reach: float) -> int:
+    """Ignore the frontier cells within ``reach`` cells of a cell, itself included; return how many (kernel)."""
+    rows, columns = flags.shape
+    margin = math.ceil(reach)
+    count = 0
+    for other in range(max(row - margin, 0), min(row + margin + 1, rows)):
+        for another in range(max(column - margin, 0), min(column + margin + 1, columns)):
+            if flags[other, another] == FRONTIER and math.hypot(other - row, another - column) <= reach:
+                flags[other, another] = IGNORED_MARK
+                tiles[other >> TILE_SHIFT, another >> TILE_SHIFT] -= 1
+                count += 1
+    return count
+
+
+@kernel
+def frontier_clusters(flags: Array, tiles: Array, minimum: int) -> tuple[Array, Array]:
+    """8-connected clusters of at least ``minimum`` frontier cells: the cells, and where each cluster starts (kernel)."""
+    return _clustered(flags, _listed(flags, tiles, tiles.sum()), minimum)
 
 
 @kernel

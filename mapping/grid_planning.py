@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping import grid_search
 from lidarium.mapping.clearance import ClearanceField, limit_of
+from lidarium.mapping.path_search import Passage, budget_of, find_path
 from lidarium.mapping.search_targets import Targets
 
 Cell = tuple[int, int]
@@ -66,8 +67,14 @@ class Footprint:
 
 
 @lru_cache(maxsize=64)
-def _costs_of(footprint: Footprint, resolution: float, limit: int) -> tuple[NDArray[np.int32], int]:
-    """Half the cost of a step, straight and diagonal, by closeness (0 = no entry), and the closeness up to which steps have room."""
+def passage_of(footprint: Footprint, resolution: float, limit: int) -> Passage:
+    """Return how a body passes over a grid of cells of ``resolution`` [m], whose clearance field has this ``limit``.
+
+    Raises
+    ------
+    ValueError
+        If the footprint needs more clearance than the field knows.
+    """
     least = limit_of(footprint.radius, resolution)
     if limit_of(footprint.preferred, resolution) > limit:
         raise ValueError(f"preferred clearance {footprint.preferred} m is beyond the largest one that the clearance field knows")
@@ -79,7 +86,7 @@ def _costs_of(footprint: Footprint, resolution: float, limit: int) -> tuple[NDAr
     costs = np.rint(np.array([[grid_search.STRAIGHT / 2], [grid_search.DIAGONAL / 2]]) * factors).astype(np.int32)
     costs[:, squared < max(least, 1)] = 0
     costs.flags.writeable = False
-    return costs, limit - least - 2
+    return Passage(limit, costs, limit - least - 2, footprint.radius / resolution, footprint.preferred / resolution)
 
 
 class SearchSpace:
@@ -114,6 +121,17 @@ class SearchSpace:
         grid_search.clear(self.remaining, self.touched, self.touched_count)
         self.touched_count = 0
         self.generation += 1
+
+    def provide(self, slots: int) -> None:
+        """Have at least so many buckets, a power of two."""
+        if slots > self.buckets.shape[0]:
+            self.buckets = np.empty((slots, self.buckets.shape[1]), dtype=np.int32)
+
+    @property
+    def memory(self) -> NDArray[np.int64]:
+        """Where the space lies, as a row of ``SearchMemory.table``."""
+        arrays = (self.remaining, self.parent, self.touched, self.buckets)
+        return np.array([*(array.ctypes.data for array in arrays), *self.buckets.shape], np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,7 +267,45 @@ def search(
     ValueError
         If shapes differ, a cell lies outside the grid, or the footprint needs more clearance than the field knows.
     """
-    return _search(space, log_odds, clearance, start, footprint, goal, targets, count, maximum_cost, blocked, guided=False)
+    _check_search(space, log_odds, clearance, start, goal)
+    passage = passage_of(footprint, space.resolution, clearance.limit)
+    space.provide(passage.slots)
+    budget = int(budget_of(float(maximum_cost), space.resolution))
+    goal_row, goal_column = (-1, -1) if goal is None else (int(goal[0]), int(goal[1]))
+    discs = _discs_array(blocked)
+    space.forget()
+    space.touched_count = grid_search.close_discs(space.remaining, space.touched, discs)
+    space.touched_count, hit_count, band, space.buckets = grid_search.spread(
+        log_odds,
+        clearance.closeness,
+        clearance.limit,
+        passage.half_costs,
+        passage.roomy,
+        passage.radius,
+        discs,
+        space.remaining,
+        space.parent,
+        space.touched,
+        space.touched_count,
+        space.buckets,
+        int(start[0]),
+        int(start[1]),
+        budget,
+        goal_row,
+        goal_column,
+        False,
+        _NO_MASK if targets is None else targets.mask,
+        _NO_MASK if targets is None else targets.near,
+        _NO_SPANS if targets is None else targets.spans,
+        0 if targets is None else count,
+        space.hits,
+    )
+    packed = space.hits[:hit_count].astype(np.int64)
+    rows, columns = packed >> 16, packed & 0xFFFF
+    order = np.lexsort((columns, rows, -space.remaining[rows, columns].astype(np.int64)))[:count]
+    hits = np.stack((rows[order], columns[order]), axis=1)
+    settled = ((band + 1) << grid_search.BUCKET_SHIFT) - 1
+    return Search(space, (int(start[0]), int(start[1])), budget, settled, hits, space.generation)
 
 
 def plan(
@@ -272,9 +328,15 @@ def plan(
     (float, (N, 2) int64) or None
         Cost [m] and cells (row, column) from start to goal; None if there is no way.
     """
-    found = _search(space, log_odds, clearance, start, footprint, goal, None, 1, maximum_cost, blocked, guided=True)
-    cost = found.cost(goal)
-    return None if math.isinf(cost) else (cost, found.path(goal))
+    _check_search(space, log_odds, clearance, start, goal)
+    passage = passage_of(footprint, space.resolution, clearance.limit)
+    space.provide(passage.slots)
+    space.forget()
+    cost, cells = find_path(
+        log_odds, clearance.closeness, passage, space.memory, _discs_array(blocked), int(start[0]), int(start[1]), int(goal[0]),
+        int(goal[1]), budget_of(float(maximum_cost), space.resolution),
+    )  # fmt: skip
+    return None if cost < 0 else (cost * (space.resolution / grid_search.STRAIGHT), cells)
 
 
 def discs_of(discs: Iterable[Disc], origin: tuple[float, float], resolution: float) -> list[Disc]:
@@ -286,64 +348,14 @@ _NO_MASK = np.zeros((1, 1), dtype=np.uint8)
 _NO_SPANS = np.zeros(1, dtype=np.int64)
 
 
-def _search(
-    space: SearchSpace,
-    log_odds: NDArray[np.int8],
-    clearance: ClearanceField,
-    start: Cell,
-    footprint: Footprint,
-    goal: Cell | None,
-    targets: Targets | None,
-    count: int,
-    maximum_cost: float,
-    blocked: Iterable[Disc],
-    *,
-    guided: bool,
-) -> Search:
+def _check_search(space: SearchSpace, log_odds: NDArray[np.int8], clearance: ClearanceField, start: Cell, goal: Cell | None) -> None:
     for name, shape in (("log_odds", log_odds.shape), ("clearance", clearance.closeness.shape)):
         if shape != space.shape:
             raise ValueError(f"{name} has shape {shape}; this space was made for {space.shape}")
     for name, cell in (("start", start), ("goal", start if goal is None else goal)):
         if not (0 <= cell[0] < space.shape[0] and 0 <= cell[1] < space.shape[1]):
             raise ValueError(f"{name} {(int(cell[0]), int(cell[1]))} lies outside the grid of {space.shape} cells")
-    half_costs, roomy = _costs_of(footprint, space.resolution, clearance.limit)
-    bands = (2 * int(half_costs.max()) * 2 >> grid_search.BUCKET_SHIFT) + 4
-    if bands > space.buckets.shape[0]:
-        space.buckets = np.empty((1 << (bands - 1).bit_length(), space.buckets.shape[1]), dtype=np.int32)
-    largest = maximum_cost * grid_search.STRAIGHT / space.resolution
-    budget = grid_search.LARGEST_BUDGET if largest > grid_search.LARGEST_BUDGET - 1 else max(int(largest), 0) + 1
-    goal_row, goal_column = (-1, -1) if goal is None else (int(goal[0]), int(goal[1]))
-    discs = np.array(list(blocked), dtype=np.float64).reshape(-1, 3)
-    space.forget()
-    space.touched_count = grid_search.close_discs(space.remaining, space.touched, discs)
-    space.touched_count, hit_count, band, space.buckets = grid_search.spread(
-        log_odds,
-        clearance.closeness,
-        clearance.limit,
-        half_costs,
-        roomy,
-        footprint.radius / space.resolution,
-        discs,
-        space.remaining,
-        space.parent,
-        space.touched,
-        space.touched_count,
-        space.buckets,
-        int(start[0]),
-        int(start[1]),
-        budget,
-        goal_row,
-        goal_column,
-        guided,
-        _NO_MASK if targets is None else targets.mask,
-        _NO_MASK if targets is None else targets.near,
-        _NO_SPANS if targets is None else targets.spans,
-        0 if targets is None else count,
-        space.hits,
-    )
-    packed = space.hits[:hit_count].astype(np.int64)
-    rows, columns = packed >> 16, packed & 0xFFFF
-    order = np.lexsort((columns, rows, -space.remaining[rows, columns].astype(np.int64)))[:count]
-    hits = np.stack((rows[order], columns[order]), axis=1)
-    settled = ((band + 1) << grid_search.BUCKET_SHIFT) - 1
-    return Search(space, (int(start[0]), int(start[1])), budget, settled, hits, space.generation)
+
+
+def _discs_array(discs: Iterable[Disc]) -> NDArray[np.float64]:
+    return np.array(list(discs), dtype=np.float64).reshape(-1, 3)

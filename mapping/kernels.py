@@ -156,6 +156,12 @@ def uint8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
 
 
 @kernel(inline=True)
+def uint16_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
+    """View a (rows, columns) uint16 grid at an address inside a kernel."""
+    return carray(_pointer(address), (rows, columns), np.uint16)
+
+
+@kernel(inline=True)
 def word_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) uint64 grid at an address inside a kernel."""
     return carray(_pointer(address), (rows, columns), np.uint64)
@@ -165,3 +171,9 @@ def word_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
 def int32_table_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) int32 table at an address inside a kernel."""
     return carray(_pointer(address), (rows, columns), np.int32)
+
+
+def use_threads(threads: int) -> None:
+    """Let parallel kernels run on so many threads of this process from now on."""
+    if numba.get_num_threads() != threads:
+        numba.set_num_threads(threads)

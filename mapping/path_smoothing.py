@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from lidarium.mapping.clearance import ClearanceField
 from lidarium.mapping.grid_lines import line_is_free
 from lidarium.mapping.grid_planning import Disc, Footprint, centres_of
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels import Array, kernel
 
 STEP = 0.5  # cells between the points at which a line is tested
+PIECES_AT_ONCE = 10  # pieces of that length that are measured together where there is doubt
+HALF_DIAGONAL = 0.7072  # cells from the centre of a square to its corners, rounded up
 
 
 def shortened(
@@ -53,7 +55,7 @@ def shortened(
         raise ValueError(f"path has shape {cells.shape}; want (N, 2) cells with N >= 1")
     resolution = clearance.resolution
     discs = np.array(list(blocked), dtype=np.float64).reshape(-1, 3)
-    kept = _shortened(
+    kept = kept_places(
         cells, log_odds, clearance.closeness, clearance.limit, footprint.radius / resolution, footprint.preferred / resolution, discs
     )
     return np.asarray(cells[kept])
@@ -79,32 +81,34 @@ def line_keeps_clearance(
         raise ValueError(f"distance is {distance} m; this field knows clearances up to {clearance.maximum} m")
     ends = np.array([from_cell, to_cell], dtype=np.int64)
     needed = distance / clearance.resolution
-    return bool(_line_is_clear(log_odds, clearance.closeness, clearance.limit, ends[0, 0], ends[0, 1], ends[1, 0], ends[1, 1], needed))
+    return bool(line_is_clear(log_odds, clearance.closeness, clearance.limit, ends[0, 0], ends[0, 1], ends[1, 0], ends[1, 1], needed))
 
 
 @kernel
-def _shortened(
-    path: NDArray[np.int64],
-    log_odds: NDArray[np.int8],
-    closeness: NDArray[np.uint16],
-    limit: int,
-    radius: float,
-    preferred: float,
-    discs: NDArray[np.float64],
+def kept_places(
+    path: Array, log_odds: Array, closeness: Array, limit: int, radius: float, preferred: float, discs: Array
 ) -> NDArray[np.int64]:
-    """From each kept cell go as far as a line can: halve the distance until it fits, then walk on while it does."""
+    """Which cells of a path :func:`shortened` keeps (kernel).
+
+    From each kept cell it goes as far as a line can: it halves the distance until a line fits, then walks on while one does.
+    """
     count = len(path)
     kept = np.zeros(count, np.int64)
     kept_count = 1
     anchor = 0
     while anchor < count - 1:
         ahead = count - 1 - anchor
-        while ahead > 1 and not _can_replace(path, anchor, anchor + ahead, log_odds, closeness, limit, radius, preferred, discs):
+        while ahead > 1:
+            nearest = _nearest_on(path, anchor, anchor + ahead + 1, closeness)
+            if _can_replace(path, anchor, anchor + ahead, nearest, log_odds, closeness, limit, radius, preferred, discs):
+                break
             ahead //= 2
         ahead = max(ahead, 1)
-        while anchor + ahead + 1 < count and _can_replace(
-            path, anchor, anchor + ahead + 1, log_odds, closeness, limit, radius, preferred, discs
-        ):
+        nearest = _nearest_on(path, anchor, anchor + ahead + 1, closeness)
+        while anchor + ahead + 1 < count:
+            nearest = max(nearest, _nearest_on(path, anchor + ahead + 1, anchor + ahead + 2, closeness))
+            if not _can_replace(path, anchor, anchor + ahead + 1, nearest, log_odds, closeness, limit, radius, preferred, discs):
+                break
             ahead += 1
         anchor += ahead
         kept[kept_count] = anchor
@@ -113,28 +117,35 @@ def _shortened(
 
 
 @kernel
+def _nearest_on(path: Array, first: int, end: int, closeness: Array) -> int:
+    """Greatest closeness of the cells of a piece of a path."""
+    nearest = 0
+    for i in range(first, end):
+        nearest = max(nearest, int(closeness[path[i, 0], path[i, 1]]))
+    return nearest
+
+
+@kernel
 def _can_replace(
-    path: NDArray[np.int64],
+    path: Array,
     first: int,
     last: int,
-    log_odds: NDArray[np.int8],
-    closeness: NDArray[np.uint16],
+    nearest: int,
+    log_odds: Array,
+    closeness: Array,
     limit: int,
     radius: float,
     preferred: float,
-    discs: NDArray[np.float64],
+    discs: Array,
 ) -> bool:
-    """Whether the line between two cells of a path is as good as the piece between them."""
-    nearest = 0
-    for i in range(first, last + 1):
-        nearest = max(nearest, closeness[path[i, 0], path[i, 1]])
+    """Whether the line between two cells of a path is as good as the piece between them, whose greatest closeness is ``nearest``."""
     own = math.sqrt(max(limit - nearest - 2.0, 0.0)) * 0.5  # diagonal steps lose at most 2 squared half cells on the way
     needed = max(radius, min(preferred, own))
     row, column, to_row, to_column = path[first, 0], path[first, 1], path[last, 0], path[last, 1]
     for k in range(len(discs)):
         if _distance_to_piece(discs[k, 0], discs[k, 1], row, column, to_row, to_column) < discs[k, 2]:
             return False
-    return bool(_line_is_clear(log_odds, closeness, limit, row, column, to_row, to_column, needed))
+    return bool(line_is_clear(log_odds, closeness, limit, row, column, to_row, to_column, needed))
 
 
 @kernel
@@ -156,8 +167,8 @@ def _distance_to_square(row: float, column: float, centre_row: int, centre_colum
 
 
 @kernel
-def _piece_is_clear(log_odds: NDArray[np.int8], row_a: float, column_a: float, row_b: float, column_b: float, needed: float) -> bool:
-    """Whether a short piece of a line, crossing free cells only, keeps ``needed`` cells from every occupied square around it."""
+def _piece_is_clear(log_odds: Array, row_a: float, column_a: float, row_b: float, column_b: float, needed: float) -> bool:
+    """Whether a piece of a line, crossing free cells only, keeps ``needed`` cells from every occupied square around it."""
     rows, columns = log_odds.shape
     row_low = max(math.floor(min(row_a, row_b) - needed), 0)
     row_high = min(math.ceil(max(row_a, row_b) + needed) + 1, rows)
@@ -165,8 +176,12 @@ def _piece_is_clear(log_odds: NDArray[np.int8], row_a: float, column_a: float, r
     column_high = min(math.ceil(max(column_a, column_b) + needed) + 1, columns)
     least = needed - 1e-9
     for row in range(row_low, row_high):
-        for column in range(column_low, column_high):
-            if log_odds[row, column] <= 0:
+        beliefs = log_odds[row, column_low:column_high]
+        for i in range(beliefs.size):
+            if beliefs[i] <= 0:
+                continue
+            column = column_low + i
+            if _distance_to_piece(row, column, row_a, column_a, row_b, column_b) >= needed + HALF_DIAGONAL:
                 continue
             if _distance_to_square(row_a, column_a, row, column) < least or _distance_to_square(row_b, column_b, row, column) < least:
                 return False
@@ -178,29 +193,29 @@ def _piece_is_clear(log_odds: NDArray[np.int8], row_a: float, column_a: float, r
 
 
 @kernel
-def _line_is_clear(
-    log_odds: NDArray[np.int8],
-    closeness: NDArray[np.uint16],
-    limit: int,
-    row: int,
-    column: int,
-    to_row: int,
-    to_column: int,
-    needed: float,
-) -> bool:
-    """Whether a line between two cells crosses only known free cells and keeps ``needed`` cells from all that is occupied."""
+def line_is_clear(log_odds: Array, closeness: Array, limit: int, row: int, column: int, to_row: int, to_column: int, needed: float) -> bool:
+    """Whether a line between two cells crosses only known free cells and keeps ``needed`` cells from all that is occupied (kernel)."""
     if not line_is_free(log_odds, row, column, to_row, to_column):
         return False
     rise = float(to_row - row)
     run = float(to_column - column)
-    pieces = max(math.ceil(math.sqrt(rise * rise + run * run) / STEP), 1)
-    for i in range(pieces):
-        row_a, row_b = row + rise * i / pieces, row + rise * (i + 1) / pieces
-        column_a, column_b = column + run * i / pieces, column + run * (i + 1) / pieces
-        middle_row, middle_column = 0.5 * (row_a + row_b), 0.5 * (column_a + column_b)
+    length = math.sqrt(rise * rise + run * run)
+    pieces = max(math.ceil(length / STEP), 1)
+    piece = length / pieces + 1e-9
+    i = 0
+    while i < pieces:
+        middle_row, middle_column = row + rise * (i + 0.5) / pieces, column + run * (i + 0.5) / pieces
         cell_row, cell_column = math.floor(middle_row + 0.5), math.floor(middle_column + 0.5)
         offset = math.sqrt((middle_row - cell_row) ** 2 + (middle_column - cell_column) ** 2) + 0.5 * STEP
-        sure = math.sqrt(float(limit - closeness[cell_row, cell_column])) * 0.5 - offset
-        if sure < needed and not _piece_is_clear(log_odds, row_a, column_a, row_b, column_b, needed):
+        spare = math.sqrt(float(limit - closeness[cell_row, cell_column])) * 0.5 - offset - needed
+        if spare >= 0.0:
+            # Clearance falls no faster than one walks: where there is room to spare the next pieces are clear as well.
+            i += 1 + int(spare / piece)
+            continue
+        end = min(i + PIECES_AT_ONCE, pieces)
+        row_a, row_b = row + rise * i / pieces, row + rise * end / pieces
+        column_a, column_b = column + run * i / pieces, column + run * end / pieces
+        if not _piece_is_clear(log_odds, row_a, column_a, row_b, column_b, needed):
             return False
+        i = end
     return True

@@ -1,66 +1,32 @@
-"""What a robot's onboard software knows: its pose and map, and what reached it of the others.
+"""What the robots' onboard software knows: their poses and maps, and what reached each of the others.
 
-With known starts and the ideal radio all robots share one map, the sum of their log-odds. Both kinds of map come with
-what planning needs (clearance and frontiers), brought up to date only where the map has changed.
+With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. Both kinds of map come
+with what planning needs (clearance and frontiers), brought up to date only where the map has changed.
 """
 
-import math
+import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.navigation import (
+    CLEARANCE_LIMIT,
+    FLAGS,
+    LOG_ODDS,
+    RECORD,
+    NavigationMap,
+    TeamMaps,
+    refresh_map,
+    refresh_team,
+    sum_team,
+)
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.kinematic import ENDED, KinematicWorld
-from lidarium.mapping.clearance import ClearanceField
-from lidarium.mapping.frontiers import FrontierMap
-from lidarium.mapping.grid_planning import SearchSpace
-from lidarium.mapping.kernels import Array, int8_grid_at, kernel
-
-CLEARANCE_LIMIT = 0.6
-"""Clearance is told exactly up to this [m]."""
-
-
-class NavigationMap:
-    """A map of log-odds with its clearance and frontiers.
-
-    Parameters
-    ----------
-    log_odds : (rows, columns) int8
-        The map; it may be written by its owner, who says so by ``changed``.
-    resolution : float
-        Side of a cell [m].
-    """
-
-    def __init__(self, log_odds: NDArray[np.int8], resolution: float) -> None:
-        self._log_odds, self.resolution = log_odds, resolution
-        rows, columns = log_odds.shape
-        self.clearance = ClearanceField((rows, columns), resolution, CLEARANCE_LIMIT)
-        self.frontiers = FrontierMap((rows, columns), resolution)
-        self.space = SearchSpace((rows, columns), resolution)
-        self._long: FrontierMap | None = None
-        self._long_cells: NDArray[np.int64] = np.zeros((0, 2), np.int64)
-
-    @property
-    def log_odds(self) -> NDArray[np.int8]:
-        """The map, read-only: only its owner, who holds the array itself, writes it."""
-        view = self._log_odds.view()
-        view.flags.writeable = False
-        return view
-
-    def changed(self, window: tuple[int, int, int, int]) -> None:
-        """Bring clearance and frontiers up to date in a window (row_low, row_high, column_low, column_high)."""
-        self.clearance.update(self.log_odds, window)
-        self.frontiers.update(self.log_odds, window)
-
-    def long_frontiers(self, minimum_size: float) -> FrontierMap:
-        """Return the frontiers without those shorter than ``minimum_size`` [m]; valid until the next call."""
-        if self._long is None:
-            self._long = FrontierMap(self.log_odds.shape, self.resolution)
-        self._long.remove(self._long_cells)
-        self._long_cells = self.frontiers.clusters(minimum_cells=max(math.ceil(minimum_size / self.resolution - 1e-9), 1)).cells
-        self._long.add(self._long_cells)
-        return self._long
+from lidarium.mapping.clearance import limit_of, stamp_of
+from lidarium.mapping.kernels import use_threads
+from lidarium.mapping.path_search import SearchMemory
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,20 +51,6 @@ class Teammate:
     has_ended: bool
 
 
-@kernel
-def _sum_maps(addresses: Array, rows: int, columns: int, window: Array, total: Array) -> None:
-    """Write the sum of maps of one shape into ``total`` within a window."""
-    for row in range(window[0], window[1]):
-        target = total[row]
-        for column in range(window[2], window[3]):
-            target[column] = 0
-        for k in range(addresses.shape[0]):
-            source = int8_grid_at(addresses[k], rows, columns)[row]
-            for column in range(window[2], window[3]):
-                value = np.int16(target[column]) + np.int16(source[column])
-                target[column] = np.int8(min(max(value, np.int16(-127)), np.int16(127)))
-
-
 class Belief:
     """Read-only handle on what one robot knows; what it shows is valid until the next step.
 
@@ -109,7 +61,7 @@ class Belief:
     perception : Perception
         The team's onboard software.
     row : int
-        Which robot.
+        Which robot: episode * robots + robot.
     """
 
     def __init__(self, perception: "Perception", row: int) -> None:
@@ -148,7 +100,7 @@ class Belief:
     @property
     def shared_map(self) -> NavigationMap | None:
         """The team's map, where it reached this robot; None with unknown starts."""
-        return self._perception.shared_map()
+        return self._perception.shared_map(self._perception.episode_of(self._row))
 
     @property
     def teammates(self) -> dict[str, Teammate]:
@@ -162,113 +114,174 @@ class Belief:
 
 
 class Perception:
-    """The onboard software of a team: keeps maps for navigation up to date, on demand.
+    """The onboard software of the teams of all episodes: keeps maps for navigation up to date, on demand.
 
     Parameters
     ----------
     world : KinematicWorld
-        Whose maps and believed poses they are.
+        Whose maps and believed poses they are; row = episode * robots + robot.
     settings : ExplorationSettings
-        The team.
-    offsets : (robots, 2) float64
+        The team of every episode.
+    offsets : (rows, 2) float64
         Origin of each robot's map frame in the frame of its believed pose [m]; the environment's own array.
+
+    Attributes
+    ----------
+    memory : SearchMemory
+        For the searches of kernels, a piece for each thread.
     """
 
     def __init__(self, world: KinematicWorld, settings: ExplorationSettings, offsets: NDArray[np.float64]) -> None:
-        self.world, self.settings, self._offsets = world, settings, offsets
-        self._own: dict[int, NavigationMap] = {}
-        self._shared: NavigationMap | None = None
-        self._sum: NDArray[np.int8] = np.zeros((0, 0), np.int8)
-        self._goal: tuple[float, float] | None = None
-        self._fresh_at = -2
+        self.world, self.settings, self.offsets = world, settings, offsets
+        self._robots, self._episodes = settings.robots, world.episodes
+        rows = self._robots * self._episodes
+        self._own: list[NavigationMap | None] = [None] * rows
+        self._shared: list[NavigationMap | None] = [None] * self._episodes
+        self._goals: list[tuple[float, float] | None] = [None] * self._episodes
+        self._own_records = np.zeros((rows, RECORD), np.int64)
+        self._shared_records = np.zeros((self._episodes, RECORD), np.int64)
+        self._known = np.zeros((rows, 4), np.int64)
+        self._fresh_at = np.full(self._episodes, -2, np.int64)
+        self._threads = min(settings.threads, int(os.cpu_count() or 1))
+        self.memory = SearchMemory(self._threads)
+        self._shares = settings.known_starts and settings.robots > 1
 
-    def start(self, goal: tuple[float, float] | None = None) -> None:
+    def start(self, goal: tuple[float, float] | None = None, episode: int = 0) -> None:
         """Begin an episode."""
-        self._own, self._shared, self._goal = {}, None, goal
-        self._fresh_at = -2
+        first, last = episode * self._robots, (episode + 1) * self._robots
+        for navigation in (*self._own[first:last], self._shared[episode]):
+            if navigation is not None:
+                # Whoever still holds a map of the last episode may go on reading it.
+                navigation.keep_record_in(np.zeros(RECORD, np.int64))
+        self._own[first:last], self._shared[episode] = [None] * self._robots, None
+        self._own_records[first:last], self._shared_records[episode] = 0, 0
+        self._known[first:last] = [(rows, 0, columns, 0) for _, rows, columns in self.world.belief_rows[first:last]]
+        self._goals[episode], self._fresh_at[episode] = goal, -2
 
-    def belief(self, agent: str) -> Belief:
+    @property
+    def maps(self) -> TeamMaps:
+        """The maps as kernels see them."""
+        world, resolution = self.world, self.settings.occupancy.resolution
+        limit = limit_of(CLEARANCE_LIMIT, resolution)
+        return TeamMaps(
+            self._robots, self._own_records, self._shared_records, world.belief_rows, world.windows, self._known, world.steps,
+            self._fresh_at, limit, stamp_of(limit),
+        )  # fmt: skip
+
+    def threads_for(self, episodes: int) -> int:
+        """Return the number of threads for kernels over so many episodes, having seen to it that parallel kernels run on as many."""
+        threads = min(self._threads, episodes)
+        if threads > 1:
+            use_threads(self._threads)
+        return threads
+
+    def belief(self, agent: str, episode: int = 0) -> Belief:
         """Return the handle on what an agent knows."""
-        return Belief(self, self.settings.agents.index(agent))
+        return Belief(self, episode * self._robots + self.settings.agents.index(agent))
+
+    def episode_of(self, row: int) -> int:
+        """Return the episode of a row."""
+        return row // self._robots
 
     def own_map(self, row: int) -> NavigationMap:
         """Return a robot's own map, up to date."""
-        self._refresh()
-        if row not in self._own:
-            log_odds = self.world.log_odds[row]
-            self._own[row] = NavigationMap(log_odds, self.settings.occupancy.resolution)
-            self._own[row].changed((0, log_odds.shape[0], 0, log_odds.shape[1]))
-        return self._own[row]
+        self._refresh(self.episode_of(row))
+        navigation = self._own[row]
+        if navigation is None:
+            navigation = NavigationMap(self.world.log_odds[row], self.settings.occupancy.resolution)
+            navigation.keep_record_in(self._own_records[row])
+            maps = self.maps
+            refresh_map(navigation.record, maps.limit, maps.stamp, self._known[row])
+            self._own[row] = navigation
+        return navigation
 
-    def shared_map(self) -> NavigationMap | None:
-        """Return the team's map, up to date; a lone robot's is its own."""
+    def shared_map(self, episode: int = 0) -> NavigationMap | None:
+        """Return the team's map, up to date; a lone robot's is its own, with unknown starts there is none."""
         if not self.settings.known_starts:
             return None
-        if self.settings.robots == 1:
-            return self.own_map(0)
-        self._refresh()
-        if self._shared is None:
-            shape = self.world.log_odds[0].shape
-            self._sum = np.zeros(shape, np.int8)
-            self._shared = NavigationMap(self._sum, self.settings.occupancy.resolution)
-            self._share((0, shape[0], 0, shape[1]))
-        return self._shared
+        if not self._shares:
+            return self.own_map(episode)
+        self._refresh(episode)
+        navigation = self._shared[episode]
+        if navigation is None:
+            first = episode * self._robots
+            log_odds = np.zeros(self.world.log_odds[first].shape, np.int8)
+            navigation = NavigationMap(log_odds, self.settings.occupancy.resolution)
+            navigation.keep_record_in(self._shared_records[episode])
+            for row in range(first, first + self._robots):
+                sum_team(self.maps, episode, self._known[row])
+            self._shared[episode] = navigation
+        return navigation
 
-    def _refresh(self) -> None:
-        """Take in what the maps have changed since the last look."""
-        step = int(self.world.steps[0])
-        if step == self._fresh_at:
-            return
-        self._fresh_at = step
-        for row in range(self.settings.robots):
-            low_row, high_row, low_column, high_column = (int(value) for value in self.world.windows[row])
-            window = (low_row, high_row, low_column, high_column)
-            if window[0] >= window[1] or window[2] >= window[3]:
-                continue
-            if row in self._own:
-                self._own[row].changed(window)
-            if self._shared is not None:
-                self._share(window)
-        self.world.forget_changes(0, self.settings.robots)
+    def planning_map(self, row: int, shares_map: bool) -> NavigationMap:
+        """Return the map that a robot plans on, up to date: the team's where it reaches the robot, else its own."""
+        shared = self.shared_map(self.episode_of(row)) if shares_map else None
+        return self.own_map(row) if shared is None else shared
 
-    def _share(self, window: tuple[int, int, int, int]) -> None:
-        assert self._shared is not None
-        rows, columns = self._shared.log_odds.shape
-        addresses = np.array([log_odds.ctypes.data for log_odds in self.world.log_odds], np.int64)
-        _sum_maps(addresses, rows, columns, np.array(window, np.int64), self._sum)
-        self._shared.changed(window)
+    def provide_records(self, rows: NDArray[np.int64], shares_map: bool, *, with_frontiers: bool = False) -> tuple[NDArray[np.int64], int]:
+        """Make the maps that robots plan on where there are none yet, for kernels.
+
+        Returns
+        -------
+        records : (maps, 10) int64
+            A table of records; kernels bring them up to date by ``refresh_team``.
+        sharing : int
+            How many rows share one record: that of a row is number ``row // sharing``.
+        """
+        is_shared = shares_map and self._shares
+        records, sharing = (self._shared_records, self._robots) if is_shared else (self._own_records, 1)
+        places = np.unique(rows // sharing)
+        for place in places[records[places, FLAGS if with_frontiers else LOG_ODDS] == 0]:
+            navigation = self.planning_map(int(place) * sharing, shares_map)
+            if with_frontiers:
+                _ = navigation.frontiers
+        return records, sharing
+
+    def _refresh(self, episode: int) -> None:
+        """Take in what the maps of a team have changed since the last look."""
+        if self._fresh_at[episode] != self.world.steps[episode]:
+            refresh_team(self.maps, episode)
 
     def offset(self, row: int) -> NDArray[np.float64]:
         """Return the origin of a robot's map frame in the frame of its believed pose [m], shape (2,)."""
-        return np.asarray(self._offsets[row])
+        return np.asarray(self.offsets[row])
 
     def pose_in_frame(self, of: int, to: int) -> NDArray[np.float64]:
         """Return the believed pose of a robot in the map frame of another (or its own), shape (3,)."""
         x, y, theta = self.world.believed[of]
-        return np.array([x - self._offsets[to, 0], y - self._offsets[to, 1], theta])
+        return np.array([x - self.offsets[to, 0], y - self.offsets[to, 1], theta])
 
     def origin_in_frame(self, row: int) -> tuple[float, float]:
         """Return the lower left corner of a robot's map in its map frame [m]."""
-        x, y = self.world.origins[row] - self._offsets[row]
+        x, y = self.world.origins[row] - self.offsets[row]
         return float(x), float(y)
 
     def teammates(self, row: int) -> dict[str, Teammate]:
         """Return what a robot knows of the others: with known starts and the ideal radio, where they are now."""
         if not self.settings.known_starts:
             return {}
+        first = self.episode_of(row) * self._robots
         return {
             agent: Teammate(self.pose_in_frame(other, row), 0.0, self.settings.robot.radius, bool(self.world.flags[other] & ENDED))
-            for other, agent in enumerate(self.settings.agents)
+            for other, agent in enumerate(self.settings.agents, first)
             if other != row
         }
 
     def goal_of(self, row: int) -> NDArray[np.float64] | None:
         """Return the goal in a robot's map frame; None without a goal, and where the robot does not know its start."""
-        if self._goal is None or not self.settings.known_starts:
+        goal = self._goals[self.episode_of(row)]
+        if goal is None or not self.settings.known_starts:
             return None
-        return np.asarray(self._goal - self._offsets[row])
+        return np.asarray(goal - self.offsets[row])
 
     def goal_in_frame(self, row: int) -> NDArray[np.float32]:
         """Return the goal for the observation: as ``goal_of``, zeros where it is not known."""
         goal = self.goal_of(row)
         return np.zeros(2, np.float32) if goal is None else goal.astype(np.float32)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        for maps, records in ((self._own, self._own_records), (self._shared, self._shared_records)):
+            for navigation, record in zip(maps, records, strict=True):
+                if navigation is not None:
+                    navigation.keep_record_in(record)

@@ -1,8 +1,13 @@
 """Orders that a robot takes and states that it reports."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 class DriveState(Enum):
@@ -37,3 +42,29 @@ class Target:
             raise ValueError(f"target is ({self.x}, {self.y}); want finite metres")
         if self.heading is not None and not math.isfinite(self.heading):
             raise ValueError(f"heading of the target is {self.heading}; want a finite angle or None")
+
+
+class Orders(NamedTuple):
+    """Targets of many robots.
+
+    Attributes
+    ----------
+    is_ordered : (rows,) bool
+        Whether the robot has a target; otherwise it stays where it is and gives way.
+    targets : (rows, 2) float64
+        Positions in the robots' map frames, finite where ordered [m].
+    headings : (rows,) float64
+        Headings to turn to at the end [rad], nan for any.
+    """
+
+    is_ordered: NDArray[np.bool_]
+    targets: NDArray[np.float64]
+    headings: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, targets: Sequence[Target | None]) -> "Orders":
+        """Return the orders of a list of targets, one for each row."""
+        places = [(0.0, 0.0) if target is None else (target.x, target.y) for target in targets]
+        headings = [math.nan if target is None or target.heading is None else target.heading for target in targets]
+        is_ordered = np.array([target is not None for target in targets])
+        return cls(is_ordered, np.array(places, np.float64).reshape(-1, 2), np.array(headings, np.float64))

@@ -1,13 +1,12 @@
 """Where a robot goes to let a teammate pass."""
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from lidarium.envs.onboard.perception import NavigationMap
+from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.grid_planning import Cell, Disc, Footprint, centres_of, search
 
 FARTHEST_REFUGE = (3.0, 12.0, 40.0)
@@ -15,25 +14,6 @@ FARTHEST_REFUGE = (3.0, 12.0, 40.0)
 
 SAMPLE = 0.05
 """Distance between the points at which a path is compared with places [m]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Refuge:
-    """A robot's stay aside.
-
-    Attributes
-    ----------
-    made_way_for : int
-        The robot that may pass.
-    place : (2,) float64
-        Where the robot stood in the way [m].
-    since_step : int
-        When it began.
-    """
-
-    made_way_for: int
-    place: NDArray[np.float64]
-    since_step: int
 
 
 def _sampled(path: NDArray[np.float64]) -> NDArray[np.float64]:

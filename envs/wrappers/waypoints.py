@@ -8,7 +8,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.onboard.state import DriveState, Target
+from lidarium.envs.onboard.state import DriveState, Orders, Target
 from lidarium.envs.onboard.team_driver import TeamDriver
 from lidarium.envs.wrappers.decisions import DecisionWrapper
 
@@ -62,17 +62,26 @@ class WaypointExploration(DecisionWrapper):
         self, actions: Mapping[str, Order]
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Drive to the targets for one decision; rewards are summed over its steps, ``infos[agent]["drive"]`` is a ``DriveState``."""
+        targets: list[Target | None] = [None] * self.env.settings.robots
+        stopping = self.env.stopping
+        for agent in self.env.agents:
+            if agent not in actions and agent not in stopping:
+                raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
+            row = self.env.possible_agents.index(agent)
+            targets[row] = self._target(row, actions.get(agent))
+        return self.carry_out(Orders.of(targets))
+
+    def carry_out(
+        self, orders: Orders
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Drive by the orders of all robots for one decision; as ``step``."""
         env, driver = self.env, self.driver
         if not env.agents:
             return env.step({})
         rows = {agent: env.possible_agents.index(agent) for agent in env.agents}
-        stopping = env.stopping
-        for agent, row in rows.items():
-            if agent not in actions and agent not in stopping:
-                raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-            driver.assign(row, self._target(row, actions.get(agent)))
+        driver.assign(np.isin(np.arange(env.settings.robots), list(rows.values())), orders)
         driver.prepare()
-        if not stopping:
+        if not env.stopping:
             waiting = {row for row in rows.values() if driver.is_done(row)}
             for _ in range(env.settings.decision_steps):
                 env.drive_at(driver.commands())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.onboard.perception import NavigationMap
+from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.occupancy import three_levels
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.envs.onboard.perception import NavigationMap
+from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.team_driver import footprint_of
 from lidarium.envs.onboard.traffic import find_refuge, obstructing
 from lidarium.mapping.grid_planning import centres_of, search

@@ -1,0 +1,201 @@
+"""The cheapest path between two cells, in kernels that plan for many bodies at once.
+
+A kernel that plans works on memory of its own thread; what a search touched is cleared behind it, so that neither the
+order of the searches nor the number of threads shows in what they find.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.grid_search import (
+    BUCKET_SHIFT,
+    LARGEST_BUDGET,
+    LEAVING,
+    NO_ENTRY,
+    STRAIGHT,
+    clear,
+    close_discs,
+    spread,
+    trace,
+)
+from lidarium.mapping.kernels import Array, int32_table_at, kernel, uint8_grid_at
+
+REMAINING, PARENT, TOUCHED, BUCKETS, SLOTS, WIDTH = range(6)
+"""Places in a row of a search memory's table: addresses, and the shape of the buckets."""
+
+BUCKET_WIDTH = 4096
+"""Cells for which a bucket has room at first; a search that needs more takes more for itself."""
+
+
+class Passage(NamedTuple):
+    """How a body passes over a grid, in the units of searches and cells.
+
+    Attributes
+    ----------
+    limit : int
+        Closeness of an occupied cell, see ``ClearanceField``.
+    half_costs : (2, limit + 1) int32
+        Half the cost of a step, straight and diagonal, by closeness; 0 where the body does not fit.
+    roomy : int
+        Closeness up to which steps have room beside them.
+    radius, preferred : float
+        Least clearance, and the one from which on a step costs no more than on open floor [cells].
+    """
+
+    limit: int
+    half_costs: NDArray[np.int32]
+    roomy: int
+    radius: float
+    preferred: float
+
+    @property
+    def slots(self) -> int:
+        """Buckets that a search needs: a power of two."""
+        bands = (2 * int(self.half_costs.max()) * 2 >> BUCKET_SHIFT) + 4
+        return 1 << (bands - 1).bit_length()
+
+
+class SearchMemory:
+    """Scratch memory for searches in kernels, one piece for each thread; memory is provided where it is touched.
+
+    Attributes
+    ----------
+    table : (pieces, 6) int64
+        Where each piece lies, for the kernels.
+    """
+
+    def __init__(self, pieces: int) -> None:
+        self.table: NDArray[np.int64] = np.zeros((pieces, 6), np.int64)
+        self._cells, self._slots = 0, 0
+        self._arrays: list[tuple[NDArray[Any], ...]] = []
+
+    def fit(self, cells: int, slots: int) -> None:
+        """Make room for searches over grids of so many cells with so many buckets."""
+        if cells <= self._cells and slots <= self._slots:
+            return
+        self._cells, self._slots = max(cells, self._cells), max(slots, self._slots)
+        self._arrays = []
+        for piece in range(len(self.table)):
+            arrays = (
+                np.zeros(self._cells, np.int32),
+                np.empty(self._cells, np.uint8),
+                np.empty(self._cells + 8, np.int32),
+                np.empty((self._slots, BUCKET_WIDTH), np.int32),
+            )
+            self._arrays.append(arrays)
+            self.table[piece] = (*(array.ctypes.data for array in arrays), self._slots, BUCKET_WIDTH)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the sizes alone: copies have memory of their own."""
+        return _memory_of, (len(self.table), self._cells, self._slots)
+
+
+def _memory_of(pieces: int, cells: int, slots: int) -> SearchMemory:
+    memory = SearchMemory(pieces)
+    if cells:
+        memory.fit(cells, slots)
+    return memory
+
+
+@kernel
+def budget_of(maximum_cost: float, resolution: float) -> int:
+    """Return what may be spent for a cost of at most ``maximum_cost`` [m], in units of searches (kernel)."""
+    largest = maximum_cost * STRAIGHT / resolution
+    return LARGEST_BUDGET if largest > LARGEST_BUDGET - 1 else max(int(largest), 0) + 1
+
+
+@kernel
+def search_all(
+    log_odds: Array, closeness: Array, passage: Passage, memory: Array, start_row: int, start_column: int
+) -> tuple[Array, Array, int, int]:
+    """Spread costs over all that a body can reach, in a thread's memory (kernel).
+
+    Returns
+    -------
+    remaining, parent : (rows, columns) int32 and uint8
+        What remains of ``LARGEST_BUDGET`` in each cell, and how it was reached; see ``grid_search``.
+    count : int
+        Number of touched cells, for ``clear_memory``.
+    least : int
+        What remains at least in cells whose costs are final.
+    """
+    rows, columns = log_odds.shape
+    remaining, parent = int32_table_at(memory[REMAINING], rows, columns), uint8_grid_at(memory[PARENT], rows, columns)
+    touched = int32_table_at(memory[TOUCHED], 1, rows * columns + 8)[0]
+    buckets = int32_table_at(memory[BUCKETS], memory[SLOTS], memory[WIDTH])
+    no_mask = np.empty((0, 0), np.uint8)
+    count, _, band, _ = spread(
+        log_odds, closeness, passage.limit, passage.half_costs, passage.roomy, passage.radius, np.empty((0, 3)), remaining, parent,
+        touched, 0, buckets, start_row, start_column, LARGEST_BUDGET, -1, -1, False, no_mask, no_mask, np.empty(0, np.int64), 0, touched,
+    )  # fmt: skip
+    return remaining, parent, count, LARGEST_BUDGET - (((band + 1) << BUCKET_SHIFT) - 1)
+
+
+@kernel
+def clear_memory(memory: Array, rows: int, columns: int, count: int) -> None:
+    """Leave a thread's memory as the next search wants it (kernel)."""
+    clear(int32_table_at(memory[REMAINING], rows, columns), int32_table_at(memory[TOUCHED], 1, rows * columns + 8)[0], count)
+
+
+@kernel
+def find_path(
+    log_odds: Array,
+    closeness: Array,
+    passage: Passage,
+    memory: Array,
+    discs: Array,
+    start_row: int,
+    start_column: int,
+    goal_row: int,
+    goal_column: int,
+    budget: int,
+) -> tuple[int, Array]:
+    """Cheapest path between two cells of a grid, by A* with the octile distance (kernel).
+
+    Parameters
+    ----------
+    log_odds, closeness : (rows, columns) int8 and uint16
+        The belief and its clearance.
+    passage : Passage
+        The body.
+    memory : (6,) int64
+        A row of ``SearchMemory.table``.
+    discs : (K, 3) float64
+        Discs (row, column, radius) [cells] that the body's centre may not enter.
+    start_row, start_column, goal_row, goal_column : int
+        From where to where; within the grid.
+    budget : int
+        What may be spent, see ``budget_of``.
+
+    Returns
+    -------
+    cost : int
+        In units of searches; negative where there is no way.
+    cells : (N, 2) int64
+        Cells (row, column) from the start to the goal.
+    """
+    rows, columns = log_odds.shape
+    nothing = np.empty((0, 2), np.int64)
+    is_there = start_row == goal_row and start_column == goal_column
+    if not is_there and (log_odds[goal_row, goal_column] >= 0 or passage.half_costs[0, closeness[goal_row, goal_column]] == 0):
+        return -1, nothing  # no step leads into it
+    remaining, parent = int32_table_at(memory[REMAINING], rows, columns), uint8_grid_at(memory[PARENT], rows, columns)
+    touched = int32_table_at(memory[TOUCHED], 1, rows * columns + 8)[0]
+    buckets = int32_table_at(memory[BUCKETS], memory[SLOTS], memory[WIDTH])
+    count = close_discs(remaining, touched, discs)
+    if not is_there and remaining[goal_row, goal_column] == NO_ENTRY:
+        clear(remaining, touched, count)
+        return -1, nothing
+    no_mask = np.empty((0, 0), np.uint8)
+    count, _, band, _ = spread(
+        log_odds, closeness, passage.limit, passage.half_costs, passage.roomy, passage.radius, discs, remaining, parent, touched, count,
+        buckets, start_row, start_column, budget, goal_row, goal_column, True, no_mask, no_mask, np.empty(0, np.int64), 0, touched,
+    )  # fmt: skip
+    left = remaining[goal_row, goal_column]
+    cost = 0 if is_there else budget - left
+    is_reached = left != 0 and left != NO_ENTRY and parent[goal_row, goal_column] < LEAVING and cost <= ((band + 1) << BUCKET_SHIFT) - 1
+    cells = trace(parent, start_row, start_column, goal_row, goal_column) if is_there or is_reached else nothing
+    clear(remaining, touched, count)
+    return cost if is_there or is_reached else -1, cells
