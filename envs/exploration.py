@@ -1,6 +1,7 @@
 """The environment: a team of lidar robots explores a floor (PettingZoo parallel API)."""
 
 import copy
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,28 +11,27 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from lidarium.envs.floors.catalogue import load_floor
+from lidarium.envs.episodes import begin, goal_of_robots, map_frames
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.starts import check_starts, draw_starts
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.options import FloorChoice, read_options
-from lidarium.envs.scorer import Scorer
+from lidarium.envs.scorer import Scorer, is_near
 from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.floor_cache import floor_tables
-from lidarium.envs.simulation.kinematic import ENDED, KinematicWorld
+from lidarium.envs.simulation.arrays import ENDED
+from lidarium.envs.simulation.kinematic import KinematicWorld
 from lidarium.mapping.kernels import Array, kernel
 
 Observation = dict[str, NDArray[Any]]
 
 
 @kernel
-def _scale(commands: Array, limits: Array) -> bool:
-    """Turn shares within [-1, 1] into speeds and turn rates; False where one is nan."""
+def scale_shares(commands: Array, limits: Array) -> bool:
+    """Turn shares within [-1, 1] into speeds and turn rates; False where one is nan or infinite."""
     for robot in range(commands.shape[0]):
         for axis in range(2):
             share = commands[robot, axis]
-            if share != share:
+            if not math.isfinite(share):
                 return False
             commands[robot, axis] = min(max(share, -1.0), 1.0) * limits[axis]
     return True
@@ -132,35 +132,17 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         chosen = read_options(options, self.settings.robots)
         if seed is not None or self._generator is None:
             self._generator = np.random.default_rng(seed)
-        choice = self._choice if chosen.floor is None else FloorChoice(chosen.floor, self._image_resolution)
-        spec = choice.draw(self._generator)
-        floor = load_floor(spec, self._image_resolution)
-        settings, radius = self.settings, self.settings.robot.radius
-        tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
-        if chosen.starts is not None:
-            check_starts(tables.body, radius, chosen.starts)
-            starts = chosen.starts
-        else:
-            starts = draw_starts(tables.body, radius, settings.robots, self._generator, floor.starts)
-        self.seed = int(self._generator.integers(2**63))
-        self.floor = floor
-        self.goal = (chosen.goal or floor.goal) if self.has_goal else None
-        self.world.place(0, tables, starts, self.seed, settings.known_starts)
-        if settings.known_starts:
-            # The map frame begins at the corner of the cell in which the robot starts.
-            cell = settings.occupancy.resolution
-            origin = np.asarray(tables.laser.origin)
-            self._offsets[:] = origin + np.floor((starts[:, :2] - origin) / cell) * cell
-        else:
-            self._offsets[:] = 0.0
+        beginning = begin(self._generator, self._choice, chosen, self.settings)
+        self.seed, self.floor, self.goal = beginning.seed, beginning.floor, beginning.goal
+        self.world.place(0, beginning.tables, beginning.starts, beginning.seed, self.settings.known_starts)
+        self._offsets[:] = map_frames(beginning, self.settings)
+        self._goals[:] = goal_of_robots(beginning, self.settings)
         self._commands[:] = 0.0
         self._stopping.clear()
         self.agents = self.possible_agents[:]
         self.world.step(self._commands, moves_bodies=False)
         self.scorer.start()
         self.perception.start(self.goal)
-        # A robot that does not know where it starts does not know where the goal is either.
-        self._goals[:] = np.nan if self.goal is None or not settings.known_starts else self.goal
         truths = self._truths()
         infos = {agent: {"truth": truths[row]} for agent, row in self._rows.items()}
         if self.render_mode == "human":
@@ -202,8 +184,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             if shares.shape != (2,):
                 raise ValueError(f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and turn rate")
             self._commands[self._rows[agent]] = shares
-        if not _scale(self._commands, self._limits):
-            raise ValueError(f"an action is nan ({actions}); want two numbers within [-1, 1] for each agent")
+        if not scale_shares(self._commands, self._limits):
+            raise ValueError(f"an action is nan or infinite ({actions}); want two finite numbers within [-1, 1] for each agent")
         self.drive_at(self._commands)
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
@@ -263,7 +245,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def _is_at_goal(self, row: int) -> bool:
         assert self.goal is not None
-        return bool(np.hypot(*(self.world.poses[row, :2] - self.goal)) <= self.settings.goal_radius)
+        return bool(is_near(self.world.poses[row, 0], self.world.poses[row, 1], *self.goal, self.settings.goal_radius))
 
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason that its policy gives (such as ``no_frontier``)."""

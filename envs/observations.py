@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lidarium.envs.settings import OBSERVABLES, ExplorationSettings
 from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.envs.simulation.stages import RANGE_GAP
-from lidarium.mapping.kernels import Array, int8_grid_at, kernel
+from lidarium.mapping.kernels import Array, int8_grid_at, kernel, use_threads
 from lidarium.mapping.map_crops import crop_levels, crop_turned
 
 FARTHEST = 1000.0
@@ -194,8 +194,7 @@ class ObservationWriter:
         known = (world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals)
         observed = tuple([out[name] if name in self.keys else self._absent[name] for name in KEYS])
         if self._threads > 1 and rows >= ROWS_FOR_THREADS:
-            if numba.get_num_threads() != self._threads:
-                numba.set_num_threads(self._threads)
+            use_threads(self._threads)
             _write_parallel(active, known, self._limits, observed)
         else:
             _write_serial(active, known, self._limits, observed)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.catalogue import load_floor, set_floors
+from lidarium.envs.floors.catalogue import is_file_name, load_floor, set_floors
 from lidarium.envs.floors.floor import Floor
 
 SET_PREFIX = "set:"
@@ -25,6 +25,7 @@ class FloorChoice:
     """
 
     def __init__(self, floor: str | Path | Floor, image_resolution: float | None = None) -> None:
+        self._image_resolution = image_resolution
         if isinstance(floor, str) and floor.startswith(SET_PREFIX):
             self._specs: tuple[str | Path | Floor, ...] = set_floors(floor.removeprefix(SET_PREFIX))
             self.has_goal = False
@@ -32,11 +33,14 @@ class FloorChoice:
             self._specs = (floor,)
             self.has_goal = load_floor(floor, image_resolution).goal is not None
 
-    def draw(self, generator: np.random.Generator) -> str | Path | Floor:
+    def instead(self, floor: str | Path | Floor) -> "FloorChoice":
+        """Return the choice of another floor or set; the side of a pixel concerns files only."""
+        return FloorChoice(floor, self._image_resolution if isinstance(floor, str | Path) and is_file_name(floor) else None)
+
+    def load(self, generator: np.random.Generator) -> Floor:
         """Return the floor of the next episode."""
-        if len(self._specs) == 1:
-            return self._specs[0]
-        return self._specs[int(generator.integers(len(self._specs)))]
+        spec = self._specs[0] if len(self._specs) == 1 else self._specs[int(generator.integers(len(self._specs)))]
+        return load_floor(spec, self._image_resolution)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,13 +14,25 @@ TRACK_PERIOD_S = 0.2
 """Time between two poses of the track [s]."""
 
 
+@kernel(inline=True)
+def is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> bool:
+    """Whether a place is within a radius of the goal [m]; never of a goal that is nan."""
+    return bool((x - goal_x) * (x - goal_x) + (y - goal_y) * (y - goal_y) <= radius * radius)
+
+
 @kernel
-def _add_rewards(gains: Array, contacts: Array, travelled: Array, weights: Array, travelled_before: Array, rewards: Array) -> None:
+def add_rewards(gains: Array, contacts: Array, travelled: Array, weights: Array, travelled_before: Array, rewards: Array) -> None:
     """Add each robot's reward of a step: its share of the new cells less the prices of time, contact and energy."""
     for robot in range(gains.shape[0]):
         driven = travelled[robot] - travelled_before[robot]
         travelled_before[robot] = travelled[robot]
         rewards[robot] += weights[0] * gains[robot] - weights[1] - weights[2] * contacts[robot] - weights[3] * driven
+
+
+def reward_weights(settings: ExplorationSettings) -> NDArray[np.float64]:
+    """Return what a new cell earns, and what a step, a contact and a metre cost, shape (4,)."""
+    weights = settings.reward
+    return np.array([weights.area * settings.occupancy.resolution**2, weights.time * settings.time_step, weights.contact, weights.energy])
 
 
 class Scorer:
@@ -51,10 +63,7 @@ class Scorer:
 
     def __init__(self, world: KinematicWorld, settings: ExplorationSettings) -> None:
         self._world, self._settings = world, settings
-        weights = settings.reward
-        self._weights = np.array(
-            [weights.area * settings.occupancy.resolution**2, weights.time * settings.time_step, weights.contact, weights.energy]
-        )
+        self._weights = reward_weights(settings)
         self._rewards = np.zeros(settings.robots)
         self._travelled = np.zeros(settings.robots)
         self.coverage = 0.0
@@ -76,7 +85,7 @@ class Scorer:
     def advance(self) -> None:
         """Take in one step of the world."""
         world = self._world
-        _add_rewards(world.gains, world.contacts, world.travelled, self._weights, self._travelled, self._rewards)
+        add_rewards(world.gains, world.contacts, world.travelled, self._weights, self._travelled, self._rewards)
         self._note()
 
     def _note(self) -> None:

@@ -173,6 +173,11 @@ def int32_table_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN40
     return carray(_pointer(address), (rows, columns), np.int32)
 
 
+def available_threads() -> int:
+    """Return how many threads parallel kernels can use."""
+    return int(_numba_config.NUMBA_NUM_THREADS)
+
+
 def use_threads(threads: int) -> None:
     """Let parallel kernels run on so many threads of this process from now on."""
     if numba.get_num_threads() != threads:

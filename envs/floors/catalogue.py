@@ -72,11 +72,19 @@ def load_floor(spec: str | Path | Floor, resolution: float | None = None) -> Flo
     """
     if isinstance(spec, Floor):
         return spec
-    if isinstance(spec, Path) or _looks_like_path(spec):
+    if is_file_name(spec):
         return load_file(Path(spec), resolution)
     if resolution is not None:
         raise ValueError(f"resolution {resolution} m is given for floor {spec!r}, which is not a file; leave it out")
     return _load_named(spec)
+
+
+def is_file_name(spec: str | Path) -> bool:
+    """Return whether a floor is named by a path to a file."""
+    if isinstance(spec, Path):
+        return True
+    suffixes = tuple(suffix for known in FORMATS for suffix in known.suffixes)
+    return "/" in spec or "\\" in spec or spec.lower().endswith(suffixes) or (spec not in drawn_names() and Path(spec).is_file())
 
 
 def set_floors(name: str) -> tuple[str, ...]:
@@ -184,11 +192,6 @@ def _generated(kind: str, seed: int) -> Floor:
     floor = generate_building(seed, BuildingSettings(kind=kind))
     store.save(key, packed_floor(floor))
     return floor
-
-
-def _looks_like_path(spec: str) -> bool:
-    suffixes = tuple(suffix for known in FORMATS for suffix in known.suffixes)
-    return "/" in spec or "\\" in spec or spec.lower().endswith(suffixes) or (spec not in drawn_names() and Path(spec).is_file())
 
 
 def _set_name(name: str) -> str:

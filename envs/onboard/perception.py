@@ -23,7 +23,8 @@ from lidarium.envs.onboard.navigation import (
     sum_team,
 )
 from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.kinematic import ENDED, KinematicWorld
+from lidarium.envs.simulation.arrays import ENDED
+from lidarium.envs.simulation.kinematic import KinematicWorld
 from lidarium.mapping.clearance import limit_of, stamp_of
 from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.path_search import SearchMemory

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.drives import Drives, drop_path
 from lidarium.envs.onboard.driving import ARRIVED, BLOCKED, DRIVING, IDLE, MAX_POINTS
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, TeamMaps, closeness_of, log_odds_of, refresh_team
-from lidarium.envs.simulation.kinematic import ENDED
+from lidarium.envs.simulation.arrays import ENDED
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.path_search import Passage, budget_of, find_path
 from lidarium.mapping.path_smoothing import kept_places, line_is_clear

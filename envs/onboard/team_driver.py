@@ -30,7 +30,7 @@ from lidarium.envs.onboard.planning import (
 from lidarium.envs.onboard.state import DriveState, Orders
 from lidarium.envs.onboard.traffic import find_refuge, obstructing
 from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.kinematic import ENDED
+from lidarium.envs.simulation.arrays import ENDED
 from lidarium.mapping.clearance import limit_of
 from lidarium.mapping.grid_planning import Cell, Disc, Footprint, cells_of, discs_of, passage_of
 

@@ -9,26 +9,23 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.coverage import pack_bits
 from lidarium.envs.floors.starts import swept_free_space
-from lidarium.envs.simulation.arrays import ENDED, KNOWN_MATES, OWN_FRAME, TRUE_POSE, WorldArrays, table_of  # noqa: F401
+from lidarium.envs.simulation.arrays import KNOWN_MATES, OWN_FRAME, TRUE_POSE, WorldArrays, table_of
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE
 from lidarium.envs.simulation.robots import Robot
-from lidarium.envs.simulation.stepping import perceive_parallel, perceive_serial, step_episodes, step_rows, step_serial
+from lidarium.envs.simulation.stepping import perceive_parallel, perceive_serial, step_rows, step_serial
 from lidarium.envs.simulation.world import Sensed
+from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.occupancy import WORD, OccupancySettings
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""
-
-EPISODES_PER_THREAD = 4
-"""From this many episodes a thread on, threads take whole episodes; with fewer some thread would wait for another's last one."""
 
 
 def counted_cells(body_free: NDArray[np.bool_], multiple: int) -> NDArray[np.bool_]:
@@ -199,8 +196,8 @@ class KinematicWorld:
 
     def use_threads(self) -> None:
         """Let numba's parallel kernels run on this world's threads."""
-        if self.threads > 1 and numba.get_num_threads() != self.threads:
-            numba.set_num_threads(self.threads)
+        if self.threads > 1:
+            use_threads(self.threads)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_perceive", "_table")}
@@ -220,9 +217,7 @@ class KinematicWorld:
         )  # fmt: skip
         self._table = table_of(arrays)
         is_parallel = self.threads > 1
-        # Whole episodes go through a thread's cache better; few episodes are shared out robot by robot.
-        parallel_step = step_episodes if self.episodes >= EPISODES_PER_THREAD * self._threads else step_rows
-        self._step = parallel_step if is_parallel else step_serial
+        self._step = step_rows if is_parallel else step_serial
         self._perceive = perceive_parallel if is_parallel else perceive_serial
 
     def _blank_map_around(self, floor: FloorTables) -> tuple[NDArray[np.int8], tuple[float, float]]:

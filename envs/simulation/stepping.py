@@ -1,8 +1,8 @@
 """A step of the world in kernels over episodes x robots: bodies move, robots sense, the scorer shares out, maps follow.
 
 Episodes do not touch each other, and within an episode only the motion and the sharing out need the robots in their order. So
-threads may take whole episodes, or the robots of few episodes; the serial and both parallel forms run the same functions and
-agree to the bit.
+threads may take the robots of an episode, or whole episodes (``envs/batch/running.py``); all forms run the same functions and agree
+to the bit.
 """
 
 import math
@@ -55,9 +55,10 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
     world.steps[episode] += 1
 
 
-@kernel(spliced=True)
-def step_episode(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
+@kernel
+def step_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of one episode: move, sense, score and (where ``perceives``) map."""
+    world = world_at(table)
     _move(world, episode, robots, commands, moves_bodies)
     for row in range(episode * robots, (episode + 1) * robots):
         if not world.flags[row] & ENDED:
@@ -65,7 +66,7 @@ def step_episode(world: WorldArrays, episode: int, robots: int, commands: Array,
     _share(world, episode, robots)
 
 
-@kernel(spliced=True)
+@kernel
 def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
     """Run both stages for the robot of a row, if it has not ended."""
     world = world_at(table)
@@ -73,32 +74,35 @@ def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
         sense_and_perceive(world, row, row // robots * robots, robots, perceives)
 
 
-@kernel(spliced=True)
+@kernel
 def _perceive_row(table: Array, row: int, robots: int) -> None:
     world = world_at(table)
     if not world.flags[row] & ENDED:
         perceive_robot(world, row, row // robots * robots, robots)
 
 
-def _step_episodes(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
-    """Run a step of the episodes with ``runs`` (episodes,); threads take whole episodes."""
-    # Loops on threads take arrays from outside, but no tuples of them; each turn views the world's arrays itself.
-    for episode in numba.prange(runs.shape[0]):
+# What runs on threads is a plain call: numba takes sums that are written out in such a loop for sums over all its turns.
+
+
+def _step_serial(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
+    """Run a step of the episodes with ``runs`` (episodes,)."""
+    for episode in range(runs.shape[0]):
         if runs[episode]:
-            step_episode(world_at(table), episode, robots, commands, moves_bodies, perceives)
+            step_episode(table, episode, robots, commands, moves_bodies, perceives)
 
 
 def _step_rows(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of the episodes with ``runs``; threads take single robots."""
+    world = world_at(table)
     for episode in range(runs.shape[0]):
         if runs[episode]:
-            _move(world_at(table), episode, robots, commands, moves_bodies)
+            _move(world, episode, robots, commands, moves_bodies)
     for row in numba.prange(runs.shape[0] * robots):
         if runs[row // robots]:
             _step_row(table, row, robots, perceives)
     for episode in range(runs.shape[0]):
         if runs[episode]:
-            _share(world_at(table), episode, robots)
+            _share(world, episode, robots)
 
 
 def _perceive(table: Array, robots: int, rows: int) -> None:
@@ -107,8 +111,7 @@ def _perceive(table: Array, robots: int, rows: int) -> None:
         _perceive_row(table, row, robots)
 
 
-step_serial = kernel(_step_episodes)
-step_episodes = kernel(parallel=True)(_step_episodes)
+step_serial = kernel(_step_serial)
 step_rows = kernel(parallel=True)(_step_rows)
 perceive_serial = kernel(_perceive)
 perceive_parallel = kernel(parallel=True)(_perceive)

@@ -35,17 +35,8 @@ class FrontierExploration(DecisionWrapper):
         super().__init__(env, "lidarium_frontier_exploration_v0")
         self.waypoints = WaypointExploration(env, shares_map)
         self._offers = FrontierOffers(env.perception, env.settings, self.waypoints.driver)
-        high = np.tile(np.array([FARTHEST, FARTHEST, FARTHEST, FARTHEST], np.float32), (CANDIDATES, 1))
-        low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (CANDIDATES, 1))
         self._observation_spaces = {
-            agent: spaces.Dict(
-                {
-                    **_boxes(env.observation_space(agent)),
-                    "frontiers": spaces.Box(low, high, dtype=np.float32),
-                    "action_mask": spaces.Box(0, 1, (CANDIDATES + 1,), np.int8),
-                }
-            )
-            for agent in self.possible_agents
+            agent: spaces.Dict({**_boxes(env.observation_space(agent)), **frontier_boxes()}) for agent in self.possible_agents
         }
         self._action_spaces = {agent: spaces.Discrete(CANDIDATES + 1) for agent in self.possible_agents}
 
@@ -106,6 +97,13 @@ class FrontierExploration(DecisionWrapper):
             observation["frontiers"] = self._offers.offers.tables[row].copy()
             observation["action_mask"] = self._offers.offers.masks[row].copy()
         return observations
+
+
+def frontier_boxes() -> dict[str, spaces.Space[Any]]:
+    """Return the spaces of what the choice among frontiers adds to an observation."""
+    high = np.full((CANDIDATES, 4), FARTHEST, np.float32)
+    low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (CANDIDATES, 1))
+    return {"frontiers": spaces.Box(low, high, dtype=np.float32), "action_mask": spaces.Box(0, 1, (CANDIDATES + 1,), np.int8)}
 
 
 def _boxes(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:

@@ -1,6 +1,7 @@
 """lidarium: teams of lidar robots explore unknown floors.
 
-``parallel_env`` makes the PettingZoo environment, ``env`` its turn-based form, and after ``import lidarium`` Gymnasium knows
+``parallel_env`` makes the PettingZoo environment, ``env`` its turn-based form, ``vector_env`` and ``sb3_vec_env`` many episodes at
+once, and after ``import lidarium`` Gymnasium knows
 ``lidarium/Exploration-v0``, ``lidarium/WaypointExploration-v0`` and ``lidarium/FrontierExploration-v0``.
 """
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from pettingzoo import AECEnv, ParallelEnv
 
     from lidarium.agents.policy import Policy
+    from lidarium.envs.batch.stable_baselines import ExplorationVecEnv
+    from lidarium.envs.batch.vector_env import ExplorationVectorEnv
     from lidarium.envs.floors.floor import Floor
     from lidarium.envs.settings import ExplorationSettings
 
@@ -24,7 +27,12 @@ _LEVELS = {"Exploration": "velocity", "WaypointExploration": "waypoint", "Fronti
 
 for _name, _level in _LEVELS.items():
     if f"lidarium/{_name}-v0" not in gymnasium.registry:
-        gymnasium.register(id=f"lidarium/{_name}-v0", entry_point="lidarium.envs.solo:SoloExploration", kwargs={"level": _level})
+        gymnasium.register(
+            id=f"lidarium/{_name}-v0",
+            entry_point="lidarium.envs.solo:SoloExploration",
+            vector_entry_point="lidarium.envs.batch.vector_env:make_vector_env",
+            kwargs={"level": _level},
+        )
         pettingzoo.register("parallel", f"lidarium/{_name}-v0", entry_point="lidarium:parallel_env", kwargs={"level": _level})
         pettingzoo.register("aec", f"lidarium/{_name}-v0", entry_point="lidarium:env", kwargs={"level": _level})
 
@@ -80,6 +88,44 @@ def env(floor: "str | Path | Floor" = "apartment", **options: Any) -> "AECEnv[st
 
     converted: AECEnv[str, Any, Any] = parallel_to_aec(parallel_env(floor, **options))
     return converted
+
+
+def vector_env(episodes: int, floor: "str | Path | Floor" = "apartment", **options: Any) -> "ExplorationVectorEnv":  # noqa: ANN401
+    """Make many episodes as one Gymnasium vector environment, stepped by one kernel call; a row for every robot.
+
+    Parameters
+    ----------
+    episodes : int
+        How many; ``num_envs`` is episodes x robots.
+    floor : str, Path or Floor
+        As for ``parallel_env``; of a set such as ``set:train``, each beginning draws one.
+    **options
+        ``level``, ``image_resolution`` and the options of ``parallel_env``; ``copy=False`` for observations in two sets of
+        arrays that take turns.
+
+    Raises
+    ------
+    ValueError, TypeError, FileNotFoundError
+        Where an option or the floor cannot be used.
+    """
+    from lidarium.envs.batch.vector_env import ExplorationVectorEnv
+
+    return ExplorationVectorEnv(episodes, floor, **options)
+
+
+def sb3_vec_env(episodes: int, floor: "str | Path | Floor" = "apartment", **options: Any) -> "ExplorationVecEnv":  # noqa: ANN401
+    """Make the same rows as ``vector_env`` for stable-baselines3, which resets in the step that ends an episode; needs ``lidarium[rl]``.
+
+    Raises
+    ------
+    ImportError
+        Where stable-baselines3 is not installed.
+    ValueError, TypeError, FileNotFoundError
+        Where an option or the floor cannot be used.
+    """
+    from lidarium.envs.batch.stable_baselines import ExplorationVecEnv
+
+    return ExplorationVecEnv(episodes, floor, **options)
 
 
 def policy(name: str, **settings: Any) -> "Policy":  # noqa: ANN401

@@ -9,7 +9,7 @@ import lidarium
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.settings import ExplorationSettings, make_settings
-from lidarium.envs.simulation.kinematic import ENDED
+from lidarium.envs.simulation.arrays import ENDED
 
 STAY = np.zeros(2, np.float32)
 AHEAD = np.array([1.0, 0.0], np.float32)

@@ -9,9 +9,10 @@ import pytest
 
 from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Raster
+from lidarium.envs.simulation.arrays import ENDED, KNOWN_MATES
 from lidarium.envs.simulation.floor_cache import floor_tables
 from lidarium.envs.simulation.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic import ENDED, KNOWN_MATES, KinematicWorld
+from lidarium.envs.simulation.kinematic import KinematicWorld
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.motion import distance_bound
 from lidarium.envs.simulation.ray_tables import RayTables

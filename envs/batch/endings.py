@@ -1,0 +1,51 @@
+"""Why robots end, for all rows at once: by the rules of ``ExplorationEnv``, to the letter."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.settings import ExplorationSettings
+from lidarium.envs.simulation.kinematic import KinematicWorld
+
+REASONS = ("", "covered", "reached", "collision", "horizon", "no_frontier", "frontier_unreachable")
+"""Why a robot ended, by number; 0 where it has not."""
+
+COVERED, REACHED, COLLISION, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE = range(1, len(REASONS))
+
+
+def endings(
+    world: KinematicWorld,
+    settings: ExplorationSettings,
+    goals: NDArray[np.float64],
+    live: NDArray[np.bool_],
+    stopping: NDArray[np.int8],
+) -> NDArray[np.int8]:
+    """Return why live robots end now, by number in ``REASONS``, shape (rows,).
+
+    Parameters
+    ----------
+    world : KinematicWorld
+        What has happened.
+    settings : ExplorationSettings
+        What ends an episode.
+    goals : (episodes, 2) float64
+        Goals in the floor's frame [m], nan for none.
+    live : (rows,) bool
+        Who has not ended and took part in the step.
+    stopping : (rows,) int8
+        Why robots end of themselves, 0 where they do not.
+    """
+    robots = settings.robots
+    reasons = np.where(live, stopping, 0).astype(np.int8)
+    away = world.poses[:, :2] - np.repeat(goals, robots, axis=0)
+    with np.errstate(invalid="ignore"):
+        is_there = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] <= settings.goal_radius * settings.goal_radius
+    reasons[live & is_there] = REACHED
+    if settings.stop_on_contact:
+        reasons[live & (world.contacts != 0)] = COLLISION
+    horizon = settings.horizon_steps
+    if horizon is not None:
+        reasons[live & (reasons == 0) & np.repeat(world.steps >= horizon, robots)] = HORIZON
+    if settings.stop_coverage is not None:
+        coverage = world.team_seen / np.maximum(world.counted, 1)
+        reasons[live & np.repeat(coverage >= settings.stop_coverage, robots)] = COVERED
+    return reasons

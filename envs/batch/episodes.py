@@ -1,0 +1,258 @@
+"""A batch of episodes: their beginnings, steps, endings and observations in arrays over rows = episodes x robots.
+
+What each row sees, earns and why it ends is what ``ExplorationEnv`` gives for the same seed, to the bit.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.batch.endings import HORIZON, REASONS, endings
+from lidarium.envs.batch.levels import make_level
+from lidarium.envs.batch.running import LOOKS, STEPS, WAITS, Tally, run_parallel, run_serial
+from lidarium.envs.episodes import Beginning, begin, goal_of_robots, map_frames
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.observations import ObservationWriter, observation_space
+from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.options import FloorChoice, ResetOptions
+from lidarium.envs.scorer import reward_weights
+from lidarium.envs.settings import ExplorationSettings
+from lidarium.envs.simulation.arrays import ENDED
+from lidarium.envs.simulation.kinematic import KinematicWorld
+
+Arrays = dict[str, NDArray[Any]]
+
+
+class EpisodeBatch:
+    """Many episodes of one team size and one choice of settings; floors may differ.
+
+    Parameters
+    ----------
+    episodes : int
+        How many.
+    floor : str, Path or Floor
+        As for ``ExplorationEnv``.
+    settings : ExplorationSettings
+        Of every episode.
+    level : str
+        What an action is: ``velocity``, ``waypoint`` or ``frontier``.
+    image_resolution : float or None
+        Side of a pixel [m] where the floor is a plain image.
+    copy : bool
+        Whether observations are new arrays at each step; otherwise two sets of arrays take turns.
+
+    Attributes
+    ----------
+    rows : int
+        Episodes x robots.
+    observation_space, action_space : Space
+        Of one row.
+    observations : dict of arrays
+        One observation a row, (rows, ...).
+    rewards : (rows,) float64
+        What each row has earned in the last step.
+    live : (rows,) bool
+        Which robots have not ended.
+    acted : (rows,) bool
+        Which robots took part in the last step.
+    reasons : (rows,) int8
+        Why robots ended in the last step, by number in ``endings.REASONS``; 0 where they did not.
+    infos : dict
+        What the last step tells beside, in arrays over rows.
+    floors : list of Floor
+        The floor of each episode.
+
+    Raises
+    ------
+    ValueError
+        Where there are no episodes, or the level, the floor or a setting cannot be used.
+    """
+
+    def __init__(
+        self,
+        episodes: int,
+        floor: str | Path | Floor,
+        settings: ExplorationSettings,
+        level: str = "velocity",
+        image_resolution: float | None = None,
+        copy: bool = True,
+    ) -> None:
+        if isinstance(episodes, bool) or not isinstance(episodes, int | np.integer) or episodes < 1:
+            raise ValueError(f"the number of episodes is {episodes!r}; want a whole number of at least 1")
+        self.episodes, self.robots, self.settings = int(episodes), settings.robots, settings
+        self.rows = self.episodes * self.robots
+        self._choice = FloorChoice(floor, image_resolution)
+        self.world = KinematicWorld(
+            [settings.robot] * settings.robots, settings.lidar, settings.occupancy, settings.time_step, self.episodes, settings.threads
+        )
+        self._offsets, self._goals = np.zeros((self.rows, 2)), np.full((self.rows, 2), np.nan)
+        self.perception = Perception(self.world, settings, self._offsets)
+        self.level = make_level(level, self.perception, settings)
+        self._writer = ObservationWriter(settings, self._choice.has_goal)
+        known = observation_space(settings, self._choice.has_goal).spaces
+        self.observation_space = spaces.Dict({**known, **self.level.boxes})
+        self.action_space = self.level.action_space
+        self._copy = copy
+        self._buffers = [self._new_buffers(), self._new_buffers()]
+        self.observations = self._buffers[0]
+        self.live, self.acted = np.zeros(self.rows, np.bool_), np.zeros(self.rows, np.bool_)
+        self.reasons = np.zeros(self.rows, np.int8)
+        self.infos: dict[str, Any] = {}
+        self.floors: list[Floor | None] = [None] * self.episodes
+        self._generators: list[np.random.Generator | None] = [None] * self.episodes
+        horizon, cover = settings.horizon_steps, settings.stop_coverage
+        bounds = (
+            np.inf if horizon is None else horizon, np.inf if cover is None else cover, settings.goal_radius, settings.stop_on_contact
+        )  # fmt: skip
+        self._tally = Tally(
+            reward_weights(settings), np.zeros(self.rows), np.zeros(self.rows), self.world.counted, np.full((self.episodes, 2), np.nan),
+            np.array(bounds, np.float64), self.live, np.zeros(self.rows, np.bool_),
+        )  # fmt: skip
+        self._commands = np.zeros((self.rows, 2))
+
+    @property
+    def rewards(self) -> NDArray[np.float64]:
+        """What each row has earned in the last step, (rows,)."""
+        return self._tally.rewards
+
+    @property
+    def is_over(self) -> NDArray[np.bool_]:
+        """Which episodes have no live robot left, (episodes,)."""
+        return np.asarray(~self.live.reshape(self.episodes, self.robots).any(axis=1))
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether every episode has begun at least once."""
+        return all(floor is not None for floor in self.floors)
+
+    def run(
+        self,
+        actions: NDArray[Any] | None,
+        beginning: NDArray[np.int64],
+        seeds: Sequence[int | None] | None = None,
+        options: Mapping[int, ResetOptions] | None = None,
+        is_same_step: bool = False,
+    ) -> None:
+        """Begin some episodes anew and run the other live ones for one step or decision.
+
+        Parameters
+        ----------
+        actions : (rows, ...) array or None
+            Actions of the live robots of the others; None where nothing else is to run.
+        beginning : (K,) int64
+            Which episodes begin.
+        seeds : sequence of int or None
+            A seed for each of them; None goes on with the episode's own generator.
+        options : mapping or None
+            Options by episode.
+        is_same_step : bool
+            Whether this goes on with the step of the call before: observations are then written over that one's.
+
+        Raises
+        ------
+        ValueError
+            Where an action or an option cannot be used; nothing has run then.
+        """
+        robots = self.robots
+        modes = np.full(self.episodes, WAITS, np.int8)
+        if actions is not None:
+            modes[~self.is_over] = STEPS
+            modes[beginning] = WAITS
+        acted = self.live & np.repeat(modes == STEPS, robots)
+        stopping = np.zeros(self.rows, np.int8)
+        if actions is not None:
+            stopping = self.level.take(actions, acted, self._commands, modes)
+        drawn = self._draw(beginning, seeds, options or {})
+        for episode, start in drawn.items():
+            self._place(episode, start)
+        modes[beginning] = LOOKS
+        self._tally.rewards[:] = 0.0
+        threads = self.world.threads
+        self.world.use_threads()
+        run = run_parallel if threads > 1 else run_serial
+        run(
+            self.world.table, robots, modes, self._commands, self.level.drives, self.level.following, self._tally,
+            self.settings.decision_steps, threads,
+        )  # fmt: skip
+        begun = np.repeat(np.isin(np.arange(self.episodes), beginning), robots)
+        self._tally.rewards[begun | ~acted], self._tally.travelled[begun] = 0.0, 0.0
+        self.acted = acted
+        self.reasons = endings(self.world, self.settings, self._tally.goals, acted, stopping)
+        self._observe(acted | begun, is_same_step)
+        ended = self.reasons != 0
+        self.live[ended] = False
+        self.world.moves[ended] = 0
+        self.world.flags[ended] |= ENDED
+        self._tell(acted | begun)
+
+    def _draw(
+        self, beginning: NDArray[np.int64], seeds: Sequence[int | None] | None, options: Mapping[int, ResetOptions]
+    ) -> dict[int, Beginning]:
+        """Draw how episodes begin, before anything of them is changed."""
+        drawn = {}
+        generators = dict(enumerate(self._generators))
+        for k, episode in enumerate(int(episode) for episode in beginning):
+            seed = None if seeds is None else seeds[k]
+            generator = generators[episode]
+            if seed is not None or generator is None:
+                generator = np.random.default_rng(seed)
+            drawn[episode] = begin(generator, self._choice, options.get(episode, ResetOptions()), self.settings)
+            generators[episode] = generator
+        self._generators = [generators[episode] for episode in range(self.episodes)]
+        return drawn
+
+    def _place(self, episode: int, start: Beginning) -> None:
+        """Put the robots of an episode where they begin."""
+        rows = slice(episode * self.robots, (episode + 1) * self.robots)
+        self.world.place(episode, start.tables, start.starts, start.seed, self.settings.known_starts)
+        self.floors[episode] = start.floor
+        self._offsets[rows] = map_frames(start, self.settings)
+        self._goals[rows] = goal_of_robots(start, self.settings)
+        self._tally.goals[episode] = np.nan if start.goal is None else start.goal
+        self._commands[rows], self.live[rows] = 0.0, True
+        self.perception.start(start.goal, episode)
+        self.level.start(episode)
+
+    def _new_buffers(self) -> Arrays:
+        arrays = self._writer.buffers(self.rows)
+        return {**arrays, **{name: np.zeros((self.rows, *(box.shape or ())), box.dtype) for name, box in self.level.boxes.items()}}
+
+    def _observe(self, seen: NDArray[np.bool_], is_same_step: bool) -> None:
+        """Write the observations of rows; the others repeat their last one."""
+        before = self.observations
+        if self._copy:
+            self.observations = self._new_buffers()
+        elif not is_same_step:
+            self._buffers.reverse()
+            self.observations = self._buffers[0]
+        self._writer.write(self.world, self._offsets, self.observations, seen, self._goals)
+        if self.observations is not before and not seen.all():
+            for name, array in self.observations.items():
+                array[~seen] = before[name][~seen]
+
+    def _tell(self, seen: NDArray[np.bool_]) -> None:
+        """Put together what the step tells beside the observations."""
+        everyone = np.ones(self.rows, np.bool_)
+        coverage = self.world.team_seen / np.maximum(self.world.counted, 1)
+        truth = {"pose": self.world.poses.copy(), "coverage": np.repeat(coverage, self.robots), "seen_cells": self.world.seen.copy()}
+        self.infos = {"truth": truth, "_truth": everyone}
+        if self.reasons.any():
+            ended = self.reasons != 0
+            names = np.full(self.rows, None, object)
+            names[ended] = [REASONS[number] for number in self.reasons[ended]]
+            self.infos["ended_because"], self.infos["_ended_because"] = names, ended
+        self.level.look(self.acted, self.live, seen, self.observations, self.infos)
+
+    @property
+    def terminated(self) -> NDArray[np.bool_]:
+        """Which robots ended in the last step for another reason than the horizon, (rows,)."""
+        return np.asarray((self.reasons != 0) & (self.reasons != HORIZON))
+
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Which robots the horizon has cut in the last step, (rows,)."""
+        return np.asarray(self.reasons == HORIZON)

@@ -1,0 +1,227 @@
+"""What an action is, for all rows of a batch: speeds, waypoints, or the choice of a frontier."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.batch.endings import FRONTIER_UNREACHABLE, NO_FRONTIER
+from lidarium.envs.batch.running import DECIDES, STEPS
+from lidarium.envs.exploration import scale_shares
+from lidarium.envs.observations import action_space
+from lidarium.envs.onboard.drives import DRIVE_STATES, Drives, Following, no_drives
+from lidarium.envs.onboard.driving import FORESIGHT_TIMES
+from lidarium.envs.onboard.frontier_offers import CANDIDATES, REASONS, FrontierOffers
+from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.state import Orders
+from lidarium.envs.onboard.team_driver import TeamDriver
+from lidarium.envs.settings import ExplorationSettings
+from lidarium.envs.wrappers.frontiers import frontier_boxes
+
+Rows = NDArray[np.bool_]
+"""Which rows are meant, (rows,)."""
+
+
+class Level(Protocol):
+    """How actions become motion.
+
+    Attributes
+    ----------
+    action_space : Space
+        Of one robot.
+    boxes : dict
+        Spaces of what the level adds to an observation.
+    drives, following : Drives, Following
+        What the kernel follows in a decision.
+    """
+
+    action_space: spaces.Space[Any]
+    boxes: dict[str, spaces.Space[Any]]
+    drives: Drives
+    following: Following
+
+    def start(self, episode: int) -> None:
+        """Begin an episode."""
+        ...
+
+    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Take the actions of live rows: write ``commands`` or orders, and in ``modes`` how the episodes run.
+
+        Returns
+        -------
+        (rows,) int8
+            Why robots end of themselves, by number in ``endings.REASONS``.
+        """
+        ...
+
+    def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
+        """Write what the level adds to observations and infos, after the episodes have run.
+
+        Parameters
+        ----------
+        acted, live, seen : (rows,) bool
+            Who took part in a step, who has not ended, and whose observations are written: of all that acted or began anew.
+        out : dict of arrays
+            Where observations are written.
+        infos : dict
+            Added to.
+        """
+        ...
+
+
+def check_actions(actions: NDArray[Any], shape: tuple[int, ...], live: Rows, wanted: str) -> NDArray[Any]:
+    """Return actions as an array of a shape, finite for live rows.
+
+    Raises
+    ------
+    ValueError
+        Where the shape is another, or a live row's action is not finite.
+    """
+    array = np.asarray(actions)
+    if array.shape != shape:
+        raise ValueError(f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots + robot")
+    if array.dtype == object or not np.isfinite(array[live]).all():
+        raise ValueError(f"an action is nan or infinite in row {_first_bad(array, live)}; want {wanted}")
+    return array
+
+
+def _first_bad(actions: NDArray[Any], live: Rows) -> int:
+    good = np.isfinite(actions.astype(np.float64)).reshape(len(actions), -1).all(axis=1)
+    return int(np.flatnonzero(live & ~good)[0])
+
+
+class VelocityLevel:
+    """An action is speed and turn rate, as shares of the robot's limits."""
+
+    boxes: dict[str, spaces.Space[Any]] = {}  # noqa: RUF012 (never written)
+
+    def __init__(self, settings: ExplorationSettings) -> None:
+        self.action_space: spaces.Space[Any] = action_space()
+        self._limits = np.array([settings.robot.max_speed, settings.robot.max_turn_rate])
+        self.drives = no_drives(1)
+        self.following = Following(
+            settings.lidar.unit_vectors, np.zeros(1), np.zeros(4), False, np.zeros(1, np.uint8), FORESIGHT_TIMES
+        )  # fmt: skip
+
+    def start(self, episode: int) -> None:
+        """Begin an episode."""
+
+    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Scale the shares; no robot ends of itself."""
+        shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]")
+        commands[:] = 0.0
+        commands[live] = shares[live]
+        scale_shares(commands, self._limits)
+        return np.zeros(len(live), np.int8)
+
+    def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
+        """Add nothing."""
+
+
+class WaypointLevel:
+    """An action is a point within the observed map, as for ``WaypointExploration``."""
+
+    boxes: dict[str, spaces.Space[Any]] = {}  # noqa: RUF012 (never written)
+
+    def __init__(self, perception: Perception, settings: ExplorationSettings) -> None:
+        self.action_space: spaces.Space[Any] = action_space()
+        self._perception = perception
+        self._half_side = 0.5 * settings.map_cells * settings.occupancy.resolution
+        self.driver = TeamDriver(perception, settings)
+        self.drives, self.following = self.driver.drives, self.driver.following
+
+    def start(self, episode: int) -> None:
+        """Begin an episode: no robot has a target."""
+        self.driver.start(episode)
+
+    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Give the robots their targets and plan."""
+        shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]").astype(np.float64)
+        places = self._perception.world.believed[:, :2] - self._perception.offsets
+        targets = places + np.clip(shares, -1.0, 1.0) * self._half_side
+        self.carry_out(Orders(live, targets, np.full(len(live), np.nan)), live, modes)
+        return np.zeros(len(live), np.int8)
+
+    def carry_out(self, orders: Orders, live: Rows, modes: NDArray[np.int8]) -> None:
+        """Let the episodes that step drive by orders for a decision."""
+        self.driver.assign(live, orders)
+        self.driver.prepare(np.flatnonzero(modes == STEPS))
+        modes[modes == STEPS] = DECIDES
+
+    def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
+        """Tell what the robots' driving is about."""
+        _tell(infos, "drive", acted, self.driver.states(), lambda number: DRIVE_STATES[number])
+
+
+class FrontierLevel:
+    """An action is the number of a frontier, as for ``FrontierExploration``."""
+
+    def __init__(self, perception: Perception, settings: ExplorationSettings) -> None:
+        self.action_space: spaces.Space[Any] = spaces.Discrete(CANDIDATES + 1)
+        self.boxes = frontier_boxes()
+        self._waypoints = WaypointLevel(perception, settings)
+        self._offers = FrontierOffers(perception, settings, self._waypoints.driver)
+        self._robots = settings.robots
+        self.drives, self.following = self._waypoints.drives, self._waypoints.following
+
+    def start(self, episode: int) -> None:
+        """Begin an episode: nothing is offered."""
+        self._waypoints.start(episode)
+        self._offers.start(episode)
+
+    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Take the choices; where no robot of an episode is offered any frontier, all end."""
+        wanted = f"a whole number from 0 to {CANDIDATES}"
+        numbers = check_actions(actions, (len(live),), live, wanted)
+        is_bad = live & ((numbers < 0) | (numbers > CANDIDATES) | (numbers != np.floor(numbers)))
+        if is_bad.any():
+            bad = int(np.flatnonzero(is_bad)[0])
+            raise ValueError(f"the action of row {bad} is {numbers[bad]}; want {wanted}, {CANDIDATES} to stay")
+        orders = self._offers.choose(live, np.where(live, numbers, CANDIDATES).astype(np.int64))
+        has_work = (live & (self._offers.offers.counts > 0)).reshape(-1, self._robots).any(axis=1)
+        is_idle = (modes == STEPS) & ~has_work
+        stopping = np.zeros(len(live), np.int8)
+        for row in np.flatnonzero(live & np.repeat(is_idle, self._robots)):
+            is_known = self._offers.why_without_work(int(row)) == "no_frontier"
+            stopping[row] = NO_FRONTIER if is_known else FRONTIER_UNREACHABLE
+        self._waypoints.carry_out(orders, live, modes)
+        # A team without work stands for one last step.
+        modes[is_idle] = STEPS
+        commands[np.repeat(is_idle, self._robots)] = 0.0
+        return stopping
+
+    def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
+        """Give up what was chosen in vain, offer anew, and tell of both."""
+        reasons = self._offers.renew(live, seen)
+        for name, array in (("frontiers", self._offers.offers.tables), ("action_mask", self._offers.offers.masks)):
+            out[name][seen] = array[seen]
+        self._waypoints.look(acted, live, seen, out, infos)
+        _tell(infos, "given_up", reasons != 0, np.arange(len(reasons)), lambda row: (self._offers.target(row), REASONS[reasons[row]]))
+
+
+def _tell(infos: dict[str, Any], name: str, rows: Rows, values: NDArray[Any], describe: Callable[[int], Any]) -> None:
+    """Add an info for some rows, with the mask that Gymnasium's vector environments put beside it."""
+    if rows.any():
+        told = np.full(len(rows), None, object)
+        for row in np.flatnonzero(rows):
+            told[row] = describe(int(values[row]))
+        infos[name], infos[f"_{name}"] = told, rows.copy()
+
+
+def make_level(name: str, perception: Perception, settings: ExplorationSettings) -> Level:
+    """Return a level by its name.
+
+    Raises
+    ------
+    ValueError
+        Where the level is unknown.
+    """
+    if name == "velocity":
+        return VelocityLevel(settings)
+    if name == "waypoint":
+        return WaypointLevel(perception, settings)
+    if name == "frontier":
+        return FrontierLevel(perception, settings)
+    raise ValueError(f"level is {name!r}; want velocity, waypoint or frontier")

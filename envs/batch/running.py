@@ -1,0 +1,108 @@
+"""The kernel that runs many episodes, each for one step or for a decision of its own length."""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.onboard.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
+from lidarium.envs.scorer import add_rewards, is_near
+from lidarium.envs.simulation.arrays import world_at
+from lidarium.envs.simulation.stepping import step_episode
+from lidarium.mapping.kernels import Array, kernel
+
+WAITS, LOOKS, STEPS, DECIDES = range(4)
+"""What an episode does in a call: nothing; it takes the scan at the start; one step by the commands given; or up to the longest
+decision along the robots' paths."""
+
+
+class Tally(NamedTuple):
+    """What an episode is scored by, and what ends it.
+
+    Attributes
+    ----------
+    weights : (4,) float64
+        ``reward_weights``.
+    travelled : (rows,) float64
+        Length of each robot's path at its last reward [m].
+    rewards : (rows,) float64
+        What each robot has earned since the call before; added to.
+    counted : (episodes,) int64
+        Size of F.
+    goals : (episodes, 2) float64
+        Goal in the floor's frame [m], nan for none.
+    bounds : (4,) float64
+        Steps of the horizon and coverage at which all end (inf for none), radius of the goal [m], and whether a contact ends.
+    live : (rows,) bool
+        Which robots have not ended.
+    waiting : (rows,) bool
+        Scratch: who waited for an order already when a decision began.
+    """
+
+    weights: NDArray[np.float64]
+    travelled: NDArray[np.float64]
+    rewards: NDArray[np.float64]
+    counted: NDArray[np.int64]
+    goals: NDArray[np.float64]
+    bounds: NDArray[np.float64]
+    live: NDArray[np.bool_]
+    waiting: NDArray[np.bool_]
+
+
+@kernel
+def _is_interrupted(poses: Array, contacts: Array, live: Array, goal: Array, radius: float, stops_on_contact: bool) -> bool:
+    """Whether something happened to a robot of the episode that ends it: the goal reached, a collision."""
+    for robot in range(live.shape[0]):
+        if live[robot] and is_near(poses[robot, 0], poses[robot, 1], goal[0], goal[1], radius):
+            return True
+        if stops_on_contact and contacts[robot] != 0:
+            return True
+    return False
+
+
+@kernel
+def _run_episode(
+    table: Array, robots: int, episode: int, mode: int, commands: Array, drives: Drives, following: Following, tally: Tally, longest: int
+) -> None:
+    """Run one episode for a step, or for a decision of at most ``longest`` steps.
+
+    A decision ends before when the episode is over, when something happens to a robot, or when a robot with a target has newly
+    arrived or found no way.
+    """
+    world = world_at(table)
+    first, last = episode * robots, (episode + 1) * robots
+    if mode == DECIDES:
+        mark_waiting(drives, first, last, tally.waiting)
+    for _ in range(longest if mode == DECIDES else 1):
+        if mode == DECIDES:
+            follow_team(drives, following, first, last, world.believed, world.velocities, world.ranges, commands)
+        step_episode(table, episode, robots, commands, mode != LOOKS, True)
+        add_rewards(
+            world.gains[first:last], world.contacts[first:last], world.travelled[first:last], tally.weights, tally.travelled[first:last],
+            tally.rewards[first:last],
+        )  # fmt: skip
+        coverage = world.team_seen[episode] / max(tally.counted[episode], 1)
+        if world.steps[episode] >= tally.bounds[0] or coverage >= tally.bounds[1]:
+            break
+        if _is_interrupted(
+            world.poses[first:last], world.contacts[first:last], tally.live[first:last], tally.goals[episode], tally.bounds[2],
+            tally.bounds[3] != 0.0,
+        ):  # fmt: skip
+            break
+        if mode == DECIDES and any_newly_done(drives, first, last, tally.live, tally.waiting):
+            break
+
+
+def _run_episodes(
+    table: Array, robots: int, modes: Array, commands: Array, drives: Drives, following: Following, tally: Tally, longest: int, pieces: int
+) -> None:
+    """Run the episodes by their ``modes`` (episodes,), on so many threads."""
+    for piece in numba.prange(pieces):
+        for episode in range(piece, modes.shape[0], pieces):
+            if modes[episode] != WAITS:
+                _run_episode(table, robots, episode, modes[episode], commands, drives, following, tally, longest)
+
+
+run_serial = kernel(_run_episodes)
+run_parallel = kernel(parallel=True)(_run_episodes)
