@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.drives import Drives, drop_path
 from lidarium.envs.onboard.driving import ARRIVED, BLOCKED, DRIVING, IDLE, MAX_POINTS
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, TeamMaps, closeness_of, log_odds_of, refresh_team
-from lidarium.envs.simulation.kinematic import ENDED
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.path_search import Passage, budget_of, find_path
 from lidarium.mapping.path_smoothing import kept_places, line_is_clear
@@ -44,8 +43,8 @@ class Planning(NamedTuple):
         For searches, a piece for each thread.
     believed, origins, offsets : (rows, 3), (rows, 2), (rows, 2) float64
         Believed poses, lower left corners of the maps and origins of the map frames [m, rad].
-    flags : (rows,) int64
-        Flags of the world's rows.
+    has_ended : (rows,) bool
+        Which robots have ended and stand where they are.
     """
 
     robots: int
@@ -61,7 +60,7 @@ class Planning(NamedTuple):
     believed: NDArray[np.float64]
     origins: NDArray[np.float64]
     offsets: NDArray[np.float64]
-    flags: NDArray[np.int64]
+    has_ended: NDArray[np.bool_]
 
 
 @kernel
@@ -215,7 +214,7 @@ def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> N
     for mate in range(planning.robots):
         other = first + mate
         if planning.knows_mates and other != row:
-            ended[mate] = planning.flags[other] & ENDED != 0
+            ended[mate] = planning.has_ended[other]
             avoided[mate] = ended[mate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
     # First round all that stand; of these only those that have ended can never give way.
     for _ in range(2):
@@ -235,7 +234,7 @@ def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, episodes:
             first = episodes[k] * planning.robots
             is_fresh = False
             for row in range(first, first + planning.robots):
-                if planning.flags[row] & ENDED != 0:
+                if planning.has_ended[row]:
                     continue
                 if drives.is_ordered[row] and drives.passing[row] < 0:
                     if not is_fresh:

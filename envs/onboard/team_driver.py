@@ -184,7 +184,7 @@ class TeamDriver:
         return Planning(
             settings.robots, settings.known_starts, settings.robot.radius, resolution, self._footprint.radius + 2 * resolution,
             CLEARANCE_LIMIT, self._passage, records, sharing, perception.memory.table, world.believed, world.origins, perception.offsets,
-            world.flags,
+            world.flags & ENDED != 0,
         )  # fmt: skip
 
     def _fresh_planning(self, row: int) -> Planning:
