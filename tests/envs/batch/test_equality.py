@@ -13,6 +13,8 @@ def draw_actions(generator, level, rows, observations):
     if level == "frontier":
         masks = observations["action_mask"]
         return np.array([generator.choice(np.flatnonzero(mask)) for mask in masks])
+    if level == "velocity":
+        return generator.uniform((0.2, -0.5), (1.0, 0.5), (rows, 2)).astype(np.float32)
     return generator.uniform(-1.0, 1.0, (rows, 2)).astype(np.float32)
 
 
@@ -59,12 +61,19 @@ def compare(level, threads, steps, floors, robots=2, seed=11, **options):
     for _ in range(steps):
         actions = draw_actions(generator, level, episodes * robots, observations)
         last, was_over = observations, [not env.agents for env in alone.envs]
-        if any(was_over):
-            # A batch draws a floor of its own choice at a reset; the one-by-one environments have theirs.
+        if any(was_over) and len(set(floors)) > 1:
+            # A batch begins again on the floor that it was made for.
             break
         observations, rewards, terminated, truncated, infos = batch.step(actions)
         for episode, result in enumerate(alone.step(actions, robots)):
             own = result[0]
+            if was_over[episode]:
+                for robot, agent in enumerate(own):
+                    row = episode * robots + robot
+                    check_row(observations, row, own[agent])
+                    assert (rewards[row], bool(terminated[row]), bool(truncated[row])) == (0.0, False, False)
+                    assert infos["active"][row]
+                continue
             is_over = not alone.envs[episode].agents
             for robot, agent in enumerate(alone.envs[episode].possible_agents):
                 row = episode * robots + robot
@@ -106,13 +115,13 @@ def test_rows_are_the_same_with_noise_and_unknown_starts(level):
 
 
 def test_rows_are_the_same_where_robots_collide_and_end_one_by_one():
-    assert compare("velocity", 2, 60, ["apartment"] * 5, stop_on_contact=True, seed=5) > 0
+    assert compare("velocity", 2, 80, ["apartment"] * 5, robots=3, stop_on_contact=True, seed=5) > 3
 
 
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
 def test_rows_are_the_same_at_the_horizon(level):
-    assert compare(level, 2, 40, ["apartment"] * 4, horizon_s=3.0, decision_period_s=0.5, seed=9) == 8
+    assert compare(level, 2, 40, ["apartment"] * 4, horizon_s=3.0, decision_period_s=0.5, seed=9) >= 8
 
 
 def test_rows_are_the_same_when_all_is_covered():
-    assert compare("frontier", 2, 60, ["apartment"] * 4, stop_coverage=0.6, seed=1) == 8
+    assert compare("frontier", 2, 40, ["apartment"] * 4, stop_coverage=0.6, seed=1) >= 8
