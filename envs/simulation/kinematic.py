@@ -34,7 +34,11 @@ def counted_cells(body_free: NDArray[np.bool_], multiple: int) -> NDArray[np.boo
     rows, columns = (-(-size // multiple) * multiple for size in body_free.shape)
     padded = np.zeros((rows, columns), np.bool_)
     padded[: body_free.shape[0], : body_free.shape[1]] = body_free
-    return np.asarray(padded.reshape(rows // multiple, multiple, columns // multiple, multiple).all(axis=(1, 3)))
+    counted = np.ones((rows // multiple, columns // multiple), np.bool_)
+    for i in range(multiple):
+        for j in range(multiple):
+            counted &= padded[i::multiple, j::multiple]
+    return counted
 
 
 def _within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
