@@ -92,7 +92,12 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._rows = {agent: row for row, agent in enumerate(self.possible_agents)}
         team = [self.settings.robot] * self.settings.robots
         self.world = KinematicWorld(
-            team, self.settings.lidar, self.settings.occupancy, self.settings.time_step, threads=self.settings.threads
+            team,
+            self.settings.lidar,
+            self.settings.occupancy,
+            self.settings.time_step,
+            threads=self.settings.threads,
+            scales=self.settings.egocentric_scales,
         )
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
         self._writer = ObservationWriter(self.settings, self.has_goal)

@@ -14,7 +14,7 @@ from lidarium.envs.settings import OBSERVABLES, ExplorationSettings
 from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.envs.simulation.stages import RANGE_GAP
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel, use_threads
-from lidarium.mapping.map_crops import crop_levels, crop_turned
+from lidarium.mapping.map_crops import crop_levels, crop_turned, pool_window
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
@@ -61,9 +61,9 @@ def action_space() -> spaces.Box:
 
 
 @kernel
-def _write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None:
-    """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements."""
-    ranges, believed, offsets, velocities, bumpers, beliefs, origins, goals = known
+def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None:
+    """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``."""
+    ranges, believed, offsets, velocities, bumpers, beliefs, origins, goals, unpooled, pools = known
     numbers, scales = limits
     scans, poses, motions, presses, maps, egocentric_maps, observed_goals = observed
     resolution, range_max, max_speed, max_turn_rate = numbers[0], numbers[1], numbers[2], numbers[3]
@@ -95,22 +95,25 @@ def _write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> Non
         if maps.size > 0:
             crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
         if egocentric_maps.size > 0:
-            corner_row, corner_column = int(math.floor(y + 0.5)), int(math.floor(x + 0.5))
-            crop_turned(log_odds, corner_row, corner_column, believed[row, 2], scales, egocentric_maps[row])
+            for k in range(scales.shape[0]):
+                if scales[k] > 1:
+                    pool_window(log_odds, unpooled[row], scales[k], int8_grid_at(pools[row, k, 0], pools[row, k, 1], pools[row, k, 2]))
+            unpooled[row, 0], unpooled[row, 1], unpooled[row, 2], unpooled[row, 3] = log_odds.shape[0], 0, log_odds.shape[1], 0
+            crop_turned(pools[row], x, y, believed[row, 2], scales, egocentric_maps[row])
 
 
 @kernel
 def _write_serial(active: Array, known: Arrays, limits: Arrays, observed: Arrays) -> None:
     for row in range(active.shape[0]):
         if active[row]:
-            _write_row(row, known, limits, observed)
+            write_row(row, known, limits, observed)
 
 
 @kernel(parallel=True)
 def _write_parallel(active: Array, known: Arrays, limits: Arrays, observed: Arrays) -> None:
     for row in numba.prange(active.shape[0]):
         if active[row]:
-            _write_row(row, known, limits, observed)
+            write_row(row, known, limits, observed)
 
 
 class ObservationWriter:
@@ -181,24 +184,35 @@ class ObservationWriter:
             Where an array is missing or is not of the shape, type and order that is written, or the goals are missing.
         """
         rows = len(world.believed)
-        if out is None:
-            out = self.buffers(rows)
-        else:
-            self._check(out, rows)
+        out = self.buffers(rows) if out is None else out
         if active is None:
             active = self._everyone = self._everyone if len(self._everyone) == rows else np.ones(rows, np.bool_)
+        known, limits, observed = self.arguments(world, offsets, out, goals)
+        if self._threads > 1 and rows >= ROWS_FOR_THREADS:
+            use_threads(self._threads)
+            _write_parallel(active, known, limits, observed)
+        else:
+            _write_serial(active, known, limits, observed)
+        return out
+
+    def arguments(
+        self,
+        world: KinematicWorld,
+        offsets: NDArray[np.float64],
+        out: Mapping[str, NDArray[Any]],
+        goals: NDArray[np.float64] | None = None,
+    ) -> tuple[Arrays, Arrays, Arrays]:
+        """Return what ``write_row`` takes beside the row: what is known, the limits, and the arrays to write; as for ``write``."""
+        self._check(out, len(world.believed))
         if goals is None:
             if "goal" in self.keys:
                 raise ValueError("goals is None; want each robot's goal (rows, 2), nan where it does not know one")
             goals = offsets
-        known = (world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals)
-        observed = tuple([out[name] if name in self.keys else self._absent[name] for name in KEYS])
-        if self._threads > 1 and rows >= ROWS_FOR_THREADS:
-            use_threads(self._threads)
-            _write_parallel(active, known, self._limits, observed)
-        else:
-            _write_serial(active, known, self._limits, observed)
-        return out
+        known = (
+            world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals, world.unpooled,
+            world.pool_rows,
+        )  # fmt: skip
+        return known, self._limits, tuple([out[name] if name in self.keys else self._absent[name] for name in KEYS])
 
     def _check(self, out: Mapping[str, NDArray[Any]], rows: int) -> None:
         for name in self.keys:

@@ -82,8 +82,6 @@ class ClearanceField:
         ``limit`` minus the squared distance in half cells to the nearest occupied square; 0 = at ``maximum`` or beyond.
     limit : int
         Squared ``maximum`` in half cells, rounded up.
-    stamp : (2 k + 1, 2 k + 1) uint16
-        Closeness around one occupied cell.
     resolution, maximum : float
         Side of a cell and the largest distance that matters [m].
 
@@ -103,7 +101,11 @@ class ClearanceField:
         self.maximum = float(maximum)
         self.limit = limit
         self.closeness: NDArray[np.uint16] = np.zeros(shape, dtype=np.uint16)
-        self.stamp = stamp_of(limit)
+
+    @property
+    def stamp(self) -> NDArray[np.uint16]:
+        """Closeness around one occupied cell, (2 k + 1, 2 k + 1) uint16, read-only and shared."""
+        return stamp_of(self.limit)
 
     @property
     def reach(self) -> int:
@@ -170,11 +172,8 @@ def update_closeness(log_odds: Array, closeness: Array, limit: int, stamp: Array
     count = len(changed)
     if count == 0:
         return False
-    area = 0
-    if added > 0:
-        target = grown_window(_box_of(log_odds, changed), reach, log_odds.shape)
-        area = (target[1] - target[0]) * (target[3] - target[2])
-    if added > STAMPS_PER_CELL * area:
+    target = grown_window(_box_of(log_odds, changed), reach, log_odds.shape)
+    if added > STAMPS_PER_CELL * (target[1] - target[0]) * (target[3] - target[2]):
         _recompute(log_odds, closeness, limit, reach, target, grown_window(target, reach, log_odds.shape))
         return True
     if added < count:

@@ -184,7 +184,8 @@ def ignore_frontiers_near(flags: Array, tiles: Array, row: int, column: int, rea
 @kernel
 def frontier_clusters(flags: Array, tiles: Array, minimum: int) -> tuple[Array, Array]:
     """8-connected clusters of at least ``minimum`` frontier cells: the cells, and where each cluster starts (kernel)."""
-    return _clustered(flags, _listed(flags, tiles, tiles.sum()), minimum)
+    cells, starts = _clustered(flags, _listed(flags, tiles, tiles.sum()), minimum)
+    return cells, starts
 
 
 @kernel

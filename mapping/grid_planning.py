@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping import grid_search
 from lidarium.mapping.clearance import ClearanceField, limit_of
-from lidarium.mapping.path_search import Passage, budget_of, find_path
+from lidarium.mapping.path_search import Lookout, Passage, budget_of, find_path, search_at
 from lidarium.mapping.search_targets import Targets
 
 Cell = tuple[int, int]
@@ -265,7 +265,8 @@ def search(
     Raises
     ------
     ValueError
-        If shapes differ, a cell lies outside the grid, or the footprint needs more clearance than the field knows.
+        If shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, or the footprint needs more clearance than
+        the field knows.
     """
     _check_search(space, log_odds, clearance, start, goal)
     passage = passage_of(footprint, space.resolution, clearance.limit)
@@ -274,37 +275,16 @@ def search(
     goal_row, goal_column = (-1, -1) if goal is None else (int(goal[0]), int(goal[1]))
     discs = _discs_array(blocked)
     space.forget()
-    space.touched_count = grid_search.close_discs(space.remaining, space.touched, discs)
-    space.touched_count, hit_count, band, space.buckets = grid_search.spread(
-        log_odds,
-        clearance.closeness,
-        clearance.limit,
-        passage.half_costs,
-        passage.roomy,
-        passage.radius,
-        discs,
-        space.remaining,
-        space.parent,
-        space.touched,
-        space.touched_count,
-        space.buckets,
-        int(start[0]),
-        int(start[1]),
-        budget,
-        goal_row,
-        goal_column,
-        False,
-        _NO_MASK if targets is None else targets.mask,
-        _NO_MASK if targets is None else targets.near,
-        _NO_SPANS if targets is None else targets.spans,
-        0 if targets is None else count,
-        space.hits,
+    task = np.array([*start, goal_row, goal_column, budget, 0, 0 if targets is None else count], np.int64)
+    mask, near = (_NO_MASK, _NO_MASK) if targets is None else (targets.mask, targets.near)
+    lookout = Lookout(mask, near, np.zeros(1, np.int64) if targets is None else targets.spans.copy(), space.hits)
+    space.touched_count, hit_count, settled = search_at(
+        log_odds.ctypes.data, clearance.closeness, passage, space.memory, discs, task, lookout
     )
     packed = space.hits[:hit_count].astype(np.int64)
     rows, columns = packed >> 16, packed & 0xFFFF
     order = np.lexsort((columns, rows, -space.remaining[rows, columns].astype(np.int64)))[:count]
     hits = np.stack((rows[order], columns[order]), axis=1)
-    settled = ((band + 1) << grid_search.BUCKET_SHIFT) - 1
     return Search(space, (int(start[0]), int(start[1])), budget, settled, hits, space.generation)
 
 
@@ -345,13 +325,14 @@ def discs_of(discs: Iterable[Disc], origin: tuple[float, float], resolution: flo
 
 
 _NO_MASK = np.zeros((1, 1), dtype=np.uint8)
-_NO_SPANS = np.zeros(1, dtype=np.int64)
 
 
 def _check_search(space: SearchSpace, log_odds: NDArray[np.int8], clearance: ClearanceField, start: Cell, goal: Cell | None) -> None:
     for name, shape in (("log_odds", log_odds.shape), ("clearance", clearance.closeness.shape)):
         if shape != space.shape:
             raise ValueError(f"{name} has shape {shape}; this space was made for {space.shape}")
+    if log_odds.dtype != np.int8 or not log_odds.flags.c_contiguous:
+        raise ValueError(f"log_odds is of {log_odds.dtype}, strides {log_odds.strides}; want C-contiguous int8")
     for name, cell in (("start", start), ("goal", start if goal is None else goal)):
         if not (0 <= cell[0] < space.shape[0] and 0 <= cell[1] < space.shape[1]):
             raise ValueError(f"{name} {(int(cell[0]), int(cell[1]))} lies outside the grid of {space.shape} cells")

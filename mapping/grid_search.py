@@ -108,29 +108,19 @@ def _margin(closeness: NDArray[np.uint16], limit: int, radius: float, discs: NDA
     return float(margin)
 
 
-@kernel
-def _step_is_open(
-    log_odds: NDArray[np.int8],
-    closeness: NDArray[np.uint16],
-    half_costs: NDArray[np.int32],
-    roomy: int,
-    row: int,
-    column: int,
-    to_row: int,
-    to_column: int,
-) -> bool:
-    """Whether a diagonal step keeps its clearance on the way.
+@kernel(inline=True)
+def _step_is_open(log_odds: Array, closeness: Array, half_costs: Array, roomy: int, nearest: int, beside: int, abeam: int) -> bool:
+    """Whether a diagonal step between cells of closeness up to ``nearest`` keeps its clearance on the way; flat grids and places.
 
     Between the centres of two diagonal neighbours the squared clearance in half cells falls at most 2 below that of
     both ends, and not at all where both cells beside the step have it too. So the path of centres is exact.
     """
-    free_beside = log_odds[to_row, column] < 0
-    free_abeam = log_odds[row, to_column] < 0
-    if max(closeness[row, column], closeness[to_row, to_column]) <= roomy:
+    free_beside, free_abeam = log_odds[beside] < 0, log_odds[abeam] < 0
+    if nearest <= roomy:
         return bool(free_beside or free_abeam)
     if not (free_beside and free_abeam):
         return False
-    return bool(half_costs[0, closeness[to_row, column]] > 0 and half_costs[0, closeness[row, to_column]] > 0)
+    return bool(half_costs[0, closeness[beside]] > 0 and half_costs[0, closeness[abeam]] > 0)
 
 
 @kernel
@@ -210,6 +200,8 @@ def _expand_band(
     buckets: NDArray[np.int32],
     sizes: Array,
     counts: NDArray[np.int64],
+    flat_steps: NDArray[np.int64],
+    packed_steps: NDArray[np.int64],
     current: int,
     first: int,
     budget: int,
@@ -258,30 +250,35 @@ def _expand_band(
             hits[hit_count] = cell
             hit_count += 1
         inside = 0 < row < rows - 1 and 0 < column < columns - 1
-        own_straight = half_costs[0, closeness_at[here]]
-        own_diagonal = half_costs[1, closeness_at[here]]
+        own_closeness = closeness_at[here]
+        own_straight = half_costs[0, own_closeness]
+        own_diagonal = half_costs[1, own_closeness]
         for k in range(8):
-            to_row = row + ROW_STEPS[k]
-            to_column = column + COLUMN_STEPS[k]
-            if not inside and (to_row < 0 or to_row >= rows or to_column < 0 or to_column >= columns):
-                continue
-            there = np.uintp(to_row * columns + to_column)
+            if not inside:
+                to_row, to_column = row + ROW_STEPS[k], column + COLUMN_STEPS[k]
+                if to_row < 0 or to_row >= rows or to_column < 0 or to_column >= columns:
+                    continue
+            there = np.uintp(np.int64(here) + flat_steps[k])
             before = remaining_at[there]
             if before >= left - (DIAGONAL if k >= 4 else STRAIGHT) or log_odds_at[there] >= 0:
                 continue
-            half = half_costs[1 if k >= 4 else 0, closeness_at[there]]
+            to_closeness = closeness_at[there]
+            half = half_costs[k >> 2, to_closeness]
             after = left - half - (own_diagonal if k >= 4 else own_straight)
             if half == 0 or after <= before or (before > 0 and parent_at[there] >= LEAVING):
                 continue
-            if k >= 4 and not _step_is_open(log_odds, closeness, half_costs, roomy, row, column, to_row, to_column):
-                continue
-            to_cell = (to_row << 16) | to_column
+            if k >= 4:
+                beside, abeam = np.uintp(np.int64(here) + ROW_STEPS[k] * columns), np.uintp(np.int64(here) + COLUMN_STEPS[k])
+                nearest = max(own_closeness, to_closeness)
+                if not _step_is_open(log_odds_at, closeness_at, half_costs, roomy, nearest, beside, abeam):
+                    continue
+            to_cell = np.int32(cell + packed_steps[k])
             if before == 0:
                 touched[np.uintp(touched_count)] = to_cell
                 touched_count += 1
             remaining_at[there] = after
             parent_at[there] = k
-            ahead = _estimate(to_row, to_column, goal_row, goal_column) if guided else 0
+            ahead = _estimate(row + ROW_STEPS[k], column + COLUMN_STEPS[k], goal_row, goal_column) if guided else 0
             bucket = (budget - after + ahead) >> BUCKET_SHIFT
             if before > 0 and bucket != current and (budget - before + ahead) >> BUCKET_SHIFT == bucket:
                 continue  # it waits there already
@@ -337,13 +334,17 @@ def spread(
     buckets[slot, 0] = (start_row << 16) | start_column
     sizes[slot] = 1
     counts = np.array([touched_count + 1, 0, 1, 1])
+    flat_steps, packed_steps = np.empty(8, np.int64), np.empty(8, np.int64)
+    for k in range(8):
+        flat_steps[k] = ROW_STEPS[k] * log_odds.shape[1] + COLUMN_STEPS[k]
+        packed_steps[k] = (ROW_STEPS[k] << 16) + COLUMN_STEPS[k]
     while counts[2] > 0:
         slot = current & (buckets.shape[0] - 1)
         i = 0
         while i < sizes[slot]:
             i = _expand_band(
                 log_odds, closeness, limit, half_costs, roomy, radius, discs, remaining, parent, touched, buckets, sizes, counts,
-                current, i, budget, goal_row, goal_column, guided, mask, near, spans, wanted, hits,
+                flat_steps, packed_steps, current, i, budget, goal_row, goal_column, guided, mask, near, spans, wanted, hits,
             )  # fmt: skip
             if counts[3] + 8 > buckets.shape[1]:
                 wider = np.empty((buckets.shape[0], 2 * buckets.shape[1]), np.int32)

@@ -1,24 +1,22 @@
 """Crops of a map around a robot as three levels: along the axes of the map, and turned with the robot at several scales.
 
 A crop at scale s shows s x s cells of the map as one, by their greatest log-odds: occupied where any is, else unknown where
-any is, else free. It is made in two passes: the cells along the axes that the turned crop can touch are pooled row by row
-into a small patch, which reads the map as it lies in memory; then each cell of the crop is looked up in the patch.
+any is, else free. Such pooled maps are kept beside the map and brought up to date where it has changed, so that a crop reads no
+more cells than it shows. The pooled cells that the turned crop can touch are copied into a small patch, and each cell of the crop
+is looked up there.
 """
 
 import math
 
 import numpy as np
 
-from lidarium.mapping.kernels import Array, int8_at, kernel
+from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
 
 _FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIED)
 
-SLAB = 32
-"""Rows of a patch that are pooled at a time."""
-
 BLOCK = 32
-"""Cells that are pooled at a time: loops of a fixed length leave no remainder to go through one by one."""
+"""Cells that are taken at a time: loops of a fixed length leave no remainder to go through one by one."""
 
 HALF_STEP = 32768.0
 """Half a cell in the numbers with 16 binary places by which a crop is looked up."""
@@ -50,22 +48,54 @@ def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
 
 
 @kernel
-def crop_turned(log_odds: Array, row: int, column: int, heading: float, scales: Array, crops: Array) -> None:
-    """Fill crops that are turned with a robot, as levels; unknown outside of the map.
-
-    Rows of a crop go to the robot's left, columns forward; the robot is at the centre. The crop turns about the corner of
-    the map's cells that is nearest to the robot, in which also the pooled cells begin, so that at headings along the axes
-    a crop is exactly the cells around that corner, turned by quarters. In between, a cell of the crop shows the pooled cell
-    in which its centre lies.
+def pool_window(log_odds: Array, window: Array, scale: int, pooled: Array) -> None:
+    """Bring a pooled map up to date where the map has changed.
 
     Parameters
     ----------
     log_odds : (rows, columns) int8
         The map.
-    row, column : int
-        The corner about which to turn: the lower left one of that cell.
+    window : (4,) int64
+        Part of it that has changed: row_low, row_high, column_low, column_high, high ends exclusive; empty for none.
+    scale : int
+        Side of a pooled cell [cells of the map].
+    pooled : (ceil(rows / scale), ceil(columns / scale)) int8
+        Greatest log-odds of the cells of each pooled cell; what a pooled cell has beyond the map counts as unknown.
+    """
+    if window[0] >= window[1] or window[2] >= window[3]:
+        return
+    rows, columns = log_odds.shape
+    first, last = window[2] // scale, (window[3] + scale - 1) // scale
+    width = (last - first) * scale
+    greatest = np.empty(width, np.int8)
+    inside = min(width, columns - first * scale)
+    for row in range(window[0] // scale, (window[1] + scale - 1) // scale):
+        greatest[:] = np.int8(-128) if (row + 1) * scale <= rows else np.int8(0)
+        greatest[inside:] = np.int8(0)
+        target = int8_at(greatest.ctypes.data, inside)
+        for map_row in range(row * scale, min((row + 1) * scale, rows)):
+            source = int8_at(log_odds.ctypes.data + map_row * columns + first * scale, inside)
+            for j in range(inside):
+                target[j] = max(target[j], source[j])
+        _pool_neighbours(greatest, scale, pooled[row, first:last])
+
+
+@kernel
+def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
+    """Fill crops that are turned with a robot, as levels; unknown outside of the map.
+
+    Rows of a crop go to the robot's left, columns forward; the robot is at the centre. The crop turns about the corner of
+    the pooled cells that is nearest to the robot, so that at headings along the axes a crop is exactly the pooled cells around
+    that corner, turned by quarters. In between, a cell of the crop shows the pooled cell in which its centre lies.
+
+    Parameters
+    ----------
+    pools : (scales, 3) int64
+        Address, rows and columns of the pooled map of each scale; at scale 1 the map itself.
+    x, y : float
+        Where the robot is [cells of the map].
     heading : float
-        Where the robot looks in the map [rad].
+        Where it looks in the map [rad].
     scales : (scales,) int64
         Side of a crop's cell [cells of the map].
     crops : (scales, side, side) uint8
@@ -80,8 +110,8 @@ def crop_turned(log_odds: Array, row: int, column: int, heading: float, scales: 
     places = _places(half, width, cosine, sine, cells)
     patch = np.empty(2 * half * width, np.uint8)
     for k in range(scales.shape[0]):
-        scale = scales[k]
-        _pool(log_odds, row - half * scale, column - half * scale, scale, spans, patch)
+        row, column = int(math.floor(y / scales[k] + 0.5)), int(math.floor(x / scales[k] + 0.5))
+        _copy_levels(int8_grid_at(pools[k, 0], pools[k, 1], pools[k, 2]), row - half, column - half, spans, patch)
         crop = crops[k].reshape(cells * cells)
         for place in range(places.size):
             crop[place] = patch[places[place]]
@@ -104,57 +134,30 @@ def _touched_columns(cells: int, half: int, cosine: float, sine: float, spans: A
 
 
 @kernel
-def _pool(log_odds: Array, first_row: int, first_column: int, scale: int, spans: Array, patch: Array) -> None:
-    """Fill the spans of a patch (rows * width) with the levels of scale x scale cells each, from (first_row, first_column) on."""
-    width = patch.size // spans.shape[0]
-    # A few rows at a time, which stay in the processor's nearest cache from one pass to the next.
-    pooled = np.empty((SLAB, width * scale), np.int8)
-    if first_column < 0 or first_column + width * scale > log_odds.shape[1]:
-        pooled[:] = np.int8(0)
-    # Rows of the patch that touch the map.
-    inside_low = min(max(-first_row // scale, 0), spans.shape[0])
-    inside_high = max(min((log_odds.shape[0] - first_row + scale - 1) // scale, spans.shape[0]), inside_low)
-    patch[: inside_low * width] = _UNKNOWN
-    patch[inside_high * width :] = _UNKNOWN
-    for low in range(inside_low, inside_high, SLAB):
-        high = min(low + SLAB, inside_high)
-        _pool_rows(log_odds, first_row + low * scale, first_column, scale, spans[low:high], pooled)
-        _pool_columns(pooled.reshape(SLAB * width * scale), scale, patch[low * width : high * width])
-
-
-@kernel
-def _pool_rows(log_odds: Array, first_row: int, first_column: int, scale: int, spans: Array, pooled: Array) -> None:
-    """Write the greatest of every ``scale`` rows of the map into the rows of ``pooled``, in the columns that are in the map."""
-    (rows, columns), width = log_odds.shape, pooled.shape[1]
+def _copy_levels(pooled: Array, first_row: int, first_column: int, spans: Array, patch: Array) -> None:
+    """Fill the spans of a patch (rows * width) with the levels of a pooled map from (first_row, first_column) on."""
+    (rows, columns), width = pooled.shape, patch.size // spans.shape[0]
     inside_low, inside_high = min(max(0, -first_column), width), max(min(width, columns - first_column), 0)
     for row in range(spans.shape[0]):
-        low, high = max(spans[row, 0] * scale, inside_low), min(spans[row, 1] * scale, inside_high)
-        if low >= high:
-            continue
-        size = high - low
-        target, start = int8_at(pooled.ctypes.data + row * width + low, size), log_odds.ctypes.data + first_column + low
-        map_row, last = first_row + row * scale, first_row + (row + 1) * scale - 1
-        least = np.int8(0) if map_row < 0 or last >= rows else np.int8(-128)
-        map_row, last = max(map_row, 0), min(last, rows - 1)
-        first = int8_at(start + map_row * columns, size)
-        for j in range(size):
-            target[j] = max(least, first[j])
-        # Three rows at a time save writing; the last one counts again where fewer are left.
-        for k in range(map_row + 1, last + 1, 3):
-            first, second = int8_at(start + k * columns, size), int8_at(start + min(k + 1, last) * columns, size)
-            third = int8_at(start + min(k + 2, last) * columns, size)
-            for j in range(size):
-                target[j] = max(target[j], max(first[j], max(second[j], third[j])))
+        low, high, map_row = spans[row, 0], spans[row, 1], first_row + row
+        if map_row < 0 or map_row >= rows or low < inside_low or high > inside_high:
+            patch[row * width + low : row * width + high] = _UNKNOWN
+            low, high = max(low, inside_low), min(high, inside_high)
+        if 0 <= map_row < rows and low < high:
+            target = bytes_at(patch.ctypes.data + row * width + low, high - low)
+            source = int8_at(pooled.ctypes.data + map_row * columns + first_column + low, high - low)
+            for j in range(high - low):
+                target[j] = _level(source[j])
 
 
 @kernel
-def _pool_columns(values: Array, scale: int, levels: Array) -> None:
-    """Write the levels of the greatest of every ``scale`` neighbours."""
-    while scale % 2 == 0:
+def _pool_neighbours(values: Array, scale: int, pooled: Array) -> None:
+    """Write the greatest of every ``scale`` neighbours."""
+    while scale % 2 == 0 and scale > 1:
         # Groups of two and four are compared many at a time, others one by one.
         group = 4 if scale % 4 == 0 else 2
         scale //= group
-        reduced = np.empty(levels.size * scale, np.int8)
+        reduced = np.empty(pooled.size * scale, np.int8)
         if group == 4:
             for j in range(reduced.size):
                 reduced[j] = max(max(values[4 * j], values[4 * j + 1]), max(values[4 * j + 2], values[4 * j + 3]))
@@ -162,16 +165,11 @@ def _pool_columns(values: Array, scale: int, levels: Array) -> None:
             for j in range(reduced.size):
                 reduced[j] = max(values[2 * j], values[2 * j + 1])
         values = reduced
-    if scale > 1:
-        reduced = np.empty(levels.size, np.int8)
-        for j in range(reduced.size):
-            greatest = values[j * scale]
-            for k in range(1, scale):
-                greatest = max(greatest, values[j * scale + k])
-            reduced[j] = greatest
-        values = reduced
-    for j in range(levels.size):
-        levels[j] = _level(values[j])
+    for j in range(pooled.size):
+        greatest = values[j * scale]
+        for k in range(1, scale):
+            greatest = max(greatest, values[j * scale + k])
+        pooled[j] = greatest
 
 
 @kernel

@@ -20,7 +20,7 @@ from lidarium.mapping.grid_search import (
     spread,
     trace,
 )
-from lidarium.mapping.kernels import Array, int32_table_at, kernel, uint8_grid_at
+from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, uint8_grid_at
 
 REMAINING, PARENT, TOUCHED, BUCKETS, SLOTS, WIDTH = range(6)
 """Places in a row of a search memory's table: addresses, and the shape of the buckets."""
@@ -55,6 +55,23 @@ class Passage(NamedTuple):
         """Buckets that a search needs: a power of two."""
         bands = (2 * int(self.half_costs.max()) * 2 >> BUCKET_SHIFT) + 4
         return 1 << (bands - 1).bit_length()
+
+
+class Lookout(NamedTuple):
+    """What a search looks for, and where it notes what it has found.
+
+    Attributes
+    ----------
+    mask, near, spans
+        As of ``Targets``.
+    hits : (N,) int32
+        Cells from which a target is seen; room for as many as there are cells, or none where no target is wanted.
+    """
+
+    mask: NDArray[np.uint8]
+    near: NDArray[np.uint8]
+    spans: NDArray[np.int64]
+    hits: NDArray[np.int32]
 
 
 class SearchMemory:
@@ -107,10 +124,78 @@ def budget_of(maximum_cost: float, resolution: float) -> int:
 
 
 @kernel
+def search_in(
+    log_odds: Array, closeness: Array, passage: Passage, memory: Array, discs: Array, task: Array, targets: Lookout
+) -> tuple[Array, Array, int, int, int]:
+    """Search in a piece of memory, see ``grid_search.spread`` (kernel).
+
+    Parameters
+    ----------
+    log_odds, closeness : (rows, columns) int8 and uint16
+        The belief and its clearance.
+    passage : Passage
+        The body.
+    memory : (6,) int64
+        A row of ``SearchMemory.table``.
+    discs : (K, 3) float64
+        Discs (row, column, radius) [cells] that the body's centre may not enter.
+    task : (7,) int64
+        Row and column of the start and of the goal (-1 for none), the budget, 1 to be guided to the goal, and how many targets
+        are wanted.
+    targets : Lookout
+        What to look for.
+
+    Returns
+    -------
+    remaining, parent : (rows, columns) int32 and uint8
+        What remains of the budget in each cell, and how it was reached.
+    count, hit_count : int
+        Number of touched cells, for ``clear_memory``, and of targets hit.
+    settled : int
+        Costs up to this one are final.
+    """
+    rows, columns = log_odds.shape
+    remaining, parent = int32_table_at(memory[REMAINING], rows, columns), uint8_grid_at(memory[PARENT], rows, columns)
+    touched = int32_table_at(memory[TOUCHED], 1, rows * columns + 8)[0]
+    buckets = int32_table_at(memory[BUCKETS], memory[SLOTS], memory[WIDTH])
+    count = close_discs(remaining, touched, discs)
+    start_row, start_column, goal_row, goal_column = task[0], task[1], task[2], task[3]
+    budget, guided, wanted = task[4], task[5], task[6]
+    count, hit_count, band, _ = spread(
+        log_odds, closeness, passage.limit, passage.half_costs, passage.roomy, passage.radius, discs, remaining, parent, touched, count,
+        buckets, start_row, start_column, budget, goal_row, goal_column, guided != 0, targets.mask, targets.near, targets.spans, wanted,
+        targets.hits,
+    )  # fmt: skip
+    return remaining, parent, count, hit_count, ((band + 1) << BUCKET_SHIFT) - 1
+
+
+@kernel
+def search_at(
+    log_odds: int, closeness: Array, passage: Passage, memory: Array, discs: Array, task: Array, targets: Lookout
+) -> tuple[int, int, int]:
+    """Search a belief given by its address, so that arrays that may not be written need no kernels of their own (kernel).
+
+    Returns
+    -------
+    count, hit_count, settled : int
+        As ``search_in``.
+    """
+    beliefs = int8_grid_at(log_odds, closeness.shape[0], closeness.shape[1])
+    _, _, count, hit_count, settled = search_in(beliefs, closeness, passage, memory, discs, task, targets)
+    return count, hit_count, settled
+
+
+@kernel
+def _nothing() -> Lookout:
+    no_mask = np.empty((0, 0), np.uint8)
+    return Lookout(no_mask, no_mask, np.empty(0, np.int64), np.empty(0, np.int32))
+
+
+@kernel
 def search_all(
     log_odds: Array, closeness: Array, passage: Passage, memory: Array, start_row: int, start_column: int
 ) -> tuple[Array, Array, int, int]:
-    """Spread costs over all that a body can reach, in a thread's memory (kernel).
+    """Spread costs over all that a body can reach, in a piece of memory (kernel).
 
     Returns
     -------
@@ -121,16 +206,9 @@ def search_all(
     least : int
         What remains at least in cells whose costs are final.
     """
-    rows, columns = log_odds.shape
-    remaining, parent = int32_table_at(memory[REMAINING], rows, columns), uint8_grid_at(memory[PARENT], rows, columns)
-    touched = int32_table_at(memory[TOUCHED], 1, rows * columns + 8)[0]
-    buckets = int32_table_at(memory[BUCKETS], memory[SLOTS], memory[WIDTH])
-    no_mask = np.empty((0, 0), np.uint8)
-    count, _, band, _ = spread(
-        log_odds, closeness, passage.limit, passage.half_costs, passage.roomy, passage.radius, np.empty((0, 3)), remaining, parent,
-        touched, 0, buckets, start_row, start_column, LARGEST_BUDGET, -1, -1, False, no_mask, no_mask, np.empty(0, np.int64), 0, touched,
-    )  # fmt: skip
-    return remaining, parent, count, LARGEST_BUDGET - (((band + 1) << BUCKET_SHIFT) - 1)
+    task = np.array([start_row, start_column, -1, -1, LARGEST_BUDGET, 0, 0])
+    remaining, parent, count, _, settled = search_in(log_odds, closeness, passage, memory, np.empty((0, 3)), task, _nothing())
+    return remaining, parent, count, LARGEST_BUDGET - settled
 
 
 @kernel
@@ -181,21 +259,14 @@ def find_path(
     is_there = start_row == goal_row and start_column == goal_column
     if not is_there and (log_odds[goal_row, goal_column] >= 0 or passage.half_costs[0, closeness[goal_row, goal_column]] == 0):
         return -1, nothing  # no step leads into it
-    remaining, parent = int32_table_at(memory[REMAINING], rows, columns), uint8_grid_at(memory[PARENT], rows, columns)
-    touched = int32_table_at(memory[TOUCHED], 1, rows * columns + 8)[0]
-    buckets = int32_table_at(memory[BUCKETS], memory[SLOTS], memory[WIDTH])
-    count = close_discs(remaining, touched, discs)
-    if not is_there and remaining[goal_row, goal_column] == NO_ENTRY:
-        clear(remaining, touched, count)
-        return -1, nothing
-    no_mask = np.empty((0, 0), np.uint8)
-    count, _, band, _ = spread(
-        log_odds, closeness, passage.limit, passage.half_costs, passage.roomy, passage.radius, discs, remaining, parent, touched, count,
-        buckets, start_row, start_column, budget, goal_row, goal_column, True, no_mask, no_mask, np.empty(0, np.int64), 0, touched,
-    )  # fmt: skip
+    for k in range(len(discs)):
+        if not is_there and (goal_row - discs[k, 0]) ** 2 + (goal_column - discs[k, 1]) ** 2 < discs[k, 2] ** 2:
+            return -1, nothing  # a body stands there
+    task = np.array([start_row, start_column, goal_row, goal_column, budget, 1, 0])
+    remaining, parent, count, _, settled = search_in(log_odds, closeness, passage, memory, discs, task, _nothing())
     left = remaining[goal_row, goal_column]
     cost = 0 if is_there else budget - left
-    is_reached = left != 0 and left != NO_ENTRY and parent[goal_row, goal_column] < LEAVING and cost <= ((band + 1) << BUCKET_SHIFT) - 1
+    is_reached = left != 0 and left != NO_ENTRY and parent[goal_row, goal_column] < LEAVING and cost <= settled
     cells = trace(parent, start_row, start_column, goal_row, goal_column) if is_there or is_reached else nothing
-    clear(remaining, touched, count)
+    clear_memory(memory, rows, columns, count)
     return cost if is_there or is_reached else -1, cells

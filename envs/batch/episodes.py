@@ -87,7 +87,13 @@ class EpisodeBatch:
         self.rows = self.episodes * self.robots
         self._choice = FloorChoice(floor, image_resolution)
         self.world = KinematicWorld(
-            [settings.robot] * settings.robots, settings.lidar, settings.occupancy, settings.time_step, self.episodes, settings.threads
+            [settings.robot] * settings.robots,
+            settings.lidar,
+            settings.occupancy,
+            settings.time_step,
+            self.episodes,
+            settings.threads,
+            settings.egocentric_scales,
         )
         self._offsets, self._goals = np.zeros((self.rows, 2)), np.full((self.rows, 2), np.nan)
         self.perception = Perception(self.world, settings, self._offsets)
@@ -171,23 +177,24 @@ class EpisodeBatch:
             self._place(episode, start)
         modes[beginning] = LOOKS
         self._tally.rewards[:] = 0.0
+        begun = np.repeat(np.isin(np.arange(self.episodes), beginning), robots)
+        seen = acted | begun
+        self._turn_buffers(seen, is_same_step)
         threads = self.world.threads
         self.world.use_threads()
         run = run_parallel if threads > 1 else run_serial
         run(
             self.world.table, robots, modes, self._commands, self.level.drives, self.level.following, self._tally,
-            self.settings.decision_steps, threads,
+            self.settings.decision_steps, seen, *self._writer.arguments(self.world, self._offsets, self.observations, self._goals), threads,
         )  # fmt: skip
-        begun = np.repeat(np.isin(np.arange(self.episodes), beginning), robots)
         self._tally.rewards[begun | ~acted], self._tally.travelled[begun] = 0.0, 0.0
         self.acted = acted
         self.reasons = endings(self.world, self.settings, self._tally.goals, acted, stopping)
-        self._observe(acted | begun, is_same_step)
         ended = self.reasons != 0
         self.live[ended] = False
         self.world.moves[ended] = 0
         self.world.flags[ended] |= ENDED
-        self._tell(acted | begun)
+        self._tell(seen)
 
     def _draw(
         self, beginning: NDArray[np.int64], seeds: Sequence[int | None] | None, options: Mapping[int, ResetOptions]
@@ -221,15 +228,14 @@ class EpisodeBatch:
         arrays = self._writer.buffers(self.rows)
         return {**arrays, **{name: np.zeros((self.rows, *(box.shape or ())), box.dtype) for name, box in self.level.boxes.items()}}
 
-    def _observe(self, seen: NDArray[np.bool_], is_same_step: bool) -> None:
-        """Write the observations of rows; the others repeat their last one."""
+    def _turn_buffers(self, seen: NDArray[np.bool_], is_same_step: bool) -> None:
+        """Choose the arrays for the observations of this step; rows that are not seen repeat their last one."""
         before = self.observations
         if self._copy:
             self.observations = self._new_buffers()
         elif not is_same_step:
             self._buffers.reverse()
             self.observations = self._buffers[0]
-        self._writer.write(self.world, self._offsets, self.observations, seen, self._goals)
         if self.observations is not before and not seen.all():
             for name, array in self.observations.items():
                 array[~seen] = before[name][~seen]

@@ -6,6 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.observations import Arrays, write_row
 from lidarium.envs.onboard.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
 from lidarium.envs.scorer import add_rewards, is_near
 from lidarium.envs.simulation.arrays import world_at
@@ -95,13 +96,31 @@ def _run_episode(
 
 
 def _run_episodes(
-    table: Array, robots: int, modes: Array, commands: Array, drives: Drives, following: Following, tally: Tally, longest: int, pieces: int
+    table: Array,
+    robots: int,
+    modes: Array,
+    commands: Array,
+    drives: Drives,
+    following: Following,
+    tally: Tally,
+    longest: int,
+    seen: Array,
+    known: Arrays,
+    limits: Arrays,
+    observed: Arrays,
+    pieces: int,
 ) -> None:
-    """Run the episodes by their ``modes`` (episodes,), on so many threads."""
+    """Run the episodes by their ``modes`` (episodes,), on so many threads, and write the observations of ``seen`` rows.
+
+    An episode's observations are written right after its run, while its maps are in the thread's cache.
+    """
     for piece in numba.prange(pieces):
         for episode in range(piece, modes.shape[0], pieces):
             if modes[episode] != WAITS:
                 _run_episode(table, robots, episode, modes[episode], commands, drives, following, tally, longest)
+                for row in range(episode * robots, (episode + 1) * robots):
+                    if seen[row]:
+                        write_row(row, known, limits, observed)
 
 
 run_serial = kernel(_run_episodes)

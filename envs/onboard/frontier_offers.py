@@ -191,37 +191,19 @@ def _offer(planning: Planning, looking: Looking, offers: Offers, row: int, cells
 
 
 @kernel
-def _renew_team(
-    planning: Planning,
-    maps: TeamMaps,
-    drives: Drives,
-    looking: Looking,
-    offers: Offers,
-    choices: Choices,
-    episode: int,
-    is_live: Array,
-    is_offered: Array,
-    reasons: Array,
-    piece: int,
+def _give_up(
+    planning: Planning, maps: TeamMaps, drives: Drives, looking: Looking, choices: Choices, episode: int, is_live: Array, reasons: Array
 ) -> None:
-    """Give up what live robots of a team chose in vain, then offer anew."""
-    first, last = episode * planning.robots, (episode + 1) * planning.robots
+    """Give up what live robots of a team chose in vain, on fresh maps."""
     refresh_team(maps, episode)
-    for row in range(first, last):
-        reasons[row] = 0
-        if is_live[row] and choices.is_chosen[row]:
-            reasons[row] = _why_in_vain(planning, drives, choices, row, maps.steps[episode] * looking.time_step)
+    time = maps.steps[episode] * looking.time_step
+    for row in range(episode * planning.robots, (episode + 1) * planning.robots):
+        if not (is_live[row] and choices.is_chosen[row]):
+            continue
+        reasons[row] = _why_in_vain(planning, drives, choices, row, time)
         if reasons[row] != 0:
             record, cell = planning.records[row // planning.sharing], choices.cells[row]
             ignore_frontiers_near(flags_of(record), tiles_of(record), cell[0], cell[1], looking.reach)
-    is_listed = False
-    for row in range(first, last):
-        if is_offered[row]:
-            if not is_listed or planning.sharing == 1:
-                record = planning.records[row // planning.sharing]
-                cells, starts = frontier_clusters(flags_of(record), tiles_of(record), 1)
-                is_listed = True
-            _offer(planning, looking, offers, row, cells, starts, piece)
 
 
 def _renew_teams(
@@ -237,10 +219,20 @@ def _renew_teams(
     reasons: Array,
     pieces: int,
 ) -> None:
-    """Renew the offers of some episodes, on so many pieces of memory at a time."""
+    """Give up what robots chose in vain, then offer anew, in so many pieces."""
     for piece in numba.prange(pieces):
         for k in range(piece, len(episodes), pieces):
-            _renew_team(planning, maps, drives, looking, offers, choices, episodes[k], is_live, is_offered, reasons, piece)
+            _give_up(planning, maps, drives, looking, choices, episodes[k], is_live, reasons)
+            cells, starts = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
+            listed = -1
+            for row in range(episodes[k] * planning.robots, (episodes[k] + 1) * planning.robots):
+                if not is_offered[row]:
+                    continue
+                if listed != row // planning.sharing:
+                    listed = row // planning.sharing
+                    record = planning.records[listed]
+                    cells, starts = frontier_clusters(flags_of(record), tiles_of(record), 1)
+                _offer(planning, looking, offers, row, cells, starts, piece)
 
 
 _renew_teams_serial = kernel(_renew_teams)
@@ -270,8 +262,8 @@ class FrontierOffers:
     def __init__(self, perception: Perception, settings: ExplorationSettings, driver: TeamDriver) -> None:
         self._perception, self._driver, self._robots = perception, driver, settings.robots
         rows, resolution = settings.robots * perception.world.episodes, settings.occupancy.resolution
-        reach = default_reach(footprint_of(settings.robot.radius), resolution) / resolution
-        self._looking = Looking(disc_spans(reach), reach, settings.time_step)
+        self._reach = default_reach(footprint_of(settings.robot.radius), resolution) / resolution
+        self._time_step = settings.time_step
         self.offers = Offers(
             np.zeros((rows, CANDIDATES, 4), np.float32), np.zeros((rows, CANDIDATES + 1), np.int8), np.zeros(rows, np.int64),
             np.zeros((rows, CANDIDATES, 2)), np.full((rows, CANDIDATES), np.nan), np.zeros((rows, CANDIDATES, 2), np.int64),
@@ -329,9 +321,10 @@ class FrontierOffers:
         episodes = np.unique(rows // self._robots)
         if len(episodes):
             threads = self._perception.threads_for(len(episodes))
+            looking = Looking(disc_spans(self._reach), self._reach, self._time_step)
             renew = _renew_teams_parallel if threads > 1 else _renew_teams_serial
             renew(
-                self._driver.planning(rows, with_frontiers=True), self._perception.maps, self._driver.drives, self._looking, self.offers,
+                self._driver.planning(rows, with_frontiers=True), self._perception.maps, self._driver.drives, looking, self.offers,
                 self.choices, episodes, is_live, is_offered, reasons, threads,
             )  # fmt: skip
         return reasons

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.drives import Drives, drop_path
 from lidarium.envs.onboard.driving import ARRIVED, BLOCKED, DRIVING, IDLE, MAX_POINTS
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, TeamMaps, closeness_of, log_odds_of, refresh_team
-from lidarium.envs.simulation.arrays import ENDED
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.path_search import Passage, budget_of, find_path
 from lidarium.mapping.path_smoothing import kept_places, line_is_clear
@@ -44,8 +43,8 @@ class Planning(NamedTuple):
         For searches, a piece for each thread.
     believed, origins, offsets : (rows, 3), (rows, 2), (rows, 2) float64
         Believed poses, lower left corners of the maps and origins of the map frames [m, rad].
-    flags : (rows,) int64
-        Flags of the world's rows.
+    has_ended : (rows,) bool
+        Which robots have ended and stand where they are.
     """
 
     robots: int
@@ -61,7 +60,7 @@ class Planning(NamedTuple):
     believed: NDArray[np.float64]
     origins: NDArray[np.float64]
     offsets: NDArray[np.float64]
-    flags: NDArray[np.int64]
+    has_ended: NDArray[np.bool_]
 
 
 @kernel
@@ -93,7 +92,7 @@ def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> 
 def _discs(planning: Planning, row: int, avoided: Array) -> Array:
     """Bodies of the avoided teammates (robots,) as discs (row, column, radius) that a robot's centre must not enter, in cells."""
     first = row // planning.robots * planning.robots
-    discs = np.empty((planning.robots, 3))
+    discs = np.empty((avoided.sum(), 3))
     count = 0
     for mate in range(planning.robots):
         if avoided[mate]:
@@ -102,7 +101,7 @@ def _discs(planning: Planning, row: int, avoided: Array) -> Array:
             discs[count, 1] = (x - planning.origins[row, 0]) / planning.resolution - 0.5
             discs[count, 2] = (planning.radius + planning.radius + MATE_DISTANCE) / planning.resolution
             count += 1
-    return discs[:count]
+    return discs
 
 
 @kernel
@@ -194,65 +193,56 @@ def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
 
 
 @kernel
-def _plan_to_target(planning: Planning, drives: Drives, row: int, piece: int) -> None:
-    """Plan a robot's path to its target, round the teammates that stand."""
+def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> None:
+    """Drop a robot's path where it is not clear any more, and plan one to its target where it has none (kernel)."""
+    if drives.passing[row] >= 0 or not drives.is_ordered[row]:
+        return
+    if drives.has_path[row]:
+        if _path_is_clear(planning, drives, row):
+            return
+        drop_path(drives, row)
+    drives.states[row] = IDLE
     record = planning.records[row // planning.sharing]
     place_x = drives.targets[row, 0] + planning.offsets[row, 0]
     place_y = drives.targets[row, 1] + planning.offsets[row, 1]
     goal_row = math.floor((place_y - planning.origins[row, 1]) / planning.resolution)
     goal_column = math.floor((place_x - planning.origins[row, 0]) / planning.resolution)
-    drives.has_path[row], drives.states[row] = False, IDLE
     if not (0.0 <= goal_row < record[ROWS] and 0.0 <= goal_column < record[COLUMNS]):
         return
     first = row // planning.robots * planning.robots
-    standing, ended = np.zeros(planning.robots, np.bool_), np.zeros(planning.robots, np.bool_)
+    avoided, ended = np.zeros(planning.robots, np.bool_), np.zeros(planning.robots, np.bool_)
     for mate in range(planning.robots):
         other = first + mate
         if planning.knows_mates and other != row:
-            ended[mate] = planning.flags[other] & ENDED != 0
-            standing[mate] = ended[mate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
-    heading = drives.target_headings[row]
-    cell_row, cell_column = int(goal_row), int(goal_column)
-    if drive_to(planning, drives, row, cell_row, cell_column, standing, heading, np.inf, place_x, place_y, piece):
-        return
-    # Only those that have ended can never give way.
-    if ended.sum() < standing.sum():
-        drive_to(planning, drives, row, cell_row, cell_column, ended, heading, np.inf, place_x, place_y, piece)
-
-
-@kernel
-def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> None:
-    """Drop a robot's path where it is not clear any more, and plan one to its target where it has none (kernel)."""
-    if drives.passing[row] >= 0 or not drives.is_ordered[row]:
-        return
-    if drives.has_path[row] and not _path_is_clear(planning, drives, row):
-        drop_path(drives, row)
-    if not drives.has_path[row]:
-        _plan_to_target(planning, drives, row, piece)
-
-
-@kernel
-def _prepare_team(planning: Planning, drives: Drives, maps: TeamMaps, episode: int, piece: int) -> bool:
-    """Prepare the live robots of a team, in their order, on fresh maps; whether one is blocked."""
-    first = episode * planning.robots
-    is_fresh, is_blocked = False, False
-    for row in range(first, first + planning.robots):
-        if planning.flags[row] & ENDED != 0:
-            continue
-        if drives.is_ordered[row] and drives.passing[row] < 0:
-            if not is_fresh:
-                refresh_team(maps, episode)
-                is_fresh = True
-            prepare_robot(planning, drives, row, piece)
-        is_blocked |= drives.states[row] == BLOCKED
-    return is_blocked
+            ended[mate] = planning.has_ended[other]
+            avoided[mate] = ended[mate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
+    # First round all that stand; of these only those that have ended can never give way.
+    for _ in range(2):
+        if drive_to(
+            planning, drives, row, int(goal_row), int(goal_column), avoided, drives.target_headings[row], np.inf, place_x, place_y, piece
+        ):
+            return
+        if ended.sum() == avoided.sum():
+            return
+        avoided = ended
 
 
 def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, episodes: Array, is_blocked: Array, pieces: int) -> None:
-    """Prepare the teams of some episodes, on so many pieces of memory at a time; note where a robot is blocked."""
+    """Prepare the live robots of some teams, in their order, on fresh maps, in so many pieces; note where a robot is blocked."""
     for piece in numba.prange(pieces):
         for k in range(piece, len(episodes), pieces):
-            is_blocked[k] = _prepare_team(planning, drives, maps, episodes[k], piece)
+            first = episodes[k] * planning.robots
+            is_fresh = False
+            for row in range(first, first + planning.robots):
+                if planning.has_ended[row]:
+                    continue
+                if drives.is_ordered[row] and drives.passing[row] < 0:
+                    if not is_fresh:
+                        refresh_team(maps, episodes[k])
+                        is_fresh = True
+                    prepare_robot(planning, drives, row, piece)
+                if drives.states[row] == BLOCKED:
+                    is_blocked[k] = True
 
 
 prepare_teams_serial = kernel(_prepare_teams)

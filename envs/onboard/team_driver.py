@@ -33,6 +33,7 @@ from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
 from lidarium.mapping.clearance import limit_of
 from lidarium.mapping.grid_planning import Cell, Disc, Footprint, cells_of, discs_of, passage_of
+from lidarium.mapping.path_search import Passage
 
 BODY_MARGIN = 0.002
 """Paths keep the body this far from occupied cells [m]."""
@@ -83,10 +84,9 @@ class TeamDriver:
 
     def __init__(self, perception: Perception, settings: ExplorationSettings, shares_map: bool = True) -> None:
         self._perception, self._settings, self.shares_map = perception, settings, shares_map
-        robot, resolution = settings.robot, settings.occupancy.resolution
+        robot = settings.robot
         self._rows = settings.robots * perception.world.episodes
         self._footprint = footprint_of(robot.radius)
-        self._passage = passage_of(self._footprint, resolution, limit_of(CLEARANCE_LIMIT, resolution))
         self.drives: Drives = no_drives(self._rows)
         limits = np.array([robot.cruise_speed, min(robot.max_turn_rate, 2.0), 0.8 * robot.max_acceleration, settings.time_step])
         self.following = Following(
@@ -120,7 +120,7 @@ class TeamDriver:
 
     def state(self, row: int) -> DriveState:
         """Return what a robot's driving is about."""
-        return DRIVE_STATES[drive_state(self.drives, row)]
+        return DRIVE_STATES[int(drive_state(self.drives, row))]
 
     def is_done(self, row: int) -> bool:
         """Whether a robot with a target waits for its next order."""
@@ -158,6 +158,12 @@ class TeamDriver:
         """Return what is left of a robot's path, from where it is, in its map frame, shape (N, 2) [m]."""
         return self._remaining(row) - self._perception.offset(row)
 
+    @property
+    def _passage(self) -> Passage:
+        """How the robots pass over a map; read-only and shared, so not kept here: copies would be other types to kernels."""
+        resolution = self._settings.occupancy.resolution
+        return passage_of(self._footprint, resolution, limit_of(CLEARANCE_LIMIT, resolution))
+
     def _team(self, episode: int) -> slice:
         return slice(episode * self._settings.robots, (episode + 1) * self._settings.robots)
 
@@ -178,7 +184,7 @@ class TeamDriver:
         return Planning(
             settings.robots, settings.known_starts, settings.robot.radius, resolution, self._footprint.radius + 2 * resolution,
             CLEARANCE_LIMIT, self._passage, records, sharing, perception.memory.table, world.believed, world.origins, perception.offsets,
-            world.flags,
+            world.flags & ENDED != 0,
         )  # fmt: skip
 
     def _fresh_planning(self, row: int) -> Planning:

@@ -62,6 +62,8 @@ class KinematicWorld:
         Number of episodes.
     threads : int
         1 for the serial kernels; more lets batches of 8 rows and more run on numba's threads, with the same result.
+    scales : sequence of int
+        Scales at which maps are pooled for observations [cells].
 
     Attributes
     ----------
@@ -77,6 +79,10 @@ class KinematicWorld:
         Cells of F that the team has seen, and the size of F.
     windows : (rows, 4) int64
         What part of each map has changed since ``forget_changes``: row_low, row_high, column_low, column_high.
+    unpooled : (rows, 4) int64
+        What part of each map has changed since its pooled maps took it in.
+    pool_rows : (rows, scales, 3) int64
+        Address, rows and columns of each robot's pooled maps.
     """
 
     def __init__(
@@ -87,6 +93,7 @@ class KinematicWorld:
         time_step: float = 0.1,
         episodes: int = 1,
         threads: int = 1,
+        scales: Sequence[int] = (),
     ) -> None:
         self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
         self.robots, self.episodes = len(robots), episodes
@@ -102,7 +109,10 @@ class KinematicWorld:
         self.gains, self.seen = np.zeros(rows), np.zeros(rows, np.int64)
         self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
         self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
-        self.windows = np.zeros((rows, 4), np.int64)
+        self.windows, self.unpooled = np.zeros((rows, 4), np.int64), np.zeros((rows, 4), np.int64)
+        self._scales = tuple(scales)
+        self._pools: list[list[NDArray[np.int8]]] = [[] for _ in range(rows)]
+        self.pool_rows = np.zeros((rows, len(self._scales), 3), np.int64)
         self.log_odds: list[NDArray[np.int8]] = [np.zeros((0, WORD), np.int8)] * rows
         self.masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * rows
         self.team_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes
@@ -168,6 +178,12 @@ class KinematicWorld:
             else:
                 self.believed[row] = 0.0
                 self.log_odds[row], self.origins[row] = self._blank_map_around(floor)
+            height, width = self.log_odds[row].shape
+            # At scale 1 a map is its own pooled map.
+            self._pools[row] = [
+                np.zeros((-(-height // scale), -(-width // scale)), np.int8) if scale > 1 else self.log_odds[row] for scale in self._scales
+            ]
+            self.unpooled[row] = (height, 0, width, 0)
         self._point_at(episode)
         self.starts[first:last] = starts
         self.flags[first:last] = TRUE_POSE | (KNOWN_MATES if known_starts else OWN_FRAME)
@@ -183,6 +199,8 @@ class KinematicWorld:
         for row in range(episode * self.robots, (episode + 1) * self.robots):
             self._mask_rows[row] = (self.masks[row].ctypes.data, team.ctypes.data, counted.ctypes.data, *counted.shape)
             self.belief_rows[row] = (self.log_odds[row].ctypes.data, *self.log_odds[row].shape)
+            for k, pooled in enumerate(self._pools[row]):
+                self.pool_rows[row, k] = (pooled.ctypes.data, *pooled.shape)
 
     @property
     def table(self) -> NDArray[np.int64]:
@@ -212,7 +230,7 @@ class KinematicWorld:
         arrays = WorldArrays(
             self.bodies, self._sensor, self._unit_vectors, GAUSSIAN_TABLE, self._increments, self._floor_rows, self._frames, self.seeds,
             self.steps, self.team_seen, self.moves, self.flags, self.poses, self.velocities, self.starts, self.believed, self.ranges,
-            self.belief_rows, self.origins, self.windows, self._mask_rows, self._boxes, self.seen, self.gains, self.bumpers, self.contacts,
+            self.belief_rows, self.origins, self.windows, self.unpooled, self._mask_rows, self._boxes, self.seen, self.gains, self.bumpers, self.contacts,
             self.travelled, self.collisions,
         )  # fmt: skip
         self._table = table_of(arrays)

@@ -140,7 +140,7 @@ def _update_map(
 ) -> None:
     """Update one robot's map from its scan; ``bits``, ``ends`` and ``box`` hold the seen area already where ``is_filled``."""
     sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]
-    ranges, belief, window = world.ranges[row], world.maps[row], world.windows[row]
+    ranges, belief = world.ranges[row], world.maps[row]
     beams = ranges.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
@@ -161,10 +161,11 @@ def _update_map(
     log_odds = int8_grid_at(belief[0], belief[1], belief[2])
     integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, world.increments, np.zeros_like(bits))
     # A hit may lie one cell beyond the seen area.
-    window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
-    window[1] = min(max(window[1], box[1] + row_offset + 1), belief[1])
-    window[2] = max(min(window[2], 64 * box[2] + column_offset - 1), 0)
-    window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[2])
+    row_low, row_high = max(box[0] + row_offset - 1, 0), min(box[1] + row_offset + 1, belief[1])
+    column_low, column_high = max(64 * box[2] + column_offset - 1, 0), min(64 * box[3] + column_offset + 1, belief[2])
+    for window in (world.windows[row], world.unpooled[row]):
+        window[0], window[1] = min(window[0], row_low), max(window[1], row_high)
+        window[2], window[3] = min(window[2], column_low), max(window[3], column_high)
 
 
 @kernel(spliced=True)

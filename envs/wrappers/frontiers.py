@@ -82,7 +82,7 @@ class FrontierExploration(DecisionWrapper):
         observations, rewards, terminations, truncations, infos = self.waypoints.carry_out(orders)
         self.agents = env.agents
         reasons = offers.renew(self._rows(self.agents), self._rows(list(observations)))
-        for row in np.flatnonzero(reasons):
+        for row in np.flatnonzero(reasons).tolist():
             infos[self.possible_agents[row]]["given_up"] = (offers.target(row), REASONS[reasons[row]])
         return self._with_offers(observations), rewards, terminations, truncations, infos
 

@@ -7,10 +7,20 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 
 from lidarium.mapping import files, kernels
-from lidarium.mapping.kernels import bytes_at, int8_grid_at, int32_table_at, kernel, uint8_grid_at, word_grid_at
+from lidarium.mapping.kernels import (
+    bytes_at,
+    int8_grid_at,
+    int32_table_at,
+    kernel,
+    uint8_grid_at,
+    uint16_grid_at,
+    use_threads,
+    word_grid_at,
+)
 
 ROOT = Path(kernels.__file__).resolve().parents[1]
 SOURCES = {path: path.read_text() for folder in kernels.PACKAGE_FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))}
@@ -32,6 +42,11 @@ def write_words(address, rows, columns):
 @kernel
 def sum_table(address, rows):
     return int32_table_at(address, rows, 3).sum()
+
+
+@kernel
+def sum_grid(address, rows, columns):
+    return uint16_grid_at(address, rows, columns).sum()
 
 
 @kernel
@@ -58,6 +73,16 @@ def test_grids_are_viewed_where_they_lie():
     assert np.flatnonzero(words).tolist() == [0, 3, 4]
     table = np.arange(12, dtype=np.int32).reshape(4, 3)
     assert sum_table(table.ctypes.data, 4) == 66
+    grid = np.arange(65_530, 65_536, dtype=np.uint16).reshape(2, 3)
+    assert sum_grid(grid.ctypes.data, 2, 3) == int(grid.sum())
+
+
+def test_parallel_kernels_run_on_as_many_threads_as_wanted():
+    before = numba.get_num_threads()
+    use_threads(1)
+    assert numba.get_num_threads() == 1
+    use_threads(before)
+    assert numba.get_num_threads() == before
 
 
 def test_arithmetic_is_exact_and_in_order():
