@@ -103,6 +103,8 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
         batch = self.batch
         if not batch.is_ready:
             raise RuntimeError("the environment was not reset; call reset() before step()")
+        if actions is None:
+            raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
         over = batch.is_over
         masked = ~batch.live & ~np.repeat(over, batch.robots)
         batch.run(actions, np.flatnonzero(over))
