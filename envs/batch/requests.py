@@ -1,13 +1,11 @@
 """What a batch may be asked for: settings, and at a reset seeds, a mask of episodes, and options for all or for each."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.floor import Floor
 from lidarium.envs.options import ResetOptions, read_options
 from lidarium.envs.settings import ExplorationSettings, make_settings
 from lidarium.mapping.kernels import available_threads
