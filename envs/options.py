@@ -25,6 +25,8 @@ class FloorChoice:
     """
 
     def __init__(self, floor: str | Path | Floor, image_resolution: float | None = None) -> None:
+        if not isinstance(floor, str | Path | Floor):
+            raise ValueError(f"floor is {floor!r}; want a name such as apartment, building:17 or set:train, a path, or a Floor")
         self._image_resolution = image_resolution
         if isinstance(floor, str) and floor.startswith(SET_PREFIX):
             self._specs: tuple[str | Path | Floor, ...] = set_floors(floor.removeprefix(SET_PREFIX))
@@ -64,13 +66,24 @@ def read_options(options: dict[str, Any] | None, robots: int) -> ResetOptions:
         return ResetOptions()
     starts = options.get("starts")
     if starts is not None:
-        starts = np.asarray(starts, np.float64)
-        if starts.shape != (robots, 3) or not np.isfinite(starts).all():
-            raise ValueError(f"option starts has shape {starts.shape}; want ({robots}, 3): x, y [m] and theta [rad] of each robot")
+        poses = _numbers(starts)
+        if poses is None or poses.shape != (robots, 3):
+            what = f"is {starts!r}" if poses is None else f"has shape {poses.shape}"
+            raise ValueError(f"option starts {what}; want ({robots}, 3) finite numbers: x, y [m] and theta [rad] of each robot")
+        starts = poses
     goal = options.get("goal")
     if goal is not None:
-        place = np.asarray(goal, np.float64)
-        if place.shape != (2,) or not np.isfinite(place).all():
+        place = _numbers(goal)
+        if place is None or place.shape != (2,):
             raise ValueError(f"option goal is {goal!r}; want two finite numbers: x, y [m]")
         goal = (float(place[0]), float(place[1]))
     return ResetOptions(options.get("floor"), starts, goal)
+
+
+def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
+    """Return a value as an array, or None where it is not one of finite numbers."""
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        return None
+    return array if np.isfinite(array).all() else None

@@ -4,6 +4,7 @@ import multiprocessing
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -151,7 +152,7 @@ def import_floor(command: Import) -> Answer:
 
 
 def prepare_floors(command: Prepare) -> Answer:
-    """Fill the store of floors; an interrupted call keeps what it has made."""
+    """Fill the store of floors; a call that is interrupted or loses a worker keeps what it has made."""
     from lidarium.envs.floors.catalogue import set_floors
     from lidarium.envs.floors.store import FOLDER_VARIABLE, SIZE_VARIABLE, floor_store
     from lidarium.envs.settings import make_settings
@@ -173,6 +174,11 @@ def prepare_floors(command: Prepare) -> Answer:
                 prepared, made = prepared + 1, made + is_new
         except KeyboardInterrupt:
             is_interrupted = True
+        except BrokenProcessPool as error:
+            raise ChildProcessError(
+                f"a worker was killed, most often for want of memory; at least {prepared:,} of {len(specs):,} floors are ready and kept: "
+                f"call again to go on, with fewer --workers than {command.workers}"
+            ) from error
     result = {
         "name": command.name,
         "floors": len(specs),

@@ -162,3 +162,10 @@ def test_policies_are_made_by_name_from_the_top():
     assert lidarium.policy("nearest_frontier").level == "waypoint"
     with pytest.raises(ValueError, match="did you mean 'nearest_frontier'"):
         lidarium.policy("nearest_frontir")
+
+
+def test_without_stable_baselines_the_error_says_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
+    monkeypatch.delitem(sys.modules, "lidarium.envs.batch.stable_baselines", raising=False)
+    with pytest.raises(ImportError, match=r'pip install "lidarium\[rl\]"'):
+        lidarium.sb3_vec_env(1)

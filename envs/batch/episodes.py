@@ -251,7 +251,8 @@ class EpisodeBatch:
             names = np.full(self.rows, None, object)
             names[ended] = [REASONS[number] for number in self.reasons[ended]]
             self.infos["ended_because"], self.infos["_ended_because"] = names, ended
-        self.level.look(self.acted, self.live, seen, self.observations, self.infos)
+        # Episodes that have not run in this call have nothing to be looked at again.
+        self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
 
     @property
     def terminated(self) -> NDArray[np.bool_]:

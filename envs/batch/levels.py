@@ -62,7 +62,8 @@ class Level(Protocol):
         Parameters
         ----------
         acted, live, seen : (rows,) bool
-            Who took part in a step, who has not ended, and whose observations are written: of all that acted or began anew.
+            Who took part in a step, who of those that are seen has not ended, and whose observations are written: of all that acted
+            or began anew.
         out : dict of arrays
             Where observations are written.
         infos : dict
@@ -77,19 +78,20 @@ def check_actions(actions: NDArray[Any], shape: tuple[int, ...], live: Rows, wan
     Raises
     ------
     ValueError
-        Where the shape is another, or a live row's action is not finite.
+        Where these are not numbers, the shape is another, or a live row's action is not finite.
     """
-    array = np.asarray(actions)
+    try:
+        array = np.asarray(actions)
+    except ValueError as error:  # rows of different lengths
+        raise ValueError(f"actions are {actions!r}; want an array {shape}: {wanted} for each row") from error
     if array.shape != shape:
         raise ValueError(f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots + robot")
-    if array.dtype == object or not np.isfinite(array[live]).all():
-        raise ValueError(f"an action is nan or infinite in row {_first_bad(array, live)}; want {wanted}")
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"actions are of type {array.dtype}; want {wanted} for each row")
+    bad = np.flatnonzero(live & ~np.isfinite(array).reshape(len(array), -1).all(axis=1))
+    if len(bad):
+        raise ValueError(f"the action of row {bad[0]} is {array[bad[0]]}, nan or infinite; want {wanted}")
     return array
-
-
-def _first_bad(actions: NDArray[Any], live: Rows) -> int:
-    good = np.isfinite(actions.astype(np.float64)).reshape(len(actions), -1).all(axis=1)
-    return int(np.flatnonzero(live & ~good)[0])
 
 
 class VelocityLevel:

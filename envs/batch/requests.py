@@ -1,14 +1,20 @@
-"""What a batch may be asked for at a reset: seeds, a mask of episodes, and options for all or for each."""
+"""What a batch may be asked for: settings, and at a reset seeds, a mask of episodes, and options for all or for each."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.floor import Floor
 from lidarium.envs.options import ResetOptions, read_options
+from lidarium.envs.settings import ExplorationSettings, make_settings
+from lidarium.mapping.kernels import available_threads
+
+
+def settings_of(options: dict[str, Any]) -> ExplorationSettings:
+    """Return the settings of a batch from the options of ``lidarium.parallel_env``; all threads of the machine where none are named."""
+    names_threads = "threads" in options or options.get("settings") is not None
+    return make_settings(**(options if names_threads else {**options, "threads": available_threads()}))
 
 
 def seeds_of(seed: int | Sequence[int | None] | NDArray[np.integer] | None, episodes: int) -> list[int | None]:
@@ -28,16 +34,18 @@ def seeds_of(seed: int | Sequence[int | None] | NDArray[np.integer] | None, epis
     """
     if seed is None:
         return [None] * episodes
-    if isinstance(seed, int | np.integer) and not isinstance(seed, bool):
-        seeds: list[Any] = [int(seed) + episode for episode in range(episodes)]
-    else:
-        seeds = list(seed) if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str) else [seed]
-        if len(seeds) != episodes:
-            raise ValueError(f"seed has {len(seeds)} entries; want one number, or one entry for each of the {episodes} episodes")
-    for one in seeds:
-        if one is not None and (isinstance(one, bool) or not isinstance(one, int | np.integer) or one < 0):
-            raise ValueError(f"seed {one!r} is not a whole number of zero or more")
-    return [None if one is None else int(one) for one in seeds]
+    if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
+        first = _checked_seed(seed)
+        return [first + episode for episode in range(episodes)]
+    if len(seed) != episodes:
+        raise ValueError(f"seed has {len(seed)} entries; want one number, or one entry for each of the {episodes} episodes")
+    return [None if one is None else _checked_seed(one) for one in seed]
+
+
+def _checked_seed(seed: Any) -> int:  # noqa: ANN401
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"seed is {seed!r}; want a whole number of zero or more")
+    return int(seed)
 
 
 def episodes_of(options: dict[str, Any] | None, episodes: int) -> NDArray[np.int64]:
@@ -83,15 +91,22 @@ _KNOWN = {"floor": 0, "starts": 2, "goal": 1}
 
 def _entry(name: str, value: Any, episode: int, episodes: int) -> Any:  # noqa: ANN401
     """Return an option's entry for an episode."""
-    if name == "floor":
-        if isinstance(value, str | Path | Floor) or value is None:
-            return value
-        entries: Sequence[Any] = list(value)
-    else:
-        array = np.asarray(value, np.float64)
-        if array.ndim <= _KNOWN[name]:
-            return value
-        entries = list(array)
-    if len(entries) != episodes:
-        raise ValueError(f"option {name} has {len(entries)} entries; want one for all, or one for each of the {episodes} episodes")
-    return entries[episode]
+    if _is_for_all(name, value):
+        return value
+    if len(value) != episodes:
+        raise ValueError(f"option {name} has {len(value)} entries; want one for all, or one for each of the {episodes} episodes")
+    return value[episode]
+
+
+def _is_for_all(name: str, value: Any) -> bool:  # noqa: ANN401
+    """Whether an option's value is that of all episodes; otherwise it is a sequence with an entry, or None, for each."""
+    names_none = isinstance(value, Sequence) and any(entry is None for entry in value)
+    return _depth(value) <= _KNOWN[name] and not names_none
+
+
+def _depth(value: Any) -> int:  # noqa: ANN401
+    """Return how deep a value is nested: 2 for (robots, 3) numbers, in an array or in lists."""
+    if isinstance(value, np.ndarray):
+        return value.ndim
+    is_nested = isinstance(value, Sequence) and not isinstance(value, str) and len(value) > 0
+    return 1 + _depth(value[0]) if is_nested else 0

@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.batch.endings import HORIZON
 from lidarium.envs.batch.episodes import Arrays, EpisodeBatch
-from lidarium.envs.batch.requests import options_of
+from lidarium.envs.batch.requests import options_of, seeds_of, settings_of
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.settings import make_settings
-from lidarium.mapping.kernels import available_threads
+from lidarium.envs.options import ResetOptions, read_options
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -25,11 +23,11 @@ Infos = list[dict[str, Any]]
 class ExplorationVecEnv(VecEnv):
     """Teams of lidar robots explore floors, many episodes in one kernel call (stable-baselines3).
 
-    Row = episode * robots + robot; one policy drives all rows. Where the last robot of an episode ends, the episode begins anew in
-    the same step: ``dones`` is set for its rows that were not done before, or that repeat; ``infos[row]["terminal_observation"]`` is
-    what the row saw last, and ``infos[row]["TimeLimit.truncated"]`` tells the horizon from an ending. A robot that ends before its
-    team is done once, with its own last observation; its row then repeats that with reward 0 and ``infos[row]["active"]`` False, and
-    is truncated when the episode ends.
+    Row = episode * robots + robot; one policy drives all rows. A robot that ends before its team is done once; its row then repeats
+    its last observation with reward 0 and ``infos[row]["active"]`` False. Where the last robot of an episode ends, the rows that
+    repeat are done as well, truncated, and the episode begins anew in the same step. In every row that is done,
+    ``infos[row]["terminal_observation"]`` is what the robot saw last, and ``infos[row]["TimeLimit.truncated"]`` tells the horizon
+    from an ending.
 
     Parameters
     ----------
@@ -40,6 +38,11 @@ class ExplorationVecEnv(VecEnv):
     -----
     Observations are written into two sets of arrays that take turns: what a step returns is overwritten by the step after the next
     one. Replay and rollout buffers copy what they keep.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        Where an option cannot be used.
     """
 
     def __init__(
@@ -50,11 +53,11 @@ class ExplorationVecEnv(VecEnv):
         image_resolution: float | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
-        settings = make_settings(**{"threads": available_threads(), **options})
-        self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy=False)
-        self.settings = settings
+        self.settings = settings_of(options)
+        self.batch = EpisodeBatch(episodes, floor, self.settings, level, image_resolution, copy=False)
         self.render_mode = None
         self._actions: NDArray[Any] | None = None
+        self._chosen: dict[int, ResetOptions] = {}
         self._is_closed = False
         super().__init__(self.batch.rows, self.batch.observation_space, self.batch.action_space)
 
@@ -62,25 +65,42 @@ class ExplorationVecEnv(VecEnv):
         """Begin all episodes, with the seeds of ``seed`` and the options of ``set_options`` where they were called."""
         self._check_open()
         batch = self.batch
-        firsts = range(0, batch.rows, batch.robots)
-        # stable-baselines3 keeps a seed and options for every row; the first robot's are the episode's.
-        options = {
-            episode: options_of(self._options[first], np.array([0]), 1, batch.robots).get(0)
-            for episode, first in enumerate(firsts)
-            if self._options[first]
-        }
-        seeds = [self._seeds[first] for first in firsts]
-        batch.run(None, np.arange(batch.episodes), seeds, {episode: chosen for episode, chosen in options.items() if chosen is not None})
+        batch.run(None, np.arange(batch.episodes), self._seeds[:: batch.robots], self._chosen)
+        self._actions = None
         self._reset_seeds()
         self._reset_options()
-        self.reset_infos = self._row_infos()
+        self.reset_infos = self._infos_of(np.arange(batch.rows))
         return batch.observations
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Give episode e the seed ``seed`` + e at the next reset; None draws one."""
         first = int(np.random.default_rng().integers(2**31)) if seed is None else seed
-        self._seeds = [first + row // self.batch.robots for row in range(self.num_envs)]
+        self._seeds = [one for one in seeds_of(first, self.batch.episodes) for _ in range(self.batch.robots)]
         return self._seeds
+
+    def set_options(self, options: Sequence[dict[str, Any]] | dict[str, Any] | None = None) -> None:
+        """Set the options of the next reset.
+
+        Parameters
+        ----------
+        options : dict, sequence of dict or None
+            As for ``ExplorationVectorEnv.reset``; or a dict for each row, of which an episode takes that of its first robot.
+
+        Raises
+        ------
+        ValueError
+            Where a sequence has another length, or an option has a bad value.
+        """
+        batch = self.batch
+        if options is None or isinstance(options, dict):
+            self._chosen = options_of(options, np.arange(batch.episodes), batch.episodes, batch.robots)
+            return
+        if len(options) != batch.rows:
+            raise ValueError(f"options has {len(options)} entries; want one dict, or one for each of the {batch.rows} rows")
+        self._chosen = {episode: read_options(chosen, batch.robots) for episode, chosen in enumerate(options[:: batch.robots])}
+
+    def _reset_options(self) -> None:
+        self._chosen = {}
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take the actions of all rows; ``step_wait`` runs them."""
@@ -97,41 +117,40 @@ class ExplorationVecEnv(VecEnv):
         batch = self.batch
         masked = ~batch.live
         batch.run(actions, np.zeros(0, np.int64))
-        over = np.flatnonzero(batch.is_over)
-        is_over = np.repeat(batch.is_over, batch.robots)
         rewards = batch.rewards.astype(np.float32)
-        truncated = (batch.reasons == HORIZON) | masked & is_over
-        dones = (batch.reasons != 0) | masked & is_over
-        infos = self._row_infos()
+        ends_masked = masked & np.repeat(batch.is_over, batch.robots)
+        truncated = batch.truncated | ends_masked
+        dones = batch.terminated | truncated
+        infos = self._infos_of(np.arange(batch.rows))
         for row, info in enumerate(infos):
-            info["TimeLimit.truncated"] = bool(truncated[row])
-            info["active"] = not masked[row]
+            info["TimeLimit.truncated"], info["active"] = bool(truncated[row]), not masked[row]
             if dones[row]:
                 info["terminal_observation"] = {name: array[row].copy() for name, array in batch.observations.items()}
-        if len(over):
-            self._begin_anew(over)
+        self._begin_anew(np.flatnonzero(batch.is_over))
         return batch.observations, rewards, dones, infos
 
     def _begin_anew(self, over: NDArray[np.int64]) -> None:
         """Begin episodes in the step that ended them; the other rows keep what they see."""
+        if not len(over):
+            return
         batch = self.batch
         batch.run(None, over, is_same_step=True)
-        beginnings = self._row_infos()
-        for row in np.flatnonzero(np.repeat(np.isin(np.arange(batch.episodes), over), batch.robots)):
-            self.reset_infos[row] = beginnings[row]
+        rows = (over[:, None] * batch.robots + np.arange(batch.robots)).ravel()
+        for row, info in zip(rows, self._infos_of(rows), strict=True):
+            self.reset_infos[row] = info
 
-    def _row_infos(self) -> Infos:
-        """Return the batch's infos as a dict for each row."""
+    def _infos_of(self, rows: NDArray[np.int64]) -> Infos:
+        """Return the batch's infos as a dict for each of some rows."""
         truth, told = self.batch.infos["truth"], self.batch.infos
         names = [name for name in told if name != "truth" and not name.startswith("_")]
-        infos: Infos = []
-        for row in range(self.num_envs):
-            info: dict[str, Any] = {"truth": {name: array[row] for name, array in truth.items()}, "active": True}
-            for name in names:
-                if told[f"_{name}"][row]:
-                    info[name] = told[name][row]
-            infos.append(info)
-        return infos
+        return [
+            {
+                "truth": {name: array[row] for name, array in truth.items()},
+                "active": True,
+                **{name: told[name][row] for name in names if told[f"_{name}"][row]},
+            }
+            for row in rows
+        ]
 
     def _check_open(self) -> None:
         if self._is_closed:
@@ -140,6 +159,13 @@ class ExplorationVecEnv(VecEnv):
     def close(self) -> None:
         """Close; nothing is held open."""
         self._is_closed = True
+
+    @property
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Which actions each row may choose now, (rows, 17); at the level of frontiers only."""
+        if "action_mask" not in self.batch.observations:
+            raise AttributeError("action_masks are there at the level of frontiers only; make the environment with level='frontier'")
+        return self.batch.observations["action_mask"].astype(np.bool_)
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
         """Return an attribute of this environment once for each row."""
@@ -156,8 +182,11 @@ class ExplorationVecEnv(VecEnv):
         indices: int | Iterable[int] | None = None,
         **method_kwargs: Any,  # noqa: ANN401
     ) -> list[Any]:
-        """Refuse: rows are no environments of their own."""
-        raise AttributeError(f"{method_name} cannot be called on single rows: all rows share one batch")
+        """Return rows of ``action_masks``, which sb3-contrib's MaskablePPO asks for; rows have no other methods."""
+        if method_name != "action_masks":
+            raise AttributeError(f"{method_name} cannot be called on single rows: all rows share one batch")
+        masks = self.action_masks
+        return [masks[row] for row in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None) -> list[bool]:
         """Return False for each row: there are no environments below to be wrapped."""

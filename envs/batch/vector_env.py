@@ -10,10 +10,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from lidarium.envs.batch.episodes import Arrays, EpisodeBatch
-from lidarium.envs.batch.requests import episodes_of, options_of, seeds_of
+from lidarium.envs.batch.requests import episodes_of, options_of, seeds_of, settings_of
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.settings import make_settings
-from lidarium.mapping.kernels import available_threads
 
 Step = tuple[Arrays, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
@@ -64,7 +62,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
     ) -> None:
         if render_mode is not None:
             raise ValueError(f"render_mode is {render_mode!r}; a batch is not drawn, use lidarium.parallel_env to look at an episode")
-        settings = make_settings(**{"threads": available_threads(), **options})
+        settings = settings_of(options)
         self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy)
         self.settings, self.render_mode = settings, None
         self.num_envs = self.batch.rows
@@ -105,6 +103,8 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
         batch = self.batch
         if not batch.is_ready:
             raise RuntimeError("the environment was not reset; call reset() before step()")
+        if actions is None:
+            raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
         over = batch.is_over
         masked = ~batch.live & ~np.repeat(over, batch.robots)
         batch.run(actions, np.flatnonzero(over))

@@ -1,3 +1,4 @@
+import importlib
 import json
 
 import cv2
@@ -119,6 +120,18 @@ def test_several_workers_prepare_the_same(store, capsys):
     assert json.loads(capsys.readouterr().out)["made"] == 3
     assert main(["floors", "prepare", "set:few", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["made"] == 0
+
+
+def test_a_killed_worker_ends_the_preparation_with_what_to_do(store, tmp_path, monkeypatch, capsys):
+    (tmp_path / "killing.py").write_text("import os, signal\n\ndef prepared(spec, **heights):\n    os.kill(os.getpid(), signal.SIGKILL)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(floors, "_prepared", importlib.import_module("killing").prepared)
+    assert main(["floors", "prepare", "set:few", "--workers", "2"]) == 2
+    told = capsys.readouterr()
+    assert "a worker was killed" in told.err
+    assert "at least 0 of 3 floors are ready" in told.err
+    assert "fewer --workers than 2" in told.err
+    assert told.out == ""
 
 
 @pytest.mark.parametrize(
