@@ -3,15 +3,18 @@
 import itertools
 
 import numpy as np
-from floors import straight_floor
-from peers.map_updates import PolygonUpdate, update_by_rays
-from report import Line, faster, run_alone
-from teams import RANGE_MAX, DrivenTeam
-from timing import Effort, interleaved, repeated
 
+from lidarium.benchmarks.speed.floors import straight_floor
+from lidarium.benchmarks.speed.lines import Line, faster
+from lidarium.benchmarks.speed.peers.map_updates import PolygonUpdate, update_by_rays
+from lidarium.benchmarks.speed.report import run_alone
+from lidarium.benchmarks.speed.teams import RANGE_MAX, DrivenTeam
+from lidarium.benchmarks.speed.timing import Effort, interleaved, repeated
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
 
 ROBOTS = 16
+
+CORES = 1
 
 NOTES = (
     "*Map update*: the same 16 noisy scans of 720 beams into int8 log-odds of 2.5 cm cells on the straight floor. Ours is "

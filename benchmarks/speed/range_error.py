@@ -8,19 +8,22 @@ import math
 
 import numba
 import numpy as np
-from floors import BenchFloor, free_poses
 from numpy.typing import NDArray
-from peers.sphere_tracing import SphereTracer
-from ray_casting import all_floors
-from report import Line, run_alone
 from scipy import ndimage
-from teams import BEAMS, LIDAR, RANGE_MAX
-from timing import Effort
 
+from lidarium.benchmarks.speed.floors import BenchFloor, free_poses
+from lidarium.benchmarks.speed.lines import Line
+from lidarium.benchmarks.speed.peers.sphere_tracing import SphereTracer
+from lidarium.benchmarks.speed.ray_casting import all_floors
+from lidarium.benchmarks.speed.report import run_alone
+from lidarium.benchmarks.speed.teams import BEAMS, LIDAR, RANGE_MAX
+from lidarium.benchmarks.speed.timing import Effort
 from lidarium.envs.simulation.lidar import cast_scans
 
 POSES = 12
 ALLOWED_MM = 0.1
+
+CORES = 1
 
 NOTES = (
     "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the nearest entry point into any "

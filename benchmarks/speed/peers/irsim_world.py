@@ -13,8 +13,9 @@ from typing import Any
 import cv2
 import numpy as np
 import yaml
-from floors import BenchFloor
 from numpy.typing import NDArray
+
+from lidarium.benchmarks.speed.floors import BenchFloor
 
 
 def fastest_irsim_step(floor: BenchFloor, poses: NDArray[np.float64], shape: str, beams: int, reach: float) -> Callable[[], object] | None:

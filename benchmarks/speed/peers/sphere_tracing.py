@@ -14,9 +14,10 @@ import math
 
 import numba
 import numpy as np
-from floors import BenchFloor
 from numpy.typing import NDArray
 from scipy import ndimage
+
+from lidarium.benchmarks.speed.floors import BenchFloor
 
 ANGLES = 2000
 CLOSE = 1e-4

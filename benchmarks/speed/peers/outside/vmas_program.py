@@ -1,12 +1,11 @@
 """The program that times VMAS, in an interpreter of its own: it needs vmas and torch, not lidarium.
 
 VMAS is under the GPL: this file is run as a separate process and nothing of lidarium imports it. It reads one line of JSON
-(boxes, poses, rays, reach) and answers with its version and the batch size that was fastest; after that each line it reads is
-a number of seconds to run, and each line it writes the seconds that one agent's step took.
+(boxes, poses, rays, reach, field_of_view, threads, batches) and answers with its version and the batch size that was fastest;
+after that each line it reads is a number of seconds to run, and each line it writes the seconds that one agent's step took.
 """
 
 import json
-import math
 import sys
 import time
 from importlib.metadata import version
@@ -18,9 +17,6 @@ from vmas.simulator.dynamics.diff_drive import DiffDrive
 from vmas.simulator.scenario import BaseScenario
 from vmas.simulator.sensors import Lidar
 
-BATCHES = (1, 32, 128)
-FIELD_OF_VIEW = math.radians(240.0)
-
 
 class Rooms(BaseScenario):
     """Differential-drive agents with lidars among boxes."""
@@ -30,7 +26,8 @@ class Rooms(BaseScenario):
         world = World(batch_dim, device, dt=0.1, substeps=1)
         self.floor = floor
         for k in range(len(floor["poses"])):
-            lidar = Lidar(world, -FIELD_OF_VIEW / 2, FIELD_OF_VIEW / 2, n_rays=floor["rays"], max_range=floor["reach"], render=False)
+            half = floor["field_of_view"] / 2
+            lidar = Lidar(world, -half, half, n_rays=floor["rays"], max_range=floor["reach"], render=False)
             drive = DiffDrive(world, integration="euler")
             world.add_agent(Agent(f"agent_{k}", shape=Sphere(0.18), collide=True, u_range=[0.5, 1.0], dynamics=drive, sensors=[lidar]))
         for k, (x_low, y_low, x_high, y_high) in enumerate(floor["boxes"]):
@@ -78,10 +75,10 @@ class Batch:
 
 def main() -> None:
     """Answer line by line."""
-    torch.set_num_threads(1)
     floor = json.loads(sys.stdin.readline())
+    torch.set_num_threads(floor["threads"])
     trials = []
-    for size in BATCHES:
+    for size in floor["batches"]:
         batch = Batch(floor, size)
         batch.run(0.0)
         trials.append((min(batch.run(0.3) for _ in range(3)), size, batch))
