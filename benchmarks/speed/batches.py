@@ -35,7 +35,7 @@ class DrivenBatch:
         Robots of all episodes.
     """
 
-    def __init__(self, floor: BenchFloor, threads: int, **options: Any) -> None:
+    def __init__(self, floor: BenchFloor, threads: int, **options: Any) -> None:  # noqa: ANN401
         chosen = {"horizon_s": None, "stop_coverage": None, "observe": OBSERVED, "egocentric_cells": 64, "egocentric_scales": (1, 4)}
         self.env = lidarium.vector_env(EPISODES, floor.floor(), robots=ROBOTS, threads=threads, copy=False, **{**chosen, **options})
         self.agents = self.env.num_envs

@@ -77,7 +77,7 @@ def measure(effort: Effort) -> list[Line]:
         twins.run(effort.block_s)
         whole, kernel = zip(*(twins.run(2.0 * effort.block_s) for _ in range(effort.rounds)), strict=True)
         title = f"whole `ExplorationEnv.step` of 3 robots, {name}"
-        lines.append(within(title, list(whole), "kernel alone", list(kernel), ALLOWED))
+        lines.append(within(title, whole, "kernel alone", kernel, ALLOWED))
     return lines
 
 

@@ -54,15 +54,24 @@ class Line:
             return None
         return self.judged <= self.to_reach if self.is_upper_bound else self.judged >= self.to_reach
 
+    @property
+    def cells(self) -> tuple[str, str, str, str, str, str]:
+        """What stands in the table: name, ours, peer, ratio with its range, what was to be reached, and whether it is."""
+        judged = "-" if self.judged is None else f"{self.judged:.3g} {self.unit}"
+        if self.ratio is not None:
+            judged = f"{self.ratio.median:.3g} x ({self.ratio.least:.3g} to {self.ratio.greatest:.3g})"
+        wanted = "-" if self.to_reach is None else f"{'<=' if self.is_upper_bound else '>='} {self.to_reach:,g} {self.unit}"
+        return self.name, self.ours, self.peer, judged, wanted, {True: "yes", False: "no", None: "-"}[self.is_reached]
+
 
 def faster(
     name: str, ours: Sequence[float], peer_name: str, peer: Sequence[float] | None, to_reach: float | None, unit: str = "agent steps/s"
 ) -> Line:
     """Make the line of a measured peer; ``peer`` is None where it is not installed."""
-    own = f"{shown(rate(list(ours)))} {unit}"
+    own = f"{shown(rate(ours))} {unit}"
     if peer is None:
         return Line(name, own, f"{peer_name}: {NOT_INSTALLED}", None, to_reach)
-    return Line(name, own, f"{peer_name}: {shown(rate(list(peer)))}", compared(list(ours), list(peer)), to_reach)
+    return Line(name, own, f"{peer_name}: {shown(rate(peer))}", compared(ours, peer), to_reach)
 
 
 def faster_than_quoted(
@@ -71,13 +80,13 @@ def faster_than_quoted(
     """Make the line of a peer whose rate is quoted, not measured here."""
     ratios = [1.0 / (seconds * quoted) for seconds in ours]
     comparison = Comparison(statistics.median(ratios), min(ratios), max(ratios))
-    return Line(name, f"{shown(rate(list(ours)))} {unit}", f"{peer_name}: {shown(quoted)} (quoted)", comparison, to_reach)
+    return Line(name, f"{shown(rate(ours))} {unit}", f"{peer_name}: {shown(quoted)} (quoted)", comparison, to_reach)
 
 
 def within(name: str, ours: Sequence[float], part_name: str, part: Sequence[float], allowed: float, unit: str = "agent steps/s") -> Line:
     """Make the line of a whole that may take so many times as long as a part of it, both in seconds per unit."""
-    own, other = f"{shown(rate(list(ours)))} {unit}", f"{part_name}: {shown(rate(list(part)))}"
-    return Line(f"{name} (time over that of the {part_name})", own, other, compared(list(part), list(ours)), allowed, is_upper_bound=True)
+    own, other = f"{shown(rate(ours))} {unit}", f"{part_name}: {shown(rate(part))}"
+    return Line(f"{name} (time over that of the {part_name})", own, other, compared(part, ours), allowed, is_upper_bound=True)
 
 
 def shown(value: float) -> str:
@@ -91,12 +100,5 @@ def shown(value: float) -> str:
 
 def table(lines: Sequence[Line]) -> str:
     """Write the lines as a markdown table."""
-    rows = ["| line | ours | peer | ratio (least to greatest) | to reach | reached |", "|---|---|---|---|---|---|"]
-    for line in lines:
-        judged = "-" if line.judged is None else f"{line.judged:.3g} {line.unit}"
-        if line.ratio is not None:
-            judged = f"{line.ratio.median:.3g} x ({line.ratio.least:.3g} to {line.ratio.greatest:.3g})"
-        wanted = "-" if line.to_reach is None else f"{'<=' if line.is_upper_bound else '>='} {line.to_reach:,g} {line.unit}"
-        reached = {True: "yes", False: "no", None: "-"}[line.is_reached]
-        rows.append(f"| {line.name} | {line.ours} | {line.peer} | {judged} | {wanted} | {reached} |")
-    return "\n".join(rows)
+    header = "| line | ours | peer | ratio (least to greatest) | to reach | reached |"
+    return "\n".join([header, "|---|---|---|---|---|---|", *(f"| {' | '.join(line.cells)} |" for line in lines)])

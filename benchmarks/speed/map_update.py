@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.benchmarks.speed.floors import straight_floor
 from lidarium.benchmarks.speed.lines import Line, faster
@@ -31,7 +32,7 @@ def measure(effort: Effort) -> list[Line]:
         team.step()
     world, floor = team.world, straight_floor()
     lidar, settings = world.lidar, OccupancySettings(resolution=floor.resolution)
-    scans = []
+    scans: list[tuple[float, float, NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]] = []
     for pose, ranges in zip(world.poses, world.ranges.astype(np.float64), strict=True):
         cosine, sine = np.cos(pose[2]), np.sin(pose[2])
         directions = np.array([[cosine, -sine], [sine, cosine]]) @ lidar.unit_vectors

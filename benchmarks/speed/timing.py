@@ -1,9 +1,10 @@
 """Interleaved timing: in every round each contender runs for a moment, so that what disturbs the machine disturbs all."""
 
+import math
 import os
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,12 +103,36 @@ def interleaved(contenders: Mapping[str, Contender], effort: Effort) -> dict[str
     return seconds
 
 
-def compared(ours: list[float], others: list[float]) -> Comparison:
+def compared(ours: Sequence[float], others: Sequence[float]) -> Comparison:
     """Return how many times faster ours is, round by round."""
     ratios = [other / own for own, other in zip(ours, others, strict=True)]
     return Comparison(statistics.median(ratios), min(ratios), max(ratios))
 
 
-def rate(seconds: list[float]) -> float:
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A median, and between what bounds that of the whole population lies."""
+
+    median: float
+    low: float
+    high: float
+
+
+def median_interval(values: Sequence[float], confidence: float = 0.95) -> Interval:
+    """Return the median of values and an interval that holds the true one with at least this confidence.
+
+    The bounds are values themselves, those of equal rank from both ends: whatever the distribution, each value lies below the
+    true median with probability one half. Too few values for the confidence give the least and the greatest.
+    """
+    ordered, count = sorted(values), len(values)
+    tail, rank = 0.5**count, 0
+    while tail <= 0.5 * (1.0 - confidence):
+        rank += 1
+        tail += math.comb(count, rank) * 0.5**count
+    rank = max(rank - 1, 0)
+    return Interval(statistics.median(ordered), ordered[rank], ordered[count - 1 - rank])
+
+
+def rate(seconds: Sequence[float]) -> float:
     """Return units per second, from the median."""
     return 1.0 / statistics.median(seconds)
