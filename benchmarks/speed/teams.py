@@ -57,9 +57,14 @@ class DrivenTeam:
         self._count = 0
         self._starts = (self._starts + 1) % 8
 
+    @property
+    def commands(self) -> NDArray[np.float64]:
+        """Speeds and turn rates of the next step, (robots, 2) [m/s, rad/s]."""
+        return np.asarray(self._commands[self._count // HOLD % DRAWS])
+
     def step(self) -> None:
         """Move, sense, score and map, for all robots."""
-        self.world.step(self._commands[self._count // HOLD % DRAWS])
+        self.world.step(self.commands)
         self._count += 1
 
 

@@ -9,6 +9,7 @@ import json
 import sys
 import time
 from importlib.metadata import version
+from typing import Any
 
 import torch
 from vmas import make_env
@@ -21,7 +22,7 @@ from vmas.simulator.sensors import Lidar
 class Rooms(BaseScenario):
     """Differential-drive agents with lidars among boxes."""
 
-    def make_world(self, batch_dim, device, floor, **kwargs):
+    def make_world(self, batch_dim: int, device: torch.device, floor: dict[str, Any], **kwargs: object) -> World:
         """Put agents and boxes into the world."""
         world = World(batch_dim, device, dt=0.1, substeps=1)
         self.floor = floor
@@ -35,7 +36,7 @@ class Rooms(BaseScenario):
             world.add_landmark(Landmark(f"box_{k}", collide=True, movable=False, shape=shape))
         return world
 
-    def reset_world_at(self, env_index=None):
+    def reset_world_at(self, env_index: int | None = None) -> None:
         """Put everything in its place."""
         for agent, (x, y, theta) in zip(self.world.agents, self.floor["poses"], strict=True):
             agent.set_pos(torch.tensor([x, y], dtype=torch.float32), batch_index=env_index)
@@ -43,11 +44,11 @@ class Rooms(BaseScenario):
         for landmark, (x_low, y_low, x_high, y_high) in zip(self.world.landmarks, self.floor["boxes"], strict=True):
             landmark.set_pos(torch.tensor([(x_low + x_high) / 2, (y_low + y_high) / 2], dtype=torch.float32), batch_index=env_index)
 
-    def reward(self, agent):
+    def reward(self, agent: Agent) -> torch.Tensor:
         """Reward nothing."""
         return torch.zeros(self.world.batch_dim)
 
-    def observation(self, agent):
+    def observation(self, agent: Agent) -> torch.Tensor:
         """Take the scan."""
         return agent.sensors[0].measure()
 
@@ -55,13 +56,13 @@ class Rooms(BaseScenario):
 class Batch:
     """Environments of one batch size, stepped by drawn actions."""
 
-    def __init__(self, floor, size):
+    def __init__(self, floor: dict[str, Any], size: int) -> None:
         self.agents = len(floor["poses"])
         self.env = make_env(Rooms(), num_envs=size, device="cpu", continuous_actions=True, seed=0, floor=floor)
         self.actions = [torch.rand(size, 2) - 0.5 for _ in range(self.agents)]
         self.size = size
 
-    def run(self, seconds):
+    def run(self, seconds: float) -> float:
         """Step for about so long and return the seconds per agent and step."""
         steps, elapsed = 0, 0.0
         began = time.perf_counter()
