@@ -9,12 +9,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lidarium.benchmarks.speed.batches import EPISODES, ROBOTS, DrivenBatch
+from lidarium.benchmarks.speed.batches import EPISODES, ROBOTS, DrivenBatch, can_use
 from lidarium.benchmarks.speed.floors import straight_floor
-from lidarium.benchmarks.speed.lines import Line, faster, shown, within
+from lidarium.benchmarks.speed.lines import Line, faster, needs_threads, shown, within
 from lidarium.benchmarks.speed.report import run_alone
 from lidarium.benchmarks.speed.teams import HOLD, LIDAR
-from lidarium.benchmarks.speed.timing import Effort, cores, rate
+from lidarium.benchmarks.speed.timing import Effort, rate
 
 CORES = 2
 LEAST_GAIN, ALLOWED, LEAST_RATE = 1.8, 1.3, 30_000.0
@@ -45,8 +45,8 @@ def run_in_turn(steps: dict[str, Callable[[], None]], seconds: float) -> dict[st
 def measure(effort: Effort) -> list[Line]:
     """Compare the whole step on two threads with that on one, and with the kernel."""
     title = f"batch of {EPISODES} episodes x {ROBOTS} robots, two threads"
-    if len(cores()) < CORES:
-        return [Line(title, "this machine lets us use one core", "-", None, LEAST_GAIN)]
+    if not can_use(CORES):
+        return [needs_threads(title, LEAST_GAIN)]
     floor = straight_floor()
     options = {"lidar": LIDAR, "resolution": floor.resolution}
     batches = {name: DrivenBatch(floor, threads, **options) for name, threads in (("two", 2), ("one", 1), ("kernel", 2))}

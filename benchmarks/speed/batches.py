@@ -8,11 +8,18 @@ from numpy.typing import NDArray
 import lidarium
 from lidarium.benchmarks.speed.floors import BenchFloor
 from lidarium.benchmarks.speed.teams import DRAWS, HOLD, drawn_commands
+from lidarium.benchmarks.speed.timing import cores
 from lidarium.envs.batch.running import STEPS, run_parallel, run_serial
+from lidarium.mapping.kernels import available_threads
 
 EPISODES, ROBOTS = 64, 2
 OBSERVED = ("scan", "pose", "velocity", "bumper", "egocentric_map")
 """What the robots of the batches observe; egocentric maps of 64 x 64 cells at the scales 1 and 4."""
+
+
+def can_use(threads: int) -> bool:
+    """Whether so many threads of kernels can run at once here."""
+    return min(len(cores()), available_threads()) >= threads
 
 
 class DrivenBatch:

@@ -1,11 +1,10 @@
 """Whole steps of a batch at the preset for learning, beside VMAS with few rays on the same floor, two threads each."""
 
 import math
-import os
 
-from lidarium.benchmarks.speed.batches import EPISODES, ROBOTS, DrivenBatch
+from lidarium.benchmarks.speed.batches import EPISODES, ROBOTS, DrivenBatch, can_use
 from lidarium.benchmarks.speed.floors import free_poses, straight_floor
-from lidarium.benchmarks.speed.lines import Line, faster
+from lidarium.benchmarks.speed.lines import Line, faster, needs_threads
 from lidarium.benchmarks.speed.peers.vmas_peer import VmasProcess
 from lidarium.benchmarks.speed.report import run_alone
 from lidarium.benchmarks.speed.teams import HOLD
@@ -25,9 +24,11 @@ NOTES = (
 
 def measure(effort: Effort) -> list[Line]:
     """Compare the whole step with VMAS."""
-    threads = min(CORES, os.cpu_count() or 1)
+    title = f"learning preset, {EPISODES} episodes x {ROBOTS} robots, two threads"
+    if not can_use(CORES):
+        return [needs_threads(title, WANTED)]
     floor = straight_floor()
-    batch = DrivenBatch(floor, threads, lidar="lidar_360_6m", resolution=0.05)
+    batch = DrivenBatch(floor, CORES, lidar="lidar_360_6m", resolution=0.05)
     reach = batch.env.settings.lidar.range_max
     blocks = 0
 
@@ -43,12 +44,11 @@ def measure(effort: Effort) -> list[Line]:
 
     contenders: dict[str, Contender] = {"ours": repeated(drive, HOLD * batch.agents, start)}
     poses = free_poses(floor, ROBOTS, 0.5)
-    with VmasProcess(floor.boxes, poses, PEER_RAYS, reach, 2.0 * math.pi, threads, PEER_BATCHES) as vmas:
+    with VmasProcess(floor.boxes, poses, PEER_RAYS, reach, 2.0 * math.pi, CORES, PEER_BATCHES) as vmas:
         if vmas.is_there:
             contenders["vmas"] = vmas.run
         seconds = interleaved(contenders, effort)
-    name = f"learning preset, {EPISODES} episodes x {ROBOTS} robots, two threads"
-    return [faster(name, seconds["ours"], f"{vmas.name}, two threads", seconds.get("vmas"), WANTED)]
+    return [faster(title, seconds["ours"], f"{vmas.name}, two threads", seconds.get("vmas"), WANTED)]
 
 
 if __name__ == "__main__":

@@ -57,9 +57,9 @@ class Line:
     @property
     def cells(self) -> tuple[str, str, str, str, str, str]:
         """What stands in the table: name, ours, peer, ratio with its range, what was to be reached, and whether it is."""
-        judged = "-" if self.judged is None else f"{self.judged:.3g} {self.unit}"
+        judged = "-" if self.judged is None else f"{shown(self.judged)} {self.unit}"
         if self.ratio is not None:
-            judged = f"{self.ratio.median:.3g} x ({self.ratio.least:.3g} to {self.ratio.greatest:.3g})"
+            judged = f"{shown(self.ratio.median)} x ({shown(self.ratio.least)} to {shown(self.ratio.greatest)})"
         wanted = "-" if self.to_reach is None else f"{'<=' if self.is_upper_bound else '>='} {self.to_reach:,g} {self.unit}"
         return self.name, self.ours, self.peer, judged, wanted, {True: "yes", False: "no", None: "-"}[self.is_reached]
 
@@ -87,6 +87,11 @@ def within(name: str, ours: Sequence[float], part_name: str, part: Sequence[floa
     """Make the line of a whole that may take so many times as long as a part of it, both in seconds per unit."""
     own, other = f"{shown(rate(ours))} {unit}", f"{part_name}: {shown(rate(part))}"
     return Line(f"{name} (time over that of the {part_name})", own, other, compared(part, ours), allowed, is_upper_bound=True)
+
+
+def needs_threads(name: str, to_reach: float, is_upper_bound: bool = False) -> Line:
+    """Make the line of what cannot be measured here, because only one thread can run at a time."""
+    return Line(name, "needs two cores", "-", None, to_reach, is_upper_bound=is_upper_bound)
 
 
 def shown(value: float) -> str:

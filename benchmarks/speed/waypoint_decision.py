@@ -6,16 +6,15 @@ average.
 """
 
 import math
-import os
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
-from lidarium.benchmarks.speed.batches import EPISODES, OBSERVED, ROBOTS
+from lidarium.benchmarks.speed.batches import EPISODES, OBSERVED, ROBOTS, can_use
 from lidarium.benchmarks.speed.floors import straight_floor
-from lidarium.benchmarks.speed.lines import Line, within
+from lidarium.benchmarks.speed.lines import Line, needs_threads, within
 from lidarium.benchmarks.speed.report import run_alone
 from lidarium.benchmarks.speed.teams import LIDAR
 from lidarium.benchmarks.speed.timing import Effort
@@ -120,8 +119,10 @@ class Deciders:
 
 def measure(effort: Effort) -> list[Line]:
     """Compare the time of decisions with that of their steps."""
-    threads = min(CORES, os.cpu_count() or 1)
-    deciders = Deciders(threads)
+    title = f"waypoint decision of 2 s, {EPISODES} episodes x {ROBOTS} robots, two threads"
+    if not can_use(CORES):
+        return [needs_threads(title, ALLOWED, is_upper_bound=True)]
+    deciders = Deciders(CORES)
     deciders.start()
     deciders.run(0.0)
     rounds = []
@@ -130,7 +131,6 @@ def measure(effort: Effort) -> list[Line]:
             deciders.start()
         rounds.append(deciders.run(effort.block_s))
     deciding, stepping = zip(*rounds, strict=True)
-    title = f"waypoint decision of 2 s, {EPISODES} episodes x {ROBOTS} robots, two threads"
     return [within(title, deciding, "bare steps", stepping, ALLOWED)]
 
 
