@@ -9,7 +9,7 @@ import lidarium
 from lidarium.benchmarks.speed.floors import BenchFloor
 from lidarium.benchmarks.speed.teams import DRAWS, HOLD, drawn_commands
 from lidarium.benchmarks.speed.timing import cores
-from lidarium.envs.batch.running import STEPS, run_parallel, run_serial
+from lidarium.envs.batch.running import STEPS
 from lidarium.mapping.kernels import available_threads
 
 EPISODES, ROBOTS = 64, 2
@@ -48,7 +48,7 @@ class DrivenBatch:
         self.agents = self.env.num_envs
         robot = self.env.settings.robot
         self._limits = np.array([robot.max_speed, robot.max_turn_rate])
-        self._modes = np.full(EPISODES, STEPS, np.int8)
+        self._modes, self._nobody = np.full(EPISODES, STEPS, np.int8), np.zeros(self.agents, np.bool_)
         self._count = 0
 
     def start(self, beginning: int) -> None:
@@ -64,13 +64,7 @@ class DrivenBatch:
 
     def step_kernel(self) -> None:
         """Take the same step by the kernel alone."""
-        batch, world = self.env.batch, self.env.batch.world
-        world.use_threads()
-        run = run_parallel if world.threads > 1 else run_serial
-        run(
-            world.table, batch.robots, self._modes, self._commands[self._draw()], batch.level.drives, batch.level.following,
-            batch._tally, batch.settings.decision_steps, world.threads,
-        )  # fmt: skip
+        self.env.batch.run_kernel(self._modes, self._commands[self._draw()], self._nobody)
 
     @property
     def poses(self) -> NDArray[np.float64]:

@@ -180,13 +180,7 @@ class EpisodeBatch:
         begun = np.repeat(np.isin(np.arange(self.episodes), beginning), robots)
         seen = acted | begun
         self._turn_buffers(seen, is_same_step)
-        threads = self.world.threads
-        self.world.use_threads()
-        run = run_parallel if threads > 1 else run_serial
-        run(
-            self.world.table, robots, modes, self._commands, self.level.drives, self.level.following, self._tally,
-            self.settings.decision_steps, seen, *self._writer.arguments(self.world, self._offsets, self.observations, self._goals), threads,
-        )  # fmt: skip
+        self.run_kernel(modes, self._commands, seen)
         self._tally.rewards[begun | ~acted], self._tally.travelled[begun] = 0.0, 0.0
         self.acted = acted
         self.reasons = endings(self.world, self.settings, self._tally.goals, acted, stopping)
@@ -195,6 +189,26 @@ class EpisodeBatch:
         self.world.moves[ended] = 0
         self.world.flags[ended] |= ENDED
         self._tell(seen)
+
+    def run_kernel(self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]) -> None:
+        """Run episodes by the kernel alone, without beginnings, endings and infos; ``run`` is made of it.
+
+        Parameters
+        ----------
+        modes : (episodes,) int8
+            What each episode does, see ``running``.
+        commands : (rows, 2) float64
+            Speeds and turn rates of episodes that take one step [m/s, rad/s].
+        seen : (rows,) bool
+            Whose observations are written.
+        """
+        threads = self.world.threads
+        self.world.use_threads()
+        run = run_parallel if threads > 1 else run_serial
+        run(
+            self.world.table, self.robots, modes, commands, self.level.drives, self.level.following, self._tally,
+            self.settings.decision_steps, seen, *self._writer.arguments(self.world, self._offsets, self.observations, self._goals), threads,
+        )  # fmt: skip
 
     def _draw(
         self, beginning: NDArray[np.int64], seeds: Sequence[int | None] | None, options: Mapping[int, ResetOptions]

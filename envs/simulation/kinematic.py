@@ -5,6 +5,7 @@ pose is the true one, its map and its mask agree to the cell.
 """
 
 import math
+import mmap
 import os
 from collections.abc import Sequence
 from typing import Any
@@ -48,6 +49,14 @@ def _within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
     wrapped = math.pi - np.mod(math.pi - headings, 2.0 * math.pi)
     poses[:, 2] = np.where((headings > -math.pi) & (headings <= math.pi), headings, wrapped)
     return poses
+
+
+def _blank_map(rows: int, columns: int) -> NDArray[np.int8]:
+    """Return a map of zeros of its own pages, which the system provides where they are touched.
+
+    What numpy allocates may come from memory that was used before, which has to be written over as a whole.
+    """
+    return np.frombuffer(mmap.mmap(-1, max(rows * columns, 1)), np.int8, rows * columns).reshape(rows, columns)
 
 
 class KinematicWorld:
@@ -178,7 +187,7 @@ class KinematicWorld:
             self.masks[row] = np.zeros_like(counted)
             if known_starts:
                 self.believed[row], self.origins[row] = starts[row - first], floor.laser.origin
-                self.log_odds[row] = np.zeros((rows, words * WORD), np.int8)
+                self.log_odds[row] = _blank_map(rows, words * WORD)
             else:
                 self.believed[row] = 0.0
                 self.log_odds[row], self.origins[row] = self._blank_map_around(floor)
@@ -253,7 +262,7 @@ class KinematicWorld:
         diagonal = math.hypot(rows, columns) * floor.laser.resolution
         half = math.ceil(math.ceil(diagonal / 32.0) * 32.0 / self.occupancy.resolution / WORD) * WORD
         origin = -half * self.occupancy.resolution
-        return np.zeros((2 * half, 2 * half), np.int8), (origin, origin)
+        return _blank_map(2 * half, 2 * half), (origin, origin)
 
     def forget_changes(self, first: int, last: int) -> None:
         """Start anew to note what part of the maps changes, for rows ``first`` to ``last``."""
