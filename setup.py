@@ -2,7 +2,7 @@
 
 from setuptools import find_packages, setup
 
-FOLDERS = ("envs", "agents", "mapping", "evaluation", "scripts")
+FOLDERS = ("envs", "agents", "mapping", "evaluation", "benchmarks", "scripts")
 
 setup(
     package_dir={"lidarium": "src/lidarium", **{f"lidarium.{folder}": folder for folder in FOLDERS}},

@@ -13,7 +13,6 @@ import json
 import multiprocessing
 import os
 import platform
-import random
 import sys
 import time
 from collections.abc import Callable
@@ -21,6 +20,7 @@ from datetime import date
 from pathlib import Path
 from statistics import mean, median
 
+import numpy as np
 from tqdm import tqdm
 
 STORE_MIB = 1024
@@ -110,13 +110,13 @@ def measure(arguments: argparse.Namespace, log: Path) -> None:
         done = {row["floor"] for row in rows_of(log) if row["phase"] == phase}
         shares = [[floor for floor in floors[(k + shift) % count :: count] if floor not in done] for k in range(count)]
         if shift:
-            for k, share in enumerate(shares):
-                random.Random(k).shuffle(share)
+            shares = [[share[place] for place in np.random.default_rng(k).permutation(len(share))] for k, share in enumerate(shares)]
         if any(shares):
             run_phase(reset_over, phase, shares, log, sum(map(len, shares)))
     for episodes in arguments.episodes:
-        generator = random.Random(episodes)
-        shares = [generator.sample(floors, min(episodes, len(floors))) for _ in range(count)]
+        generator = np.random.default_rng(episodes)
+        chosen = [generator.choice(len(floors), min(episodes, len(floors)), replace=False) for _ in range(count)]
+        shares = [[floors[place] for place in places] for places in chosen]
         if not any(row["phase"] == f"held {episodes}" for row in rows_of(log)):
             run_phase(hold, f"held {episodes}", shares, log, count)
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from lidarium.envs.settings import OBSERVABLES, ExplorationSettings
 from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.envs.simulation.stages import RANGE_GAP
-from lidarium.mapping.kernels import Array, int8_grid_at, kernel, use_threads
-from lidarium.mapping.map_crops import crop_levels, crop_turned, pool_window
+from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, use_threads
+from lidarium.mapping.map_crops import crop_levels, crop_turned, forget_touched, pool_touched
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
@@ -63,7 +63,7 @@ def action_space() -> spaces.Box:
 @kernel
 def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None:
     """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``."""
-    ranges, believed, offsets, velocities, bumpers, beliefs, origins, goals, unpooled, pools = known
+    ranges, believed, offsets, velocities, bumpers, beliefs, origins, goals, pools = known
     numbers, scales = limits
     scans, poses, motions, presses, maps, egocentric_maps, observed_goals = observed
     resolution, range_max, max_speed, max_turn_rate = numbers[0], numbers[1], numbers[2], numbers[3]
@@ -95,10 +95,11 @@ def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None
         if maps.size > 0:
             crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
         if egocentric_maps.size > 0:
+            touched = int32_table_at(beliefs[row, 3], beliefs[row, 4], 2)
             for k in range(scales.shape[0]):
                 if scales[k] > 1:
-                    pool_window(log_odds, unpooled[row], scales[k], int8_grid_at(pools[row, k, 0], pools[row, k, 1], pools[row, k, 2]))
-            unpooled[row, 0], unpooled[row, 1], unpooled[row, 2], unpooled[row, 3] = log_odds.shape[0], 0, log_odds.shape[1], 0
+                    pool_touched(log_odds, touched, scales[k], int8_grid_at(pools[row, k, 0], pools[row, k, 1], pools[row, k, 2]))
+            forget_touched(touched)
             crop_turned(pools[row], x, y, believed[row, 2], scales, egocentric_maps[row])
 
 
@@ -209,7 +210,7 @@ class ObservationWriter:
                 raise ValueError("goals is None; want each robot's goal (rows, 2), nan where it does not know one")
             goals = offsets
         known = (
-            world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals, world.unpooled,
+            world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals,
             world.pool_rows,
         )  # fmt: skip
         return known, self._limits, tuple([out[name] if name in self.keys else self._absent[name] for name in KEYS])

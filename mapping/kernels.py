@@ -75,7 +75,8 @@ def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False
         The function to compile.
     parallel : bool
         Whether ``numba.prange`` loops run on threads. Only loops whose iterations write to places of their own may,
-        so that the result does not depend on the number of threads.
+        so that the result does not depend on the number of threads. Such a function calls kernels and does nothing else: what it
+        wrote itself to arrays viewed at addresses, numba would drop as of no use.
     inline : bool
         Whether the function is inlined into its callers by LLVM (small helpers in hot loops).
     spliced : bool

@@ -9,14 +9,18 @@ is looked up there.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel
-from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, WORD
 
 _FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIED)
 
 BLOCK = 32
 """Cells that are taken at a time: loops of a fixed length leave no remainder to go through one by one."""
+
+NO_WORD = 2**30
+"""Low end of the words of a row of which none has changed."""
 
 HALF_STEP = 32768.0
 """Half a cell in the numbers with 16 binary places by which a crop is looked up."""
@@ -47,33 +51,49 @@ def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
             inner[j] = _level(source[j])
 
 
+def untouched(rows: int) -> NDArray[np.int32]:
+    """Return the words of each row of a map that have changed, low end and high end (exclusive), where none have: (rows, 2)."""
+    return np.tile(np.array([NO_WORD, 0], np.int32), (rows, 1))
+
+
 @kernel
-def pool_window(log_odds: Array, window: Array, scale: int, pooled: Array) -> None:
+def forget_touched(touched: Array) -> None:
+    """Take all changes of a map (rows, 2) as known."""
+    for row in range(touched.shape[0]):
+        touched[row, 0], touched[row, 1] = NO_WORD, 0
+
+
+@kernel
+def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> None:
     """Bring a pooled map up to date where the map has changed.
 
     Parameters
     ----------
     log_odds : (rows, columns) int8
-        The map.
-    window : (4,) int64
-        Part of it that has changed: row_low, row_high, column_low, column_high, high ends exclusive; empty for none.
+        The map; columns a multiple of 64.
+    touched : (rows, 2) int32
+        Words of 64 cells of each row that have changed, low end and high end (exclusive), see ``untouched``.
     scale : int
         Side of a pooled cell [cells of the map].
     pooled : (ceil(rows / scale), ceil(columns / scale)) int8
         Greatest log-odds of the cells of each pooled cell; what a pooled cell has beyond the map counts as unknown.
     """
-    if window[0] >= window[1] or window[2] >= window[3]:
-        return
     rows, columns = log_odds.shape
-    first, last = window[2] // scale, (window[3] + scale - 1) // scale
-    width = (last - first) * scale
-    greatest = np.empty(width, np.int8)
-    inside = min(width, columns - first * scale)
-    for row in range(window[0] // scale, (window[1] + scale - 1) // scale):
-        greatest[:] = np.int8(-128) if (row + 1) * scale <= rows else np.int8(0)
+    for row in range(pooled.shape[0]):
+        first_row, last_row = row * scale, min((row + 1) * scale, rows)
+        low, high = NO_WORD, 0
+        for map_row in range(first_row, last_row):
+            low, high = min(low, touched[map_row, 0]), max(high, touched[map_row, 1])
+        if low >= high:
+            continue
+        first, last = low * WORD // scale, min((high * WORD + scale - 1) // scale, pooled.shape[1])
+        width = (last - first) * scale
+        inside = min(width, columns - first * scale)
+        greatest = np.empty(width, np.int8)
+        greatest[:] = np.int8(-128) if first_row + scale <= rows else np.int8(0)
         greatest[inside:] = np.int8(0)
         target = int8_at(greatest.ctypes.data, inside)
-        for map_row in range(row * scale, min((row + 1) * scale, rows)):
+        for map_row in range(first_row, last_row):
             source = int8_at(log_odds.ctypes.data + map_row * columns + first * scale, inside)
             for j in range(inside):
                 target[j] = max(target[j], source[j])
@@ -165,6 +185,10 @@ def _pool_neighbours(values: Array, scale: int, pooled: Array) -> None:
             for j in range(reduced.size):
                 reduced[j] = max(values[2 * j], values[2 * j + 1])
         values = reduced
+    if scale == 1:
+        for j in range(pooled.size):
+            pooled[j] = values[j]
+        return
     for j in range(pooled.size):
         greatest = values[j * scale]
         for k in range(1, scale):

@@ -81,6 +81,7 @@ def integrate_scan(
     column_offset: int,
     increments: Array,
     hit_bits: Array,
+    touched: Array,
 ) -> None:
     """Update a map by a scan: lower the seen cells, raise those in which beams ended, each once.
 
@@ -98,6 +99,8 @@ def integrate_scan(
         Place of the window's first cell in the map; column_offset a multiple of 64.
     increments : (4,) int64
         ``OccupancySettings.increments``.
+    touched : (rows, 2) int32
+        Words of each row, low end and high end (exclusive), that scans have changed; extended. None are noted where it has no rows.
     """
     _note_hits(ends, is_hit, hit_bits)
     hit, miss, minimum, maximum = increments[0], increments[1], increments[2], increments[3]
@@ -106,10 +109,15 @@ def integrate_scan(
     word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
     for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
         address = log_odds.ctypes.data + (row + row_offset) * columns + word_offset * WORD
+        low, high = word_high, word_low
         for word in range(word_low, word_high):
             seen, hits = bits[row, word], hit_bits[row, word]
             if seen | hits != np.uint64(0):
                 update_block(address + word * WORD, seen, hits, hit, miss, minimum, maximum)
+                low, high = min(low, word), word + 1
+        if low < high and touched.shape[0] > 0:
+            span = touched[row + row_offset]
+            span[0], span[1] = min(span[0], low + word_offset), max(span[1], high + word_offset)
 
 
 @kernel
@@ -144,7 +152,9 @@ def _integrate_one(
     box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, geometry[0], geometry[3] != 0.0, bits)
     window[0], window[1] = box[0] + row_offset, box[1] + row_offset
     window[2], window[3] = 64 * box[2] + column_offset, 64 * box[3] + column_offset
-    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, np.zeros_like(bits))
+    integrate_scan(
+        log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, np.zeros_like(bits), np.empty((0, 2), np.int32)
+    )
 
 
 class OccupancyGrid:

@@ -1,25 +1,49 @@
-"""Run all speed benchmarks in one go and write docs/results/speed.md and speed.json.
+"""All questions of speed in one go: the table of the speed budget.
 
-The peers take part where they are installed: IR-SIM and PyBullet in this interpreter (``pip install ".[bench]"``), VMAS in
-this one or in the interpreter that LIDARIUM_VMAS_PYTHON names, f1tenth's scan simulator from the file that LIDARIUM_F1TENTH
-names. Everything runs in turn on one core.
+    python benchmarks/speed/all.py                  # writes docs/results/speed.md and speed.json
+    python benchmarks/speed/all.py --effort quick
+
+``lidarium bench`` measures the same. The peers take part where they are installed, see ``peers/catalogue.py``.
 """
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
-import environment_step
-import exploration_projects
-import kernel_step
-import map_update
-import range_error
-import ray_casting
-from peers.vmas_peer import interpreter, package_version
-from report import Line, table, write
-from timing import QUICK, Effort, pin
+from lidarium.benchmarks.speed import (
+    batch_step,
+    cached_start,
+    environment_step,
+    exploration_projects,
+    kernel_step,
+    learning_preset,
+    map_update,
+    range_error,
+    ray_casting,
+    waypoint_decision,
+)
+from lidarium.benchmarks.speed.lines import Line, table
+from lidarium.benchmarks.speed.peers.catalogue import missing_peers
+from lidarium.benchmarks.speed.report import speed_result, with_effort, write_speed
+from lidarium.benchmarks.speed.timing import EFFORTS, Effort, on_cores
 
-QUESTIONS = (kernel_step, ray_casting, range_error, map_update, exploration_projects, environment_step)
-RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results"
+_MODULES: tuple[ModuleType, ...] = (
+    kernel_step,
+    ray_casting,
+    range_error,
+    map_update,
+    exploration_projects,
+    environment_step,
+    batch_step,
+    learning_preset,
+    waypoint_decision,
+    cached_start,
+)
+
+QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}
+"""The questions by name: modules with ``CORES``, ``NOTES`` and ``measure(effort)``."""
 
 ABOUT_QUOTES = (
     "*quoted* marks a rate that was not measured in this run but on an AMD Zen 5 core of about 4.1 GHz; on another machine read "
@@ -27,25 +51,35 @@ ABOUT_QUOTES = (
 )
 
 
+def ask(name: str, effort: Effort) -> list[Line]:
+    """Measure the lines of a question, on as many cores as it is about."""
+    question = QUESTIONS[name]
+    with on_cores(question.CORES):
+        lines: list[Line] = question.measure(effort)
+    return lines
+
+
+def result_of(names: Sequence[str], lines: Sequence[Line], command: str, effort: Effort) -> dict[str, Any]:
+    """Return the result of questions: their lines, what explains them, and which peers were left out."""
+    notes = [note for name in names for note in QUESTIONS[name].NOTES]
+    return speed_result(lines, command, effort, [*notes, *ABOUT_QUOTES, *missing_peers()])
+
+
 def main() -> None:
     """Measure, print and write."""
-    parser = argparse.ArgumentParser(description="All speed benchmarks in one run.")
-    parser.add_argument("--quick", action="store_true", help="few short rounds: about a minute, coarse figures")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of speed.md and speed.json")
-    arguments = parser.parse_args()
-    effort = QUICK if arguments.quick else Effort()
-    pin()
+    parser = with_effort(argparse.ArgumentParser(description="All speed benchmarks in one run."))
+    parser.add_argument("--out", type=Path, default=Path("docs/results"), help="folder of speed.md and speed.json")
+    chosen = parser.parse_args()
+    effort = EFFORTS[chosen.effort]
     lines: list[Line] = []
-    for question in QUESTIONS:
-        measured = question.measure(effort)
-        print(f"{question.__name__}\n\n{table(measured)}\n", flush=True)
-        lines += measured
-    notes = tuple(note for question in QUESTIONS for note in question.NOTES) + ABOUT_QUOTES
-    vmas = package_version() if interpreter() is not None else None
-    command = "python benchmarks/speed/all.py" + (" --quick" if arguments.quick else "")
-    write(lines, arguments.out, command, effort, {} if vmas is None else {"vmas": vmas}, notes)
+    for name in QUESTIONS:
+        found = ask(name, effort)
+        print(f"{name}\n\n{table(found)}\n", flush=True)
+        lines += found
+    command = f"python benchmarks/speed/all.py --effort {chosen.effort}"
+    write_speed(result_of(list(QUESTIONS), lines, command, effort), lines, chosen.out)
     missed = [line.name for line in lines if line.is_reached is False]
-    print(f"{len(lines)} lines written to speed.md and speed.json; not reached: {len(missed)}")
+    print(f"{len(lines)} lines written to {chosen.out}/speed.md and speed.json; not reached: {len(missed)}")
 
 
 if __name__ == "__main__":

@@ -7,17 +7,20 @@ infos; of the other the kernel alone is called.
 import time
 
 import numpy as np
-from floors import BenchFloor, straight_floor, turned_floor
-from report import Line, rate, run_alone, shown
-from teams import LIDAR
-from timing import Effort, compared
 
+from lidarium.benchmarks.speed.floors import BenchFloor, straight_floor, turned_floor
+from lidarium.benchmarks.speed.lines import Line, within
+from lidarium.benchmarks.speed.report import run_alone
+from lidarium.benchmarks.speed.teams import LIDAR
+from lidarium.benchmarks.speed.timing import Effort
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings import make_settings
 
 ROBOTS = 3
 ALLOWED = 1.4
 _HOLD, _DRAWS = 20, 50
+
+CORES = 1
 
 NOTES = (
     "*Whole step*: `ExplorationEnv.step` of 3 robots with observations (each with a 256 x 256 crop of the map), rewards, endings "
@@ -73,16 +76,8 @@ def measure(effort: Effort) -> list[Line]:
         twins = Twins(floor)
         twins.run(effort.block_s)
         whole, kernel = zip(*(twins.run(2.0 * effort.block_s) for _ in range(effort.rounds)), strict=True)
-        lines.append(
-            Line(
-                f"whole `ExplorationEnv.step` of 3 robots, {name} (time over the kernel's)",
-                f"{shown(rate(list(whole)))} agent steps/s",
-                f"kernel alone: {shown(rate(list(kernel)))}",
-                compared(list(kernel), list(whole)),
-                ALLOWED,
-                is_upper_bound=True,
-            )
-        )
+        title = f"whole `ExplorationEnv.step` of 3 robots, {name}"
+        lines.append(within(title, whole, "kernel alone", kernel, ALLOWED))
     return lines
 
 

@@ -6,12 +6,14 @@ code, map and defaults, and are quoted; ours runs with one robot on floors of ou
 
 import math
 
-from floors import straight_floor
-from report import Line, faster_than_quoted, run_alone
-from teams import DrivenTeam, full_circle
-from timing import Effort, interleaved, repeated
-
+from lidarium.benchmarks.speed.floors import straight_floor
+from lidarium.benchmarks.speed.lines import Line, faster_than_quoted
+from lidarium.benchmarks.speed.report import run_alone
+from lidarium.benchmarks.speed.teams import DrivenTeam, full_circle
+from lidarium.benchmarks.speed.timing import Effort, interleaved, repeated
 from lidarium.envs.simulation.lidar import Lidar
+
+CORES = 1
 
 NOTES = (
     "*Scan and map update*: `KinematicWorld.step` with one robot, motion and scorer included, at the settings of three projects; "

@@ -107,18 +107,39 @@ def turned_floor(floor: BenchFloor, angle: float = TURN) -> BenchFloor:
 def free_poses(floor: BenchFloor, count: int, clearance: float = 0.3, seed: int = 1) -> NDArray[np.float64]:
     """Draw poses x, y, theta [m, rad] inside the building, this far off everything and twice that off each other."""
     generator = np.random.default_rng(seed)
-    distance = ndimage.distance_transform_edt(floor.solid == 0) * floor.resolution
-    parts, _ = ndimage.label(floor.solid == 0)
-    inside = parts == 1 + int(np.argmax(np.bincount(parts[parts > 0])[1:]))
-    rows, columns = np.nonzero(inside & (distance > clearance))
+    roomy = _roomy_places(floor, clearance)
     places: list[NDArray[np.float64]] = []
-    for k in generator.permutation(len(rows)):
-        place = (np.array([columns[k], rows[k]]) + 0.5) * floor.resolution
+    for k in generator.permutation(len(roomy)):
+        place = roomy[k]
         if all(np.hypot(*(place - other)) > 2.0 * clearance for other in places):
             places.append(place)
         if len(places) == count:
             return np.column_stack([np.array(places), generator.uniform(-math.pi, math.pi, count)])
     raise ValueError(f"floor {floor.name!r} has no room for {count} poses that are {clearance} m off everything")
+
+
+def team_poses(floor: BenchFloor, teams: int, robots: int, clearance: float = 0.3, seed: int = 1) -> NDArray[np.float64]:
+    """Draw poses as ``free_poses`` for many teams that do not see each other, (teams * robots, 3) [m, rad]."""
+    generator = np.random.default_rng(seed)
+    roomy = _roomy_places(floor, clearance)
+    places = np.empty((teams, robots, 2))
+    for team in places:
+        is_apart = False
+        while not is_apart:
+            team[:] = roomy[generator.integers(len(roomy), size=robots)]
+            gaps = np.hypot(*(team[:, None] - team[None]).transpose(2, 0, 1))
+            is_apart = bool((gaps[~np.eye(robots, dtype=np.bool_)] > 2.0 * clearance).all())
+    return np.column_stack([places.reshape(-1, 2), generator.uniform(-math.pi, math.pi, teams * robots)])
+
+
+def _roomy_places(floor: BenchFloor, clearance: float) -> NDArray[np.float64]:
+    """Return the middles of cells inside the building that are this far off everything, (N, 2) [m]."""
+    distance = ndimage.distance_transform_edt(floor.solid == 0) * floor.resolution
+    parts, _ = ndimage.label(floor.solid == 0)
+    inside = parts == 1 + int(np.argmax(np.bincount(parts[parts > 0])[1:]))
+    rows, columns = np.nonzero(inside & (distance > clearance))
+    places: NDArray[np.float64] = (np.column_stack([columns, rows]).astype(np.float64) + 0.5) * floor.resolution
+    return places
 
 
 def _divided(room: Rectangle, generator: np.random.Generator) -> tuple[list[Rectangle], list[Rectangle]] | None:

@@ -4,16 +4,19 @@ Ours moves 16 robots with contact, casts 720 beams for each with mutual visibili
 seen and updates 16 maps. VMAS and IR-SIM move and cast; they keep no map.
 """
 
-from floors import free_poses, straight_floor, turned_floor
-from peers.irsim_world import fastest_irsim_step
-from peers.vmas_peer import VmasProcess
-from report import Line, faster, run_alone
-from teams import BEAMS, RANGE_MAX, DrivenTeam
-from timing import Contender, Effort, interleaved, repeated
+from lidarium.benchmarks.speed.floors import free_poses, straight_floor, turned_floor
+from lidarium.benchmarks.speed.lines import Line, faster
+from lidarium.benchmarks.speed.peers.irsim_world import fastest_irsim_step
+from lidarium.benchmarks.speed.peers.vmas_peer import VmasProcess
+from lidarium.benchmarks.speed.report import run_alone
+from lidarium.benchmarks.speed.teams import BEAMS, RANGE_MAX, DrivenTeam
+from lidarium.benchmarks.speed.timing import Contender, Effort, interleaved, repeated
 
 ROBOTS = 16
 PEER_ROBOTS = 3
 TRIAL_POSES = 6
+
+CORES = 1
 
 NOTES = (
     "*Kernel step*: one call of `KinematicWorld.step` for 16 robots: motion with contact, 720 noisy beams over 240 deg to 5.6 m, teammates "

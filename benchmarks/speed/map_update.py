@@ -3,15 +3,19 @@
 import itertools
 
 import numpy as np
-from floors import straight_floor
-from peers.map_updates import PolygonUpdate, update_by_rays
-from report import Line, faster, run_alone
-from teams import RANGE_MAX, DrivenTeam
-from timing import Effort, interleaved, repeated
+from numpy.typing import NDArray
 
+from lidarium.benchmarks.speed.floors import straight_floor
+from lidarium.benchmarks.speed.lines import Line, faster
+from lidarium.benchmarks.speed.peers.map_updates import PolygonUpdate, update_by_rays
+from lidarium.benchmarks.speed.report import run_alone
+from lidarium.benchmarks.speed.teams import RANGE_MAX, DrivenTeam
+from lidarium.benchmarks.speed.timing import Effort, interleaved, repeated
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
 
 ROBOTS = 16
+
+CORES = 1
 
 NOTES = (
     "*Map update*: the same 16 noisy scans of 720 beams into int8 log-odds of 2.5 cm cells on the straight floor. Ours is "
@@ -28,7 +32,7 @@ def measure(effort: Effort) -> list[Line]:
         team.step()
     world, floor = team.world, straight_floor()
     lidar, settings = world.lidar, OccupancySettings(resolution=floor.resolution)
-    scans = []
+    scans: list[tuple[float, float, NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]] = []
     for pose, ranges in zip(world.poses, world.ranges.astype(np.float64), strict=True):
         cosine, sine = np.cos(pose[2]), np.sin(pose[2])
         directions = np.array([[cosine, -sine], [sine, cosine]]) @ lidar.unit_vectors

@@ -8,19 +8,23 @@ import math
 
 import numba
 import numpy as np
-from floors import BenchFloor, free_poses
 from numpy.typing import NDArray
-from peers.sphere_tracing import SphereTracer
-from ray_casting import all_floors
-from report import Line, run_alone
 from scipy import ndimage
-from teams import BEAMS, LIDAR, RANGE_MAX
-from timing import Effort
 
+from lidarium.benchmarks.speed.floors import BenchFloor, free_poses
+from lidarium.benchmarks.speed.lines import Line
+from lidarium.benchmarks.speed.peers.sphere_tracing import SphereTracer
+from lidarium.benchmarks.speed.ray_casting import all_floors
+from lidarium.benchmarks.speed.report import run_alone
+from lidarium.benchmarks.speed.teams import BEAMS, LIDAR, RANGE_MAX
+from lidarium.benchmarks.speed.timing import Effort
 from lidarium.envs.simulation.lidar import cast_scans
+from lidarium.mapping.kernels import Array
 
 POSES = 12
 ALLOWED_MM = 0.1
+
+CORES = 1
 
 NOTES = (
     "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the nearest entry point into any "
@@ -30,7 +34,7 @@ NOTES = (
 
 
 @numba.njit
-def _exact(x, y, cosine, sine, cells, reach):
+def _exact(x: float, y: float, cosine: float, sine: float, cells: Array, reach: float) -> float:
     """Return the distance to the nearest of the cells (N, 2: column, row) along a beam, all in cells."""
     nearest = reach
     for k in range(cells.shape[0]):
@@ -53,7 +57,7 @@ def _exact(x, y, cosine, sine, cells, reach):
 
 
 @numba.njit
-def _exact_scan(pose, angles, cells, reach):
+def _exact_scan(pose: Array, angles: Array, cells: Array, reach: float) -> Array:
     ranges = np.empty(angles.shape[0])
     for beam in range(angles.shape[0]):
         angle = pose[2] + angles[beam]
@@ -64,7 +68,7 @@ def _exact_scan(pose, angles, cells, reach):
 def exact_ranges(floor: BenchFloor, poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the ranges at poses (N, 3) [m, rad] by the reference, shape (N, beams) [m]; ``RANGE_MAX`` for no return."""
     solid = floor.solid != 0
-    surface = solid & ndimage.binary_dilation(~solid, np.ones((3, 3)))
+    surface = solid & ndimage.binary_dilation(~solid, np.ones((3, 3), np.bool_))
     rows, columns = np.nonzero(surface)
     cells = np.column_stack([columns, rows]).astype(np.float64)
     reach = RANGE_MAX / floor.resolution

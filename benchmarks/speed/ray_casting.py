@@ -4,20 +4,23 @@ import itertools
 import math
 
 import numpy as np
-from floors import BenchFloor, free_poses, straight_floor, turned_floor
-from peers import f1tenth_scans
-from peers.bullet_rays import bullet_scan
-from peers.f1tenth_scans import F1tenthScanner
-from peers.sphere_tracing import SphereTracer
-from report import Line, faster, faster_than_quoted, run_alone
-from teams import BEAMS, LIDAR, RANGE_MAX
-from timing import Contender, Effort, interleaved, repeated
 
+from lidarium.benchmarks.speed.floors import BenchFloor, free_poses, straight_floor, turned_floor
+from lidarium.benchmarks.speed.lines import Line, faster, faster_than_quoted
+from lidarium.benchmarks.speed.peers import f1tenth_scans
+from lidarium.benchmarks.speed.peers.bullet_rays import bullet_scan
+from lidarium.benchmarks.speed.peers.f1tenth_scans import F1tenthScanner
+from lidarium.benchmarks.speed.peers.sphere_tracing import SphereTracer
+from lidarium.benchmarks.speed.report import run_alone
+from lidarium.benchmarks.speed.teams import BEAMS, LIDAR, RANGE_MAX
+from lidarium.benchmarks.speed.timing import Contender, Effort, interleaved, repeated
 from lidarium.envs.simulation.lidar import cast_scans
 
 POSES = 32
 F1TENTH_RAYS = 10e6
 """Rays per second of f1tenth's scan simulator, measured on an AMD Zen 5 core on floors like these (9 to 12 M)."""
+
+CORES = 1
 
 NOTES = (
     "*Rays alone*: `cast_scans` of the package on 32 poses, 720 beams over 240 deg to 5.6 m, no noise, no map. The larger floor has "

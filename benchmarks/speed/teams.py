@@ -1,10 +1,11 @@
-"""Our side of the comparisons: a team in the kinematic world, driven by drawn commands."""
+"""Our side of the comparisons: robots in the kinematic world, driven by drawn commands."""
 
 import math
 
 import numpy as np
-from floors import BenchFloor, free_poses
+from numpy.typing import NDArray
 
+from lidarium.benchmarks.speed.floors import BenchFloor, free_poses
 from lidarium.envs.simulation.kinematic import KinematicWorld
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.robots import ROBOTS
@@ -13,8 +14,18 @@ from lidarium.mapping.occupancy import OccupancySettings
 BEAMS, RANGE_MAX = 720, 5.6
 LIDAR = Lidar(beams=BEAMS, range_max=RANGE_MAX, noise_floor=0.01, noise_share=0.01)
 
-_HOLD = 20
-_DRAWS = 50
+HOLD = 20
+"""Steps for which a robot drives at the same speed and turn rate."""
+
+DRAWS = 50
+
+
+def drawn_commands(robots: int, seed: int) -> NDArray[np.float64]:
+    """Draw speeds and turn rates, each to be held for ``HOLD`` steps, shape (DRAWS, robots, 2) [m/s, rad/s]."""
+    generator = np.random.default_rng(seed)
+    speeds = generator.uniform(0.2, 0.7, (DRAWS, robots))
+    turns = generator.uniform(-1.0, 1.0, (DRAWS, robots))
+    return np.stack([speeds, turns], axis=2)
 
 
 class DrivenTeam:
@@ -39,19 +50,21 @@ class DrivenTeam:
 
     def start(self) -> None:
         """Begin anew: blank maps, other places."""
-        generator = np.random.default_rng(self._starts)
         poses = free_poses(self._floor, self.robots, seed=self._starts)
         self.world.place(0, self._tables, poses, seed=self._starts)
-        speeds = generator.uniform(0.2, 0.7, (_DRAWS, self.robots))
-        turns = generator.uniform(-1.0, 1.0, (_DRAWS, self.robots))
-        self._commands = np.stack([speeds, turns], axis=2)
+        self._commands = drawn_commands(self.robots, self._starts)
         self.world.step(self._commands[0], moves_bodies=False)
         self._count = 0
         self._starts = (self._starts + 1) % 8
 
+    @property
+    def commands(self) -> NDArray[np.float64]:
+        """Speeds and turn rates of the next step, (robots, 2) [m/s, rad/s]."""
+        return np.asarray(self._commands[self._count // HOLD % DRAWS])
+
     def step(self) -> None:
         """Move, sense, score and map, for all robots."""
-        self.world.step(self._commands[self._count // _HOLD % _DRAWS])
+        self.world.step(self.commands)
         self._count += 1
 
 

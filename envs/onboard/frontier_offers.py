@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.drives import STATE_ARRIVED, STATE_GIVING_WAY, STATE_NO_PATH, Drives, drive_state
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, TeamMaps, closeness_of, flags_of, log_odds_of, refresh_team, tiles_of
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.onboard.planning import Planning
+from lidarium.envs.onboard.planning import Planning, passage_in
 from lidarium.envs.onboard.state import Orders, Target
 from lidarium.envs.onboard.team_driver import TeamDriver, footprint_of
 from lidarium.envs.settings import ExplorationSettings
@@ -165,7 +165,7 @@ def _offer(planning: Planning, looking: Looking, offers: Offers, row: int, cells
     start_column = int(math.floor((planning.believed[row, 0] - origin_x) / resolution))
     if not (0 <= start_row < record[ROWS] and 0 <= start_column < record[COLUMNS]):
         return
-    remaining, parent, touched, least = search_all(log_odds, closeness_of(record), planning.passage, memory, start_row, start_column)
+    remaining, parent, touched, least = search_all(log_odds, closeness_of(record), passage_in(planning), memory, start_row, start_column)
     places, left, is_near = approach_places(cells, starts, log_odds, remaining, parent, least, looking.spans)
     clear_memory(memory, record[ROWS], record[COLUMNS], touched)
     is_long = is_near.copy()

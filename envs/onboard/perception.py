@@ -156,7 +156,7 @@ class Perception:
                 navigation.keep_record_in(np.zeros(RECORD, np.int64))
         self._own[first:last], self._shared[episode] = [None] * self._robots, None
         self._own_records[first:last], self._shared_records[episode] = 0, 0
-        self._known[first:last] = [(rows, 0, columns, 0) for _, rows, columns in self.world.belief_rows[first:last]]
+        self._known[first:last] = [(rows, 0, columns, 0) for rows, columns in self.world.belief_rows[first:last, 1:3]]
         self._goals[episode], self._fresh_at[episode] = goal, -2
 
     @property

@@ -35,8 +35,8 @@ class Planning(NamedTuple):
         Clearance below which a path ends in the middle of its last cell [m].
     farthest : float
         Clearance is told up to this [m].
-    passage : Passage
-        How a body passes over a map.
+    limit, half_costs, roomy, least_clearance, preferred : as of ``Passage``
+        How a body passes over a map; written out, because loops on threads take no tuples within tuples.
     records, sharing : (maps, 10) int64 and int
         Records of the maps that the robots plan on, and how many rows share one.
     memory : (pieces, 6) int64
@@ -53,7 +53,11 @@ class Planning(NamedTuple):
     resolution: float
     tight: float
     farthest: float
-    passage: Passage
+    limit: int
+    half_costs: NDArray[np.int32]
+    roomy: int
+    least_clearance: float
+    preferred: float
     records: NDArray[np.int64]
     sharing: int
     memory: NDArray[np.int64]
@@ -61,6 +65,12 @@ class Planning(NamedTuple):
     origins: NDArray[np.float64]
     offsets: NDArray[np.float64]
     has_ended: NDArray[np.bool_]
+
+
+@kernel(inline=True)
+def passage_in(planning: Planning) -> Passage:
+    """Return how a body passes over a map (kernel)."""
+    return Passage(planning.limit, planning.half_costs, planning.roomy, planning.least_clearance, planning.preferred)
 
 
 @kernel
@@ -85,7 +95,7 @@ def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> 
         cell_row = _place_along(row, to_row, step, steps, is_straight)
         cell_column = _place_along(column, to_column, step, steps, is_straight)
         nearest = max(nearest, int(closeness[cell_row, cell_column]))
-    return math.sqrt(max(planning.passage.limit - nearest, 0)) * 0.5 * planning.resolution - planning.radius
+    return math.sqrt(max(planning.limit - nearest, 0)) * 0.5 * planning.resolution - planning.radius
 
 
 @kernel
@@ -147,7 +157,7 @@ def drive_to(
     record = planning.records[row // planning.sharing]
     if not (0 <= goal_row < record[ROWS] and 0 <= goal_column < record[COLUMNS]):
         return False
-    log_odds, closeness, passage, resolution = log_odds_of(record), closeness_of(record), planning.passage, planning.resolution
+    log_odds, closeness, passage, resolution = log_odds_of(record), closeness_of(record), passage_in(planning), planning.resolution
     origin_x, origin_y = planning.origins[row, 0], planning.origins[row, 1]
     start_row = int(math.floor((planning.believed[row, 1] - origin_y) / resolution))
     start_column = int(math.floor((planning.believed[row, 0] - origin_x) / resolution))
@@ -185,9 +195,7 @@ def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
     log_odds, closeness, cells = log_odds_of(record), closeness_of(record), drives.cells[row]
     needed = planning.radius / planning.resolution
     for k in range(max(drives.places[row], 1), drives.counts[row]):
-        if not line_is_clear(
-            log_odds, closeness, planning.passage.limit, cells[k - 1, 0], cells[k - 1, 1], cells[k, 0], cells[k, 1], needed
-        ):
+        if not line_is_clear(log_odds, closeness, planning.limit, cells[k - 1, 0], cells[k - 1, 1], cells[k, 0], cells[k, 1], needed):
             return False
     return True
 

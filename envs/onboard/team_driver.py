@@ -183,7 +183,7 @@ class TeamDriver:
         world = perception.world
         return Planning(
             settings.robots, settings.known_starts, settings.robot.radius, resolution, self._footprint.radius + 2 * resolution,
-            CLEARANCE_LIMIT, self._passage, records, sharing, perception.memory.table, world.believed, world.origins, perception.offsets,
+            CLEARANCE_LIMIT, *self._passage, records, sharing, perception.memory.table, world.believed, world.origins, perception.offsets,
             world.flags & ENDED != 0,
         )  # fmt: skip
 

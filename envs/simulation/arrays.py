@@ -43,10 +43,11 @@ class WorldArrays(NamedTuple):
         True poses and velocities, poses at the start, and poses as the localizers believe.
     ranges : (rows, beams) float32
         Scans [m]; inf for no return.
-    maps, origins : (rows, 3) int64, (rows, 2) float64
-        Address, rows and columns of each robot's log-odds, and where its cell (0, 0) begins.
-    windows, unpooled : (rows, 4) int64
-        What part of each map has changed since planning, and since the pooled maps, took it in.
+    maps, origins : (rows, 5) int64, (rows, 2) float64
+        Address, rows and columns of each robot's log-odds, address and rows (0 for none) of the words of each row that have changed
+        since the pooled maps took them in, and where cell (0, 0) begins.
+    windows : (rows, 4) int64
+        What part of each map has changed since planning took it in.
     masks : (rows, 5) int64
         Addresses of the robot's mask, the team's and F's, and their rows and words.
     boxes : (rows, 4) int64
@@ -79,7 +80,6 @@ class WorldArrays(NamedTuple):
     maps: Array
     origins: Array
     windows: Array
-    unpooled: Array
     masks: Array
     boxes: Array
     seen: Array
@@ -91,7 +91,7 @@ class WorldArrays(NamedTuple):
 
 
 def table_of(arrays: WorldArrays) -> NDArray[np.int64]:
-    """Return where the arrays lie: address, rows and columns (1 for a vector) of each, shape (29, 3). The caller keeps them alive."""
+    """Return where the arrays lie: address, rows and columns (1 for a vector) of each, shape (28, 3). The caller keeps them alive."""
     return np.array([(array.ctypes.data, array.shape[0], array.size // max(array.shape[0], 1)) for array in arrays], np.int64)
 
 
@@ -131,11 +131,10 @@ def world_at(table: Array) -> WorldArrays:
         _grid(table, 19, np.int64),
         _grid(table, 20, np.int64),
         _grid(table, 21, np.int64),
-        _grid(table, 22, np.int64),
-        _vector(table, 23, np.int64),
-        _vector(table, 24, np.float64),
-        _grid(table, 25, np.int8),
-        _vector(table, 26, np.uint8),
-        _vector(table, 27, np.float64),
-        _vector(table, 28, np.int64),
+        _vector(table, 22, np.int64),
+        _vector(table, 23, np.float64),
+        _grid(table, 24, np.int8),
+        _vector(table, 25, np.uint8),
+        _vector(table, 26, np.float64),
+        _vector(table, 27, np.int64),
     )

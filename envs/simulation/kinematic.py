@@ -22,6 +22,7 @@ from lidarium.envs.simulation.robots import Robot
 from lidarium.envs.simulation.stepping import perceive_parallel, perceive_serial, step_rows, step_serial
 from lidarium.envs.simulation.world import Sensed
 from lidarium.mapping.kernels import use_threads
+from lidarium.mapping.map_crops import untouched
 from lidarium.mapping.occupancy import WORD, OccupancySettings
 
 ROWS_FOR_THREADS = 8
@@ -33,7 +34,11 @@ def counted_cells(body_free: NDArray[np.bool_], multiple: int) -> NDArray[np.boo
     rows, columns = (-(-size // multiple) * multiple for size in body_free.shape)
     padded = np.zeros((rows, columns), np.bool_)
     padded[: body_free.shape[0], : body_free.shape[1]] = body_free
-    return np.asarray(padded.reshape(rows // multiple, multiple, columns // multiple, multiple).all(axis=(1, 3)))
+    counted = np.ones((rows // multiple, columns // multiple), np.bool_)
+    for i in range(multiple):
+        for j in range(multiple):
+            counted &= padded[i::multiple, j::multiple]
+    return counted
 
 
 def _within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -79,8 +84,6 @@ class KinematicWorld:
         Cells of F that the team has seen, and the size of F.
     windows : (rows, 4) int64
         What part of each map has changed since ``forget_changes``: row_low, row_high, column_low, column_high.
-    unpooled : (rows, 4) int64
-        What part of each map has changed since its pooled maps took it in.
     pool_rows : (rows, scales, 3) int64
         Address, rows and columns of each robot's pooled maps.
     """
@@ -109,8 +112,9 @@ class KinematicWorld:
         self.gains, self.seen = np.zeros(rows), np.zeros(rows, np.int64)
         self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
         self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
-        self.windows, self.unpooled = np.zeros((rows, 4), np.int64), np.zeros((rows, 4), np.int64)
+        self.windows = np.zeros((rows, 4), np.int64)
         self._scales = tuple(scales)
+        self._touched: list[NDArray[np.int32]] = [untouched(0)] * rows
         self._pools: list[list[NDArray[np.int8]]] = [[] for _ in range(rows)]
         self.pool_rows = np.zeros((rows, len(self._scales), 3), np.int64)
         self.log_odds: list[NDArray[np.int8]] = [np.zeros((0, WORD), np.int8)] * rows
@@ -119,7 +123,7 @@ class KinematicWorld:
         self.counted_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes
         self.floors: list[FloorTables | None] = [None] * episodes
         self._floor_rows, self._frames = np.zeros((episodes, 10), np.int64), np.zeros((episodes, 3))
-        self.belief_rows, self.origins = np.zeros((rows, 3), np.int64), np.zeros((rows, 2))
+        self.belief_rows, self.origins = np.zeros((rows, 5), np.int64), np.zeros((rows, 2))
         self._mask_rows = np.zeros((rows, 5), np.int64)
         self._boxes = np.zeros((rows, 4), np.int64)
         self._unit_vectors, self._increments = lidar.unit_vectors, occupancy.increments
@@ -183,7 +187,7 @@ class KinematicWorld:
             self._pools[row] = [
                 np.zeros((-(-height // scale), -(-width // scale)), np.int8) if scale > 1 else self.log_odds[row] for scale in self._scales
             ]
-            self.unpooled[row] = (height, 0, width, 0)
+            self._touched[row] = untouched(height if self._scales else 0)
         self._point_at(episode)
         self.starts[first:last] = starts
         self.flags[first:last] = TRUE_POSE | (KNOWN_MATES if known_starts else OWN_FRAME)
@@ -198,7 +202,8 @@ class KinematicWorld:
         counted, team = self.counted_masks[episode], self.team_masks[episode]
         for row in range(episode * self.robots, (episode + 1) * self.robots):
             self._mask_rows[row] = (self.masks[row].ctypes.data, team.ctypes.data, counted.ctypes.data, *counted.shape)
-            self.belief_rows[row] = (self.log_odds[row].ctypes.data, *self.log_odds[row].shape)
+            touched = self._touched[row]
+            self.belief_rows[row] = (self.log_odds[row].ctypes.data, *self.log_odds[row].shape, touched.ctypes.data, len(touched))
             for k, pooled in enumerate(self._pools[row]):
                 self.pool_rows[row, k] = (pooled.ctypes.data, *pooled.shape)
 
@@ -230,7 +235,7 @@ class KinematicWorld:
         arrays = WorldArrays(
             self.bodies, self._sensor, self._unit_vectors, GAUSSIAN_TABLE, self._increments, self._floor_rows, self._frames, self.seeds,
             self.steps, self.team_seen, self.moves, self.flags, self.poses, self.velocities, self.starts, self.believed, self.ranges,
-            self.belief_rows, self.origins, self.windows, self.unpooled, self._mask_rows, self._boxes, self.seen, self.gains, self.bumpers, self.contacts,
+            self.belief_rows, self.origins, self.windows, self._mask_rows, self._boxes, self.seen, self.gains, self.bumpers, self.contacts,
             self.travelled, self.collisions,
         )  # fmt: skip
         self._table = table_of(arrays)

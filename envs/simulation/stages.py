@@ -14,7 +14,7 @@ from lidarium.envs.coverage import mark_seen
 from lidarium.envs.simulation.arrays import KNOWN_MATES, OWN_FRAME, TRUE_POSE, WorldArrays
 from lidarium.envs.simulation.lidar import cast_scan, cut_by_disc
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
-from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
+from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, word_grid_at
 from lidarium.mapping.occupancy import integrate_scan
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import beam_directions, beams_towards
@@ -159,13 +159,14 @@ def _update_map(
     if world.flags[row] & KNOWN_MATES:
         _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
     log_odds = int8_grid_at(belief[0], belief[1], belief[2])
-    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, world.increments, np.zeros_like(bits))
+    touched = int32_table_at(belief[3], belief[4], 2)
+    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, world.increments, np.zeros_like(bits), touched)
     # A hit may lie one cell beyond the seen area.
-    row_low, row_high = max(box[0] + row_offset - 1, 0), min(box[1] + row_offset + 1, belief[1])
-    column_low, column_high = max(64 * box[2] + column_offset - 1, 0), min(64 * box[3] + column_offset + 1, belief[2])
-    for window in (world.windows[row], world.unpooled[row]):
-        window[0], window[1] = min(window[0], row_low), max(window[1], row_high)
-        window[2], window[3] = min(window[2], column_low), max(window[3], column_high)
+    window = world.windows[row]
+    window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
+    window[1] = min(max(window[1], box[1] + row_offset + 1), belief[1])
+    window[2] = max(min(window[2], 64 * box[2] + column_offset - 1), 0)
+    window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[2])
 
 
 @kernel(spliced=True)

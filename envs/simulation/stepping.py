@@ -67,6 +67,16 @@ def step_episode(table: Array, episode: int, robots: int, commands: Array, moves
 
 
 @kernel
+def _move_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
+    _move(world_at(table), episode, robots, commands, moves_bodies)
+
+
+@kernel
+def _share_episode(table: Array, episode: int, robots: int) -> None:
+    _share(world_at(table), episode, robots)
+
+
+@kernel
 def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
     """Run both stages for the robot of a row, if it has not ended."""
     world = world_at(table)
@@ -81,9 +91,6 @@ def _perceive_row(table: Array, row: int, robots: int) -> None:
         perceive_robot(world, row, row // robots * robots, robots)
 
 
-# What runs on threads is a plain call: numba takes sums that are written out in such a loop for sums over all its turns.
-
-
 def _step_serial(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of the episodes with ``runs`` (episodes,)."""
     for episode in range(runs.shape[0]):
@@ -93,16 +100,15 @@ def _step_serial(table: Array, robots: int, commands: Array, runs: Array, moves_
 
 def _step_rows(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool) -> None:
     """Run a step of the episodes with ``runs``; threads take single robots."""
-    world = world_at(table)
     for episode in range(runs.shape[0]):
         if runs[episode]:
-            _move(world, episode, robots, commands, moves_bodies)
+            _move_episode(table, episode, robots, commands, moves_bodies)
     for row in numba.prange(runs.shape[0] * robots):
         if runs[row // robots]:
             _step_row(table, row, robots, perceives)
     for episode in range(runs.shape[0]):
         if runs[episode]:
-            _share(world, episode, robots)
+            _share_episode(table, episode, robots)
 
 
 def _perceive(table: Array, robots: int, rows: int) -> None:

@@ -9,7 +9,7 @@ tools="${1:-}"
 rm -rf build/types
 mkdir -p build/types/lidarium
 cp -rs "$PWD/src/lidarium/." build/types/lidarium/
-for folder in envs agents mapping evaluation scripts; do
+for folder in envs agents mapping evaluation benchmarks scripts; do
     cp -rs "$PWD/$folder" build/types/lidarium/
 done
 

@@ -76,13 +76,21 @@ def test_the_order_of_the_names_does_not_matter():
     assert list(observation_space(one, has_goal=True).spaces) == list(observation_space(other, has_goal=True).spaces)
 
 
+def pooled(log_odds, scale):
+    rows, columns = (-(-size // scale) * scale for size in log_odds.shape)
+    padded = np.zeros((rows, columns), np.int8)
+    padded[: log_odds.shape[0], : log_odds.shape[1]] = log_odds
+    return np.ascontiguousarray(padded.reshape(rows // scale, scale, columns // scale, scale).max(axis=(1, 3)))
+
+
 def test_the_egocentric_map_is_turned_about_the_corner_nearest_to_where_the_robot_believes_to_be():
     env, observations = driven(observe=["egocentric_map"])
     for row, agent in enumerate(env.agents):
-        place = (env.world.believed[row, :2] - env.world.origins[row]) / env.settings.occupancy.resolution
-        column, line = (math.floor(value + 0.5) for value in place)
+        x, y = (env.world.believed[row, :2] - env.world.origins[row]) / env.settings.occupancy.resolution
         expected = np.zeros((3, 16, 16), np.uint8)
-        crop_turned(env.world.log_odds[row], line, column, env.world.believed[row, 2], np.array([1, 2, 3]), expected)
+        pools = [env.world.log_odds[row], *(pooled(env.world.log_odds[row], scale) for scale in (2, 3))]
+        table = np.array([(pool.ctypes.data, *pool.shape) for pool in pools], np.int64)
+        crop_turned(table, x, y, env.world.believed[row, 2], np.array([1, 2, 3]), expected)
         assert np.array_equal(observations[agent]["egocentric_map"], expected)
         assert np.unique(expected).size > 1
 

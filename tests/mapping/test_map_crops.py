@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.map_crops import crop_levels, crop_turned
+from lidarium.mapping.map_crops import crop_levels, crop_turned, forget_touched, pool_touched, untouched
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
 
 
@@ -19,30 +19,72 @@ def random_map(seed, rows=40, columns=128):
     return np.where(generator.random((rows, columns)) < 0.03, generator.integers(-40, 71, (rows, columns)), fine).astype(np.int8)
 
 
-def pooled_around(log_odds, row, column, scale, half):
-    """Levels of 2 * half cells a side, of scale x scale cells each, around a corner; the least level of the cells wins."""
-    reach = half * scale
-    padding = reach + 200
-    around = np.pad(log_odds, padding)
-    row, column = row + padding, column + padding
-    levels = three_levels(around[row - reach : row + reach, column - reach : column + reach])
-    return levels.reshape(2 * half, scale, 2 * half, scale).min(axis=(1, 3))
+def pooled_levels(log_odds, scale):
+    """Levels of the pooled cells; the least level of their cells wins, and what lies beyond the map is unknown."""
+    rows, columns = (-(-size // scale) for size in log_odds.shape)
+    padded = np.zeros((rows * scale, columns * scale), np.int8)
+    padded[: log_odds.shape[0], : log_odds.shape[1]] = log_odds
+    return three_levels(padded).reshape(rows, scale, columns, scale).min(axis=(1, 3))
+
+
+def levels_around(log_odds, row, column, scale, half):
+    """Levels of 2 * half pooled cells a side around the corner of pooled cells that is nearest to a corner of cells."""
+    padding = 2 * half + 400
+    around = np.pad(pooled_levels(log_odds, scale), padding, constant_values=UNKNOWN)
+    row, column = (min(max(math.floor(value / scale + 0.5), -300 - half), 300 + half) + padding for value in (row, column))
+    return around[row - half : row + half, column - half : column + half]
 
 
 def turned(log_odds, row, column, heading, scale, cells):
-    """The crop by whole numbers of half steps of 2**-15 cells: each centre is looked up in the cell in which it lies."""
+    """The crop by whole numbers of half steps of 2**-15 cells: each centre is looked up in the pooled cell in which it lies."""
     half = cells
-    pooled = pooled_around(log_odds, row, column, scale, half)
+    pooled = levels_around(log_odds, row, column, scale, half)
     step_x, step_y = round(math.cos(heading) * 2**15), round(math.sin(heading) * 2**15)
     left, forward = np.meshgrid(*[2 * np.arange(cells, dtype=np.int64) + 1 - cells] * 2, indexing="ij")
     x, y = forward * step_x - left * step_y, forward * step_y + left * step_x
     return pooled[(y >> 16) + half, (x >> 16) + half]
 
 
+def all_touched(log_odds):
+    touched = untouched(len(log_odds))
+    touched[:] = (0, log_odds.shape[1] // 64)
+    return touched
+
+
+def pools_of(log_odds, scales, touched):
+    """Pooled maps from a blank start, and their table."""
+    pools = [log_odds if scale == 1 else np.zeros([-(-size // scale) for size in log_odds.shape], np.int8) for scale in scales]
+    for scale, pooled in zip(scales, pools, strict=True):
+        if scale > 1:
+            pool_touched(log_odds, touched, scale, pooled)
+    return pools, np.array([(pooled.ctypes.data, *pooled.shape) for pooled in pools], np.int64)
+
+
 def crop(log_odds, row, column, heading, scales, cells):
     crops = np.full((len(scales), cells, cells), 99, np.uint8)
-    crop_turned(log_odds, row, column, heading, np.array(scales, np.int64), crops)
+    pools, table = pools_of(log_odds, scales, all_touched(log_odds))
+    crop_turned(table, float(column), float(row), heading, np.array(scales, np.int64), crops)
+    assert pools
     return crops
+
+
+@given(seed=st.integers(0, 10**6), scale=st.integers(2, 9), changes=st.integers(1, 6))
+@settings(max_examples=60, deadline=None)
+def test_a_pooled_map_kept_up_to_date_is_the_one_made_anew(seed, scale, changes):
+    generator = np.random.default_rng(seed)
+    log_odds = np.zeros((37, 192), np.int8)
+    pooled, touched = np.zeros((-(-37 // scale), -(-192 // scale)), np.int8), untouched(37)
+    for _ in range(changes):
+        row, word, height = generator.integers(0, 37), generator.integers(0, 3), generator.integers(1, 12)
+        words = int(generator.integers(1, 4 - word))
+        block = log_odds[row : row + height, 64 * word : 64 * (word + words)]
+        block[:] = generator.integers(-40, 71, block.shape)
+        touched[row : row + height, 0] = np.minimum(touched[row : row + height, 0], word)
+        touched[row : row + height, 1] = np.maximum(touched[row : row + height, 1], word + words)
+        pool_touched(log_odds, touched, scale, pooled)
+        forget_touched(touched)
+        assert np.array_equal(touched, untouched(37))
+    assert np.array_equal(three_levels(pooled), pooled_levels(log_odds, scale))
 
 
 @given(row=st.integers(-40, 80), column=st.integers(-40, 170), half=st.integers(1, 32), seed=st.integers(0, 99))
@@ -93,7 +135,7 @@ def test_a_turned_crop_is_right_all_around_within_a_large_map(heading, cells, sc
 def test_along_the_axes_a_crop_is_the_cells_around_the_corner_turned_by_quarters(row, column, quarters, scale, half, seed):
     log_odds = random_map(seed)
     crops = crop(log_odds, row, column, quarters * math.pi / 2.0, [scale], 2 * half)
-    assert np.array_equal(crops[0], np.rot90(pooled_around(log_odds, row, column, scale, half), quarters))
+    assert np.array_equal(crops[0], np.rot90(levels_around(log_odds, row, column, scale, half), quarters))
 
 
 def test_ahead_is_to_the_right_and_left_is_up_at_any_heading():

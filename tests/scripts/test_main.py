@@ -299,16 +299,6 @@ def test_show_tells_what_can_be_chosen(capsys):
         assert word in json.dumps(json.loads(capsys.readouterr().out)[what])
 
 
-def test_bench_tells_figures(tmp_path, capsys):
-    assert main(["bench", "--seconds", "0.01", "--json", "--out", str(tmp_path)]) == 0
-    told = capsys.readouterr()
-    result = json.loads(told.out)
-    assert len(result["figures"]) == 8
-    assert all(value > 0 for value in result["figures"].values())
-    assert result == json.loads((tmp_path / "bench.json").read_text())
-    assert "measuring rays" in told.err
-
-
 def test_progress_is_a_line_every_few_seconds_where_there_is_no_terminal(capsys):
     from types import SimpleNamespace
 

@@ -1,5 +1,6 @@
 """PyBullet's rayTestBatch as a peer: scans among boxes."""
 
+import importlib
 import importlib.util
 import math
 from collections.abc import Callable
@@ -26,7 +27,7 @@ def bullet_scan(boxes: NDArray[np.float64], poses: NDArray[np.float64], beams: i
     """
     if importlib.util.find_spec("pybullet") is None:
         return None
-    import pybullet
+    pybullet = importlib.import_module("pybullet")
 
     client = pybullet.connect(pybullet.DIRECT)
     for x_low, y_low, x_high, y_high in boxes:

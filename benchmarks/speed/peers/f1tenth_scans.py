@@ -12,8 +12,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from floors import BenchFloor
 from numpy.typing import NDArray
+
+from lidarium.benchmarks.speed.floors import BenchFloor
 
 SOURCE = "LIDARIUM_F1TENTH"
 

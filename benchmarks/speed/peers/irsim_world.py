@@ -1,6 +1,7 @@
 """IR-SIM as a peer: one robot with a lidar2d, on a floor of rectangles or on its grid map."""
 
 import contextlib
+import importlib
 import importlib.util
 import io
 import math
@@ -13,8 +14,9 @@ from typing import Any
 import cv2
 import numpy as np
 import yaml
-from floors import BenchFloor
 from numpy.typing import NDArray
+
+from lidarium.benchmarks.speed.floors import BenchFloor
 
 
 def fastest_irsim_step(floor: BenchFloor, poses: NDArray[np.float64], shape: str, beams: int, reach: float) -> Callable[[], object] | None:
@@ -39,13 +41,20 @@ def fastest_irsim_step(floor: BenchFloor, poses: NDArray[np.float64], shape: str
         return None
     # IR-SIM asks matplotlib for a window while it is imported, and tells on standard output that there is none.
     with contextlib.redirect_stdout(io.StringIO()):
-        import irsim
+        irsim = importlib.import_module("irsim")
 
     steps = [_step(irsim, floor, pose, shape, beams, reach) for pose in poses]
     return min(steps, key=_seconds)
 
 
-def _step(irsim: Any, floor: BenchFloor, pose: NDArray[np.float64], shape: str, beams: int, reach: float) -> Callable[[], object]:
+def _step(
+    irsim: Any,  # noqa: ANN401
+    floor: BenchFloor,
+    pose: NDArray[np.float64],
+    shape: str,
+    beams: int,
+    reach: float,
+) -> Callable[[], object]:
     with tempfile.TemporaryDirectory() as folder:
         env = irsim.make(str(_write_world(Path(folder), floor, pose, shape, beams, reach)), headless=True, log_level="ERROR")
     action = np.array([[0.2], [0.3]])

@@ -7,6 +7,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.kernels import Array
+
 
 class PolygonUpdate:
     """Fills the polygon of the beams' ends with ``cv2.fillPoly`` and changes the map with numpy, in the scan's window.
@@ -43,7 +45,7 @@ class PolygonUpdate:
 
 
 @numba.njit
-def update_by_rays(log_odds, x, y, directions, lengths, is_hit, increments):
+def update_by_rays(log_odds: Array, x: float, y: float, directions: Array, lengths: Array, is_hit: Array, increments: Array) -> None:
     """Put in a scan by walking along every beam: each cell on the way is lowered, the last one is raised."""
     hit, miss, least, greatest = increments[0], increments[1], increments[2], increments[3]
     rows, columns = log_odds.shape

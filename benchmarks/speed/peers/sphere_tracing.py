@@ -14,9 +14,11 @@ import math
 
 import numba
 import numpy as np
-from floors import BenchFloor
 from numpy.typing import NDArray
 from scipy import ndimage
+
+from lidarium.benchmarks.speed.floors import BenchFloor
+from lidarium.mapping.kernels import Array
 
 ANGLES = 2000
 CLOSE = 1e-4
@@ -24,19 +26,23 @@ CLOSE = 1e-4
 
 
 @numba.njit
-def _distance_at(x, y, origin_x, origin_y, cosine, sine, resolution, distances):
+def _distance_at(
+    x: float, y: float, origin_x: float, origin_y: float, cosine: float, sine: float, resolution: float, distances: Array
+) -> float:
     """Look the distance of a point up in the transform, whose grid may be shifted and turned."""
     rows, columns = distances.shape
     shifted_x, shifted_y = x - origin_x, y - origin_y
     grid_x = shifted_x * cosine + shifted_y * sine
     grid_y = shifted_y * cosine - shifted_x * sine
     if grid_x < 0.0 or grid_x >= columns * resolution or grid_y < 0.0 or grid_y >= rows * resolution:
-        return distances[-1, -1]
-    return distances[int(grid_y / resolution), int(grid_x / resolution)]
+        return distances[-1, -1]  # type: ignore[no-any-return]
+    return distances[int(grid_y / resolution), int(grid_x / resolution)]  # type: ignore[no-any-return]
 
 
 @numba.njit
-def _scan(pose, beams, field_of_view, directions, reach, frame, resolution, distances):
+def _scan(
+    pose: Array, beams: int, field_of_view: float, directions: Array, reach: float, frame: Array, resolution: float, distances: Array
+) -> Array:
     """Return the ranges of one scan [m]."""
     ranges = np.empty(beams)
     angles = directions.shape[1]

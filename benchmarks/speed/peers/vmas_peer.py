@@ -2,9 +2,11 @@
 
 import importlib.util
 import json
+import math
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
@@ -12,6 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 INTERPRETER = "LIDARIUM_VMAS_PYTHON"
+
+BATCHES = (1, 32, 128)
+"""Batch sizes of which the best is taken."""
+
+_WRONG = f"{INTERPRETER} is {{}}, which gives no answer; want a Python interpreter with vmas and torch"
 
 # glibc otherwise hands VMAS's large temporaries back to the system after every operation, which slows it down.
 MEMORY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": "20000000000"}
@@ -25,12 +32,26 @@ def interpreter() -> str | None:
     return sys.executable if importlib.util.find_spec("vmas") is not None else None
 
 
+def is_there() -> bool:
+    """Whether there is an interpreter to ask; it shows later whether it has VMAS."""
+    return interpreter() is not None
+
+
 def package_version() -> str:
-    """Return the version of VMAS in its interpreter."""
+    """Return the version of VMAS in its interpreter.
+
+    Raises
+    ------
+    ValueError
+        Where the interpreter has none.
+    """
     python = interpreter()
     assert python is not None
     program = "from importlib.metadata import version; print(version('vmas'))"
-    return subprocess.run([python, "-c", program], capture_output=True, text=True, check=True).stdout.strip()
+    try:
+        return subprocess.run([python, "-c", program], capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise ValueError(_WRONG.format(python)) from error
 
 
 class VmasProcess:
@@ -46,6 +67,12 @@ class VmasProcess:
         Rays of each lidar.
     reach : float
         Their longest range [m].
+    field_of_view : float
+        What the rays are spread over [rad].
+    threads : int
+        Threads of torch.
+    batches : sequence of int
+        Numbers of environments of which the best is taken, in a short trial.
 
     Attributes
     ----------
@@ -55,18 +82,35 @@ class VmasProcess:
         What it is, with its version and batch size.
     """
 
-    def __init__(self, boxes: NDArray[np.float64], poses: NDArray[np.float64], rays: int, reach: float) -> None:
+    def __init__(
+        self,
+        boxes: NDArray[np.float64],
+        poses: NDArray[np.float64],
+        rays: int,
+        reach: float,
+        field_of_view: float = math.radians(240.0),
+        threads: int = 1,
+        batches: Sequence[int] = BATCHES,
+    ) -> None:
         self.is_there, self.name = False, f"VMAS, {rays} rays"
         self._process: subprocess.Popen[str] | None = None
         python = interpreter()
         if python is None:
             return
-        program = Path(__file__).with_name("vmas_program.py")
+        program = Path(__file__).parent / "outside" / "vmas_program.py"
         self._process = subprocess.Popen(
             [python, str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, **MEMORY}
         )
-        answer = self._ask(json.dumps({"boxes": boxes.tolist(), "poses": poses.tolist(), "rays": rays, "reach": reach}))
-        about = json.loads(answer)
+        request = {
+            "boxes": boxes.tolist(),
+            "poses": poses.tolist(),
+            "rays": rays,
+            "reach": reach,
+            "field_of_view": field_of_view,
+            "threads": threads,
+            "batches": list(batches),
+        }
+        about = json.loads(self._ask(json.dumps(request)))
         self.is_there = True
         self.name = f"VMAS {about['vmas']}, {rays} rays, batch {about['batch']}"
 
@@ -78,7 +122,7 @@ class VmasProcess:
         self._process.stdin.flush()
         answer = self._process.stdout.readline()
         if not answer:
-            raise RuntimeError(f"the VMAS program ended without an answer; does the interpreter in {INTERPRETER} have vmas and torch?")
+            raise ValueError(_WRONG.format(interpreter()))
         return answer
 
     def run(self, seconds: float) -> float:

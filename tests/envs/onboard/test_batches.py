@@ -14,8 +14,9 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.state import Orders, Target
 from lidarium.envs.onboard.team_driver import TeamDriver
 from lidarium.envs.settings import make_settings
+from lidarium.envs.simulation.arrays import ENDED
 from lidarium.envs.simulation.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic import ENDED, KinematicWorld
+from lidarium.envs.simulation.kinematic import KinematicWorld
 
 ROBOTS = 2
 

@@ -1,15 +1,15 @@
 """The program that times VMAS, in an interpreter of its own: it needs vmas and torch, not lidarium.
 
 VMAS is under the GPL: this file is run as a separate process and nothing of lidarium imports it. It reads one line of JSON
-(boxes, poses, rays, reach) and answers with its version and the batch size that was fastest; after that each line it reads is
-a number of seconds to run, and each line it writes the seconds that one agent's step took.
+(boxes, poses, rays, reach, field_of_view, threads, batches) and answers with its version and the batch size that was fastest;
+after that each line it reads is a number of seconds to run, and each line it writes the seconds that one agent's step took.
 """
 
 import json
-import math
 import sys
 import time
 from importlib.metadata import version
+from typing import Any
 
 import torch
 from vmas import make_env
@@ -18,19 +18,17 @@ from vmas.simulator.dynamics.diff_drive import DiffDrive
 from vmas.simulator.scenario import BaseScenario
 from vmas.simulator.sensors import Lidar
 
-BATCHES = (1, 32, 128)
-FIELD_OF_VIEW = math.radians(240.0)
-
 
 class Rooms(BaseScenario):
     """Differential-drive agents with lidars among boxes."""
 
-    def make_world(self, batch_dim, device, floor, **kwargs):
+    def make_world(self, batch_dim: int, device: torch.device, floor: dict[str, Any], **kwargs: object) -> World:
         """Put agents and boxes into the world."""
         world = World(batch_dim, device, dt=0.1, substeps=1)
         self.floor = floor
         for k in range(len(floor["poses"])):
-            lidar = Lidar(world, -FIELD_OF_VIEW / 2, FIELD_OF_VIEW / 2, n_rays=floor["rays"], max_range=floor["reach"], render=False)
+            half = floor["field_of_view"] / 2
+            lidar = Lidar(world, -half, half, n_rays=floor["rays"], max_range=floor["reach"], render=False)
             drive = DiffDrive(world, integration="euler")
             world.add_agent(Agent(f"agent_{k}", shape=Sphere(0.18), collide=True, u_range=[0.5, 1.0], dynamics=drive, sensors=[lidar]))
         for k, (x_low, y_low, x_high, y_high) in enumerate(floor["boxes"]):
@@ -38,7 +36,7 @@ class Rooms(BaseScenario):
             world.add_landmark(Landmark(f"box_{k}", collide=True, movable=False, shape=shape))
         return world
 
-    def reset_world_at(self, env_index=None):
+    def reset_world_at(self, env_index: int | None = None) -> None:
         """Put everything in its place."""
         for agent, (x, y, theta) in zip(self.world.agents, self.floor["poses"], strict=True):
             agent.set_pos(torch.tensor([x, y], dtype=torch.float32), batch_index=env_index)
@@ -46,11 +44,11 @@ class Rooms(BaseScenario):
         for landmark, (x_low, y_low, x_high, y_high) in zip(self.world.landmarks, self.floor["boxes"], strict=True):
             landmark.set_pos(torch.tensor([(x_low + x_high) / 2, (y_low + y_high) / 2], dtype=torch.float32), batch_index=env_index)
 
-    def reward(self, agent):
+    def reward(self, agent: Agent) -> torch.Tensor:
         """Reward nothing."""
         return torch.zeros(self.world.batch_dim)
 
-    def observation(self, agent):
+    def observation(self, agent: Agent) -> torch.Tensor:
         """Take the scan."""
         return agent.sensors[0].measure()
 
@@ -58,13 +56,13 @@ class Rooms(BaseScenario):
 class Batch:
     """Environments of one batch size, stepped by drawn actions."""
 
-    def __init__(self, floor, size):
+    def __init__(self, floor: dict[str, Any], size: int) -> None:
         self.agents = len(floor["poses"])
         self.env = make_env(Rooms(), num_envs=size, device="cpu", continuous_actions=True, seed=0, floor=floor)
         self.actions = [torch.rand(size, 2) - 0.5 for _ in range(self.agents)]
         self.size = size
 
-    def run(self, seconds):
+    def run(self, seconds: float) -> float:
         """Step for about so long and return the seconds per agent and step."""
         steps, elapsed = 0, 0.0
         began = time.perf_counter()
@@ -78,10 +76,10 @@ class Batch:
 
 def main() -> None:
     """Answer line by line."""
-    torch.set_num_threads(1)
     floor = json.loads(sys.stdin.readline())
+    torch.set_num_threads(floor["threads"])
     trials = []
-    for size in BATCHES:
+    for size in floor["batches"]:
         batch = Batch(floor, size)
         batch.run(0.0)
         trials.append((min(batch.run(0.3) for _ in range(3)), size, batch))

@@ -1,0 +1,53 @@
+"""Which other simulators there are to be compared with, and how to get them."""
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from lidarium.benchmarks.speed.peers import f1tenth_scans, vmas_peer
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """Another simulator.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    is_there : callable
+        Whether it can take part.
+    how : str
+        How to get it.
+    """
+
+    name: str
+    is_there: Callable[[], bool]
+    how: str
+
+
+def _is_installed(module: str) -> bool:
+    return importlib.util.find_spec(module) is not None
+
+
+PEERS = (
+    Peer("IR-SIM", partial(_is_installed, "irsim"), 'pip install "lidarium[bench]"'),
+    Peer("PyBullet", partial(_is_installed, "pybullet"), 'pip install "lidarium[bench]" (Python 3.11)'),
+    Peer("VMAS", vmas_peer.is_there, f"pip install vmas in an environment of its own, and name its interpreter in {vmas_peer.INTERPRETER}"),
+    Peer(
+        "f1tenth's scan simulator",
+        f1tenth_scans.is_there,
+        f"fetch github.com/f1tenth/f1tenth_gym and name its file laser_models.py in {f1tenth_scans.SOURCE}",
+    ),
+)
+
+
+def missing_peers() -> list[str]:
+    """Say of each simulator that is not there how to get it."""
+    return [f"{peer.name} is not installed and left out: {peer.how}" for peer in PEERS if not peer.is_there()]
+
+
+def outside_versions() -> dict[str, str]:
+    """Return the versions of the peers that run in interpreters of their own."""
+    return {"vmas": vmas_peer.package_version()} if vmas_peer.is_there() else {}

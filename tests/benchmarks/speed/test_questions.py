@@ -1,0 +1,94 @@
+"""The questions themselves, at the least effort: that they measure what they say, not how fast it is."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from lidarium.benchmarks.speed import batches, cached_start, waypoint_decision
+from lidarium.benchmarks.speed.batches import DrivenBatch
+from lidarium.benchmarks.speed.floors import straight_floor
+from lidarium.benchmarks.speed.peers.catalogue import PEERS, missing_peers
+from lidarium.benchmarks.speed.profile_step import OBSERVATION, REST, WHOLE, profile, profile_page
+from lidarium.benchmarks.speed.timing import Effort
+from lidarium.benchmarks.speed.waypoint_decision import Deciders
+
+LEAST = Effort(rounds=1, block_s=0.0)
+
+
+@pytest.fixture
+def few_episodes(monkeypatch):
+    for module in (batches, waypoint_decision):
+        monkeypatch.setattr(module, "EPISODES", 4)
+
+
+def test_the_kernel_alone_takes_the_steps_of_the_whole(few_episodes):
+    whole, kernel = (DrivenBatch(straight_floor(), 1, lidar="lidar_360_6m", resolution=0.05) for _ in range(2))
+    for batch in (whole, kernel):
+        batch.start(3)
+    began = whole.poses.copy()
+    for _ in range(3):
+        whole.step()
+        kernel.step_kernel()
+    assert np.array_equal(whole.poses, kernel.poses)
+    assert (np.abs(whole.poses - began).max(axis=1) > 0.0).all()
+    assert np.array_equal(whole.env.batch.world.log_odds[5], kernel.env.batch.world.log_odds[5])
+
+
+def test_waypoints_are_free_cells_some_way_off(few_episodes):
+    deciders = Deciders(1)
+    deciders.start()
+    assert min(deciders.run(0.0)) > 0.0
+    world = deciders._deciding.batch.world
+    for row in range(8):
+        place = deciders._drawn(row)
+        distance = float(np.hypot(*(place - world.believed[row, :2])))
+        column, line = ((place - world.origins[row]) / 0.025).astype(int)
+        assert 0.5 <= distance <= 3.0
+        assert world.log_odds[row][line, column] < 0
+
+
+def test_the_profile_has_all_parts_and_they_make_up_the_whole(tmp_path):
+    spent, rays, cells = profile(straight_floor(), Effort(rounds=1, block_s=0.001))
+    parts = [name for name in spent if name not in (WHOLE, OBSERVATION)]
+    assert len(parts) == 9
+    assert sum(spent[name] for name in parts) == pytest.approx(spent[WHOLE])
+    assert all(spent[name] > 0.0 for name in spent if name != REST)
+    assert (rays, cells > 1000) == (720, True)
+    page = profile_page({"straight": (spent, rays, cells)}, LEAST, "python profile_step.py")
+    assert "| ray casting |" in page
+    assert "../profiling.md" in page
+
+
+def test_a_second_start_compiles_nothing():
+    cached_start.start()
+    told = cached_start.start()
+    assert told.compiled == 0
+    assert told.loaded > 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders are made read-only in another way there")
+def test_nothing_but_the_temporary_folder_takes_files_in_the_read_only_environment(tmp_path):
+    environment = cached_start.read_only_environment(tmp_path)
+    program = (
+        "import lidarium, os; from lidarium.mapping import files, kernels; from pathlib import Path; "
+        "print(lidarium.__file__, kernels._FOLDER, files.is_writable(files.user_cache_folder()), sep=os.linesep)"
+    )
+    told = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True, cwd=tmp_path)
+    package, folder, has_home = told.stdout.splitlines()
+    assert package.startswith(str(tmp_path / "package"))
+    assert folder.startswith(str(tmp_path / "temporary") + os.sep)
+    assert has_home == "False"
+    for each in [tmp_path / "home", *(path for path in (tmp_path / "package").rglob("*") if path.is_dir())]:
+        each.chmod(0o755)
+
+
+def test_peers_that_are_not_there_are_named_with_how_to_get_them(monkeypatch):
+    monkeypatch.setenv("LIDARIUM_F1TENTH", "laser_models.py")
+    monkeypatch.setenv("LIDARIUM_VMAS_PYTHON", "python")
+    assert not [line for line in missing_peers() if "VMAS" in line or "f1tenth" in line]
+    monkeypatch.delenv("LIDARIUM_F1TENTH")
+    assert [line for line in missing_peers() if "laser_models.py in LIDARIUM_F1TENTH" in line]
+    assert all(peer.how for peer in PEERS)
