@@ -209,6 +209,10 @@ class ObservationWriter:
             if "goal" in self.keys:
                 raise ValueError("goals is None; want each robot's goal (rows, 2), nan where it does not know one")
             goals = offsets
+        if "egocentric_map" in self.keys and world.scales != tuple(self._limits[1].tolist()):
+            raise ValueError(
+                f"the world pools its maps at scales {world.scales}; want those of the settings, {tuple(self._limits[1].tolist())}"
+            )
         known = (
             world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals,
             world.pool_rows,

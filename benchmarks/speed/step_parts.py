@@ -10,7 +10,7 @@ from lidarium.benchmarks.speed.floors import BenchFloor
 from lidarium.benchmarks.speed.teams import DrivenTeam
 from lidarium.envs.coverage import mark_seen
 from lidarium.envs.observations import ObservationWriter
-from lidarium.envs.settings import make_settings
+from lidarium.envs.settings import ExplorationSettings, make_settings
 from lidarium.envs.simulation.lidar import cast_scan
 from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE, fill_gaussian
@@ -94,7 +94,7 @@ class StepParts:
     """
 
     def __init__(self, floor: BenchFloor) -> None:
-        team = DrivenTeam(floor, ROBOTS)
+        team = DrivenTeam(floor, ROBOTS, scales=ExplorationSettings().egocentric_scales)
         for _ in range(WARM_STEPS):
             team.step()
         world, lidar = team.world, team.world.lidar

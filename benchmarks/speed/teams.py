@@ -39,12 +39,15 @@ class DrivenTeam:
         How many.
     lidar : Lidar
         The laser of each.
+    scales : tuple of int
+        Scales at which maps are pooled for observations [cells].
     """
 
-    def __init__(self, floor: BenchFloor, robots: int, lidar: Lidar = LIDAR) -> None:
+    def __init__(self, floor: BenchFloor, robots: int, lidar: Lidar = LIDAR, scales: tuple[int, ...] = ()) -> None:
         self.robots = robots
         self._floor, self._tables = floor, floor.tables()
-        self.world = KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, OccupancySettings(resolution=floor.resolution))
+        settings = OccupancySettings(resolution=floor.resolution)
+        self.world = KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, settings, scales=scales)
         self._count, self._starts = 0, 0
         self.start()
 

@@ -122,10 +122,10 @@ class KinematicWorld:
         self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
         self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
         self.windows = np.zeros((rows, 4), np.int64)
-        self._scales = tuple(scales)
+        self.scales = tuple(scales)
         self._touched: list[NDArray[np.int32]] = [untouched(0)] * rows
         self._pools: list[list[NDArray[np.int8]]] = [[] for _ in range(rows)]
-        self.pool_rows = np.zeros((rows, len(self._scales), 3), np.int64)
+        self.pool_rows = np.zeros((rows, len(self.scales), 3), np.int64)
         self.log_odds: list[NDArray[np.int8]] = [np.zeros((0, WORD), np.int8)] * rows
         self.masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * rows
         self.team_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes
@@ -194,9 +194,9 @@ class KinematicWorld:
             height, width = self.log_odds[row].shape
             # At scale 1 a map is its own pooled map.
             self._pools[row] = [
-                np.zeros((-(-height // scale), -(-width // scale)), np.int8) if scale > 1 else self.log_odds[row] for scale in self._scales
+                np.zeros((-(-height // scale), -(-width // scale)), np.int8) if scale > 1 else self.log_odds[row] for scale in self.scales
             ]
-            self._touched[row] = untouched(height if self._scales else 0)
+            self._touched[row] = untouched(height if self.scales else 0)
         self._point_at(episode)
         self.starts[first:last] = starts
         self.flags[first:last] = TRUE_POSE | (KNOWN_MATES if known_starts else OWN_FRAME)
