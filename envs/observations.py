@@ -11,6 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.settings import OBSERVABLES, ExplorationSettings
+from lidarium.envs.simulation.arrays import world_at
 from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.envs.simulation.stages import RANGE_GAP
 from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, use_threads
@@ -63,7 +64,10 @@ def action_space() -> spaces.Box:
 @kernel
 def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None:
     """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``."""
-    ranges, believed, offsets, velocities, bumpers, beliefs, origins, goals, pools = known
+    table, offsets, goals, pools = known
+    world = world_at(table)
+    ranges, believed, velocities, bumpers = world.ranges, world.believed, world.velocities, world.bumpers
+    beliefs, origins = world.maps, world.origins
     numbers, scales = limits
     scans, poses, motions, presses, maps, egocentric_maps, observed_goals = observed
     resolution, range_max, max_speed, max_turn_rate = numbers[0], numbers[1], numbers[2], numbers[3]
@@ -144,12 +148,16 @@ class ObservationWriter:
             np.array([numbers[0], *(float(np.float32(number)) for number in numbers[1:])]),
             np.array(settings.egocentric_scales, np.int64),
         )
+        self._scales = settings.egocentric_scales if "egocentric_map" in self.keys else None
         self._everyone = np.ones(0, np.bool_)
+        self._shapes: dict[int, list[tuple[str, tuple[int, ...], np.dtype[Any]]]] = {}
         self._threads = min(settings.threads, int(os.cpu_count() or 1))
 
     def buffers(self, rows: int) -> dict[str, NDArray[Any]]:
         """Return new arrays for the observations of ``rows`` rows, by key; what they hold is undefined until it is written."""
-        return {name: np.empty((rows, *self._kinds[name][0]), self._kinds[name][1]) for name in self.keys}
+        if rows not in self._shapes:
+            self._shapes[rows] = [(name, (rows, *self._kinds[name][0]), self._kinds[name][1]) for name in self.keys]
+        return {name: np.empty(shape, dtype) for name, shape, dtype in self._shapes[rows]}
 
     def write(
         self,
@@ -185,7 +193,10 @@ class ObservationWriter:
             Where an array is missing or is not of the shape, type and order that is written, or the goals are missing.
         """
         rows = len(world.believed)
-        out = self.buffers(rows) if out is None else out
+        if out is None:
+            out = self.buffers(rows)
+        else:
+            self.check(out, rows)
         if active is None:
             active = self._everyone = self._everyone if len(self._everyone) == rows else np.ones(rows, np.bool_)
         known, limits, observed = self.arguments(world, offsets, out, goals)
@@ -203,23 +214,27 @@ class ObservationWriter:
         out: Mapping[str, NDArray[Any]],
         goals: NDArray[np.float64] | None = None,
     ) -> tuple[Arrays, Arrays, Arrays]:
-        """Return what ``write_row`` takes beside the row: what is known, the limits, and the arrays to write; as for ``write``."""
-        self._check(out, len(world.believed))
+        """Return what ``write_row`` takes beside the row: what is known, the limits, and the arrays to write; as for ``write``.
+
+        ``out`` must hold what ``buffers`` gives.
+        """
         if goals is None:
             if "goal" in self.keys:
                 raise ValueError("goals is None; want each robot's goal (rows, 2), nan where it does not know one")
             goals = offsets
-        if "egocentric_map" in self.keys and world.scales != tuple(self._limits[1].tolist()):
-            raise ValueError(
-                f"the world pools its maps at scales {world.scales}; want those of the settings, {tuple(self._limits[1].tolist())}"
-            )
-        known = (
-            world.ranges, world.believed, offsets, world.velocities, world.bumpers, world.belief_rows, world.origins, goals,
-            world.pool_rows,
-        )  # fmt: skip
-        return known, self._limits, tuple([out[name] if name in self.keys else self._absent[name] for name in KEYS])
+        if self._scales is not None and world.scales != self._scales:
+            raise ValueError(f"the world pools its maps at scales {world.scales}; want those of the settings, {self._scales}")
+        known = (world.table, offsets, goals, world.pool_rows)
+        return known, self._limits, tuple([out[name] if name in out else self._absent[name] for name in KEYS])
 
-    def _check(self, out: Mapping[str, NDArray[Any]], rows: int) -> None:
+    def check(self, out: Mapping[str, NDArray[Any]], rows: int) -> None:
+        """Check arrays that a caller gives.
+
+        Raises
+        ------
+        ValueError
+            Where an array is missing or is not of the shape, type and order that is written.
+        """
         for name in self.keys:
             shape, dtype = (rows, *self._kinds[name][0]), self._kinds[name][1]
             array = out.get(name)
