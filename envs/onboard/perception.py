@@ -275,11 +275,6 @@ class Perception:
             return None
         return np.asarray(goal - self.offsets[row])
 
-    def goal_in_frame(self, row: int) -> NDArray[np.float32]:
-        """Return the goal for the observation: as ``goal_of``, zeros where it is not known."""
-        goal = self.goal_of(row)
-        return np.zeros(2, np.float32) if goal is None else goal.astype(np.float32)
-
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         for maps, records in ((self._own, self._own_records), (self._shared, self._shared_records)):
