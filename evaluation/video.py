@@ -1,6 +1,6 @@
 """Films of a run: frames at equal simulated time, as an mp4 that is there whole or not at all."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,26 +17,8 @@ FRAMES_PER_SECOND = 20
 _LAST_FRAME_S = 1.5
 
 
-class FilmedExploration(ExplorationEnv):
-    """An exploration environment that tells of every step, whatever drives it.
-
-    Attributes
-    ----------
-    on_step : callable or None
-        Called with the environment after every time step of the world.
-    """
-
-    on_step: Callable[[ExplorationEnv], None] | None = None
-
-    def drive_at(self, commands: NDArray[np.float64]) -> None:
-        """Run one time step, then tell of it."""
-        super().drive_at(commands)
-        if self.on_step is not None:
-            self.on_step(self)
-
-
 class Film:
-    """Takes frames of an environment at equal simulated time.
+    """Takes frames of an environment at equal simulated time; a ``Watcher``.
 
     Parameters
     ----------
@@ -52,8 +34,18 @@ class Film:
         self._writer, self._period_s, self._size = writer, period_s, size
         self._next_s = 0.0
 
-    def take(self, env: ExplorationEnv) -> None:
+    def begin(self, env: ExplorationEnv) -> None:
+        """Take the first frame."""
+        self._take(env)
+
+    def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
         """Take a frame where it is time for one."""
+        self._take(env)
+
+    def outcome(self, env: ExplorationEnv) -> None:
+        """Take nothing: endings do not change the picture."""
+
+    def _take(self, env: ExplorationEnv) -> None:
         if env.scorer.time + 1e-9 >= self._next_s:
             self._writer.append_data(draw_frame(env, self._size))
             self._next_s += self._period_s

@@ -96,9 +96,9 @@ def _settings(command: Run) -> "ExplorationSettings":
 
 def _environment(command: Run) -> "ExplorationEnv":
     from lidarium.envs.exploration import ExplorationEnv
-    from lidarium.evaluation.video import FilmedExploration
+    from lidarium.evaluation.watching import WatchedExploration
 
-    kind = FilmedExploration if command.video else ExplorationEnv
+    kind = WatchedExploration if command.video else ExplorationEnv
     return kind(command.floor, _settings(command), image_resolution=command.resolution)
 
 
@@ -131,9 +131,10 @@ def _explore(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str
 
 def _film(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
     from lidarium.evaluation.runner import run_episode
-    from lidarium.evaluation.video import Film, FilmedExploration, film
+    from lidarium.evaluation.video import Film, film
+    from lidarium.evaluation.watching import WatchedExploration
 
-    assert isinstance(env, FilmedExploration)
+    assert isinstance(env, WatchedExploration)
     with ExitStack() as stack:
         camera: list[Film] = []
 
@@ -143,12 +144,12 @@ def _film(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, A
                 assert current.floor is not None
                 path = _folder(command, current.floor.name) / "run.mp4"
                 camera.append(stack.enter_context(film(path, command.video_speed)))
-                camera[0].take(current)
-                env.on_step = camera[0].take
+                camera[0].begin(current)
+                env.watchers.append(camera[0])
             progress.tell(current)
 
         episode = run_episode(policy, env, command.seed, options, on_decision, raise_interrupt=False)
-        env.on_step = None
+        env.watchers.clear()
         if camera and not episode.is_interrupted:
             camera[0].end(env)
         return episode

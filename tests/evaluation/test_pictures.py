@@ -9,7 +9,8 @@ from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.settings import make_settings
 from lidarium.evaluation.pictures import frontiers_left, save_floor_picture, save_run_picture
 from lidarium.evaluation.runner import run_episode
-from lidarium.evaluation.video import FilmedExploration, film
+from lidarium.evaluation.video import film
+from lidarium.evaluation.watching import WatchedExploration
 
 
 def explored(policy="nearest_frontier", kind=ExplorationEnv, on_decision=None, **options):
@@ -47,11 +48,11 @@ def test_a_film_has_frames_at_equal_simulated_time(tmp_path):
     with film(path, speed=20.0, size=160) as camera:
 
         def begin(env):
-            if env.on_step is None:
-                camera.take(env)
-                env.on_step = camera.take
+            if not env.watchers:
+                camera.begin(env)
+                env.watchers.append(camera)
 
-        episode = explored(kind=FilmedExploration, on_decision=begin, horizon_s=6.0)
+        episode = explored(kind=WatchedExploration, on_decision=begin, horizon_s=6.0)
         assert not path.exists()
         camera.end(episode.env)
     with imageio.get_reader(path) as reader:

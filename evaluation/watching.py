@@ -1,0 +1,71 @@
+"""An environment that shows every step of its world to those who watch: cameras, histories, records."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings import ExplorationSettings
+
+
+class Watcher(Protocol):
+    """Who looks on. Looking changes nothing: a watched episode is the same to the bit as one that is not."""
+
+    def begin(self, env: ExplorationEnv) -> None:
+        """Look at an episode after its reset, when the scan at the start is taken."""
+
+    def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
+        """Look at the world after a time step that was driven at ``commands`` (robots, 2) [m/s, rad/s]."""
+
+    def outcome(self, env: ExplorationEnv) -> None:
+        """Look after rewards and endings have been told, when ended agents have left."""
+
+
+class WatchedExploration(ExplorationEnv):
+    """An exploration environment with watchers, whatever drives it.
+
+    Parameters
+    ----------
+    floor, settings, image_resolution
+        As for ``ExplorationEnv``.
+    watchers : iterable of Watcher
+        Who looks on, in this order; the list ``watchers`` may change between steps.
+    """
+
+    def __init__(
+        self,
+        floor: str | Path | Floor,
+        settings: ExplorationSettings,
+        image_resolution: float | None = None,
+        watchers: Iterable[Watcher] = (),
+    ) -> None:
+        super().__init__(floor, settings, image_resolution=image_resolution)
+        self.watchers: list[Watcher] = list(watchers)
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Start an episode, as ``ExplorationEnv.reset``."""
+        told = super().reset(seed, options)
+        for watcher in self.watchers:
+            watcher.begin(self)
+        return told
+
+    def drive_at(self, commands: NDArray[np.float64]) -> None:
+        """Run one time step, as ``ExplorationEnv.drive_at``."""
+        super().drive_at(commands)
+        for watcher in self.watchers:
+            watcher.step(self, commands)
+
+    def outcome(
+        self,
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Return what ``step`` returns, as ``ExplorationEnv.outcome``."""
+        told = super().outcome()
+        for watcher in self.watchers:
+            watcher.outcome(self)
+        return told
