@@ -14,8 +14,8 @@ from lidarium.envs.settings import OBSERVABLES, ExplorationSettings
 from lidarium.envs.simulation.arrays import world_at
 from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.envs.simulation.stages import RANGE_GAP
-from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, use_threads
-from lidarium.mapping.map_crops import crop_levels, crop_turned, forget_touched, pool_touched
+from lidarium.mapping.kernels import Array, int8_grid_at, kernel, use_threads, word_grid_at
+from lidarium.mapping.map_crops import crop_levels, crop_turned, pool_touched, touched_words
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
@@ -99,11 +99,11 @@ def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None
         if maps.size > 0:
             crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
         if egocentric_maps.size > 0:
-            touched = int32_table_at(beliefs[row, 3], beliefs[row, 4], 2)
+            touched = word_grid_at(beliefs[row, 3], beliefs[row, 4], touched_words(beliefs[row, 2]))
             for k in range(scales.shape[0]):
                 if scales[k] > 1:
                     pool_touched(log_odds, touched, scales[k], int8_grid_at(pools[row, k, 0], pools[row, k, 1], pools[row, k, 2]))
-            forget_touched(touched)
+            touched[:] = np.uint64(0)
             crop_turned(pools[row], x, y, believed[row, 2], scales, egocentric_maps[row])
 
 

@@ -42,18 +42,22 @@ def _update_block(typing_context: Any, address: Any, seen: Any, hits: Any, hit: 
         old = builder.load(pointer, align=1)
         lowered = _call(builder, "smax", _call(builder, "ssub.sat", old, _splat(builder, miss_step)), _splat(builder, least))
         raised = _call(builder, "smin", _call(builder, "sadd.sat", old, _splat(builder, hit_step)), _splat(builder, greatest))
-        new = builder.select(builder.bitcast(seen_bits, _MASK), lowered, old)
-        builder.store(builder.select(builder.bitcast(hit_bits, _MASK), raised, new), pointer, align=1)
+        missed = builder.select(builder.bitcast(seen_bits, _MASK), lowered, old)
+        new = builder.select(builder.bitcast(hit_bits, _MASK), raised, missed)
+        builder.store(new, pointer, align=1)
+        zero = ir.Constant(_BLOCK, [0] * 64)
+        is_other = [builder.xor(builder.icmp_signed(sign, old, zero), builder.icmp_signed(sign, new, zero)) for sign in ("<", ">")]
+        return builder.bitcast(builder.or_(*is_other), ir.IntType(64))
 
     steps = (types.int64,) * 4
-    return types.void(types.int64, types.uint64, types.uint64, *steps), generate
+    return types.uint64(types.int64, types.uint64, types.uint64, *steps), generate
 
 
 _update: Any = intrinsic(_update_block)
 
 
 @kernel(inline=True)
-def update_block(address: int, seen: np.uint64, hits: np.uint64, hit: int, miss: int, minimum: int, maximum: int) -> None:
+def update_block(address: int, seen: np.uint64, hits: np.uint64, hit: int, miss: int, minimum: int, maximum: int) -> np.uint64:
     """Lower the seen cells of a block and raise the hit ones; a cell that is both is raised.
 
     Parameters
@@ -66,5 +70,11 @@ def update_block(address: int, seen: np.uint64, hits: np.uint64, hit: int, miss:
         What is added where hit and taken where seen, positive.
     minimum, maximum : int
         Bounds of lowered and of raised cells.
+
+    Returns
+    -------
+    uint64
+        Which cells have changed their sign: another level than before.
     """
-    _update(address, seen, hits, hit, miss, minimum, maximum)
+    changed: np.uint64 = _update(address, seen, hits, hit, miss, minimum, maximum)
+    return changed

@@ -19,9 +19,6 @@ _FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIE
 BLOCK = 32
 """Cells that are taken at a time: loops of a fixed length leave no remainder to go through one by one."""
 
-NO_WORD = 2**30
-"""Low end of the words of a row of which none has changed."""
-
 HALF_STEP = 32768.0
 """Half a cell in the numbers with 16 binary places by which a crop is looked up."""
 
@@ -51,53 +48,89 @@ def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
             inner[j] = _level(source[j])
 
 
-def untouched(rows: int) -> NDArray[np.int32]:
-    """Return the words of each row of a map that have changed, low end and high end (exclusive), where none have: (rows, 2)."""
-    return np.tile(np.array([NO_WORD, 0], np.int32), (rows, 1))
+@kernel(inline=True)
+def touched_words(columns: int) -> int:
+    """Return how many words hold a bit for each word of 64 cells of a row of a map."""
+    return (columns + WORD * WORD - 1) // (WORD * WORD)
 
 
-@kernel
-def forget_touched(touched: Array) -> None:
-    """Take all changes of a map (rows, 2) as known."""
-    for row in range(touched.shape[0]):
-        touched[row, 0], touched[row, 1] = NO_WORD, 0
+def untouched(rows: int, columns: int) -> NDArray[np.uint64]:
+    """Return the bits of the words of 64 cells in which a level of the map has changed, where none has: (rows, ``touched_words``)."""
+    return np.zeros((rows, touched_words(columns)), np.uint64)
 
 
 @kernel
 def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> None:
-    """Bring a pooled map up to date where the map has changed.
+    """Bring a pooled map up to date where levels of the map have changed.
 
     Parameters
     ----------
     log_odds : (rows, columns) int8
         The map; columns a multiple of 64.
-    touched : (rows, 2) int32
-        Words of 64 cells of each row that have changed, low end and high end (exclusive), see ``untouched``.
+    touched : (rows, touched_words) uint64
+        Bits of the words of 64 cells in which a level has changed, see ``untouched``.
     scale : int
         Side of a pooled cell [cells of the map].
     pooled : (ceil(rows / scale), ceil(columns / scale)) int8
-        Greatest log-odds of the cells of each pooled cell; what a pooled cell has beyond the map counts as unknown.
+        Of the sign of the greatest log-odds of the cells of each pooled cell; what a pooled cell has beyond the map counts as
+        unknown.
     """
     rows, columns = log_odds.shape
+    # Whole groups of cells in a word are compared many at a time, others one by one.
+    in_groups = scale in (2, 4, 8, 16)
+    greatest = np.empty(WORD, np.int8)
     for row in range(pooled.shape[0]):
         first_row, last_row = row * scale, min((row + 1) * scale, rows)
-        low, high = NO_WORD, 0
-        for map_row in range(first_row, last_row):
-            low, high = min(low, touched[map_row, 0]), max(high, touched[map_row, 1])
-        if low >= high:
-            continue
-        first, last = low * WORD // scale, min((high * WORD + scale - 1) // scale, pooled.shape[1])
-        width = (last - first) * scale
-        inside = min(width, columns - first * scale)
-        greatest = np.empty(width, np.int8)
-        greatest[:] = np.int8(-128) if first_row + scale <= rows else np.int8(0)
-        greatest[inside:] = np.int8(0)
-        target = int8_at(greatest.ctypes.data, inside)
-        for map_row in range(first_row, last_row):
-            source = int8_at(log_odds.ctypes.data + map_row * columns + first * scale, inside)
-            for j in range(inside):
-                target[j] = max(target[j], source[j])
-        _pool_neighbours(greatest, scale, pooled[row, first:last])
+        for place in range(touched.shape[1]):
+            changed = np.uint64(0)
+            for map_row in range(first_row, last_row):
+                changed |= touched[map_row, place]
+            if changed == np.uint64(0):
+                continue
+            for word in range(place * WORD, min((place + 1) * WORD, columns // WORD)):
+                if (changed >> np.uint64(word & 63)) & np.uint64(1) == np.uint64(0):
+                    continue
+                if in_groups:
+                    _pool_word(log_odds, first_row, last_row, word, scale, greatest, pooled[row])
+                else:
+                    for column in range(word * WORD // scale, min(((word + 1) * WORD - 1) // scale + 1, pooled.shape[1])):
+                        pooled[row, column] = _greatest(log_odds, first_row, column * scale, scale)
+
+
+@kernel(inline=True)
+def _greatest(log_odds: Array, first_row: int, first_column: int, scale: int) -> np.int8:
+    """Return the greatest log-odds of a square of cells; beyond the map they are 0."""
+    last_row, last_column = min(first_row + scale, log_odds.shape[0]), min(first_column + scale, log_odds.shape[1])
+    is_whole = last_row == first_row + scale and last_column == first_column + scale
+    greatest = np.int8(-128) if is_whole else np.int8(0)
+    for row in range(first_row, last_row):
+        for column in range(first_column, last_column):
+            greatest = max(greatest, log_odds[row, column])
+    return greatest
+
+
+@kernel(inline=True)
+def _pool_word(log_odds: Array, first_row: int, last_row: int, word: int, scale: int, greatest: Array, pooled: Array) -> None:
+    """Write the pooled cells of a word of 64 cells; ``scale`` is a power of two below 64, ``greatest`` (64,) is scratch."""
+    columns = log_odds.shape[1]
+    column = int8_at(greatest.ctypes.data, WORD)
+    least = np.int8(-128) if last_row - first_row == scale else np.int8(0)
+    for j in range(WORD):
+        column[j] = least
+    for row in range(first_row, last_row):
+        source = int8_at(log_odds.ctypes.data + row * columns + word * WORD, WORD)
+        for j in range(WORD):
+            column[j] = max(column[j], source[j])
+    width = WORD
+    while scale > 1:
+        # In place: a cell is written after those that it is made of were read.
+        width //= 2
+        scale //= 2
+        for j in range(width):
+            column[j] = max(column[2 * j], column[2 * j + 1])
+    target = int8_at(pooled.ctypes.data + word * width, width)
+    for j in range(width):
+        target[j] = column[j]
 
 
 @kernel
@@ -168,32 +201,6 @@ def _copy_levels(pooled: Array, first_row: int, first_column: int, spans: Array,
             source = int8_at(pooled.ctypes.data + map_row * columns + first_column + low, high - low)
             for j in range(high - low):
                 target[j] = _level(source[j])
-
-
-@kernel
-def _pool_neighbours(values: Array, scale: int, pooled: Array) -> None:
-    """Write the greatest of every ``scale`` neighbours."""
-    while scale % 2 == 0 and scale > 1:
-        # Groups of two and four are compared many at a time, others one by one.
-        group = 4 if scale % 4 == 0 else 2
-        scale //= group
-        reduced = np.empty(pooled.size * scale, np.int8)
-        if group == 4:
-            for j in range(reduced.size):
-                reduced[j] = max(max(values[4 * j], values[4 * j + 1]), max(values[4 * j + 2], values[4 * j + 3]))
-        else:
-            for j in range(reduced.size):
-                reduced[j] = max(values[2 * j], values[2 * j + 1])
-        values = reduced
-    if scale == 1:
-        for j in range(pooled.size):
-            pooled[j] = values[j]
-        return
-    for j in range(pooled.size):
-        greatest = values[j * scale]
-        for k in range(1, scale):
-            greatest = max(greatest, values[j * scale + k])
-        pooled[j] = greatest
 
 
 @kernel

@@ -99,25 +99,24 @@ def integrate_scan(
         Place of the window's first cell in the map; column_offset a multiple of 64.
     increments : (4,) int64
         ``OccupancySettings.increments``.
-    touched : (rows, 2) int32
-        Words of each row, low end and high end (exclusive), that scans have changed; extended. None are noted where it has no rows.
+    touched : (rows, words) uint64
+        Bits of the words of 64 cells of each row in which a level has changed; added to. None are noted where it has no rows.
     """
     _note_hits(ends, is_hit, hit_bits)
     hit, miss, minimum, maximum = increments[0], increments[1], increments[2], increments[3]
     rows, columns = log_odds.shape
     words, word_offset = columns // WORD, column_offset // WORD
     word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
+    is_noted = touched.shape[0] > 0
     for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
         address = log_odds.ctypes.data + (row + row_offset) * columns + word_offset * WORD
-        low, high = word_high, word_low
         for word in range(word_low, word_high):
             seen, hits = bits[row, word], hit_bits[row, word]
             if seen | hits != np.uint64(0):
-                update_block(address + word * WORD, seen, hits, hit, miss, minimum, maximum)
-                low, high = min(low, word), word + 1
-        if low < high and touched.shape[0] > 0:
-            span = touched[row + row_offset]
-            span[0], span[1] = min(span[0], low + word_offset), max(span[1], high + word_offset)
+                changed = update_block(address + word * WORD, seen, hits, hit, miss, minimum, maximum)
+                if is_noted:
+                    place = word + word_offset
+                    touched[row + row_offset, place >> 6] |= np.uint64(changed != np.uint64(0)) << np.uint64(place & 63)
 
 
 @kernel
@@ -153,7 +152,7 @@ def _integrate_one(
     window[0], window[1] = box[0] + row_offset, box[1] + row_offset
     window[2], window[3] = 64 * box[2] + column_offset, 64 * box[3] + column_offset
     integrate_scan(
-        log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, np.zeros_like(bits), np.empty((0, 2), np.int32)
+        log_odds, bits, box, ends, is_hit, row_offset, column_offset, increments, np.zeros_like(bits), np.empty((0, 1), np.uint64)
     )
 
 

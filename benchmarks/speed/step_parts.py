@@ -15,7 +15,8 @@ from lidarium.envs.simulation.lidar import cast_scan
 from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE, fill_gaussian
 from lidarium.envs.simulation.stages import _window_corner
-from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, word_grid_at
+from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
+from lidarium.mapping.map_crops import touched_words
 from lidarium.mapping.occupancy import integrate_scan
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import beam_directions
@@ -67,7 +68,7 @@ def _map(maps: Array, bits: Array, boxes: Array, ends: Array, is_hit: Array, cor
         hit_bits[row] = 0
         log_odds = int8_grid_at(maps[row, 0], maps[row, 1], maps[row, 2])
         box = (boxes[row, 0], boxes[row, 1], boxes[row, 2], boxes[row, 3])
-        touched = int32_table_at(maps[row, 3], maps[row, 4], 2)
+        touched = word_grid_at(maps[row, 3], maps[row, 4], touched_words(maps[row, 2]))
         integrate_scan(
             log_odds, bits[row], box, ends[row], is_hit[row], corners[row, 0], corners[row, 1], increments, hit_bits[row], touched
         )  # fmt: skip

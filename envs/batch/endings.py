@@ -35,17 +35,22 @@ def endings(
         Why robots end of themselves, 0 where they do not.
     """
     robots = settings.robots
-    reasons = np.where(live, stopping, 0).astype(np.int8)
-    away = world.poses[:, :2] - np.repeat(goals, robots, axis=0)
-    with np.errstate(invalid="ignore"):
-        is_there = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] <= settings.goal_radius * settings.goal_radius
-    reasons[live & is_there] = REACHED
+    reasons = np.where(live, stopping, np.int8(0))
+    has_goal = goals[:, 0] == goals[:, 0]
+    if has_goal.any():
+        away = world.poses[:, :2] - np.repeat(goals, robots, axis=0)
+        with np.errstate(invalid="ignore"):
+            is_there = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] <= settings.goal_radius * settings.goal_radius
+        reasons[live & is_there] = REACHED
     if settings.stop_on_contact:
         reasons[live & (world.contacts != 0)] = COLLISION
     horizon = settings.horizon_steps
     if horizon is not None:
-        reasons[live & (reasons == 0) & np.repeat(world.steps >= horizon, robots)] = HORIZON
+        is_late = world.steps >= horizon
+        if is_late.any():
+            reasons[live & (reasons == 0) & np.repeat(is_late, robots)] = HORIZON
     if settings.stop_coverage is not None:
-        coverage = world.team_seen / np.maximum(world.counted, 1)
-        reasons[live & np.repeat(coverage >= settings.stop_coverage, robots)] = COVERED
+        is_covered = world.coverages() >= settings.stop_coverage
+        if is_covered.any():
+            reasons[live & np.repeat(is_covered, robots)] = COVERED
     return reasons

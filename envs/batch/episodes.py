@@ -133,7 +133,7 @@ class EpisodeBatch:
     @property
     def is_ready(self) -> bool:
         """Whether every episode has begun at least once."""
-        return all(floor is not None for floor in self.floors)
+        return None not in self.floors
 
     def run(
         self,
@@ -177,7 +177,8 @@ class EpisodeBatch:
             self._place(episode, start)
         modes[beginning] = LOOKS
         self._tally.rewards[:] = 0.0
-        begun = np.repeat(np.isin(np.arange(self.episodes), beginning), robots)
+        begun = np.zeros(self.rows, np.bool_)
+        begun.reshape(self.episodes, robots)[beginning] = True
         seen = acted | begun
         self._turn_buffers(seen, is_same_step)
         self.run_kernel(modes, self._commands, seen)
@@ -214,7 +215,9 @@ class EpisodeBatch:
         self, beginning: NDArray[np.int64], seeds: Sequence[int | None] | None, options: Mapping[int, ResetOptions]
     ) -> dict[int, Beginning]:
         """Draw how episodes begin, before anything of them is changed."""
-        drawn = {}
+        drawn: dict[int, Beginning] = {}
+        if not len(beginning):
+            return drawn
         generators = dict(enumerate(self._generators))
         for k, episode in enumerate(int(episode) for episode in beginning):
             seed = None if seeds is None else seeds[k]
@@ -257,8 +260,7 @@ class EpisodeBatch:
     def _tell(self, seen: NDArray[np.bool_]) -> None:
         """Put together what the step tells beside the observations."""
         everyone = np.ones(self.rows, np.bool_)
-        coverage = self.world.team_seen / np.maximum(self.world.counted, 1)
-        truth = {"pose": self.world.poses.copy(), "coverage": np.repeat(coverage, self.robots), "seen_cells": self.world.seen.copy()}
+        truth = {"pose": self.world.poses.copy(), "coverage": np.repeat(self.world.coverages(), self.robots), "seen_cells": self.world.seen.copy()}
         self.infos = {"truth": truth, "_truth": everyone}
         if self.reasons.any():
             ended = self.reasons != 0

@@ -88,7 +88,10 @@ def check_actions(actions: NDArray[Any], shape: tuple[int, ...], live: Rows, wan
         raise ValueError(f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots + robot")
     if array.dtype.kind not in "biuf":
         raise ValueError(f"actions are of type {array.dtype}; want {wanted} for each row")
-    bad = np.flatnonzero(live & ~np.isfinite(array).reshape(len(array), -1).all(axis=1))
+    is_finite = np.isfinite(array)
+    if is_finite.all():
+        return array
+    bad = np.flatnonzero(live & ~is_finite.reshape(len(array), -1).all(axis=1))
     if len(bad):
         raise ValueError(f"the action of row {bad[0]} is {array[bad[0]]}, nan or infinite; want {wanted}")
     return array

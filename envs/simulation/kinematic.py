@@ -123,7 +123,7 @@ class KinematicWorld:
         self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
         self.windows = np.zeros((rows, 4), np.int64)
         self.scales = tuple(scales)
-        self._touched: list[NDArray[np.int32]] = [untouched(0)] * rows
+        self._touched: list[NDArray[np.uint64]] = [untouched(0, WORD)] * rows
         self._pools: list[list[NDArray[np.int8]]] = [[] for _ in range(rows)]
         self.pool_rows = np.zeros((rows, len(self.scales), 3), np.int64)
         self.log_odds: list[NDArray[np.int8]] = [np.zeros((0, WORD), np.int8)] * rows
@@ -196,7 +196,7 @@ class KinematicWorld:
             self._pools[row] = [
                 np.zeros((-(-height // scale), -(-width // scale)), np.int8) if scale > 1 else self.log_odds[row] for scale in self.scales
             ]
-            self._touched[row] = untouched(height if self.scales else 0)
+            self._touched[row] = untouched(height if self.scales else 0, width)
         self._point_at(episode)
         self.starts[first:last] = starts
         self.flags[first:last] = TRUE_POSE | (KNOWN_MATES if known_starts else OWN_FRAME)
@@ -308,3 +308,7 @@ class KinematicWorld:
     def coverage(self, episode: int) -> float:
         """Return the sensed share of F, ``C_free``."""
         return float(self.team_seen[episode] / max(int(self.counted[episode]), 1))
+
+    def coverages(self) -> NDArray[np.float64]:
+        """Return the sensed share of F of every episode, ``C_free``, shape (episodes,)."""
+        return np.asarray(self.team_seen / np.maximum(self.counted, 1))

@@ -14,7 +14,8 @@ from lidarium.envs.coverage import mark_seen
 from lidarium.envs.simulation.arrays import KNOWN_MATES, OWN_FRAME, TRUE_POSE, WorldArrays
 from lidarium.envs.simulation.lidar import cast_scan, cut_by_disc
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
-from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, word_grid_at
+from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
+from lidarium.mapping.map_crops import touched_words
 from lidarium.mapping.occupancy import integrate_scan
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import beam_directions, beams_towards
@@ -159,7 +160,7 @@ def _update_map(
     if world.flags[row] & KNOWN_MATES:
         _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
     log_odds = int8_grid_at(belief[0], belief[1], belief[2])
-    touched = int32_table_at(belief[3], belief[4], 2)
+    touched = word_grid_at(belief[3], belief[4], touched_words(belief[2]))
     integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, world.increments, np.zeros_like(bits), touched)
     # A hit may lie one cell beyond the seen area.
     window = world.windows[row]
