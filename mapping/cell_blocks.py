@@ -1,7 +1,9 @@
-"""Blocks of 64 cells at once: log-odds lowered and raised under masks of bits.
+"""Blocks of 64 cells at once: what kernels do to log-odds and distances by the word.
 
-A word of bits says which cells of a block are meant. LLVM turns the operations on vectors of 64 bytes into what the machine
-has, whatever the width of its registers; numba cannot write them as loops, since it keeps no bit per lane.
+A word of bits says which cells of a block are meant. LLVM turns the operations on vectors of 64 numbers into what the machine
+has, whatever the width of its registers; numba cannot write them as loops, since it keeps no bit per lane and unrolls loops of a
+known length before it could run them on vectors. Blocks are given by their address; the caller sees to it that all 64 cells
+lie within the array.
 """
 
 from typing import Any
@@ -14,23 +16,40 @@ from numba.extending import intrinsic
 
 from lidarium.mapping.kernels import kernel
 
-_BYTE = ir.IntType(8)
-_BLOCK = ir.VectorType(_BYTE, 64)
-_MASK = ir.VectorType(ir.IntType(1), 64)
+BLOCK = 64
+"""Cells of a block."""
+
+HALF_BLOCK = 32
+"""Cells of which levels are told at a time."""
+
+_INT16, _INT64 = ir.IntType(16), ir.IntType(64)
+_BYTES, _SHORTS = ir.VectorType(ir.IntType(8), BLOCK), ir.VectorType(_INT16, BLOCK)
+_MASK = ir.VectorType(ir.IntType(1), BLOCK)
+_NO_BYTES, _NO_SHORTS = ir.Constant(_BYTES, [0] * BLOCK), ir.Constant(_SHORTS, [0] * BLOCK)
 
 
-def _splat(builder: Any, value: Any) -> Any:  # noqa: ANN401
-    """Repeat an integer in all 64 lanes."""
-    lane = builder.trunc(value, _BYTE)
-    first = builder.insert_element(ir.Constant(_BLOCK, ir.Undefined), lane, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(first, ir.Constant(_BLOCK, ir.Undefined), ir.Constant(ir.VectorType(ir.IntType(32), 64), [0] * 64))
+def _splat(builder: Any, value: Any, kind: Any) -> Any:  # noqa: ANN401
+    """Repeat an integer in all lanes of a kind of vector."""
+    nothing = ir.Constant(kind, ir.Undefined)
+    lane = value if value.type == kind.element else builder.trunc(value, kind.element)
+    first = builder.insert_element(nothing, lane, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(ir.IntType(32), BLOCK), [0] * BLOCK))
 
 
 def _call(builder: Any, name: str, first: Any, second: Any) -> Any:  # noqa: ANN401
-    """Call one of LLVM's own functions of two blocks."""
+    """Call one of LLVM's own functions of two vectors."""
+    kind = first.type
     insert: Any = cgutils.get_or_insert_function
-    function = insert(builder.module, ir.FunctionType(_BLOCK, [_BLOCK, _BLOCK]), f"llvm.{name}.v64i8")
+    function = insert(builder.module, ir.FunctionType(kind, [kind, kind]), f"llvm.{name}.v{BLOCK}i{kind.element.width}")
     return builder.call(function, [first, second])
+
+
+def _load(builder: Any, address: Any, kind: Any) -> Any:  # noqa: ANN401
+    return builder.load(builder.inttoptr(address, kind.as_pointer()), align=1)
+
+
+def _store(builder: Any, value: Any, address: Any) -> None:  # noqa: ANN401
+    builder.store(value, builder.inttoptr(address, value.type.as_pointer()), align=1)
 
 
 def _update_block(typing_context: Any, address: Any, seen: Any, hits: Any, hit: Any, miss: Any, minimum: Any, maximum: Any) -> Any:  # noqa: ANN401
@@ -38,22 +57,126 @@ def _update_block(typing_context: Any, address: Any, seen: Any, hits: Any, hit: 
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         place, seen_bits, hit_bits, hit_step, miss_step, least, greatest = arguments
-        pointer = builder.inttoptr(place, _BLOCK.as_pointer())
-        old = builder.load(pointer, align=1)
-        lowered = _call(builder, "smax", _call(builder, "ssub.sat", old, _splat(builder, miss_step)), _splat(builder, least))
-        raised = _call(builder, "smin", _call(builder, "sadd.sat", old, _splat(builder, hit_step)), _splat(builder, greatest))
+        old = _load(builder, place, _BYTES)
+        lowered = _call(builder, "ssub.sat", old, _splat(builder, miss_step, _BYTES))
+        lowered = _call(builder, "smax", lowered, _splat(builder, least, _BYTES))
+        raised = _call(builder, "sadd.sat", old, _splat(builder, hit_step, _BYTES))
+        raised = _call(builder, "smin", raised, _splat(builder, greatest, _BYTES))
         missed = builder.select(builder.bitcast(seen_bits, _MASK), lowered, old)
         new = builder.select(builder.bitcast(hit_bits, _MASK), raised, missed)
-        builder.store(new, pointer, align=1)
-        zero = ir.Constant(_BLOCK, [0] * 64)
-        is_other = [builder.xor(builder.icmp_signed(sign, old, zero), builder.icmp_signed(sign, new, zero)) for sign in ("<", ">")]
-        return builder.bitcast(builder.or_(*is_other), ir.IntType(64))
+        _store(builder, new, place)
+        is_other = [builder.xor(builder.icmp_signed(sign, old, _NO_BYTES), builder.icmp_signed(sign, new, _NO_BYTES)) for sign in "<>"]
+        return builder.bitcast(builder.or_(*is_other), _INT64)
 
     steps = (types.int64,) * 4
     return types.uint64(types.int64, types.uint64, types.uint64, *steps), generate
 
 
+def _sum_blocks(typing_context: Any, first: Any, second: Any, result: Any) -> Any:  # noqa: ANN401
+    """Write the sum of two blocks, cut to [-127, 127]."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        one, other = (_load(builder, address, _BYTES) for address in arguments[:2])
+        total = _call(builder, "sadd.sat", one, other)
+        _store(builder, _call(builder, "smax", total, ir.Constant(_BYTES, [-127] * BLOCK)), arguments[2])
+
+    return types.void(*(types.int64,) * 3), generate
+
+
+def _greater_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: ANN401
+    """Raise a block of log-odds to those of another where these are greater."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        _store(builder, _call(builder, "smax", *(_load(builder, address, _BYTES) for address in arguments)), arguments[0])
+
+    return types.void(types.int64, types.int64), generate
+
+
+def _greater_neighbours(typing_context: Any, block: Any) -> Any:  # noqa: ANN401
+    """Write the greater of every two neighbours of a block into its first half."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        old = _load(builder, arguments[0], _BYTES)
+        half, nothing = BLOCK // 2, ir.Constant(_BYTES, ir.Undefined)
+        lanes = [ir.Constant(ir.VectorType(ir.IntType(32), BLOCK), [2 * (k % half) + place for k in range(BLOCK)]) for place in (0, 1)]
+        _store(builder, _call(builder, "smax", *(builder.shuffle_vector(old, nothing, places) for places in lanes)), arguments[0])
+
+    return types.void(types.int64), generate
+
+
+def _levels(typing_context: Any, log_odds: Any, levels: Any) -> Any:  # noqa: ANN401
+    """Write a half block of log-odds as levels: 0 where positive, 127 at zero, 255 where negative."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        kind = ir.VectorType(ir.IntType(8), HALF_BLOCK)
+        zero, unknown, free = (ir.Constant(kind, [level] * HALF_BLOCK) for level in (0, 127, 255))
+        old = _load(builder, arguments[0], kind)
+        known = builder.select(builder.icmp_signed(">", old, zero), zero, unknown)
+        _store(builder, builder.select(builder.icmp_signed("<", old, zero), free, known), arguments[1])
+
+    return types.void(types.int64, types.int64), generate
+
+
+def _positive_differs(typing_context: Any, log_odds: Any, numbers: Any, number: Any) -> Any:  # noqa: ANN401
+    """Tell in which cells it does not go together that the log-odds are positive and the number is the given one."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        beliefs_at, numbers_at, value = arguments
+        is_positive = builder.icmp_signed(">", _load(builder, beliefs_at, _BYTES), _NO_BYTES)
+        is_number = builder.icmp_signed("==", _load(builder, numbers_at, _SHORTS), _splat(builder, value, _SHORTS))
+        return builder.bitcast(builder.xor(is_positive, is_number), _INT64)
+
+    return types.uint64(*(types.int64,) * 3), generate
+
+
+def _count_steps(typing_context: Any, log_odds: Any, steps: Any, largest: Any) -> Any:  # noqa: ANN401
+    """Count one more step in each lane, up to the largest number, or begin anew at 0 where the log-odds are positive."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        beliefs_at, steps_at, most = arguments
+        is_positive = builder.icmp_signed(">", _load(builder, beliefs_at, _BYTES), _NO_BYTES)
+        more = builder.add(_load(builder, steps_at, _SHORTS), ir.Constant(_SHORTS, [1] * BLOCK))
+        more = _call(builder, "umin", more, _splat(builder, most, _SHORTS))
+        _store(builder, builder.select(is_positive, _NO_SHORTS, more), steps_at)
+
+    return types.void(*(types.int64,) * 3), generate
+
+
+def _least_sums(typing_context: Any, numbers: Any, costs: Any, low: Any, high: Any, cap: Any, result: Any) -> Any:  # noqa: ANN401
+    """Write cap - min(cap, numbers[j + k] + costs[k]) for the lanes j, the least over k from low to high."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        numbers_at, costs_at, first, last, most, result_at = arguments
+        caps = _splat(builder, most, _SHORTS)
+        least = cgutils.alloca_once_value(builder, caps)
+        with cgutils.for_range_slice(builder, first, last, ir.Constant(_INT64, 1), intp=_INT64) as (k, _):
+            offset = builder.shl(k, ir.Constant(_INT64, 1))
+            number = _load(builder, builder.add(numbers_at, offset), _SHORTS)
+            cost = _splat(builder, _load(builder, builder.add(costs_at, offset), _INT16), _SHORTS)
+            builder.store(_call(builder, "umin", builder.load(least), builder.add(number, cost)), least)
+        _store(builder, builder.sub(caps, builder.load(least)), result_at)
+
+    return types.void(*(types.int64,) * 6), generate
+
+
+def _raise_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: ANN401
+    """Raise the numbers of a block to those of another where these are greater."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        _store(builder, _call(builder, "umax", *(_load(builder, address, _SHORTS) for address in arguments)), arguments[0])
+
+    return types.void(types.int64, types.int64), generate
+
+
 _update: Any = intrinsic(_update_block)
+_sum: Any = intrinsic(_sum_blocks)
+_raise_log_odds: Any = intrinsic(_greater_block)
+_halve: Any = intrinsic(_greater_neighbours)
+_write_levels: Any = intrinsic(_levels)
+_differs: Any = intrinsic(_positive_differs)
+_count: Any = intrinsic(_count_steps)
+_least: Any = intrinsic(_least_sums)
+_raise: Any = intrinsic(_raise_block)
 
 
 @kernel(inline=True)
@@ -78,3 +201,55 @@ def update_block(address: int, seen: np.uint64, hits: np.uint64, hit: int, miss:
     """
     changed: np.uint64 = _update(address, seen, hits, hit, miss, minimum, maximum)
     return changed
+
+
+@kernel(inline=True)
+def sum_blocks(first: int, second: int, result: int) -> None:
+    """Write the sum of two blocks of int8, cut to [-127, 127], into a third, which may be one of them."""
+    _sum(first, second, result)
+
+
+@kernel(inline=True)
+def raise_log_odds(block: int, other: int) -> None:
+    """Raise the int8 of a block to those of another where these are greater."""
+    _raise_log_odds(block, other)
+
+
+@kernel(inline=True)
+def halve_block(block: int) -> None:
+    """Write the greater of every two neighbours of a block of int8 into its first half; the second half repeats them."""
+    _halve(block)
+
+
+@kernel(inline=True)
+def write_levels(log_odds: int, levels: int) -> None:
+    """Write 32 cells of int8 as levels of uint8: 0 occupied where positive, 127 unknown at zero, 255 free where negative."""
+    _write_levels(log_odds, levels)
+
+
+@kernel(inline=True)
+def cells_that_differ(log_odds: int, numbers: int, number: int) -> np.uint64:
+    """Tell in which cells of two blocks, int8 and uint16, only one is true: the log-odds are positive, the other is ``number``."""
+    cells: np.uint64 = _differs(log_odds, numbers, number)
+    return cells
+
+
+@kernel(inline=True)
+def count_steps(log_odds: int, steps: int, largest: int) -> None:
+    """Count one more step in each cell of a block of uint16, up to ``largest``, or begin anew at 0 where log-odds (int8) are positive."""
+    _count(log_odds, steps, largest)
+
+
+@kernel(inline=True)
+def write_least_sums(numbers: int, costs: int, low: int, high: int, cap: int, result: int) -> None:
+    """Write what is left of ``cap`` after the least of ``numbers[j + k] + costs[k]`` over k from ``low`` to ``high``, for 64 cells j.
+
+    All are uint16, of which no sum may exceed 65,535; high ends excluded.
+    """
+    _least(numbers, costs, low, high, cap, result)
+
+
+@kernel(inline=True)
+def raise_block(block: int, other: int) -> None:
+    """Raise the uint16 of a block to those of another where these are greater."""
+    _raise(block, other)

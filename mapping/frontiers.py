@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.clearance import Window, full_window, grown_window
+from lidarium.mapping.clearance import full_window
+from lidarium.mapping.clearance_updates import Window, grown_window
 from lidarium.mapping.grid_planning import centres_of
 from lidarium.mapping.grid_search import TILE_SHIFT
 from lidarium.mapping.kernels import Array, kernel

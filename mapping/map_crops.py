@@ -11,13 +11,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.cell_blocks import HALF_BLOCK, halve_block, raise_log_odds, write_levels
 from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, WORD
 
 _FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIED)
-
-BLOCK = 32
-"""Cells that are taken at a time: loops of a fixed length leave no remainder to go through one by one."""
 
 HALF_STEP = 32768.0
 """Half a cell in the numbers with 16 binary places by which a crop is looked up."""
@@ -26,6 +24,20 @@ HALF_STEP = 32768.0
 @kernel(inline=True)
 def _level(log_odds: int) -> np.uint8:
     return _FREE if log_odds < 0 else (_OCCUPIED if log_odds > 0 else _UNKNOWN)
+
+
+@kernel(inline=True)
+def _write_row(log_odds: int, count: int, levels: int) -> None:
+    """Write ``count`` cells from one address on as levels from another on."""
+    if count < HALF_BLOCK:
+        source, target = int8_at(log_odds, count), bytes_at(levels, count)
+        for j in range(count):
+            target[j] = _level(source[j])
+        return
+    for place in range(0, count - HALF_BLOCK, HALF_BLOCK):
+        write_levels(log_odds + place, levels + place)
+    # The last ones may overlap those before: nothing remains to go through one by one.
+    write_levels(log_odds + count - HALF_BLOCK, levels + count - HALF_BLOCK)
 
 
 @kernel
@@ -43,9 +55,7 @@ def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
             continue
         target[:low] = _UNKNOWN
         target[high:] = _UNKNOWN
-        source, inner = log_odds[map_row, first_column + low : first_column + high], target[low:high]
-        for j in range(high - low):
-            inner[j] = _level(source[j])
+        _write_row(log_odds.ctypes.data + map_row * columns + first_column + low, high - low, target.ctypes.data + low)
 
 
 @kernel(inline=True)
@@ -112,25 +122,18 @@ def _greatest(log_odds: Array, first_row: int, first_column: int, scale: int) ->
 @kernel(inline=True)
 def _pool_word(log_odds: Array, first_row: int, last_row: int, word: int, scale: int, greatest: Array, pooled: Array) -> None:
     """Write the pooled cells of a word of 64 cells; ``scale`` is a power of two below 64, ``greatest`` (64,) is scratch."""
-    columns = log_odds.shape[1]
-    column = int8_at(greatest.ctypes.data, WORD)
-    least = np.int8(-128) if last_row - first_row == scale else np.int8(0)
-    for j in range(WORD):
-        column[j] = least
+    columns, block = log_odds.shape[1], greatest.ctypes.data
+    greatest[:] = np.int8(-128) if last_row - first_row == scale else np.int8(0)
     for row in range(first_row, last_row):
-        source = int8_at(log_odds.ctypes.data + row * columns + word * WORD, WORD)
-        for j in range(WORD):
-            column[j] = max(column[j], source[j])
+        raise_log_odds(block, log_odds.ctypes.data + row * columns + word * WORD)
     width = WORD
     while scale > 1:
-        # In place: a cell is written after those that it is made of were read.
+        halve_block(block)
         width //= 2
         scale //= 2
-        for j in range(width):
-            column[j] = max(column[2 * j], column[2 * j + 1])
     target = int8_at(pooled.ctypes.data + word * width, width)
     for j in range(width):
-        target[j] = column[j]
+        target[j] = greatest[j]
 
 
 @kernel
@@ -157,7 +160,7 @@ def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array,
     cells = crops.shape[1]
     cosine, sine = math.cos(heading), math.sin(heading)
     half = int(math.ceil(0.5 * cells * (abs(cosine) + abs(sine))))
-    width = (2 * half + BLOCK - 1) // BLOCK * BLOCK
+    width = (2 * half + HALF_BLOCK - 1) // HALF_BLOCK * HALF_BLOCK
     spans = np.empty((2 * half, 2), np.int64)
     _touched_columns(cells, half, cosine, sine, spans)
     places = _places(half, width, cosine, sine, cells)
@@ -182,8 +185,8 @@ def _touched_columns(cells: int, half: int, cosine: float, sine: float, spans: A
         middle_along, middle_across = slope_along * y, slope_across * y
         low = max(middle_along - reach_along, middle_across - reach_across, -half)
         high = min(middle_along + reach_along, middle_across + reach_across, half)
-        spans[row, 0] = (int(math.floor(low)) + half) // BLOCK * BLOCK
-        spans[row, 1] = (int(math.ceil(high)) + half + BLOCK - 1) // BLOCK * BLOCK
+        spans[row, 0] = (int(math.floor(low)) + half) // HALF_BLOCK * HALF_BLOCK
+        spans[row, 1] = (int(math.ceil(high)) + half + HALF_BLOCK - 1) // HALF_BLOCK * HALF_BLOCK
 
 
 @kernel
@@ -197,10 +200,8 @@ def _copy_levels(pooled: Array, first_row: int, first_column: int, spans: Array,
             patch[row * width + low : row * width + high] = _UNKNOWN
             low, high = max(low, inside_low), min(high, inside_high)
         if 0 <= map_row < rows and low < high:
-            target = bytes_at(patch.ctypes.data + row * width + low, high - low)
-            source = int8_at(pooled.ctypes.data + map_row * columns + first_column + low, high - low)
-            for j in range(high - low):
-                target[j] = _level(source[j])
+            source = pooled.ctypes.data + map_row * columns + first_column + low
+            _write_row(source, high - low, patch.ctypes.data + row * width + low)
 
 
 @kernel

@@ -260,7 +260,11 @@ class EpisodeBatch:
     def _tell(self, seen: NDArray[np.bool_]) -> None:
         """Put together what the step tells beside the observations."""
         everyone = np.ones(self.rows, np.bool_)
-        truth = {"pose": self.world.poses.copy(), "coverage": np.repeat(self.world.coverages(), self.robots), "seen_cells": self.world.seen.copy()}
+        truth = {
+            "pose": self.world.poses.copy(),
+            "coverage": np.repeat(self.world.coverages(), self.robots),
+            "seen_cells": self.world.seen.copy(),
+        }
         self.infos = {"truth": truth, "_truth": everyone}
         if self.reasons.any():
             ended = self.reasons != 0

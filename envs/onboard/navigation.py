@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.clearance import ClearanceField, Window, update_closeness
+from lidarium.mapping.cell_blocks import BLOCK, sum_blocks
+from lidarium.mapping.clearance import ClearanceField
+from lidarium.mapping.clearance_updates import Window, update_closeness
 from lidarium.mapping.frontiers import FrontierMap, update_frontiers
 from lidarium.mapping.grid_planning import SearchSpace
 from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, uint8_grid_at, uint16_grid_at
@@ -158,19 +160,15 @@ def extend_window(known: Array, window: Array) -> None:
 
 @kernel
 def _sum_maps(beliefs: Array, window: Array, total: Array) -> None:
-    """Write the sum of maps of one shape into ``total`` within a window, cut to [-127, 127]."""
-    rows, columns = total.shape
-    first, end = np.uintp(window[2]), np.uintp(window[3])
+    """Write the sum of maps of one shape into ``total`` within a window, cut to [-127, 127]; columns are multiples of 64."""
+    columns = total.shape[1]
+    first, end = window[2] // BLOCK * BLOCK, window[3]
     for row in range(window[0], window[1]):
-        target = total[row]
-        one = int8_grid_at(beliefs[0, 0], rows, columns)[row]
-        other = int8_grid_at(beliefs[1, 0], rows, columns)[row]
-        for column in range(first, end):
-            target[column] = np.int8(min(max(np.int16(one[column]) + np.int16(other[column]), np.int16(-127)), np.int16(127)))
-        for k in range(2, beliefs.shape[0]):
-            source = int8_grid_at(beliefs[k, 0], rows, columns)[row]
-            for column in range(first, end):
-                target[column] = np.int8(min(max(np.int16(target[column]) + np.int16(source[column]), np.int16(-127)), np.int16(127)))
+        for place in range(row * columns + first, row * columns + end, BLOCK):
+            target = total.ctypes.data + place
+            sum_blocks(beliefs[0, 0] + place, beliefs[1, 0] + place, target)
+            for k in range(2, beliefs.shape[0]):
+                sum_blocks(target, beliefs[k, 0] + place, target)
 
 
 class TeamMaps(NamedTuple):

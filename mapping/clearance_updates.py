@@ -1,0 +1,200 @@
+"""How closeness is brought up to date: stamps around cells that became occupied, blocks computed anew where cells became free.
+
+The distance transform is separable (Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, Theory of
+Computing 8, 2012); with a small largest distance the plain minimum along rows, of many cells at once, beats the lower envelope.
+"""
+
+import numpy as np
+
+from lidarium.mapping.cell_blocks import BLOCK, cells_that_differ, count_steps, raise_block, write_least_sums
+from lidarium.mapping.kernels import Array, kernel
+
+Window = tuple[int, int, int, int]
+
+STAMPS_PER_CELL = 1.0 / 200.0
+"""Stamping one disc costs about as much as computing 200 cells anew."""
+
+
+@kernel
+def grown_window(window: Window, margin: int, shape: tuple[int, int]) -> Window:
+    """Grow a window by ``margin`` cells on each side, clipped to the grid (kernel)."""
+    row_low, row_high, column_low, column_high = window
+    return max(row_low - margin, 0), min(row_high + margin, shape[0]), max(column_low - margin, 0), min(column_high + margin, shape[1])
+
+
+@kernel
+def update_closeness(log_odds: Array, closeness: Array, limit: int, stamp: Array, window: Window) -> bool:
+    """Bring closeness up to date where cells of a window became occupied or ceased to be; whether any did (kernel).
+
+    Parameters are those of :class:`ClearanceField` and its ``update``.
+    """
+    reach = stamp.shape[0] // 2
+    changed, added = _changed_cells(log_odds, closeness, limit, grown_window(window, 0, log_odds.shape))
+    if len(changed) == 0:
+        return False
+    target = grown_window(_box_of(log_odds, changed), reach, log_odds.shape)
+    first_block, last_block = target[2] // BLOCK, (target[3] - 1) // BLOCK + 1
+    is_stale = np.zeros((last_block - first_block, target[1] - target[0]), np.bool_)
+    if added > STAMPS_PER_CELL * (target[1] - target[0]) * (target[3] - target[2]):
+        is_stale[:] = True
+    elif added < len(changed):
+        for k in range(len(changed)):
+            if log_odds[changed[k, 0], changed[k, 1]] <= 0:
+                low, high = max(changed[k, 0] - reach, target[0]) - target[0], min(changed[k, 0] + reach + 1, target[1]) - target[0]
+                for block in range(max(changed[k, 1] - reach, 0) // BLOCK, min(changed[k, 1] + reach, log_odds.shape[1] - 1) // BLOCK + 1):
+                    is_stale[block - first_block, low:high] = True
+    for block in range(first_block, last_block):
+        row, stale = 0, is_stale[block - first_block]
+        while row < stale.size:
+            first = row
+            while row < stale.size and stale[row]:
+                row += 1
+            if row > first:
+                _recompute(log_odds, closeness, limit, reach, target[0] + first, target[0] + row, block * BLOCK)
+            row += 1
+    for k in range(len(changed)):
+        if log_odds[changed[k, 0], changed[k, 1]] > 0 and not _is_within(
+            is_stale, reach, changed[k, 0], changed[k, 1], target, log_odds.shape
+        ):
+            _stamp_at(closeness, stamp, changed[k, 0], changed[k, 1])
+    return True
+
+
+@kernel
+def _is_within(is_stale: Array, reach: int, row: int, column: int, target: Window, shape: tuple[int, int]) -> bool:
+    """Whether all that is near a cell has been computed anew."""
+    low, high = max(row - reach, target[0]) - target[0], min(row + reach + 1, target[1]) - target[0]
+    for block in range(max(column - reach, 0) // BLOCK, min(column + reach, shape[1] - 1) // BLOCK + 1):
+        stale = is_stale[block - target[2] // BLOCK]
+        for other in range(low, high):
+            if not stale[other]:
+                return False
+    return True
+
+
+@kernel
+def _changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window) -> tuple[Array, int]:
+    """List the cells (row, column) that became occupied or free, and count those that became occupied."""
+    row_low, row_high, column_low, column_high = window
+    columns = log_odds.shape[1]
+    changed = np.empty((256, 2), np.int64)
+    count, added = 0, 0
+    for row in range(row_low, row_high):
+        place = row * columns + column_low
+        for column in range(column_low, column_high, BLOCK):
+            differing = _that_differ(log_odds, closeness, limit, place, min(BLOCK, column_high - column))
+            place += BLOCK
+            if differing == np.uint64(0):
+                continue
+            if count + BLOCK > len(changed):
+                longer = np.empty((2 * len(changed), 2), np.int64)
+                longer[:count] = changed[:count]
+                changed = longer
+            while differing != np.uint64(0):
+                if differing & np.uint64(1):
+                    changed[count, 0], changed[count, 1] = row, column
+                    added += log_odds[row, column] > 0
+                    count += 1
+                differing >>= np.uint64(1)
+                column += 1
+    return changed[:count], added
+
+
+@kernel
+def _that_differ(log_odds: Array, closeness: Array, limit: int, place: int, cells: int) -> np.uint64:
+    """Tell which of up to 64 cells from a place in the grid on became occupied or free."""
+    if place + BLOCK <= log_odds.size:
+        differing = cells_that_differ(log_odds.ctypes.data + place, closeness.ctypes.data + 2 * place, limit)
+        return differing & (np.uint64(0xFFFFFFFFFFFFFFFF) >> np.uint64(BLOCK - cells))
+    differing, beliefs, known = np.uint64(0), log_odds.reshape(-1), closeness.reshape(-1)
+    for k in range(cells):
+        differing |= np.uint64((beliefs[place + k] > 0) != (known[place + k] == limit)) << np.uint64(k)
+    return differing
+
+
+@kernel
+def _box_of(log_odds: Array, cells: Array) -> Window:
+    """Bound cells by a window."""
+    row_low, row_high, column_low, column_high = log_odds.shape[0], 0, log_odds.shape[1], 0
+    for k in range(len(cells)):
+        row_low, row_high = min(row_low, cells[k, 0]), max(row_high, cells[k, 0] + 1)
+        column_low, column_high = min(column_low, cells[k, 1]), max(column_high, cells[k, 1] + 1)
+    return row_low, row_high, column_low, column_high
+
+
+@kernel
+def _stamp_at(closeness: Array, stamp: Array, row: int, column: int) -> None:
+    """Raise the closeness around an occupied cell."""
+    rows, columns = closeness.shape
+    reach = stamp.shape[0] // 2
+    first = column - reach
+    if first >= 0 and first + stamp.shape[1] <= columns:
+        for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
+            target = closeness.ctypes.data + 2 * (other * columns + first)
+            source = stamp.ctypes.data + 2 * (other - row + reach) * stamp.shape[1]
+            for block in range(0, stamp.shape[1], BLOCK):
+                raise_block(target + 2 * block, source + 2 * block)
+        return
+    left, right = max(first, 0), min(column + reach + 1, columns)
+    for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
+        for place in range(left, right):
+            closeness[other, place] = max(closeness[other, place], stamp[other - row + reach, place - first])
+
+
+@kernel
+def _count_row(log_odds: Array, row: int, first: int, steps: Array, largest: int) -> None:
+    """Count the rows up to the last occupied cell of each column from ``first`` on; beyond the grid there are none."""
+    columns = log_odds.shape[1]
+    for chunk in range(0, steps.size, BLOCK):
+        column = first + chunk
+        if column >= 0 and column + BLOCK <= columns:
+            count_steps(log_odds.ctypes.data + row * columns + column, steps.ctypes.data + 2 * chunk, largest)
+            continue
+        for k in range(max(-column, 0), min(BLOCK, columns - column)):
+            steps[chunk + k] = 0 if log_odds[row, column + k] > 0 else min(steps[chunk + k] + 1, largest)
+
+
+@kernel
+def _recompute(log_odds: Array, closeness: Array, limit: int, reach: int, row_low: int, row_high: int, column: int) -> None:
+    """Compute the closeness of a block of columns, from ``column`` on, in some rows from all occupied cells near them."""
+    rows, columns = log_odds.shape
+    first, far, cap = column - reach, reach + 1, np.uint16(limit)
+    width = (BLOCK + 2 * reach + BLOCK - 1) // BLOCK * BLOCK
+    costs, squared = np.empty(2 * reach + 1, np.uint16), np.full(far + 1, cap, np.uint16)
+    for k in range(2 * reach + 1):
+        costs[k] = max(2 * abs(k - reach) - 1, 0) ** 2
+    for k in range(far):
+        squared[k] = min(max(2 * k - 1, 0) ** 2, limit)
+    # Rows up to the last occupied cell of each column, first from below, then from above.
+    steps = np.full(width, far, np.uint16)
+    below = np.empty((row_high - row_low, width), np.uint16)
+    for row in range(max(row_low - reach, 0), row_high):
+        _count_row(log_odds, row, first, steps, far)
+        if row >= row_low:
+            below[row - row_low, :] = steps
+    steps[:] = far
+    result = np.empty(BLOCK, np.uint16)
+    used = min(BLOCK, columns - column)
+    for row in range(min(row_high + reach, rows) - 1, row_low - 1, -1):
+        _count_row(log_odds, row, first, steps, far)
+        if row >= row_high:
+            continue
+        squares = below[row - row_low]
+        nearest = np.uint16(far)
+        for i in range(width):
+            squares[i] = min(squares[i], steps[i])
+            nearest = min(nearest, squares[i])
+        if nearest == far:
+            closeness[row, column : column + used] = 0
+            continue
+        for i in range(width):
+            half_cells = np.uint16(max(np.int16(2 * squares[i] - 1), np.int16(0)))
+            squares[i] = min(np.uint16(half_cells * half_cells), cap) if squares[i] < far else cap
+        # Steps to the side that cost more than what is left cannot bring anything.
+        side = 0
+        while side < reach and np.int64(costs[reach + side + 1]) + np.int64(squared[nearest]) < limit:
+            side += 1
+        target = closeness.ctypes.data + 2 * (row * columns + column) if used == BLOCK else result.ctypes.data
+        write_least_sums(squares.ctypes.data, costs.ctypes.data, reach - side, reach + side + 1, limit, target)
+        if used < BLOCK:
+            closeness[row, column : column + used] = result[:used]
