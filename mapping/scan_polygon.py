@@ -17,8 +17,8 @@ from lidarium.mapping.kernels import Array, kernel
 GRAZING = 8.0
 """Cotangent of the flattest angle under which two neighbouring end points still belong to one surface."""
 
-LONG = np.uint8(255)
-"""Mark of an edge that is walked row by row."""
+JUMP = np.uint8(255)
+"""Mark of an edge that is walked by itself: from a near to a far end point, or across more rows than a byte holds."""
 
 
 @kernel(inline=True)
@@ -101,10 +101,11 @@ def _toggle_between(
 
 
 @kernel
-def _edges(lengths: Array, ends: Array, rows: Array, steepness: float, width: int) -> tuple[Array, Array, Array]:
-    """How many rows the edge from each beam to the next crosses (``LONG`` for more than two, or a jump), and the bits it toggles in them.
+def _edges(lengths: Array, ends: Array, rows: Array, steepness: float, width: int) -> tuple[Array, Array, Array, Array, Array]:
+    """How many rows the edge from each beam to the next crosses (or ``JUMP``), which bits it toggles in the first two, and its line.
 
-    Loops without branches over few arrays, which LLVM runs on vectors.
+    The line is where it crosses the first row, and by how much farther each one after it. Loops without branches over few arrays,
+    which LLVM runs on vectors.
     """
     edges = lengths.shape[0] - 1
     from_x, to_x, from_y, to_y = ends[0, :-1], ends[0, 1:], ends[1, :-1], ends[1, 1:]
@@ -113,8 +114,8 @@ def _edges(lengths: Array, ends: Array, rows: Array, steepness: float, width: in
     for k in range(edges):
         step = abs(to_length[k] - from_length[k])
         climb = abs(to_row[k] - from_row[k])
-        is_short = (step <= 1.0 + steepness * min(from_length[k], to_length[k])) & (climb <= 2)
-        crossed[k] = np.uint8(climb) if is_short else LONG
+        is_surface = (step <= 1.0 + steepness * min(from_length[k], to_length[k])) & (climb < JUMP)
+        crossed[k] = np.uint8(climb) if is_surface else JUMP
     slopes, crossings = np.empty(edges), np.empty(edges)
     for k in range(edges):
         slopes[k] = (to_x[k] - from_x[k]) / (to_y[k] - from_y[k])
@@ -127,7 +128,7 @@ def _edges(lengths: Array, ends: Array, rows: Array, steepness: float, width: in
         first[k] = min(from_row[k], to_row[k]) * stride + np.int32(crossings[k])
     for k in range(edges):
         second[k] = (min(from_row[k], to_row[k]) + np.int32(1)) * stride + np.int32(crossings[k] + slopes[k])
-    return crossed, first, second
+    return crossed, first, second, crossings, slopes
 
 
 @kernel
@@ -171,19 +172,27 @@ def fill_scan_polygon(
     steepness = GRAZING * increment
     if is_full_circle:
         _toggle_between(bits, lengths, directions, ends, x, y, beams - 1, 0, steepness)
-    crossed, first, second = _edges(lengths, ends, rows, steepness, 64 * bits.shape[1])
+    width = 64 * bits.shape[1]
+    crossed, first, second, crossings, slopes = _edges(lengths, ends, rows, steepness, width)
     toggles, listed = np.empty(2 * beams + 2, np.int32), np.uintp(0)
+    flat = bits.reshape(-1)
     for k in range(beams - 1):
         count = crossed[k]
-        if count == LONG:
+        if count == JUMP:
             _toggle_between(bits, lengths, directions, ends, x, y, k, k + 1, steepness)
             continue
         # Most edges cross two rows, one or none. What they toggle is listed without branches, which could not be foreseen.
         toggles[listed] = first[k]
-        listed += np.uintp((count + 1) >> 1)
+        listed += np.uintp(count > 0)
         toggles[listed] = second[k]
-        listed += np.uintp(count >> 1)
-    flat = bits.reshape(-1)
+        listed += np.uintp(count > 1)
+        if count > 2:
+            start, crossing = min(rows[k], rows[k + 1]) * width + width, crossings[k] + slopes[k]
+            for _ in range(2, count):
+                start += width
+                crossing += slopes[k]
+                place = start + int(crossing)
+                flat[np.uintp(place >> 6)] ^= np.uint64(1) << np.uint64(place & 63)
     for k in range(listed):
         flat[np.uintp(toggles[k] >> 6)] ^= np.uint64(1) << np.uint64(toggles[k] & 63)
     row_low, row_high = max(int(low_row) - 2, 0), min(int(high_row) + 2, bits.shape[0])
