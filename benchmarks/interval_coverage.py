@@ -10,6 +10,7 @@ import argparse
 import platform
 import sys
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import date
@@ -92,6 +93,7 @@ FAMILIES = (
     Family("exponential", stats.expon(scale=100.0)),
     Family("lognormal, sigma 1", stats.lognorm(1.0, scale=100.0), is_asked_for=False),
 )
+ASKED_FOR = tuple(family for family in FAMILIES if family.is_asked_for)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +129,7 @@ def cases(resamples: int) -> Iterator[Case]:
     draws = {"resamples": resamples}
     for family in FAMILIES:
         yield Case("mean", family.name, family.times.mean(), _on_first(family, partial(mean_interval, **draws)), family.is_asked_for)
-    for family in FAMILIES:
+    for family in ASKED_FOR:
         truth = 2.0 * integrate.quad(family.times.ppf, 0.25, 0.75)[0]
         interval = _on_first(family, partial(interquartile_mean_interval, **draws))
         yield Case("interquartile mean", family.name, truth, interval, family.is_asked_for)
@@ -138,7 +140,7 @@ def cases(resamples: int) -> Iterator[Case]:
         yield Case("paired ratio", family.name, 1.0 / SLOWER, _on_both(family, partial(paired_ratio, **draws)), family.is_asked_for)
     for compare in (None, restricted_difference, restricted_ratio):
         for is_random in (False, True):
-            for family in FAMILIES:
+            for family in FAMILIES if compare is None else ASKED_FOR:
                 yield _restricted(family, is_random, compare, draws)
     for share in (0.5, 0.8, 0.95):
         yield Case("success rate", f"true rate {share:g}", share, partial(_share, share), is_asked_for=False)
@@ -196,7 +198,7 @@ def _share(share: float, generator: np.random.Generator, size: int, _seed: int) 
 
 def held(case: Case, size: int, trials: int) -> tuple[float, int]:
     """Return the share of trials whose interval holds the truth, of those that were not refused, and how many were."""
-    generator = np.random.default_rng([_SEED, size])
+    generator = np.random.default_rng([_SEED, size, zlib.crc32(f"{case.figure} {case.data}".encode())])
     hits = refused = 0
     for trial in range(trials):
         try:
@@ -231,8 +233,8 @@ def page(found: list[tuple[Case, list[tuple[float, int]]]], trials: int, resampl
         "",
         f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number of runs or pairs. Its standard "
         f"error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 %. Intervals are made of {resamples:,} resamples here, of 10,000 in "
-        f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and more on normal, skewed and 20 % "
-        "censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. Rows marked as beyond are "
+        f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and more on normal, skewed and "
+        "20 % censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. Rows marked as beyond are "
         "harder than what is asked for, or discrete. What each interval is made of: [statistics](../reference/statistics.md).",
         "",
         "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second policy takes 1.2 times "
@@ -270,7 +272,7 @@ def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=2000)
-    parser.add_argument("--resamples", type=int, default=1000)
+    parser.add_argument("--resamples", type=int, default=599)
     parser.add_argument("--out", type=Path, default=Path("docs/results/interval_coverage.md"), help="the page")
     chosen = parser.parse_args()
     began = time.perf_counter()

@@ -108,7 +108,13 @@ def studentised_interval(
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.where(errors > 0.0, shifts / errors, np.where(shifts == 0.0, 0.0, np.copysign(np.inf, shifts)))
     if is_symmetric:
-        reach = float(np.quantile(np.abs(ratios), 1.0 - 2.0 * tail, method="nearest"))
+        reach = _ranked(np.abs(ratios), 1.0 - 2.0 * tail)
         return Interval(estimate, estimate - reach * error, estimate + reach * error, confidence, size)
-    low, high = (float(end) for end in np.quantile(ratios, [tail, 1.0 - tail], method="nearest"))
+    low, high = _ranked(ratios, tail), _ranked(ratios, 1.0 - tail)
     return Interval(estimate, estimate - high * error, estimate - low * error, confidence, size)
+
+
+def _ranked(ratios: Values, share: float) -> float:
+    """Return the value of rank (number + 1) share, which no rounding of the number of resamples makes too near the middle."""
+    rank = min(max(round((len(ratios) + 1) * share), 1), len(ratios))
+    return float(np.partition(ratios, rank - 1)[rank - 1])

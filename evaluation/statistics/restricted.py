@@ -240,12 +240,11 @@ def _influences_on(counts: Array, times: Array, is_observed: Array, order: Array
         if count == 0.0:
             continue
         left = at_risk - count
+        influences[i] = hazard
         # Right of the last event of all the area is 0.
         if is_observed[i] and left > 0.0:
-            right = area - areas[rank]
-            hazard += count * right / (at_risk * left)
-            influences[i] = hazard - right / left
-        else:
-            influences[i] = hazard
+            pull = (area - areas[rank]) / (at_risk * left)
+            hazard += count * pull
+            influences[i] = hazard - at_risk * pull
         at_risk = left
     return area
