@@ -88,7 +88,7 @@ class Family:
 
 
 FAMILIES = (
-    Family("normal, mean 100, sd 20", stats.norm(100.0, 20.0)),
+    Family("normal, mean 100, sd 15", stats.norm(100.0, 15.0)),
     Family("lognormal, sigma 0.5", stats.lognorm(0.5, scale=100.0)),
     Family("exponential", stats.expon(scale=100.0)),
     Family("lognormal, sigma 1", stats.lognorm(1.0, scale=100.0), is_asked_for=False),
@@ -272,7 +272,7 @@ def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=2000)
-    parser.add_argument("--resamples", type=int, default=599)
+    parser.add_argument("--resamples", type=int, default=399)
     parser.add_argument("--out", type=Path, default=Path("docs/results/interval_coverage.md"), help="the page")
     chosen = parser.parse_args()
     began = time.perf_counter()

@@ -37,8 +37,8 @@ class CensoredTimes:
     Raises
     ------
     ValueError
-        Where a sample is empty, holds nan or negative times, lengths differ, the horizon is not positive, nothing was observed
-        before the horizon, or the longest time is censored before the horizon, so that the curve is unknown up to there.
+        Where a sample is empty, holds nan or negative times, lengths differ, the horizon is not positive, or the longest time is
+        censored before the horizon, so that the curve is unknown up to there.
     """
 
     def __init__(self, times: ArrayLike, is_observed: ArrayLike, horizon: float) -> None:
@@ -46,8 +46,6 @@ class CensoredTimes:
         if not 0.0 < horizon < math.inf:
             raise ValueError(f"horizon is {horizon}; want a positive number of seconds")
         happened = happened & (known <= horizon)
-        if not happened.any():
-            raise ValueError(f"none of {len(known)} times was observed before the horizon of {horizon:g} s; want one at least")
         longest = float(known.max())
         if longest < horizon and not happened[known == longest].all():
             raise ValueError(
@@ -100,13 +98,15 @@ def restricted_mean(
     Parameters
     ----------
     times, is_observed, horizon
-        As in `CensoredTimes`, with its errors.
+        As in `CensoredTimes`, with its errors; also refused where nothing was observed up to the horizon.
     confidence : float
         How often the interval shall hold the truth.
     resamples, seed : int
         Number of resamples, and where their draws come from.
     """
     sample = CensoredTimes(times, is_observed, horizon)
+    if not sample.is_observed.any():
+        raise ValueError(f"none of {len(sample)} times was observed up to the horizon of {horizon:g} s; want one at least")
 
     def replicates(counts: Counts) -> tuple[Values, Values]:
         return _unzipped(_means_of(counts, *sample.arrays))
@@ -129,7 +129,7 @@ def restricted_difference(
     Raises
     ------
     ValueError
-        Where lengths or horizons differ.
+        Where lengths or horizons differ, or nothing was observed in either.
     """
     _check_partners(a, b)
 
@@ -160,6 +160,8 @@ def _check_partners(a: CensoredTimes, b: CensoredTimes) -> None:
         raise ValueError(f"a has {len(a)} times and b has {len(b)}; want as many, each with its partner")
     if a.horizon != b.horizon:
         raise ValueError(f"the horizon of a is {a.horizon:g} s and that of b {b.horizon:g} s; want the same")
+    if not (a.is_observed.any() or b.is_observed.any()):
+        raise ValueError(f"nothing was observed up to the horizon of {a.horizon:g} s, neither in a nor in b; want one time at least")
 
 
 def _unzipped(pairs: Values) -> tuple[Values, Values]:

@@ -132,7 +132,7 @@ def test_a_policy_does_not_differ_from_itself():
         ([1.0, np.nan], [True, True], 10.0, r"times\[1\] is nan"),
         ([1.0, -2.0], [True, True], 10.0, r"times\[1\] is -2.0; want 0 or more"),
         ([1.0, 2.0], [True], 10.0, "want one for each time"),
-        ([10.0, 10.0], [False, False], 10.0, "none of 2 times was observed before the horizon of 10 s"),
+        ([10.0, 10.0], [False, False], 10.0, "none of 2 times was observed up to the horizon of 10 s"),
         ([12.0, 14.0], [True, True], 10.0, "none of 2 times was observed"),
         ([1.0, 5.0], [True, False], 10.0, "want a horizon of at most 5 s"),
         ([1.0, 5.0], [True, True], 0.0, "horizon is 0.0"),
@@ -152,3 +152,11 @@ def test_partners_share_length_and_horizon():
         restricted_ratio(a, CensoredTimes([1.0, 2.0], [True, True], 9.0))
     with pytest.raises(ValueError, match="all times of b are 0"):
         restricted_ratio(a, CensoredTimes([0.0, 0.0], [True, True], 10.0))
+
+
+def test_of_a_policy_that_never_gets_there_the_horizon_counts():
+    never = CensoredTimes([10.0] * 8, [False] * 8, 10.0)
+    faster = CensoredTimes(np.linspace(2.0, 9.0, 8), [True] * 8, 10.0)
+    assert restricted_difference(never, faster).estimate == pytest.approx(4.5)
+    with pytest.raises(ValueError, match="neither in a nor in b"):
+        restricted_difference(never, never)
