@@ -12,7 +12,7 @@ Row = dict[str, Any]
 
 FILE = "episodes.jsonl"
 
-_WALL_TIME = ("decision_ms", "steps_per_s")
+WALL_TIME = ("decision_ms", "steps_per_s")
 """What differs between two runs of the same episode."""
 
 _WANTED: dict[str, type | tuple[type, ...]] = {
@@ -139,7 +139,7 @@ def _without_doubles(numbered: Iterable[tuple[int, Row]], path: Path) -> tuple[l
         known = kept.setdefault((*key_of(row), row["version"], row["settings_sha256"]), (number, row))
         if known[1] is row:
             continue
-        differing = [key for key in sorted({*known[1], *row} - set(_WALL_TIME)) if known[1].get(key) != row.get(key)]
+        differing = [key for key in sorted({*known[1], *row} - set(WALL_TIME)) if known[1].get(key) != row.get(key)]
         if differing:
             raise ValueError(
                 f"{path}, lines {known[0]} and {number} tell of the same episode ({name_of(row)}) but differ in {', '.join(differing)}; "

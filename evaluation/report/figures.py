@@ -40,12 +40,15 @@ class Value:
         In ``report.json``, for people, and what it is measured in.
     of : callable
         The figure of a run.
+    digits : int
+        Behind the point, for people.
     """
 
     key: str
     title: str
     unit: str
     of: Callable[[Row], float]
+    digits: int = 1
 
 
 VALUES = (
@@ -53,7 +56,7 @@ VALUES = (
     Value("path_m", "path of the team", "m", lambda row: float(sum(row["path_m"]))),
     Value("longest_path_m", "longest path of a robot", "m", lambda row: float(max(row["path_m"]))),
     Value("overlap_percent", "overlap", "%", lambda row: 100.0 * row["overlap"]),
-    Value("collisions", "collisions", "", lambda row: float(row["collisions"])),
+    Value("collisions", "collisions", "", lambda row: float(row["collisions"]), 2),
 )
 COMPARED = ("coverage_percent", "path_m", "overlap_percent")
 """Values in the table of comparisons, beside the times."""

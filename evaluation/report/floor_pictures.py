@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -23,6 +24,7 @@ VISIT_CELL_M = 0.25
 """Side of a cell of the maps of visits [m]."""
 
 MOST_PANELS = 6
+_COLOUR_MAP = "viridis_r"
 _MARGIN_M = 0.4
 _LEVELS = {0: (55, 65, 81), 127: (226, 230, 236), 255: (255, 255, 255)}
 
@@ -118,20 +120,21 @@ def save_visits(path: Path, group: Group, floor: str, visits: dict[str, Visits],
     for axes, (policy, each) in zip(panels, visits.items(), strict=True):
         _show_map(axes, tracks[policy], extent)
         shown = np.ma.masked_less(each.seconds, 1e-9)
-        image = axes.imshow(
-            shown, origin="lower", extent=each.extent, norm=scale, cmap="viridis_r", interpolation="nearest", zorder=2, alpha=0.92
-        )
+        look: dict[str, Any] = {"norm": scale, "cmap": _COLOUR_MAP, "interpolation": "nearest", "zorder": 2, "alpha": 0.92}
+        axes.imshow(shown, origin="lower", extent=each.extent, **look)
         _caption(axes, policy, f"{each.runs} run{'s' if each.runs != 1 else ''}")
-    bar = figure.colorbar(image, ax=panels, shrink=0.85, pad=0.015, aspect=28)
+    bar = figure.colorbar(ScalarMappable(scale, _COLOUR_MAP), ax=panels, alpha=0.92, shrink=0.85, pad=0.015, aspect=28)
     bar.set_label(f"robots' time per run in a cell of {VISIT_CELL_M:g} m [s]", fontsize=9, color=FAINT)
     bar.ax.tick_params(labelsize=8.5, colors=FAINT)
-    bar.ax.yaxis.set_major_formatter("{x:g}")
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    ticks = [digit * 10.0**power for power in range(-1, 5) for digit in (1, 2, 5) if digit * 10.0**power <= most]
+    bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    bar.minorticks_off()
+    bar.outline.set_visible(False)
     save(
         path,
         figure,
         f"Where the robots were on {floor}: {group.robots} robot{'s' if group.robots != 1 else ''}",
-        "mean over the recorded runs; logarithmic scale; below: a map that the team made",
+        "mean over the recorded runs; logarithmic scale; underneath, a map that the team made",
     )
 
 
@@ -154,9 +157,9 @@ def _ending_of(row: Row) -> str:
 def _known_extent(track: Track) -> Extent:
     is_known = track.levels != 127
     if not is_known.any():
-        x, y = track.poses[..., 0], track.poses[..., 1]
-        return float(x.min()), float(x.max()), float(y.min()), float(y.max())
-    rows, columns = np.flatnonzero(is_known.any(axis=1)), np.flatnonzero(is_known.any(axis=0))
+        (x_min, y_min), (x_max, y_max) = (end(track.poses[..., :2], axis=(0, 1)) for end in (np.min, np.max))
+        return float(x_min), float(x_max), float(y_min), float(y_max)
+    rows, columns = np.flatnonzero(is_known.any(axis=1)).tolist(), np.flatnonzero(is_known.any(axis=0)).tolist()
     (x, y), side = track.origin, track.resolution
     return x + columns[0] * side, x + (columns[-1] + 1) * side, y + rows[0] * side, y + (rows[-1] + 1) * side
 
@@ -186,7 +189,8 @@ def _show_map(axes: Axes, track: Track, extent: Extent) -> None:
         picture[track.levels == level] = colour
     rows, columns = track.levels.shape
     (x, y), side = track.origin, track.resolution
-    axes.set_facecolor(tuple(part / 255.0 for part in _LEVELS[127]))
+    red, green, blue = (part / 255.0 for part in _LEVELS[127])
+    axes.set_facecolor((red, green, blue))
     axes.imshow(picture, origin="lower", extent=(x, x + columns * side, y, y + rows * side), interpolation="antialiased", zorder=0)
     axes.set_xlim(extent[0], extent[1])
     axes.set_ylim(extent[2], extent[3])

@@ -1,12 +1,14 @@
 """Sorts episodes into groups whose figures may be put side by side, and into pairs."""
 
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.envs.floors.catalogue import GENERATORS, SETS, floor_names
-from lidarium.evaluation.report.episodes import Row, pair_key_of
+from lidarium.evaluation.report.episodes import WALL_TIME, Row, pair_key_of
 from lidarium.evaluation.statistics import CensoredTimes
 
 
@@ -67,8 +69,8 @@ class Reached:
         How many did not and were cut before the horizon: nobody knows when they would have.
     """
 
-    times: np.ndarray[tuple[int], np.dtype[np.float64]]
-    is_reached: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    times: NDArray[np.float64]
+    is_reached: NDArray[np.bool_]
     horizon_s: float
     cut: int
 
@@ -78,12 +80,12 @@ class Reached:
         return CensoredTimes(self.times, self.is_reached, self.horizon_s)
 
     @property
-    def or_never(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def or_never(self) -> NDArray[np.float64]:
         """The times, inf where the share was not reached."""
         return np.where(self.is_reached, self.times, np.inf)
 
     @property
-    def up_to_horizon(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def up_to_horizon(self) -> NDArray[np.float64]:
         """The times, the horizon where the share was not reached."""
         return np.where(self.is_reached, self.times, self.horizon_s)
 
@@ -142,6 +144,15 @@ def paired(a: Iterable[Row], b: Iterable[Row]) -> tuple[list[Row], list[Row]]:
     partners = {pair_key_of(row): row for row in b}
     pairs = [(row, partners[pair_key_of(row)]) for row in a if pair_key_of(row) in partners]
     return [first for first, _ in pairs], [second for _, second in pairs]
+
+
+def repeats(rows: Iterable[Row]) -> int:
+    """Return how many runs say what another run on the same floor said already, seed and wall time aside.
+
+    Where neither starts nor noise are drawn, a policy without chance does the same whatever the seed.
+    """
+    said = [json.dumps({key: value for key, value in row.items() if key not in ("seed", *WALL_TIME)}, sort_keys=True) for row in rows]
+    return len(said) - len(set(said))
 
 
 def _is_cut(row: Row) -> bool:

@@ -15,7 +15,7 @@ from lidarium.evaluation.report.episodes import pair_key_of
 from lidarium.evaluation.report.figures import TIMES, VALUES
 from lidarium.evaluation.report.groups import Group, times_to
 from lidarium.evaluation.report.records import Entry, Key, coverage_at, record_key
-from lidarium.evaluation.report.style import colours, dash, dress, legend, save
+from lidarium.evaluation.report.style import band, colours, dash, dress, legend, save
 from lidarium.evaluation.statistics import median_bands, ratio_profile, score_profile
 
 CURVE_POINTS = 181
@@ -59,15 +59,15 @@ def save_coverage(path: Path, group: Group, curves: Curves) -> None:
         colour = colours(len(shown))[index]
         axes.plot(curve["times_s"], curve["median_percent"], color=colour, linestyle=dash(index), linewidth=1.9, zorder=3)
         if None not in curve["low_percent"]:
-            axes.fill_between(curve["times_s"], curve["low_percent"], curve["high_percent"], color=colour, alpha=0.16, linewidth=0)
+            band(axes, curve["times_s"], curve["low_percent"], curve["high_percent"], colour)
     dress(axes, "", "simulated time [s]", "coverage C_free [%]")
     axes.set_xlim(0.0, _end_of(curves, group.horizon_s))
     axes.set_ylim(0.0, 101.0)
     handles = [Line2D([], [], color=colours(len(shown))[k], linestyle=dash(k), linewidth=1.9) for k in map(shown.index, curves)]
     legend(figure, [f"{policy} ({curve['runs']} runs)" for policy, curve in curves.items()], handles)
     has_bands = any(None not in curve["low_percent"] for curve in curves.values())
-    band = "shaded: its 95 % interval at each time" if has_bands else "too few runs for intervals"
-    save(path, figure, f"Coverage over time: {group.title}", f"median of the runs; {band}; a run that ends keeps its coverage")
+    shaded = "shaded: its 95 % interval at each time" if has_bands else "too few runs for intervals"
+    save(path, figure, f"Coverage over time: {group.title}", f"median of the runs; {shaded}; a run that ends keeps its coverage")
 
 
 def save_boxes(path: Path, group: Group) -> None:
@@ -124,14 +124,12 @@ def save_profiles(path: Path, group: Group, found: dict[str, Any]) -> None:
         axes = figure.add_subplot(1, len(panels), k + 1)
         if panel == "coverage":
             curve = found["coverage_at_least"]
+            x = 100.0 * np.array(curve["thresholds"])
             for index, (share, low, high) in enumerate(curve["share_low_high"].values()):
-                x = 100.0 * np.array(curve["thresholds"])
                 _draw_share(axes, x, share, index, chosen[index], "pre")
-                axes.fill_between(
-                    x, 100.0 * np.array(low), 100.0 * np.array(high), step="pre", color=chosen[index], alpha=0.13, linewidth=0
-                )
+                band(axes, x, 100.0 * np.array(low), 100.0 * np.array(high), chosen[index], "pre")
             dress(axes, "coverage at the end", "coverage of at least [%]", "share of runs [%]")
-            axes.set_xlim(x[0], 100.0)
+            axes.set_xlim(float(x[0]), 100.0)
         else:
             curve = found["within_factor"][panel]
             for index, share in enumerate(curve["shares"].values()):

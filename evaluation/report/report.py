@@ -99,9 +99,8 @@ def _about_records(episodes: Episodes, records: dict[Key, Entry]) -> list[str]:
         return []
     if not records:
         return [f"There are no records in {FOLDER}/, so coverage over time, paths and visits are not drawn."]
-    return [
-        f"{len(missing)} of {len(episodes.rows)} episodes have no record, such as {name_of(missing[0])}; curves and pictures show the others."
-    ]
+    many = f"{len(missing)} of {len(episodes.rows)} episodes have no record, such as {name_of(missing[0])}"
+    return [f"{many}; curves and pictures show the others."]
 
 
 def _page(result: dict[str, Any], sections: Sequence[Section]) -> str:

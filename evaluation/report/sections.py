@@ -12,7 +12,6 @@ from lidarium.evaluation.report.episodes import Row
 from lidarium.evaluation.report.figures import (
     TIMES,
     VALUES,
-    Comparison,
     TimeFigure,
     compared,
     further_figure,
@@ -21,7 +20,7 @@ from lidarium.evaluation.report.figures import (
     value_figure,
 )
 from lidarium.evaluation.report.floor_pictures import recorded_pair, save_paths, save_visits, visits_on
-from lidarium.evaluation.report.groups import Group, paired, times_to
+from lidarium.evaluation.report.groups import Group, paired, repeats, times_to
 from lidarium.evaluation.report.plots import coverage_curves, profiles, save_boxes, save_coverage, save_profiles
 from lidarium.evaluation.report.records import Entry, Key
 from lidarium.evaluation.statistics import FEWEST_FOR_NOMINAL, median_interval
@@ -92,6 +91,11 @@ def _tell_times(section: Section, seed: int) -> None:
         if missed := [_missed(policy, figure) for policy, figure in figures.items() if figure.reached < figure.size]:
             section.warnings.append(f"{title} was not reached in {', '.join(missed)}.")
     few = [f"`{policy}` ({len(rows)})" for policy, rows in group.runs.items() if len(rows) < FEWEST_FOR_NOMINAL]
+    if again := [f"{repeats(rows)} of {len(rows)} of `{policy}`" for policy, rows in group.runs.items() if repeats(rows)]:
+        section.warnings.append(
+            f"runs that repeat another one on their floor in every figure: {', '.join(again)}. The seed changed nothing there, so they "
+            "are no further evidence: intervals are too narrow and p values too small."
+        )
     if few:
         section.warnings.append(f"fewer than {FEWEST_FOR_NOMINAL} runs of {', '.join(few)}: {_OF_FEW}")
 
@@ -129,7 +133,10 @@ def _tell_comparisons(section: Section, baseline: str, seed: int) -> None:
     _warn_of_pairs(section, others, baseline)
     if comparisons:
         section.markdown += [f"### Compared with `{baseline}`, pair by pair", tables.comparisons_table(comparisons)]
-        section.markdown += _differences_in_words(comparisons, baseline)
+        section.markdown.append(
+            "Policy less baseline, policy over baseline. Wilcoxon's signed rank test and the sign test leave out pairs that are the same; "
+            f"Holm's correction is for the {len(comparisons)} comparisons of this table, and what is beyond chance at 5 % is in bold."
+        )
 
 
 def _warn_of_pairs(section: Section, others: Sequence[str], baseline: str) -> None:
@@ -148,18 +155,6 @@ def _warn_of_pairs(section: Section, others: Sequence[str], baseline: str) -> No
         section.warnings.append(
             f"runs without a partner on the same floor, starts and seed were left out of comparisons: {', '.join(unpaired)}."
         )
-
-
-def _differences_in_words(comparisons: Sequence[Comparison], baseline: str) -> list[str]:
-    real = [each for each in comparisons if each.p_holm < 0.05 and each.difference is not None]
-    if not real:
-        return [f"No difference from `{baseline}` is beyond chance at 5 % in this table."]
-    told = "; ".join(f"`{each.policy}` has {_less_or_more(each)} {tables.TITLES[each.key]}" for each in real)
-    return [f"Beyond chance at 5 % over the whole table (Holm), against `{baseline}`: {told}."]
-
-
-def _less_or_more(comparison: Comparison) -> str:
-    return "less" if comparison.difference is not None and comparison.difference.estimate < 0.0 else "more"
 
 
 def _draw_plots(section: Section, records: dict[Key, Entry], out: Path) -> None:

@@ -2,9 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, Literal
 
+import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import ArrayLike
 
 from lidarium.envs.rendering import team_colours
 from lidarium.evaluation.pictures import FAINT, INK, save_figure
@@ -21,7 +26,7 @@ def colours(count: int) -> list[str]:
     return [*COLOURS, *(f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in team_colours(count))][:count]
 
 
-def dash(index: int) -> str | tuple[int, tuple[float, ...]]:
+def dash(index: int) -> Any:  # noqa: ANN401
     """Return the line style of a policy, so that lines differ without colour, too."""
     return DASHES[index % len(DASHES)]
 
@@ -38,18 +43,24 @@ def dress(axes: Axes, title: str, x_label: str, y_label: str) -> None:
     axes.spines[["left", "bottom"]].set_color(FRAME)
 
 
+def band(axes: Axes, x: ArrayLike, low: ArrayLike, high: ArrayLike, colour: str, step: Literal["pre", "post", "mid"] | None = None) -> None:
+    """Shade an interval, with thin edges by which overlapping ones are told apart."""
+    look: dict[str, Any] = {"facecolor": f"{colour}1f", "edgecolor": f"{colour}80", "linewidth": 0.7}
+    axes.fill_between(np.asarray(x), np.asarray(low), np.asarray(high), step=step, **look)
+
+
 def save(path: Path, figure: Figure, title: str, subtitle: str = "") -> None:
     """Write a figure with a title and, below it, a line that says what is to be seen."""
     height = figure.get_figheight()
     figure.text(0.012, 1.0 - 0.12 / height, title, ha="left", va="top", fontsize=13, fontweight="bold", color=INK)
     figure.text(0.012, 1.0 - 0.40 / height, subtitle, ha="left", va="top", fontsize=9, color=FAINT)
     engine = figure.get_layout_engine()
-    if engine is not None:
+    if isinstance(engine, ConstrainedLayoutEngine):
         engine.set(rect=(0.0, 0.0, 1.0, 1.0 - 0.66 / height))
     save_figure(path, figure)
 
 
-def legend(figure: Figure, names: Sequence[str], handles: Sequence[object]) -> None:
+def legend(figure: Figure, names: Sequence[str], handles: Sequence[Artist]) -> None:
     """Put one legend below all axes, in as many columns as there is room for."""
     # Width of the longest entry [inch] at this size of letters, line and gaps included.
     width = 0.072 * max(len(name) for name in names) + 0.66

@@ -18,19 +18,19 @@ def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def number(value: float, horizon_s: float | None = None) -> str:
-    """Return a number with one digit behind the point, of small ones two; inf as later than the horizon."""
+def number(value: float, horizon_s: float | None = None, digits: int = 1) -> str:
+    """Return a number with so many digits behind the point; inf as later than the horizon."""
     if math.isinf(value):
         return f"> {horizon_s:.0f}" if value > 0.0 and horizon_s is not None else NONE
-    text = f"{value:.1f}" if abs(value) >= 10.0 else f"{value:.2f}"
+    text = f"{value:.{digits}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
-def interval(found: Interval | None, horizon_s: float | None = None, scale: float = 1.0) -> str:
+def interval(found: Interval | None, horizon_s: float | None = None, scale: float = 1.0, digits: int = 1) -> str:
     """Return an estimate with its interval in brackets, of which unbounded ends are left open."""
     if found is None:
         return NONE
-    estimate, low, high = (number(scale * end, horizon_s) for end in (found.estimate, found.low, found.high))
+    estimate, low, high = (number(scale * end, horizon_s, digits) for end in (found.estimate, found.low, found.high))
     return f"{estimate} [{low}, {high}]"
 
 
@@ -65,7 +65,8 @@ def values_table(figures: dict[str, dict[str, ValueFigure]]) -> str:
         header.append(f"{value.title}{unit}, {'mean' if value.key in by_mean else 'median'}")
     rows = []
     for policy, by_key in figures.items():
-        cells = [interval(by_key[value.key].mean if value.key in by_mean else by_key[value.key].median) for value in VALUES]
+        shown = [(by_key[value.key].mean if value.key in by_mean else by_key[value.key].median, value.digits) for value in VALUES]
+        cells = [interval(found, digits=digits) for found, digits in shown]
         rows.append([f"`{policy}`", *cells])
     return markdown_table(header, rows)
 
@@ -74,8 +75,12 @@ def further_table(figures: dict[str, dict[str, Interval]], horizon_s: float) -> 
     """Return the medians of all other figures, one a line, policies side by side."""
     policies = list(figures)
     keys = [key for key in figures[policies[0]] if all(key in by_key for by_key in figures.values())]
-    rows = [[f"`{key}`", *(interval(figures[policy][key], horizon_s) for policy in policies)] for key in keys]
+    rows = [[f"`{key}`", *(interval(figures[policy][key], horizon_s, digits=_digits(key)) for policy in policies)] for key in keys]
     return markdown_table(["figure, median", *(f"`{policy}`" for policy in policies)], rows) if rows else ""
+
+
+def _digits(key: str) -> int:
+    return 1 if key.endswith(("_s", "_m", "_ms", "_percent")) else 3
 
 
 def comparisons_table(comparisons: Sequence[Comparison]) -> str:
@@ -87,7 +92,7 @@ def comparisons_table(comparisons: Sequence[Comparison]) -> str:
             f"{TITLES[each.key]} [{UNITS[each.key]}]",
             str(each.pairs),
             interval(each.difference),
-            interval(each.ratio),
+            interval(each.ratio, digits=2),
             f"{each.wilcoxon.less} / {each.wilcoxon.greater} / {each.wilcoxon.ties}",
             p_value(each.wilcoxon.p_value),
             p_value(each.p_holm),

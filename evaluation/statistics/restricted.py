@@ -12,6 +12,7 @@ Medical Research Methodology 13 (2013). Influence: Reid, Annals of Statistics 9 
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,7 +88,7 @@ def kaplan_meier(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, Valu
     known, happened = checked_times(times, is_observed)
     moments, events = np.unique(known[happened], return_counts=True)
     at_risk = len(known) - np.searchsorted(np.sort(known), moments, side="left")
-    return moments, np.cumprod(1.0 - events / at_risk)
+    return moments, np.asarray(np.cumprod(1.0 - events / at_risk), np.float64)
 
 
 def restricted_mean(
@@ -111,7 +112,9 @@ def restricted_mean(
     def replicates(counts: Counts) -> tuple[Values, Values]:
         return _unzipped(_means_of(counts, *sample.arrays))
 
-    return studentised_interval(replicates, len(sample), confidence, resamples, seed)
+    found = studentised_interval(replicates, len(sample), confidence, resamples, seed)
+    # The truth lies between 0 and the horizon whatever the sample.
+    return replace(found, low=max(found.low, 0.0), high=min(found.high, sample.horizon))
 
 
 def restricted_difference(
@@ -249,4 +252,4 @@ def _influences_on(counts: Array, times: Array, is_observed: Array, order: Array
             hazard += count * pull
             influences[i] = hazard - at_risk * pull
         at_risk = left
-    return area
+    return float(area)

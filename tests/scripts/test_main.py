@@ -58,7 +58,7 @@ def rewritten(path, **changes):
 def test_help_names_the_commands(capsys):
     assert main(["--help"]) == 0
     told = capsys.readouterr().out
-    assert all(name in told for name in ("run", "floors", "bench", "show"))
+    assert all(name in told for name in ("run", "report", "floors", "bench", "show"))
 
 
 def test_help_comes_without_loading_the_kernels():
@@ -69,7 +69,7 @@ def test_help_comes_without_loading_the_kernels():
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "floors list", "floors show", "floors generate", "floors import", "floors prepare", "bench", "show"]
+    "command", ["run", "report", "floors list", "floors show", "floors generate", "floors import", "floors prepare", "bench", "show"]
 )
 def test_every_command_has_seed_out_and_json(command, capsys):
     assert main([*command.split(), "--help"]) == 0
@@ -221,7 +221,7 @@ def test_numbers_out_of_range_are_refused(option, tmp_path, capsys):
     refused(["run", "--video", *option.split()], capsys, tmp_path, option.split()[1])
 
 
-@pytest.mark.parametrize("command", ["run", "floors list", "floors show apartment", "floors generate", "show robots", "bench"])
+@pytest.mark.parametrize("command", ["run", "report", "floors list", "floors show apartment", "floors generate", "show robots", "bench"])
 def test_an_out_that_cannot_be_written_is_refused_before_the_work(command, tmp_path, capsys):
     (tmp_path / "file").write_text("mine")
     for place in (tmp_path / "file", tmp_path / "file" / "below"):
