@@ -10,6 +10,8 @@ Hettmansperger and Sheather, Confidence intervals based on interpolated order st
 Nyblom, Note on interpolated order statistics, Statistics and Probability Letters 14 (1992).
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
@@ -39,15 +41,11 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, is_interpolated
     ordered = np.sort(checked_values(values, allow_infinite=True))
     size, tail = len(ordered), 0.5 * (1.0 - checked_confidence(confidence))
     median = _between(ordered[(size - 1) // 2], ordered[size // 2], 0.5)
-    # The greatest rank d from below with P(Binomial(n, 1/2) < d) <= tail.
-    rank = int(stats.binom.ppf(tail, size, 0.5))
-    if stats.binom.cdf(rank, size, 0.5) <= tail:
-        rank += 1
+    rank, share = _rank_and_share(size, tail)
     if rank < 1:
         return Interval(median, -np.inf, np.inf, confidence, size)
     if not is_interpolated:
         return Interval(median, float(ordered[rank - 1]), float(ordered[-rank]), confidence, size)
-    share = _interpolation(size, rank, tail)
     low = _between(ordered[rank - 1], ordered[rank], share)
     high = _between(ordered[size - rank], ordered[size - rank - 1], share)
     return Interval(median, low, high, confidence, size)
@@ -62,11 +60,20 @@ def median_bands(values: Values, confidence: float = 0.95) -> Values:
     return np.array([[each.estimate, each.low, each.high] for each in columns]).T
 
 
-def _interpolation(size: int, rank: int, tail: float) -> float:
-    """Return how far to go from rank d to d + 1 (Hettmansperger and Sheather, equation 2)."""
+@lru_cache(maxsize=1024)
+def _rank_and_share(size: int, tail: float) -> tuple[int, float]:
+    """Return the greatest rank d with P(Binomial(n, 1/2) < d) <= tail, and how far to go from there to rank d + 1.
+
+    The latter is equation 2 of Hettmansperger and Sheather. Rank 0 where there is none.
+    """
+    rank = int(stats.binom.ppf(tail, size, 0.5))
+    if stats.binom.cdf(rank, size, 0.5) <= tail:
+        rank += 1
+    if rank < 1:
+        return 0, 0.0
     outer, inner = (1.0 - 2.0 * stats.binom.cdf(d - 1, size, 0.5) for d in (rank, rank + 1))
     part = (outer - (1.0 - 2.0 * tail)) / (outer - inner)
-    return float((size - rank) * part / (rank + (size - 2 * rank) * part))
+    return rank, float((size - rank) * part / (rank + (size - 2 * rank) * part))
 
 
 def _between(start: float, end: float, share: float) -> float:
