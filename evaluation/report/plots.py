@@ -22,6 +22,8 @@ CURVE_POINTS = 181
 FACTORS = np.geomspace(1.0, 4.0, 121)
 BOXED = ("path_m", "overlap_percent")
 _FEWEST_FOR_BOX = 5
+_MOST_BANDS = 5
+"""Intervals of more policies than this would hide each other; they are in ``report.json`` all the same."""
 
 Curves = dict[str, dict[str, Any]]
 
@@ -64,7 +66,7 @@ def save_coverage(path: Path, group: Group, curves: Curves) -> None:
     axes.set_xlim(0.0, _end_of(curves, group.horizon_s))
     axes.set_ylim(0.0, 101.0)
     handles = [Line2D([], [], color=colours(len(shown))[k], linestyle=dash(k), linewidth=1.9) for k in map(shown.index, curves)]
-    legend(figure, [f"{policy} ({curve['runs']} runs)" for policy, curve in curves.items()], handles)
+    legend(figure, [f"{policy} ({curve['runs']} run{'s' if curve['runs'] != 1 else ''})" for policy, curve in curves.items()], handles)
     has_bands = any(None not in curve["low_percent"] for curve in curves.values())
     shaded = "shaded: its 95 % interval at each time" if has_bands else "too few runs for intervals"
     save(path, figure, f"Coverage over time: {group.title}", f"median of the runs; {shaded}; a run that ends keeps its coverage")
@@ -75,7 +77,9 @@ def save_boxes(path: Path, group: Group) -> None:
     values = [value for value in VALUES if value.key in BOXED and not (value.key == "overlap_percent" and group.robots == 1)]
     panels = len(TIMES) + len(values)
     policies = list(group.runs)
-    figure = Figure(figsize=(max(0.9 + 0.58 * len(policies), 2.5) * panels, 4.9), layout="constrained")
+    # Names of policies stand aslant below the axes.
+    height = 4.1 + 0.042 * max(map(len, policies))
+    figure = Figure(figsize=(max(0.9 + 0.58 * len(policies), 2.5) * panels, height), layout="constrained")
     row_of_axes = [figure.add_subplot(1, panels, k + 1) for k in range(panels)]
     for axes, (key, title) in zip(row_of_axes, TIMES.items(), strict=False):
         found = [times_to(rows, key, group.horizon_s) for rows in group.runs.values()]
@@ -120,6 +124,7 @@ def save_profiles(path: Path, group: Group, found: dict[str, Any]) -> None:
     panels = [*found["within_factor"], "coverage"]
     figure = Figure(figsize=(4.3 * len(panels), 4.7), layout="constrained")
     chosen = colours(len(group.runs))
+    is_banded = len(group.runs) <= _MOST_BANDS
     for k, panel in enumerate(panels):
         axes = figure.add_subplot(1, len(panels), k + 1)
         if panel == "coverage":
@@ -127,7 +132,8 @@ def save_profiles(path: Path, group: Group, found: dict[str, Any]) -> None:
             x = 100.0 * np.array(curve["thresholds"])
             for index, (share, low, high) in enumerate(curve["share_low_high"].values()):
                 _draw_share(axes, x, share, index, chosen[index], "pre")
-                band(axes, x, 100.0 * np.array(low), 100.0 * np.array(high), chosen[index], "pre")
+                if is_banded:
+                    band(axes, x, 100.0 * np.array(low), 100.0 * np.array(high), chosen[index], "pre")
             dress(axes, "coverage at the end", "coverage of at least [%]", "share of runs [%]")
             axes.set_xlim(float(x[0]), 100.0)
         else:
@@ -142,12 +148,8 @@ def save_profiles(path: Path, group: Group, found: dict[str, Any]) -> None:
         axes.set_ylim(0.0, 102.0)
     handles = [Line2D([], [], color=chosen[k], linestyle=dash(k), linewidth=1.9) for k in range(len(chosen))]
     legend(figure, list(group.runs), handles)
-    save(
-        path,
-        figure,
-        f"Performance profiles: {group.title}",
-        "shaded: 95 % interval of the share (Wilson); runs that did not get there count as missed",
-    )
+    shaded = "shaded: 95 % interval of the share (Wilson); " if is_banded else ""
+    save(path, figure, f"Performance profiles: {group.title}", f"{shaded}runs that did not get there count as missed")
 
 
 def _end_of(curves: Curves, horizon_s: float) -> float:

@@ -221,7 +221,7 @@ def test_numbers_out_of_range_are_refused(option, tmp_path, capsys):
     refused(["run", "--video", *option.split()], capsys, tmp_path, option.split()[1])
 
 
-@pytest.mark.parametrize("command", ["run", "report", "floors list", "floors show apartment", "floors generate", "show robots", "bench"])
+@pytest.mark.parametrize("command", ["run", "floors list", "floors show apartment", "floors generate", "show robots", "bench"])
 def test_an_out_that_cannot_be_written_is_refused_before_the_work(command, tmp_path, capsys):
     (tmp_path / "file").write_text("mine")
     for place in (tmp_path / "file", tmp_path / "file" / "below"):
