@@ -161,6 +161,11 @@ def _page(aspect: float) -> tuple[Figure, Axes, Axes, Axes]:
 def _save(path: Path, figure: Figure, title: str, subtitle: str) -> None:
     figure.suptitle(title, x=0.012, ha="left", fontsize=15, fontweight="bold", color=INK)
     figure.axes[0].set_title(subtitle, loc="left", fontsize=10.5, color=FAINT)
+    save_figure(path, figure)
+
+
+def save_figure(path: Path, figure: Figure) -> None:
+    """Write a figure as a PNG file, whole or not at all."""
     FigureCanvasAgg(figure)
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=DPI, facecolor="white")

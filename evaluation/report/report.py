@@ -1,0 +1,127 @@
+"""Writes the report of a directory of episodes: tables, plots, and all numbers behind them."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lidarium
+from lidarium.evaluation.output import check_writable, write_text
+from lidarium.evaluation.report.episodes import Episodes, name_of, read_episodes
+from lidarium.evaluation.report.groups import grouped
+from lidarium.evaluation.report.records import FOLDER, Entry, Key, read_records, record_key
+from lidarium.evaluation.report.sections import Section, tell_group
+
+
+def write_report(directory: Path, out: Path, baseline: str | None = None, seed: int = 0) -> dict[str, Any]:
+    """Write ``report.md``, ``report.json`` and plots of the episodes of a directory.
+
+    Parameters
+    ----------
+    directory : Path
+        What `lidarium evaluate --out` wrote: ``episodes.jsonl``, and ``records`` for the plots that show paths and curves.
+    out : Path
+        Folder of the report.
+    baseline : str or None
+        Policy that the others are compared with; ``nearest_frontier`` where it is there, else the first of the alphabet.
+    seed : int
+        Where the draws of bootstrap intervals come from.
+
+    Returns
+    -------
+    dict
+        The content of ``report.json``.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError, OSError
+        As `read_episodes`; where the baseline is not among the policies; where nothing can be written.
+    """
+    check_writable(out)
+    episodes = read_episodes(directory)
+    baseline = _baseline(episodes, baseline)
+    records, warnings = read_records(directory, episodes.rows)
+    sections = [tell_group(group, records, out, baseline, seed) for group in grouped(episodes.rows)]
+    warnings = [*episodes.warnings, *_about_names(episodes), *warnings, *_about_records(episodes, records)]
+    result = {
+        "version": lidarium.__version__,
+        "episodes_version": episodes.version,
+        "episodes": len(episodes.rows),
+        "records": len(records),
+        "baseline": baseline,
+        "confidence": 0.95,
+        "seed": seed,
+        "warnings": [*warnings, *(f"{section.group.title}: {warning}" for section in sections for warning in section.warnings)],
+        "groups": [section.numbers for section in sections],
+    }
+    numbers: dict[str, Any] = jsonable(result)
+    # For programs: thousands of numbers, which would stand on a line each otherwise.
+    write_text(out / "report.json", json.dumps(numbers, allow_nan=False, ensure_ascii=False, separators=(",", ":")) + "\n")
+    write_text(out / "report.md", _page(result, sections))
+    return numbers
+
+
+def jsonable(content: Any) -> Any:  # noqa: ANN401
+    """Return the same of what JSON knows: dataclasses as objects, numbers that are not finite as null."""
+    if is_dataclass(content) and not isinstance(content, type):
+        return jsonable(asdict(content))
+    if isinstance(content, dict):
+        return {key: jsonable(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [jsonable(value) for value in content]
+    if isinstance(content, np.ndarray):
+        return jsonable(content.tolist())
+    return None if isinstance(content, float) and not np.isfinite(content) else content
+
+
+def _baseline(episodes: Episodes, baseline: str | None) -> str:
+    policies = sorted({str(row["policy"]) for row in episodes.rows})
+    if baseline is None:
+        return "nearest_frontier" if "nearest_frontier" in policies else policies[0]
+    if baseline not in policies:
+        raise ValueError(f"--baseline is {baseline!r}, of which there are no episodes; want one of {', '.join(policies)}")
+    return baseline
+
+
+def _about_names(episodes: Episodes) -> list[str]:
+    from lidarium.agents import policy_names
+
+    unknown = sorted({str(row["policy"]) for row in episodes.rows} - set(policy_names()))
+    return [f"Policies that this lidarium does not have: {', '.join(unknown)}; their figures are told all the same."] if unknown else []
+
+
+def _about_records(episodes: Episodes, records: dict[Key, Entry]) -> list[str]:
+    missing = [row for row in episodes.rows if record_key(row) not in records]
+    if not missing:
+        return []
+    if not records:
+        return [f"There are no records in {FOLDER}/, so coverage over time, paths and visits are not drawn."]
+    many = f"{len(missing)} of {len(episodes.rows)} episodes have no record, such as {name_of(missing[0])}"
+    return [f"{many}; curves and pictures show the others."]
+
+
+def _page(result: dict[str, Any], sections: Sequence[Section]) -> str:
+    paragraphs = [
+        "# Report",
+        f"{result['episodes']} episodes of lidarium {result['episodes_version']}, {result['records']} of them recorded; baseline "
+        f"`{result['baseline']}`. Times are simulated. In brackets stand 95 % intervals: medians by interpolated order statistics, "
+        f"shares by Wilson, means, differences and ratios by the studentised bootstrap (10,000 resamples, seed {result['seed']}). "
+        "Differences and ratios of times are those of restricted means, in which a run that did not get there counts with the horizon; "
+        "those of other figures are the mean difference and the geometric mean of the ratios. All numbers are in `report.json`.",
+    ]
+    if result["warnings"]:
+        paragraphs += ["## Be careful", "\n".join(f"- {warning}" for warning in result["warnings"])]
+    for section in sections:
+        group = section.group
+        seeds = len({row["seed"] for rows in group.runs.values() for row in rows})
+        runs = sum(len(rows) for rows in group.runs.values())
+        paragraphs += [
+            f"## {group.title}",
+            f"{runs} runs of {len(group.runs)} policies on {len(group.floors)} floor{'s' if len(group.floors) != 1 else ''}, "
+            f"{seeds} seed{'s' if seeds != 1 else ''}; times count up to {group.horizon_s:.0f} s.",
+            *section.markdown,
+        ]
+    return "\n\n".join(paragraphs) + "\n"

@@ -1,0 +1,120 @@
+"""Figures as markdown."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+from lidarium.evaluation.report.figures import TIMES, VALUES, Comparison, TimeFigure, ValueFigure
+from lidarium.evaluation.report.groups import Group, times_to
+from lidarium.evaluation.statistics import Interval, median_interval
+
+NONE = "–"  # noqa: RUF001
+TITLES = {**TIMES, **{value.key: value.title for value in VALUES}}
+UNITS = {**dict.fromkeys(TIMES, "s"), **{value.key: value.unit for value in VALUES}}
+
+
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table; the first column to the left, the others to the right."""
+    lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def number(value: float, horizon_s: float | None = None, digits: int = 1) -> str:
+    """Return a number with so many digits behind the point; inf as later than the horizon."""
+    if math.isinf(value):
+        return f"> {horizon_s:.0f}" if value > 0.0 and horizon_s is not None else NONE
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def interval(found: Interval | None, horizon_s: float | None = None, scale: float = 1.0, digits: int = 1) -> str:
+    """Return an estimate with its interval in brackets, of which unbounded ends are left open."""
+    if found is None:
+        return NONE
+    estimate, low, high = (number(scale * end, horizon_s, digits) for end in (found.estimate, found.low, found.high))
+    return f"{estimate} [{low}, {high}]"
+
+
+def p_value(value: float) -> str:
+    """Return a p value with as many digits as tell something."""
+    return "< 0.0001" if value < 1e-4 else f"{value:.2g}" if value < 0.01 else f"{value:.3f}"
+
+
+def times_table(figures: dict[str, TimeFigure], horizon_s: float) -> str:
+    """Return success, median and restricted mean of a time by policy."""
+    header = ("policy", "runs", "reached", "success [%]", "median [s]", f"mean up to {horizon_s:.0f} s [s]")
+    rows = [
+        (
+            f"`{policy}`",
+            str(figure.size),
+            str(figure.reached),
+            interval(figure.success, scale=100.0),
+            interval(figure.median, horizon_s),
+            interval(figure.restricted_mean, horizon_s),
+        )
+        for policy, figure in figures.items()
+    ]
+    return markdown_table(header, rows)
+
+
+def values_table(figures: dict[str, dict[str, ValueFigure]]) -> str:
+    """Return the median of every value by policy, of collisions and coverage the mean."""
+    by_mean = ("coverage_percent", "collisions")
+    header = ["policy"]
+    for value in VALUES:
+        unit = f" [{value.unit}]" if value.unit else ""
+        header.append(f"{value.title}{unit}, {'mean' if value.key in by_mean else 'median'}")
+    rows = []
+    for policy, by_key in figures.items():
+        shown = [(by_key[value.key].mean if value.key in by_mean else by_key[value.key].median, value.digits) for value in VALUES]
+        cells = [interval(found, digits=digits) for found, digits in shown]
+        rows.append([f"`{policy}`", *cells])
+    return markdown_table(header, rows)
+
+
+def further_table(figures: dict[str, dict[str, Interval]], horizon_s: float) -> str:
+    """Return the medians of all other figures, one a line, policies side by side."""
+    policies = list(figures)
+    keys = [key for key in figures[policies[0]] if all(key in by_key for by_key in figures.values())]
+    rows = [[f"`{key}`", *(interval(figures[policy][key], horizon_s, digits=_digits(key)) for policy in policies)] for key in keys]
+    return markdown_table(["figure, median", *(f"`{policy}`" for policy in policies)], rows) if rows else ""
+
+
+def _digits(key: str) -> int:
+    return 1 if key.endswith(("_s", "_m", "_ms", "_percent")) else 3
+
+
+def comparisons_table(comparisons: Sequence[Comparison]) -> str:
+    """Return differences, ratios and tests of policies against the baseline."""
+    header = ("policy", "figure", "pairs", "difference", "ratio", "less / more / same", "Wilcoxon p", "p of Holm", "sign p")
+    rows = [
+        (
+            f"`{each.policy}`",
+            f"{TITLES[each.key]} [{UNITS[each.key]}]",
+            str(each.pairs),
+            interval(each.difference),
+            interval(each.ratio, digits=2),
+            f"{each.wilcoxon.less} / {each.wilcoxon.greater} / {each.wilcoxon.ties}",
+            p_value(each.wilcoxon.p_value),
+            p_value(each.p_holm),
+            p_value(each.sign.p_value),
+        )
+        for each in comparisons
+    ]
+    return markdown_table(header, rows)
+
+
+def floors_table(group: Group, key: str) -> str:
+    """Return the median time of each policy on each floor, and how many of its runs reached the share."""
+    rows = []
+    for floor in group.floors:
+        cells = []
+        for rows_of_policy in group.on_floor(floor).values():
+            if not rows_of_policy:
+                cells.append(NONE)
+                continue
+            found = times_to(rows_of_policy, key, group.horizon_s)
+            cells.append(
+                f"{number(median_interval(found.or_never).estimate, group.horizon_s)} ({found.is_reached.sum()}/{len(found.times)})"
+            )
+        rows.append([floor, *cells])
+    return markdown_table(["floor", *(f"`{policy}`" for policy in group.runs)], rows)

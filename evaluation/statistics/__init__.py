@@ -1,0 +1,49 @@
+"""What figures of many episodes are worth: estimates with intervals, paired comparisons, profiles.
+
+Pure functions on arrays. Which interval belongs to which figure, and how often each holds the truth, is in
+docs/reference/statistics.md and docs/results/interval_coverage.md.
+"""
+
+from lidarium.evaluation.statistics.means import (
+    interquartile_mean,
+    interquartile_mean_interval,
+    mean_interval,
+    paired_difference,
+    paired_ratio,
+)
+from lidarium.evaluation.statistics.medians import median_bands, median_interval
+from lidarium.evaluation.statistics.paired_tests import PairedTest, holm, sign_test, wilcoxon_test
+from lidarium.evaluation.statistics.profiles import ratio_profile, score_profile
+from lidarium.evaluation.statistics.restricted import (
+    CensoredTimes,
+    kaplan_meier,
+    restricted_difference,
+    restricted_mean,
+    restricted_ratio,
+)
+from lidarium.evaluation.statistics.samples import FEWEST_FOR_NOMINAL, Interval
+from lidarium.evaluation.statistics.shares import share_interval
+
+__all__ = [
+    "FEWEST_FOR_NOMINAL",
+    "CensoredTimes",
+    "Interval",
+    "PairedTest",
+    "holm",
+    "interquartile_mean",
+    "interquartile_mean_interval",
+    "kaplan_meier",
+    "mean_interval",
+    "median_bands",
+    "median_interval",
+    "paired_difference",
+    "paired_ratio",
+    "ratio_profile",
+    "restricted_difference",
+    "restricted_mean",
+    "restricted_ratio",
+    "score_profile",
+    "share_interval",
+    "sign_test",
+    "wilcoxon_test",
+]

@@ -1,0 +1,95 @@
+"""Tests of whether the partners of pairs differ, and what many of them in one table are worth.
+
+References
+----------
+Wilcoxon, Biometrics Bulletin 1 (1945). Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of
+Statistics 6 (1979).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
+
+from lidarium.evaluation.statistics.samples import Values, checked_pairs, checked_values
+
+
+@dataclass(frozen=True, slots=True)
+class PairedTest:
+    """What a paired test found.
+
+    Attributes
+    ----------
+    p_value : float
+        How likely so much difference is by chance, two-sided; 1 where all pairs are ties.
+    size : int
+        Number of pairs.
+    less, greater, ties : int
+        Pairs with a < b, with a > b, and with equal values; ties are no evidence and left out of the test.
+    """
+
+    p_value: float
+    size: int
+    less: int
+    greater: int
+    ties: int
+
+
+def wilcoxon_test(a: ArrayLike, b: ArrayLike) -> PairedTest:
+    """Test by Wilcoxon's signed ranks whether ``a - b`` lies around 0.
+
+    Parameters
+    ----------
+    a, b : (n,) array_like
+        Values of the two partners of each pair.
+    """
+    first, second = checked_pairs(a, b)
+    less, greater, ties = _signs(first, second)
+    if less + greater == 0:
+        return PairedTest(1.0, len(first), 0, 0, ties)
+    differences = first - second
+    found = stats.wilcoxon(differences[differences != 0.0])
+    return PairedTest(min(float(found.pvalue), 1.0), len(first), less, greater, ties)
+
+
+def sign_test(a: ArrayLike, b: ArrayLike) -> PairedTest:
+    """Test whether a is as often below b as above; the size of differences does not count.
+
+    Parameters
+    ----------
+    a, b : (n,) array_like
+        Values of the two partners of each pair.
+    """
+    first, second = checked_pairs(a, b)
+    less, greater, ties = _signs(first, second)
+    p_value = float(stats.binomtest(less, less + greater).pvalue) if less + greater else 1.0
+    return PairedTest(p_value, len(first), less, greater, ties)
+
+
+def holm(p_values: ArrayLike) -> Values:
+    """Return p values corrected for how many there are: the least times m, the next times m - 1, and so on, never falling.
+
+    A table in which those below 0.05 are taken for real holds a false one with a probability of at most 0.05.
+
+    Parameters
+    ----------
+    p_values : (m,) array_like
+        From 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        Where there are none, or one is not from 0 to 1.
+    """
+    given = checked_values(p_values, "p_values")
+    if (given < 0.0).any() or (given > 1.0).any():
+        raise ValueError(f"p_values reach from {given.min():g} to {given.max():g}; want 0 to 1")
+    order = np.argsort(given, kind="stable")
+    corrected = np.empty_like(given)
+    corrected[order] = np.minimum(np.maximum.accumulate(given[order] * np.arange(len(given), 0, -1)), 1.0)
+    return corrected
+
+
+def _signs(first: Values, second: Values) -> tuple[int, int, int]:
+    return int((first < second).sum()), int((first > second).sum()), int((first == second).sum())

@@ -1,0 +1,68 @@
+"""Performance profiles: in what share of runs a policy is that good.
+
+References
+----------
+Dolan and More, Benchmarking optimization software with performance profiles, Mathematical Programming 91 (2002). Agarwal et al., Deep
+reinforcement learning at the edge of the statistical precipice (NeurIPS 2021).
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lidarium.evaluation.statistics.samples import Values, checked_values
+from lidarium.evaluation.statistics.shares import share_interval
+
+
+def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
+    """Return in what share of runs each policy is within a factor of the best policy of that run.
+
+    Parameters
+    ----------
+    costs : (runs, policies) array_like
+        What each policy needed, 0 or more; inf where it did not succeed. Runs in which none succeeded count for nobody.
+    factors : (k,) array_like
+        Factors, 1 or more.
+
+    Returns
+    -------
+    (policies, k) float64
+        Shares of all runs.
+
+    Raises
+    ------
+    ValueError
+        Where there are no costs, costs are nan or negative, or a factor is below 1.
+    """
+    needed, within = np.asarray(costs, np.float64), checked_values(factors, "factors")
+    if needed.ndim != 2 or not needed.size:
+        raise ValueError(f"costs have shape {needed.shape}; want (runs, policies), one of each at least")
+    if np.isnan(needed).any() or (needed < 0.0).any():
+        raise ValueError("costs hold nan or negative values; want 0 or more, and inf where a policy did not succeed")
+    if (within < 1.0).any():
+        raise ValueError(f"factors reach down to {within.min():g}; want 1 or more")
+    best = needed.min(axis=1)
+    is_good = (needed[:, :, np.newaxis] <= best[:, np.newaxis, np.newaxis] * within) & np.isfinite(needed)[:, :, np.newaxis]
+    return np.asarray(is_good.mean(axis=0))
+
+
+def score_profile(scores: ArrayLike, thresholds: ArrayLike, confidence: float = 0.95) -> Values:
+    """Return in what share of runs the score is at least each threshold, with the ends of Wilson's intervals.
+
+    Parameters
+    ----------
+    scores : (n,) array_like
+        Score of each run.
+    thresholds : (k,) array_like
+        What is asked of them.
+    confidence : float
+        How often the interval at one threshold shall hold the truth.
+
+    Returns
+    -------
+    (3, k) float64
+        Share, low and high end.
+    """
+    reached, asked = np.sort(checked_values(scores, "scores")), checked_values(thresholds, "thresholds")
+    counts = len(reached) - np.searchsorted(reached, asked, side="left")
+    intervals = {int(count): share_interval(int(count), len(reached), confidence) for count in np.unique(counts)}
+    return np.array([[each.estimate, each.low, each.high] for each in (intervals[int(count)] for count in counts)]).T

@@ -1,0 +1,100 @@
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from lidarium.evaluation.report import write_report
+from lidarium.evaluation.report.records import coverage_at
+from lidarium.evaluation.report.report import jsonable
+from lidarium.evaluation.statistics import Interval
+
+
+def pictures_in(page):
+    return [line.split("(")[1].rstrip(")") for line in page.splitlines() if line.startswith("![")]
+
+
+@pytest.mark.usefixtures("readable_records")
+def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_path):
+    result = write_report(episodes_folder, tmp_path / "out")
+    page = (tmp_path / "out" / "report.md").read_text()
+    assert json.loads((tmp_path / "out" / "report.json").read_text()) == result
+    assert result["baseline"] == "nearest_frontier"
+    assert (result["episodes"], result["records"]) == (6, 6)
+    (group,) = result["groups"]
+    assert group["pictures"] == pictures_in(page)
+    assert [name.split("_")[0] for name in group["pictures"]] == ["coverage", "boxes", "profiles", "paths", "visits"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted([*group["pictures"], "report.json", "report.md"])
+    for name in group["pictures"]:
+        picture = cv2.imread(str(tmp_path / "out" / name))
+        assert min(picture.shape[:2]) > 300
+        assert (picture != 255).any()
+    for heading in ("Time to 90 %", "Time to 99 %", "Coverage, paths, overlap", "Compared with `nearest_frontier`", "By floor"):
+        assert f"### {heading}" in page
+    visits = group["visits"]["apartment"]["random_walk"]
+    # Two robots for the whole of each run.
+    assert np.sum(visits["seconds"]) == pytest.approx(2 * 40.0, rel=0.01)
+    curve = group["coverage_over_time"]["random_walk"]
+    assert curve["runs"] == 2
+    assert all(later >= sooner for sooner, later in zip(curve["median_percent"], curve["median_percent"][1:], strict=False))
+    assert {each["policy"] for each in group["comparisons"]} == {"random_walk", "utility_frontier"}
+    assert any("fewer than 50 runs" in warning for warning in result["warnings"])
+    assert any("fewer than 50 pairs" in warning for warning in result["warnings"])
+    assert any("repeat another one" in warning for warning in result["warnings"])
+
+
+def test_without_records_their_plots_are_left_out_and_that_is_told(rows, directory_of, tmp_path):
+    result = write_report(directory_of(rows), tmp_path / "out", baseline="random_walk")
+    assert [name.split("_")[0] for name in result["groups"][0]["pictures"]] == ["boxes", "profiles"]
+    assert "There are no records in records/, so coverage over time, paths and visits are not drawn." in result["warnings"]
+    assert "Compared with `random_walk`" in (tmp_path / "out" / "report.md").read_text()
+
+
+@pytest.mark.usefixtures("readable_records")
+def test_a_damaged_record_is_left_out_and_named(rows, directory_of, tmp_path, episodes_folder):
+    folder = directory_of(rows[:2])
+    (folder / "records").mkdir()
+    (folder / "records" / "whole.npz").write_bytes((episodes_folder / "records" / "apartment-2-nearest_frontier-0.npz").read_bytes())
+    (folder / "records" / "other.npz").write_bytes((episodes_folder / "records" / "apartment-2-random_walk-0.npz").read_bytes())
+    (folder / "records" / "cut.npz").write_bytes(b"PK")
+    result = write_report(folder, tmp_path / "out")
+    assert result["records"] == 1
+    assert any(warning.startswith("The record cut.npz was left out") for warning in result["warnings"])
+    assert any("1 of 2 episodes have no record" in warning for warning in result["warnings"])
+
+
+def test_the_same_directory_gives_the_same_report(rows, directory_of, tmp_path):
+    folder = directory_of(rows)
+    first, second = (write_report(folder, tmp_path / name, seed=3) for name in ("first", "second"))
+    assert first == second
+    for name in ("report.md", "report.json", first["groups"][0]["pictures"][0]):
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
+
+
+def test_runs_without_a_partner_are_told(rows, directory_of, tmp_path):
+    result = write_report(directory_of(rows[:-1]), tmp_path / "out")
+    assert any("1 of `utility_frontier` or `nearest_frontier`" in warning for warning in result["warnings"])
+
+
+def test_a_policy_that_is_gone_is_reported_all_the_same(rows, directory_of, tmp_path):
+    result = write_report(directory_of([{**rows[0], "policy": "gone"}]), tmp_path / "out")
+    assert result["baseline"] == "gone"
+    assert any("does not have: gone" in warning for warning in result["warnings"])
+
+
+def test_a_baseline_without_episodes_is_refused_and_nothing_written(rows, directory_of, tmp_path):
+    with pytest.raises(ValueError, match="--baseline is 'best', of which there are no episodes; want one of nearest_frontier, random_walk"):
+        write_report(directory_of(rows), tmp_path / "out", baseline="best")
+    assert not (tmp_path / "out").exists()
+
+
+def test_coverage_holds_from_each_change_on():
+    coverage = np.array([[0.0, 0.1], [2.0, 0.4], [3.0, 0.9]])
+    assert coverage_at(coverage, np.array([0.0, 1.9, 2.0, 10.0])).tolist() == [0.1, 0.1, 0.4, 0.9]
+
+
+def test_what_is_not_finite_becomes_null():
+    assert jsonable({"a": Interval(1.0, -np.inf, np.inf, 0.95, 3), "b": np.array([np.nan, 2.0])}) == {
+        "a": {"estimate": 1.0, "low": None, "high": None, "confidence": 0.95, "size": 3},
+        "b": [None, 2.0],
+    }
