@@ -8,17 +8,21 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
-from lidarium.scripts import bench, floors, report, run, show
+from lidarium.scripts import bench, evaluate, floors, report, reproduce, run, show
 from lidarium.scripts.bench import Bench
 from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
+from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
 from lidarium.scripts.report import Report
+from lidarium.scripts.reproduce import Reproduce
 from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
 
 Choice = (
     Annotated[Run, subcommand("run")]
+    | Annotated[Evaluate, subcommand("evaluate")]
     | Annotated[Report, subcommand("report")]
+    | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -26,7 +30,9 @@ Choice = (
 
 _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Run: run.execute,
+    Evaluate: evaluate.execute,
     Report: report.execute,
+    Reproduce: reproduce.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,

@@ -87,13 +87,19 @@ def is_file_name(spec: str | Path) -> bool:
     return "/" in spec or "\\" in spec or spec.lower().endswith(suffixes) or (spec not in drawn_names() and Path(spec).is_file())
 
 
+def is_generated(spec: str) -> bool:
+    """Return whether a floor is named by a generator and a seed, so that there is one without looking."""
+    prefix, colon, rest = spec.partition(":")
+    return bool(colon) and prefix in GENERATORS and rest.isascii() and rest.isdigit()
+
+
 def set_floors(name: str) -> tuple[str, ...]:
     """Floors of a set as specs for `load_floor`.
 
     Parameters
     ----------
     name : str
-        "train", "validation" or "test", with or without ``set:`` before it.
+        "train", "validation" or "test", with or without ``set:`` before it; ``test:40`` are the first 40 floors of it.
 
     Returns
     -------
@@ -102,9 +108,14 @@ def set_floors(name: str) -> tuple[str, ...]:
     Raises
     ------
     ValueError
-        If there is no such set.
+        If there is no such set, or not as many floors in it.
     """
-    first, count = SETS[_set_name(name)]
+    short, colon, wanted = name.removeprefix("set:").partition(":")
+    first, count = SETS[_set_name(short)]
+    if colon:
+        if not (wanted.isascii() and wanted.isdigit() and 1 <= int(wanted) <= count):
+            raise ValueError(f"{name!r} wants {wanted!r} floors; the set {short} has {count}, as in set:{short}:{min(count, 40)}")
+        count = int(wanted)
     return tuple(f"building:{seed}" for seed in range(first, first + count))
 
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from lidarium.evaluation.episodes_file import TIMINGS, read_lines
+
 Row = dict[str, Any]
 """A line of ``episodes.jsonl``: what `evaluation.result.result_of` returns."""
 
 FILE = "episodes.jsonl"
-
-WALL_TIME = ("decision_ms", "steps_per_s")
-"""What differs between two runs of the same episode."""
 
 _WANTED: dict[str, type | tuple[type, ...]] = {
     "floor": str,
@@ -74,7 +73,11 @@ def read_episodes(directory: Path) -> Episodes:
     path = Path(directory) / FILE
     if not path.is_file():
         raise FileNotFoundError(f"no {FILE} in {directory}; want a folder that `lidarium evaluate --out` wrote")
-    numbered, warnings = _parsed(path)
+    lines = read_lines(path)
+    numbered, warnings = lines.numbered, []
+    if lines.cut_off is not None:
+        number, size = lines.cut_off
+        warnings = [f"Line {number} of {path.name} breaks off ({size} bytes) and was left out: its episode was not finished."]
     for number, row in numbered:
         _check_row(row, f"{path}, line {number}")
     kept, doubled = _without_doubles(numbered, path)
@@ -90,34 +93,18 @@ def key_of(row: Row) -> tuple[Any, ...]:
 
 
 def pair_key_of(row: Row) -> tuple[Any, ...]:
-    """Return what partners of a pair share: floor, starts, seed and number of robots."""
-    return row["floor"], row["floor_sha256"], json.dumps(row.get("starts")), row["seed"], row["robots"]
+    """Return what partners of a pair share: settings, floor, starts, seed and number of robots."""
+    return variant_of(row), row["floor"], row["floor_sha256"], json.dumps(row.get("starts")), row["seed"], row["robots"]
+
+
+def variant_of(row: Row) -> str:
+    """Return the name of an episode's settings, empty where it has none."""
+    return str(row.get("variant") or "")
 
 
 def name_of(row: Row) -> str:
     """Name an episode for people."""
     return f"{row['policy']} on {row['floor']}, {row['robots']} robots, seed {row['seed']}"
-
-
-def _parsed(path: Path) -> tuple[list[tuple[int, Row]], list[str]]:
-    lines = path.read_bytes().split(b"\n")
-    rows: list[tuple[int, Row]] = []
-    for number, line in enumerate(lines, 1):
-        if not line.strip():
-            continue
-        try:
-            row = json.loads(line)
-        except ValueError as error:
-            # Without a line feed behind it, writing was broken off there.
-            if number == len(lines):
-                return rows, [
-                    f"Line {number} of {path.name} breaks off ({len(line)} bytes) and was left out: its episode was not finished."
-                ]
-            raise ValueError(f"{path}, line {number} is not JSON ({error}); want one episode a line") from error
-        if not isinstance(row, dict):
-            raise ValueError(f"{path}, line {number} is not a JSON object; want one episode a line")
-        rows.append((number, row))
-    return rows, []
 
 
 def _check_row(row: Row, where: str) -> None:
@@ -139,7 +126,7 @@ def _without_doubles(numbered: Iterable[tuple[int, Row]], path: Path) -> tuple[l
         known = kept.setdefault((*key_of(row), row["version"], row["settings_sha256"]), (number, row))
         if known[1] is row:
             continue
-        differing = [key for key in sorted({*known[1], *row} - set(WALL_TIME)) if known[1].get(key) != row.get(key)]
+        differing = [key for key in sorted({*known[1], *row} - set(TIMINGS)) if known[1].get(key) != row.get(key)]
         if differing:
             raise ValueError(
                 f"{path}, lines {known[0]} and {number} tell of the same episode ({name_of(row)}) but differ in {', '.join(differing)}; "
@@ -150,9 +137,9 @@ def _without_doubles(numbered: Iterable[tuple[int, Row]], path: Path) -> tuple[l
 
 
 def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
-    """Refuse episodes of two versions, or for one number of robots of two sets of settings."""
+    """Refuse episodes of two versions, or for one name of settings and one number of robots of two sets of settings."""
     first: tuple[int, Row] | None = None
-    by_robots: dict[int, tuple[int, Row]] = {}
+    alike: dict[tuple[str, int], tuple[int, Row]] = {}
     for number, row in numbered:
         first = first or (number, row)
         if row["version"] != first[1]["version"]:
@@ -160,11 +147,11 @@ def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
                 f"{path} has episodes of two versions: {first[1]['version']} in line {first[0]} and {row['version']} in line {number}; "
                 "want one version in a directory"
             )
-        known_number, known = by_robots.setdefault(row["robots"], (number, row))
+        known_number, known = alike.setdefault((variant_of(row), row["robots"]), (number, row))
         if row["settings_sha256"] != known["settings_sha256"]:
             seen = [f"{key} {known.get(key)} and {row.get(key)}" for key in _OF_SETTINGS if known.get(key) != row.get(key)]
             told = ", ".join(seen) or f"settings_sha256 {known['settings_sha256'][:12]}... and {row['settings_sha256'][:12]}..."
             raise ValueError(
                 f"{path} has episodes of two settings with {row['robots']} robots, in lines {known_number} and {number}: {told}; "
-                "want one set of settings in a directory"
+                "want a name for each set of settings"
             )

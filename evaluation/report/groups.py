@@ -8,16 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.catalogue import GENERATORS, SETS, floor_names
-from lidarium.evaluation.report.episodes import WALL_TIME, Row, pair_key_of
+from lidarium.evaluation.episodes_file import TIMINGS
+from lidarium.evaluation.report.episodes import Row, pair_key_of, variant_of
 from lidarium.evaluation.statistics import CensoredTimes
+from lidarium.evaluation.suite import DEFAULT_VARIANT
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Episodes with one number of robots on the floors of one set.
+    """Episodes with one set of settings and one number of robots on the floors of one set.
 
     Attributes
     ----------
+    variant : str
+        Name of the settings, empty where they have none.
     robots : int
         Number of robots.
     floor_set : str
@@ -28,6 +32,7 @@ class Group:
         Up to when times count: the horizon of the runs, or where they had none the longest run of the group.
     """
 
+    variant: str
     robots: int
     floor_set: str
     runs: dict[str, list[Row]]
@@ -36,12 +41,14 @@ class Group:
     @property
     def title(self) -> str:
         """Heading for people."""
-        return f"{self.robots} robot{'s' if self.robots != 1 else ''}, {self.floor_set}"
+        settings = "" if self.variant in ("", DEFAULT_VARIANT) else f"{self.variant}: "
+        return f"{settings}{self.robots} robot{'s' if self.robots != 1 else ''}, {self.floor_set}"
 
     @property
     def slug(self) -> str:
         """Part of names of files."""
-        return f"{self.robots}_{''.join(letter if letter.isalnum() else '_' for letter in self.floor_set)}"
+        settings = "" if self.variant in ("", DEFAULT_VARIANT) else f"{self.variant}_"
+        return "".join(letter if letter.isalnum() else "_" for letter in f"{settings}{self.robots}_{self.floor_set}")
 
     @property
     def floors(self) -> list[str]:
@@ -91,16 +98,16 @@ class Reached:
 
 
 def grouped(rows: Iterable[Row]) -> list[Group]:
-    """Return the groups, by floor set and number of robots."""
-    sorted_rows: dict[tuple[str, int], dict[str, list[Row]]] = {}
+    """Return the groups, by settings, floor set and number of robots."""
+    sorted_rows: dict[tuple[str, str, int], dict[str, list[Row]]] = {}
     for row in rows:
-        runs = sorted_rows.setdefault((floor_set_of(row["floor"]), row["robots"]), {})
+        runs = sorted_rows.setdefault((variant_of(row), floor_set_of(row["floor"]), row["robots"]), {})
         runs.setdefault(row["policy"], []).append(row)
     groups = []
-    for (floor_set, robots), runs in sorted(sorted_rows.items()):
+    for (variant, floor_set, robots), runs in sorted(sorted_rows.items()):
         everything = [row for policy_rows in runs.values() for row in policy_rows]
         horizons = [row["horizon_s"] if row["horizon_s"] is not None else row["time_s"] for row in everything]
-        groups.append(Group(robots, floor_set, {policy: runs[policy] for policy in sorted(runs)}, float(max(horizons))))
+        groups.append(Group(variant, robots, floor_set, {policy: runs[policy] for policy in sorted(runs)}, float(max(horizons))))
     return groups
 
 
@@ -151,7 +158,7 @@ def repeats(rows: Iterable[Row]) -> int:
 
     Where neither starts nor noise are drawn, a policy without chance does the same whatever the seed.
     """
-    said = [json.dumps({key: value for key, value in row.items() if key not in ("seed", *WALL_TIME)}, sort_keys=True) for row in rows]
+    said = [json.dumps({key: value for key, value in row.items() if key not in ("seed", *TIMINGS)}, sort_keys=True) for row in rows]
     return len(said) - len(set(said))
 
 

@@ -2,19 +2,21 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.evaluation.record import read_record
 from lidarium.evaluation.report.episodes import Row
 
 FOLDER = "records"
 
-Key = tuple[str, str, str, int, int]
-"""Policy, floor, its hash, seed, robots."""
+Key = str
+"""Where an episode's line says that its record is, in the directory; empty for no record."""
+
+_SAME = ("policy", "floor", "floor_sha256", "seed", "robots", "settings_sha256")
+"""What a record and the line of its episode both tell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +68,7 @@ def read_records(directory: Path, rows: Iterable[Row]) -> tuple[dict[Key, Entry]
     directory : Path
         What `lidarium evaluate --out` wrote.
     rows : iterable of dict
-        The episodes; records of others are passed over.
+        The episodes.
 
     Returns
     -------
@@ -75,29 +77,34 @@ def read_records(directory: Path, rows: Iterable[Row]) -> tuple[dict[Key, Entry]
     list of str
         Which files could not be read, and why.
     """
-    wanted = {record_key(row): str(row["settings_sha256"]) for row in rows}
     found: dict[Key, Entry] = {}
     warnings = []
-    for path in sorted((Path(directory) / FOLDER).glob("*.npz")):
+    for row in rows:
+        key = record_key(row)
+        path = Path(directory) / key
+        if not key or not path.exists():
+            continue
         try:
-            record = _read(path)
+            record = read_record(path)
         except (ValueError, OSError) as error:
             warnings.append(f"The record {path.name} was left out: {error}.")
             continue
-        key = record_key(record.header)
-        if wanted.get(key) == record.header.get("settings_sha256", wanted.get(key)) and key in wanted:
-            found[key] = Entry(path, np.asarray(record.display.coverage, np.float64))
+        differing = [name for name in _SAME if record.header.get(name, row[name]) != row[name]]
+        if differing:
+            warnings.append(f"The record {path.name} was left out: it is of an episode with another {differing[0]}.")
+            continue
+        found[key] = Entry(path, np.asarray(record.display.coverage, np.float64))
     return found, warnings
 
 
 def record_key(row: Row) -> Key:
-    """Return what joins episodes and records; both lines and headers have it."""
-    return str(row["policy"]), str(row["floor"]), str(row["floor_sha256"]), row["seed"], row["robots"]
+    """Return what joins an episode and its record."""
+    return str(row.get("record") or "")
 
 
 def read_track(entry: Entry) -> Track:
     """Read ways and the last map of a record."""
-    display = _read(entry.path).display
+    display = read_record(entry.path).display
     levels = display.map_at(float(display.times[-1]))
     return Track(display.times, display.poses, levels, (display.origin[0], display.origin[1]), display.resolution)
 
@@ -106,7 +113,3 @@ def coverage_at(coverage: NDArray[np.float64], times: NDArray[np.float64]) -> ND
     """Return the coverage of a step function at given times, the last value from the end on."""
     places = np.searchsorted(coverage[:, 0], times + 1e-9, side="right") - 1
     return np.where(places >= 0, coverage[np.maximum(places, 0), 1], 0.0)
-
-
-def _read(path: Path) -> Any:  # noqa: ANN401
-    return import_module("lidarium.evaluation.record").read_record(path)

@@ -1,7 +1,6 @@
 """A directory of episodes as `lidarium evaluate` writes it: a few short real runs, with records in a form of their own."""
 
 import json
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -76,9 +75,9 @@ def write_directory(folder, policies=POLICIES, seeds=SEEDS, floor="apartment", *
     for policy in policies:
         for seed in seeds:
             episode = run_episode(lidarium.policy(policy), ExplorationEnv(floor, make_settings(**chosen)), seed)
-            lines.append(json.dumps(result_of(episode, policy)) + "\n")
-            name = f"{floor.replace(':', '-')}-{chosen['robots']}-{policy}-{seed}.npz"
-            save_display(folder / "records" / name, episode, policy)
+            name = f"records/{floor.replace(':', '-')}-{chosen['robots']}-{policy}-{seed}.npz"
+            lines.append(json.dumps({**result_of(episode, policy), "record": name}) + "\n")
+            save_display(folder / name, episode, policy)
     with (folder / "episodes.jsonl").open("a") as file:
         file.writelines(lines)
     return folder
@@ -93,7 +92,7 @@ def episodes_folder(tmp_path_factory) -> Path:
 @pytest.fixture
 def readable_records(monkeypatch):
     """Records are read in the form above."""
-    monkeypatch.setitem(sys.modules, "lidarium.evaluation.record", SimpleNamespace(read_record=read_display))
+    monkeypatch.setattr("lidarium.evaluation.report.records.read_record", read_display)
 
 
 @pytest.fixture(scope="session")

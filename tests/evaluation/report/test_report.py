@@ -52,15 +52,16 @@ def test_without_records_their_plots_are_left_out_and_that_is_told(rows, directo
 
 @pytest.mark.usefixtures("readable_records")
 def test_a_damaged_record_is_left_out_and_named(rows, directory_of, tmp_path, episodes_folder):
-    folder = directory_of(rows[:2])
+    folder = directory_of([rows[0], {**rows[1], "record": "records/cut.npz"}, {**rows[2], "record": "records/other.npz"}])
     (folder / "records").mkdir()
-    (folder / "records" / "whole.npz").write_bytes((episodes_folder / "records" / "apartment-2-nearest_frontier-0.npz").read_bytes())
-    (folder / "records" / "other.npz").write_bytes((episodes_folder / "records" / "apartment-2-random_walk-0.npz").read_bytes())
+    for name in (rows[0]["record"], "records/other.npz"):
+        (folder / name).write_bytes((episodes_folder / rows[0]["record"]).read_bytes())
     (folder / "records" / "cut.npz").write_bytes(b"PK")
     result = write_report(folder, tmp_path / "out")
     assert result["records"] == 1
     assert any(warning.startswith("The record cut.npz was left out") for warning in result["warnings"])
-    assert any("1 of 2 episodes have no record" in warning for warning in result["warnings"])
+    assert any("left out: it is of an episode with another policy" in warning for warning in result["warnings"])
+    assert any("2 of 3 episodes have no record" in warning for warning in result["warnings"])
 
 
 def test_the_same_directory_gives_the_same_report(rows, directory_of, tmp_path):

@@ -1,0 +1,177 @@
+"""`lidarium evaluate`: policies on floors, in teams, with seeds and settings, into a folder that can be gone on with."""
+
+import os
+import statistics
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tyro.conf import Positional
+
+from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, Command, counted, table, tell
+
+if TYPE_CHECKING:
+    from lidarium.evaluation.campaign import Campaign
+    from lidarium.evaluation.suite import Suite
+
+DEFAULT_FOLDER = Path("runs/evaluation")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate(Command):
+    """Run policies x floors x robots x seeds; finished episodes are kept, and the same command goes on where it stopped."""
+
+    suite: Positional[Path | None] = None
+    """TOML file that says what to run, in place of the options below"""
+    preset: str | None = None
+    """evaluate as another project does: explore-bench, ariadne, chen, ir2, marvel, maexp, mapex or houseexpo; settings, teams and
+    stop rule are then its own, and its floors, too, unless --floors names others"""
+    data: Path | None = None
+    """folder of real floors, for presets"""
+    policies: tuple[str, ...] = ("nearest_frontier", "utility_frontier", "explore_lite")
+    """who decides; `lidarium show policies` lists them"""
+    floors: tuple[str, ...] = ()
+    """floors as for `lidarium run`, apartment where left out; set:NAME for all floors of a set, set:NAME:COUNT for its first ones"""
+    robots: tuple[int, ...] = (1, 2, 3)
+    """sizes of teams"""
+    seeds: int = 3
+    """how many seeds, from --seed on; the same seed draws the same starts for every policy"""
+    robot: str = "kobuki"
+    """body of the robots; `lidarium show robots` lists them"""
+    lidar: str = "urg"
+    """laser of the robots; `lidarium show lidars` lists them"""
+    noise: str = "none"
+    """noise of the laser's ranges: none, datasheet or thesis"""
+    map_resolution: float = 0.025
+    """side of a cell of the maps, a whole multiple of 0.025 [m]"""
+    horizon_s: float = 1800.0
+    """simulated time after which an episode is cut [s]"""
+    stop_coverage: float = 0.99
+    """share of the floor at which an episode ends"""
+    resolution: float | None = None
+    """metres per pixel, where floors are plain images"""
+    workers: int = 0
+    """processes that run episodes; 0 for as many as there are cores"""
+    records: bool = True
+    """keep a record of every episode, for replays and for the pictures of the report"""
+
+
+def execute(command: Evaluate) -> Answer:
+    """Run what is missing of a suite.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError, OSError
+        Where the input or ``--out`` is no good; what was finished before is kept.
+    """
+    from lidarium.evaluation.campaign import Campaign
+    from lidarium.evaluation.output import check_writable
+
+    if command.workers < 0:
+        raise ValueError(f"--workers is {command.workers}; want 0 for as many as there are cores, or more")
+    folder = command.out or DEFAULT_FOLDER
+    check_writable(folder)
+    campaign = Campaign(_suite(command), folder, command.workers or len(os.sched_getaffinity(0)), command.records)
+    is_interrupted = False
+    runs = campaign.run()
+    try:
+        missing = sum(1 for _ in campaign.suite.trials())
+        for _ in counted(runs, missing, "episodes", command.json):
+            pass
+    except KeyboardInterrupt:
+        is_interrupted = True
+    finally:
+        runs.close()
+    return _answer(campaign, folder, is_interrupted)
+
+
+def _suite(command: Evaluate) -> "Suite":
+    from lidarium.evaluation.suite import DEFAULT_VARIANT, Suite, read_suite
+
+    if command.suite is not None:
+        return read_suite(command.suite)
+    if command.seeds < 1:
+        raise ValueError(f"--seeds is {command.seeds}; want at least 1")
+    seeds = tuple(range(command.seed, command.seed + command.seeds))
+    if command.preset is not None:
+        from lidarium.evaluation.presets import preset_suite
+
+        return preset_suite(command.preset, command.policies, seeds, command.data, command.floors)
+    settings = {
+        "robot": command.robot,
+        "lidar": command.lidar,
+        "noise": command.noise,
+        "resolution": command.map_resolution,
+        "horizon_s": command.horizon_s,
+        "stop_coverage": command.stop_coverage,
+    }
+    return Suite(
+        policies=command.policies,
+        floors=command.floors or ("apartment",),
+        robots=command.robots,
+        seeds=seeds,
+        variants={DEFAULT_VARIANT: settings},
+        image_resolution=command.resolution,
+    )
+
+
+def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
+    from lidarium.evaluation.campaign import EPISODES_FILE
+    from lidarium.evaluation.episodes_file import read_episodes
+
+    for trial, error in campaign.failures:
+        tell(f"{trial.key}: {type(error).__name__}: {error}")
+    keys = {trial.key for trial in campaign.suite.trials()}
+    episodes = [episode for episode in read_episodes(folder / EPISODES_FILE) if episode["key"] in keys]
+    rows = summary_of(episodes)
+    result = {
+        "folder": str(folder),
+        "episodes": campaign.total,
+        "finished": campaign.done,
+        "failed": [{"key": trial.key, "error": f"{type(error).__name__}: {error}"} for trial, error in campaign.failures],
+        "interrupted": is_interrupted,
+        "summary": rows,
+    }
+    how = " (interrupted; the same command goes on)" if is_interrupted else ""
+    shown = [tuple(_shown(value) for value in row.values()) for row in rows]
+    text = "\n".join(
+        [
+            f"{campaign.done} of {campaign.total} episodes finished, {len(campaign.failures)} failed{how}",
+            table(shown, ("settings", "policy", "robots", "episodes", "t99 median [s]", "not reached", "coverage", "path [m]", "overlap")),
+            f"  {folder}; `lidarium report {folder}` makes tables with intervals, and plots",
+        ]
+    )
+    code = INTERRUPTED if is_interrupted else (DEFECT if campaign.failures else 0)
+    return Answer(result, text, code)
+
+
+def summary_of(episodes: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return medians by settings, policy and size of the team; a median time is None where half did not reach it."""
+    groups: dict[tuple[str, str, int], list[Mapping[str, Any]]] = {}
+    for episode in episodes:
+        groups.setdefault((episode["variant"], episode["policy"], episode["robots"]), []).append(episode)
+    rows = []
+    for (variant, policy, robots), group in sorted(groups.items(), key=lambda item: (item[0][0], item[0][2], item[0][1])):
+        times = [episode["t99_s"] if episode["t99_s"] is not None else float("inf") for episode in group]
+        median = statistics.median_high(times)
+        rows.append(
+            {
+                "variant": variant,
+                "policy": policy,
+                "robots": robots,
+                "episodes": len(group),
+                "t99_s": None if median == float("inf") else round(median, 3),
+                "not_reached": sum(time == float("inf") for time in times),
+                "coverage": round(statistics.median(episode["coverage_final"] for episode in group), 6),
+                "path_m": round(statistics.median(sum(episode["path_m"]) for episode in group), 3),
+                "overlap": round(statistics.median(episode["overlap"] for episode in group), 6),
+            }
+        )
+    return rows
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if isinstance(value, float) else str(value)

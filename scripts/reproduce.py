@@ -1,0 +1,94 @@
+"""`lidarium reproduce`: published results, made anew by one command."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from tyro.conf import Positional
+
+from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, Command, counted, tell
+
+if TYPE_CHECKING:
+    from lidarium.evaluation.campaign import Campaign
+
+DEFAULT_FOLDER = Path("docs/results")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduce(Command):
+    """Run what a page of docs/results shows, and write the page to --out; what has been run before is not run again."""
+
+    name: Positional[Literal["leaderboard"]]
+    """which page"""
+    data: Path | None = None
+    """folder of real floors; without it generated floors alone"""
+    every: int = 1
+    """of each kind of floor every so many-th, for a shorter run"""
+    runs: Path = Path("runs/reproduce")
+    """folder for the episodes"""
+    workers: int = 0
+    """processes that run episodes; 0 for as many as there are cores"""
+    records: bool = False
+    """keep a record of every episode"""
+
+
+def execute(command: Reproduce) -> Answer:
+    """Run what is missing, then write the page.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError, OSError
+        Where the input or ``--out`` is no good; what was finished before is kept.
+    """
+    from lidarium.evaluation.campaign import Campaign
+    from lidarium.evaluation.experiments import EXPERIMENTS
+    from lidarium.evaluation.output import check_writable, write_text
+
+    if command.every < 1 or command.workers < 0:
+        raise ValueError(f"--every is {command.every} and --workers {command.workers}; want at least 1, and at least 0")
+    out = command.out or DEFAULT_FOLDER
+    check_writable(out)
+    experiment = EXPERIMENTS[command.name]
+    folder = command.runs / command.name
+    workers = command.workers or len(os.sched_getaffinity(0))
+    campaigns = {
+        name: Campaign(suite, folder / name, workers, command.records)
+        for name, suite in experiment.suites(command.data, command.every).items()
+    }
+    for name, campaign in campaigns.items():
+        if not _ran(campaign, name, command.json):
+            return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
+    page = out / f"{command.name}.md"
+    write_text(page, experiment.page(folder, _command_line(command)))
+    failures = [(trial, error) for campaign in campaigns.values() for trial, error in campaign.failures]
+    for trial, error in failures:
+        tell(f"{trial.key}: {type(error).__name__}: {error}")
+    return Answer({**_told(campaigns), "page": str(page)}, f"{page} is written", DEFECT if failures else 0)
+
+
+def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
+    """Run a campaign; False where the user broke it off."""
+    runs = campaign.run()
+    total = sum(1 for _ in campaign.suite.trials())
+    try:
+        for _ in counted(runs, total, f"{name} episodes", is_quiet):
+            pass
+    except KeyboardInterrupt:
+        return False
+    finally:
+        runs.close()
+    return True
+
+
+def _told(campaigns: dict[str, "Campaign"]) -> dict[str, Any]:
+    parts = {
+        name: {"episodes": campaign.total, "finished": campaign.done, "failed": [trial.key for trial, _ in campaign.failures]}
+        for name, campaign in campaigns.items()
+    }
+    return {"suites": parts}
+
+
+def _command_line(command: Reproduce) -> str:
+    data = "" if command.data is None else f" --data {command.data.name if command.data.is_absolute() else command.data}"
+    return f"lidarium reproduce {command.name}{data}{f' --every {command.every}' if command.every > 1 else ''}"

@@ -1,0 +1,27 @@
+"""Tasks are shared out; a task that fails or whose process dies concerns nobody else."""
+
+import pytest
+
+from lidarium.evaluation.workers import shared_out
+
+DIES = "__import__('os').kill(__import__('os').getpid(), 9)"
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_every_task_has_its_result_or_its_error(workers):
+    results = dict(shared_out(eval, ["1 * 1", "2 * 2", "1 / 0", "4 * 4", "5 * 5"], workers))
+    assert isinstance(results.pop("1 / 0"), ZeroDivisionError)
+    assert results == {"1 * 1": 1, "2 * 2": 4, "4 * 4": 16, "5 * 5": 25}
+
+
+def test_a_process_that_dies_takes_no_other_task_with_it():
+    tasks = [str(number) for number in range(12)]
+    results = dict(shared_out(eval, [*tasks[:5], DIES, *tasks[5:]], 2))
+    assert isinstance(results.pop(DIES), RuntimeError)
+    assert results == {task: int(task) for task in tasks}
+
+
+def test_who_stops_listening_ends_the_work():
+    running = shared_out(eval, iter(str(number) for number in range(10**9)), 2)
+    next(running)
+    running.close()
