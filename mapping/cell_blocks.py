@@ -1,4 +1,4 @@
-"""Blocks of 64 cells at once: log-odds lowered and raised under masks of bits.
+"""Blocks of 64 cells at once: log-odds lowered and raised under masks of bits, and told apart by their signs.
 
 A word of bits says which cells of a block are meant. LLVM turns the operations on vectors of 64 bytes into what the machine
 has, whatever the width of its registers; numba cannot write them as loops, since it keeps no bit per lane.
@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 
 from lidarium.mapping.kernels import kernel
 
-_BYTE = ir.IntType(8)
+_BYTE, _SUM = ir.IntType(8), ir.VectorType(ir.IntType(16), 64)
 _BLOCK = ir.VectorType(_BYTE, 64)
 _MASK = ir.VectorType(ir.IntType(1), 64)
 
@@ -68,3 +68,24 @@ def update_block(address: int, seen: np.uint64, hits: np.uint64, hit: int, miss:
         Bounds of lowered and of raised cells.
     """
     _update(address, seen, hits, hit, miss, minimum, maximum)
+
+
+def _sign_bits(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
+    """Tell which cells of a block of sums are below and which are above 0."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        sums = builder.load(builder.inttoptr(arguments[0], _SUM.as_pointer()), align=2)
+        zero = ir.Constant(_SUM, None)
+        below, above = (builder.bitcast(builder.icmp_signed(order, sums, zero), ir.IntType(64)) for order in ("<", ">"))
+        return context.make_tuple(builder, signature.return_type, (below, above))
+
+    return types.UniTuple(types.uint64, 2)(types.int64), generate
+
+
+_signs: Any = intrinsic(_sign_bits)
+
+
+@kernel(inline=True)
+def sign_bits(address: int) -> tuple[np.uint64, np.uint64]:
+    """Return which of the 64 int16 at an address are below 0, and which are above, bit 0 the first one."""
+    return _signs(address)  # type: ignore[no-any-return]

@@ -1,0 +1,258 @@
+"""Records an episode as it runs: what re-runs it, and what can be shown of it."""
+
+import math
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+import lidarium
+from lidarium.agents.policy import GivenUp
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.onboard.state import Orders
+from lidarium.evaluation.record.display import DisplayTrack, MapChanges
+from lidarium.evaluation.record.episode_record import FORMAT, EpisodeRecord
+from lidarium.evaluation.record.state import state_sha256
+from lidarium.evaluation.result import in_floor_frame, settings_sha256
+from lidarium.mapping.level_changes import note_changes
+from lidarium.mapping.occupancy import WORD
+
+MAP_PERIOD_S = 2.0
+"""Time between samples of the team's map [s]."""
+
+
+class Recorder:
+    """Records an episode; a ``Watcher`` that also looks at decisions.
+
+    Parameters
+    ----------
+    policy : str
+        Name of the policy, for the header.
+    seed : int or None
+        The seed that the episode was reset with, for the header; what was drawn with it is recorded itself.
+    floor : str, Path or None
+        The floor as the user named it, to find it again; without it only floors that are not files are found again by themselves.
+    image_resolution : float or None
+        Side of a pixel [m] where the floor is a plain image.
+
+    Notes
+    -----
+    An episode is what was drawn at its beginning (floor, starts, seed of the noise, goal), the speeds that its robots were driven at, and
+    when robots ended. Nothing else enters the world, so neither the policy nor the onboard software is needed to run it again.
+    """
+
+    def __init__(
+        self, policy: str = "", seed: int | None = None, floor: str | Path | None = None, image_resolution: float | None = None
+    ) -> None:
+        self._about = {
+            "policy": policy,
+            "seed": seed,
+            "floor_source": None if floor is None else str(floor),
+            "image_resolution": image_resolution,
+        }
+        self._env: ExplorationEnv | None = None
+
+    def begin(self, env: ExplorationEnv) -> None:
+        """Begin a new record, with the map of the scan at the start."""
+        world, settings = env.world, env.settings
+        tables = world.floors[0]
+        assert tables is not None
+        self._env = env
+        self._commands = bytearray()
+        self._endings: list[tuple[int, str, str]] = []
+        self._events: list[dict[str, Any]] = []
+        self._collisions = world.collisions.copy()
+        self._told_collisions = self._collisions.tobytes()
+        self._live, self._decided_at = len(env.agents), 0
+        self._targets: list[tuple[float, float] | None] = [None] * settings.robots
+        self._given_up: set[GivenUp] = set()
+        self._map_steps = max(round(MAP_PERIOD_S / settings.time_step), 1)
+        self._origin = tables.laser.origin
+        rows, words = world.counted_masks[0].shape
+        self._free, self._occupied = np.zeros((rows, words), np.uint64), np.zeros((rows, words), np.uint64)
+        self._buffer = np.empty((rows * words, 3), np.uint64)
+        self._changes: list[NDArray[np.uint64]] = []
+        self._sampled_at: list[int] = []
+        self._lays = np.zeros((0, 8)) if settings.known_starts else _lays_of(env, self._origin)
+        # Between two samples a robot gets no further from both places than half of what it can drive.
+        way = settings.robot.max_speed * self._map_steps * settings.time_step
+        self._reach = settings.lidar.range_max + 0.5 * way + 4 * settings.occupancy.resolution
+        self._places = _places_of(env)
+        self._sample(env, everywhere=True)
+
+    def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
+        """Note how the robots were driven, contacts that began, and from time to time the map."""
+        self._commands += commands.tobytes()
+        world = env.world
+        if world.collisions.tobytes() != self._told_collisions:
+            self._note_contacts(env)
+        if int(world.steps[0]) % self._map_steps == 0:
+            self._sample(env)
+
+    def outcome(self, env: ExplorationEnv) -> None:
+        """Note which robots ended, and why."""
+        if len(env.agents) == self._live:
+            return
+        self._live = len(env.agents)
+        known = {agent for _, agent, _ in self._endings}
+        step = int(env.world.steps[0])
+        self._endings += [(step, agent, reason) for agent, reason in env.scorer.ended_because.items() if agent not in known]
+
+    def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
+        """Note where robots were sent anew, and what was given up."""
+        time_s = self._decided_at * env.settings.time_step
+        self._decided_at = int(env.world.steps[0])
+        if orders is not None:
+            for robot, agent in enumerate(env.possible_agents):
+                target = (float(orders.targets[robot, 0]), float(orders.targets[robot, 1])) if orders.is_ordered[robot] else None
+                if target != self._targets[robot]:
+                    self._targets[robot] = target
+                    place = None if target is None else in_floor_frame(env, agent, *target)
+                    self.note("decision", time_s, agent, **_rounded(place))
+        for entry in given_up:
+            if entry not in self._given_up:
+                self._given_up.add(entry)
+                place = _rounded(in_floor_frame(env, entry.agent, entry.x, entry.y))
+                self.note("given_up", time_s, entry.agent, **place, size_m=round(entry.size_m, 3), reason=entry.reason)
+
+    def note(self, kind: str, time_s: float, agent: str | None, **details: Any) -> None:  # noqa: ANN401
+        """Add an event, such as a message or a merge.
+
+        Parameters
+        ----------
+        kind : str
+            What happened.
+        time_s : float
+            When [s].
+        agent : str or None
+            Whom it concerns, None for the team.
+        **details
+            What else is to be known, ready for JSON; positions in the floor's frame [m].
+        """
+        self._events.append({"time_s": round(time_s, 6), "kind": kind, "agent": agent, **details})
+
+    def finish(self, *, is_interrupted: bool = False) -> EpisodeRecord:
+        """Return the record of the episode so far; recording may go on.
+
+        Parameters
+        ----------
+        is_interrupted : bool
+            Whether the user broke the episode off.
+
+        Raises
+        ------
+        ValueError
+            Where no episode was begun.
+        """
+        env = self._env
+        if env is None or env.floor is None:
+            raise ValueError("the recorder has seen no episode; let it watch an environment from its reset on")
+        settings, world = env.settings, env.world
+        steps = int(world.steps[0])
+        commands = np.frombuffer(self._commands, np.float64).reshape(-1, settings.robots, 2).copy()
+        self._sample(env, everywhere=True)
+        header = {
+            "format": FORMAT,
+            "version": lidarium.__version__,
+            "made_with": {"numpy": np.__version__, "numba": numba.__version__, "machine": platform.machine()},
+            **self._about,
+            "floor": env.floor.name,
+            "floor_sha256": env.floor.sha256,
+            "robots": settings.robots,
+            "time_step": settings.time_step,
+            "settings": asdict(settings),
+            "settings_sha256": settings_sha256(settings),
+            "starts": world.starts.tolist(),
+            "noise_seed": env.seed,
+            "goal": None if env.goal is None else list(env.goal),
+            "steps": len(commands),
+            "counted_cells": int(world.counted[0]),
+            "map_origin": list(self._origin),
+            "map_resolution": settings.occupancy.resolution,
+            "map_shape": list(self._free.shape),
+            "endings": [list(ending) for ending in self._endings],
+            "interrupted": is_interrupted,
+            # Broken off within a step, the world is ahead of what was recorded.
+            "final_sha256": state_sha256(env) if steps == len(commands) else None,
+        }
+        return EpisodeRecord(header, commands, self._display(env))
+
+    def _display(self, env: ExplorationEnv) -> DisplayTrack:
+        scorer, time_step = env.scorer, env.settings.time_step
+        track = list(scorer.track)
+        if track[-1][0] < scorer.time:
+            track.append((scorer.time, env.world.poses.copy()))
+        changes = np.concatenate(self._changes)
+        rows, words = self._free.shape
+        maps = MapChanges(
+            rows,
+            words,
+            np.array(self._sampled_at) * time_step,
+            np.array([len(change) for change in self._changes], np.int64),
+            changes[:, 0].astype(np.int64),
+            changes[:, 1].copy(),
+            changes[:, 2].copy(),
+        )
+        ended = [
+            {"time_s": round(step * time_step, 6), "kind": "ended", "agent": agent, "reason": why} for step, agent, why in self._endings
+        ]
+        return DisplayTrack(
+            np.array([time for time, _ in track]),
+            np.rint(np.stack([poses for _, poses in track]) * 1e3) / 1e3,
+            np.array(scorer.curve, np.float64).reshape(-1, 2),
+            self._origin,
+            env.settings.occupancy.resolution,
+            maps,
+            sorted(self._events + ended, key=lambda event: float(event["time_s"])),
+        )
+
+    def _note_contacts(self, env: ExplorationEnv) -> None:
+        collisions = env.world.collisions
+        for robot in np.flatnonzero(collisions > self._collisions).tolist():
+            self.note("contact", env.scorer.time, env.possible_agents[robot])
+        self._collisions, self._told_collisions = collisions.copy(), collisions.tobytes()
+
+    def _sample(self, env: ExplorationEnv, *, everywhere: bool = False) -> None:
+        """Note what of the team's map has changed since the last sample."""
+        world, resolution, (rows, words) = env.world, env.settings.occupancy.resolution, self._free.shape
+        places = _places_of(env)
+        if everywhere:
+            boxes = np.array([(0, rows, 0, words * WORD)])
+        else:
+            low = ((np.minimum(places, self._places) - self._reach - self._origin) / resolution).astype(np.int64)
+            high = ((np.maximum(places, self._places) + self._reach - self._origin) / resolution).astype(np.int64)
+            boxes = np.stack([low[:, 1], high[:, 1], low[:, 0], high[:, 0]], axis=1)
+        self._places = places
+        count = note_changes(world.belief_rows, self._lays, resolution, boxes, self._free, self._occupied, self._buffer)
+        step = int(world.steps[0])
+        if not self._sampled_at or step > self._sampled_at[-1]:
+            self._sampled_at.append(step)
+            self._changes.append(self._buffer[:count].copy())
+
+
+def _places_of(env: ExplorationEnv) -> NDArray[np.float64]:
+    """Return where the robots believe to be, in the floor's frame, shape (robots, 2) [m]."""
+    world = env.world
+    if env.settings.known_starts:
+        return world.believed[:, :2].copy()
+    cosines, sines = np.cos(world.starts[:, 2]), np.sin(world.starts[:, 2])
+    x, y = world.believed[:, 0], world.believed[:, 1]
+    return world.starts[:, :2] + np.stack([cosines * x - sines * y, sines * x + cosines * y], axis=1)
+
+
+def _lays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
+    """Return how maps in the frames of the starts lie over the floor's lattice, as ``note_changes`` takes it."""
+    world = env.world
+    return np.array([
+        (*origin, x, y, math.cos(theta), math.sin(theta), *own_origin)
+        for (x, y, theta), own_origin in zip(world.starts, world.origins, strict=True)
+    ])  # fmt: skip
+
+
+def _rounded(place: tuple[float, float] | None) -> dict[str, float | None]:
+    return {"x": None, "y": None} if place is None else {"x": round(place[0], 3), "y": round(place[1], 3)}
