@@ -1,6 +1,5 @@
 """Records an episode as it runs: what re-runs it, and what can be shown of it."""
 
-import math
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -15,12 +14,11 @@ import lidarium
 from lidarium.agents.policy import GivenUp
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.onboard.state import Orders
-from lidarium.evaluation.record.display import DisplayTrack, MapChanges
+from lidarium.evaluation.record.display import DisplayTrack
 from lidarium.evaluation.record.episode_record import FORMAT, EpisodeRecord
+from lidarium.evaluation.record.map_sampler import MapSampler
 from lidarium.evaluation.record.state import state_sha256
 from lidarium.evaluation.result import in_floor_frame, settings_sha256
-from lidarium.mapping.level_changes import note_changes
-from lidarium.mapping.occupancy import WORD
 
 MAP_PERIOD_S = 2.0
 """Time between samples of the team's map [s]."""
@@ -60,8 +58,6 @@ class Recorder:
     def begin(self, env: ExplorationEnv) -> None:
         """Begin a new record, with the map of the scan at the start."""
         world, settings = env.world, env.settings
-        tables = world.floors[0]
-        assert tables is not None
         self._env = env
         self._commands = bytearray()
         self._endings: list[tuple[int, str, str]] = []
@@ -72,18 +68,7 @@ class Recorder:
         self._targets: list[tuple[float, float] | None] = [None] * settings.robots
         self._given_up: set[GivenUp] = set()
         self._map_steps = max(round(MAP_PERIOD_S / settings.time_step), 1)
-        self._origin = tables.laser.origin
-        rows, words = world.counted_masks[0].shape
-        self._free, self._occupied = np.zeros((rows, words), np.uint64), np.zeros((rows, words), np.uint64)
-        self._buffer = np.empty((rows * words, 3), np.uint64)
-        self._changes: list[NDArray[np.uint64]] = []
-        self._sampled_at: list[int] = []
-        self._lays = np.zeros((0, 8)) if settings.known_starts else _lays_of(env, self._origin)
-        # Between two samples a robot gets no further from both places than half of what it can drive.
-        way = settings.robot.max_speed * self._map_steps * settings.time_step
-        self._reach = settings.lidar.range_max + 0.5 * way + 4 * settings.occupancy.resolution
-        self._places = _places_of(env)
-        self._sample(env, everywhere=True)
+        self._maps = MapSampler(env, MAP_PERIOD_S)
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
         """Note how the robots were driven, contacts that began, and from time to time the map."""
@@ -92,7 +77,7 @@ class Recorder:
         if world.collisions.tobytes() != self._told_collisions:
             self._note_contacts(env)
         if int(world.steps[0]) % self._map_steps == 0:
-            self._sample(env)
+            self._maps.sample()
 
     def outcome(self, env: ExplorationEnv) -> None:
         """Note which robots ended, and why."""
@@ -108,12 +93,7 @@ class Recorder:
         time_s = self._decided_at * env.settings.time_step
         self._decided_at = int(env.world.steps[0])
         if orders is not None:
-            for robot, agent in enumerate(env.possible_agents):
-                target = (float(orders.targets[robot, 0]), float(orders.targets[robot, 1])) if orders.is_ordered[robot] else None
-                if target != self._targets[robot]:
-                    self._targets[robot] = target
-                    place = None if target is None else in_floor_frame(env, agent, *target)
-                    self.note("decision", time_s, agent, **_rounded(place))
+            self._note_targets(env, orders, time_s)
         for entry in given_up:
             if entry not in self._given_up:
                 self._given_up.add(entry)
@@ -155,7 +135,7 @@ class Recorder:
         settings, world = env.settings, env.world
         steps = int(world.steps[0])
         commands = np.frombuffer(self._commands, np.float64).reshape(-1, settings.robots, 2).copy()
-        self._sample(env, everywhere=True)
+        self._maps.sample()
         header = {
             "format": FORMAT,
             "version": lidarium.__version__,
@@ -172,9 +152,9 @@ class Recorder:
             "goal": None if env.goal is None else list(env.goal),
             "steps": len(commands),
             "counted_cells": int(world.counted[0]),
-            "map_origin": list(self._origin),
+            "map_origin": list(self._maps.origin),
             "map_resolution": settings.occupancy.resolution,
-            "map_shape": list(self._free.shape),
+            "map_shape": list(self._maps.shape),
             "endings": [list(ending) for ending in self._endings],
             "interrupted": is_interrupted,
             # Broken off within a step, the world is ahead of what was recorded.
@@ -187,17 +167,6 @@ class Recorder:
         track = list(scorer.track)
         if track[-1][0] < scorer.time:
             track.append((scorer.time, env.world.poses.copy()))
-        changes = np.concatenate(self._changes)
-        rows, words = self._free.shape
-        maps = MapChanges(
-            rows,
-            words,
-            np.array(self._sampled_at) * time_step,
-            np.array([len(change) for change in self._changes], np.int64),
-            changes[:, 0].astype(np.int64),
-            changes[:, 1].copy(),
-            changes[:, 2].copy(),
-        )
         ended = [
             {"time_s": round(step * time_step, 6), "kind": "ended", "agent": agent, "reason": why} for step, agent, why in self._endings
         ]
@@ -205,53 +174,25 @@ class Recorder:
             np.array([time for time, _ in track]),
             np.rint(np.stack([poses for _, poses in track]) * 1e3) / 1e3,
             np.array(scorer.curve, np.float64).reshape(-1, 2),
-            self._origin,
+            self._maps.origin,
             env.settings.occupancy.resolution,
-            maps,
+            self._maps.changes(),
             sorted(self._events + ended, key=lambda event: float(event["time_s"])),
         )
+
+    def _note_targets(self, env: ExplorationEnv, orders: Orders, time_s: float) -> None:
+        is_ordered, targets = orders.is_ordered.tolist(), orders.targets.tolist()
+        for robot, agent in enumerate(env.possible_agents):
+            target = (targets[robot][0], targets[robot][1]) if is_ordered[robot] else None
+            if target != self._targets[robot]:
+                self._targets[robot] = target
+                self.note("decision", time_s, agent, **_rounded(None if target is None else in_floor_frame(env, agent, *target)))
 
     def _note_contacts(self, env: ExplorationEnv) -> None:
         collisions = env.world.collisions
         for robot in np.flatnonzero(collisions > self._collisions).tolist():
             self.note("contact", env.scorer.time, env.possible_agents[robot])
         self._collisions, self._told_collisions = collisions.copy(), collisions.tobytes()
-
-    def _sample(self, env: ExplorationEnv, *, everywhere: bool = False) -> None:
-        """Note what of the team's map has changed since the last sample."""
-        world, resolution, (rows, words) = env.world, env.settings.occupancy.resolution, self._free.shape
-        places = _places_of(env)
-        if everywhere:
-            boxes = np.array([(0, rows, 0, words * WORD)])
-        else:
-            low = ((np.minimum(places, self._places) - self._reach - self._origin) / resolution).astype(np.int64)
-            high = ((np.maximum(places, self._places) + self._reach - self._origin) / resolution).astype(np.int64)
-            boxes = np.stack([low[:, 1], high[:, 1], low[:, 0], high[:, 0]], axis=1)
-        self._places = places
-        count = note_changes(world.belief_rows, self._lays, resolution, boxes, self._free, self._occupied, self._buffer)
-        step = int(world.steps[0])
-        if not self._sampled_at or step > self._sampled_at[-1]:
-            self._sampled_at.append(step)
-            self._changes.append(self._buffer[:count].copy())
-
-
-def _places_of(env: ExplorationEnv) -> NDArray[np.float64]:
-    """Return where the robots believe to be, in the floor's frame, shape (robots, 2) [m]."""
-    world = env.world
-    if env.settings.known_starts:
-        return world.believed[:, :2].copy()
-    cosines, sines = np.cos(world.starts[:, 2]), np.sin(world.starts[:, 2])
-    x, y = world.believed[:, 0], world.believed[:, 1]
-    return world.starts[:, :2] + np.stack([cosines * x - sines * y, sines * x + cosines * y], axis=1)
-
-
-def _lays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
-    """Return how maps in the frames of the starts lie over the floor's lattice, as ``note_changes`` takes it."""
-    world = env.world
-    return np.array([
-        (*origin, x, y, math.cos(theta), math.sin(theta), *own_origin)
-        for (x, y, theta), own_origin in zip(world.starts, world.origins, strict=True)
-    ])  # fmt: skip
 
 
 def _rounded(place: tuple[float, float] | None) -> dict[str, float | None]:
