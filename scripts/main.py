@@ -8,15 +8,17 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
-from lidarium.scripts import bench, floors, run, show
+from lidarium.scripts import bench, floors, replay, run, show
 from lidarium.scripts.bench import Bench
 from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
 from lidarium.scripts.floors import Floors
+from lidarium.scripts.replay import Replay
 from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
 
 Choice = (
     Annotated[Run, subcommand("run")]
+    | Annotated[Replay, subcommand("replay")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -24,6 +26,7 @@ Choice = (
 
 _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Run: run.execute,
+    Replay: replay.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,
