@@ -42,6 +42,7 @@ SHIFT = 4
 
 BORDER = 10
 
+
 def team_colours(robots: int) -> list[Colour]:
     """Return a colour (red, green, blue) for each robot; the first eight are far apart, the others evenly around the circle."""
     colours = list(_TEAM[:robots])

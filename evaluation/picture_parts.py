@@ -37,6 +37,7 @@ class Box:
 
     @property
     def aspect(self) -> float:
+        """Width over height."""
         x_min, x_max, y_min, y_max = self.extent
         return (x_max - x_min) / (y_max - y_min)
 
@@ -134,7 +135,9 @@ def hex_colours(robots: int) -> list[str]:
     return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in team_colours(robots)]
 
 
-def draw_curve(axes: Axes, curve: Sequence[tuple[float, float]] | NDArray[np.float64], reached: Mapping[float, float], end_s: float) -> None:
+def draw_curve(
+    axes: Axes, curve: Sequence[tuple[float, float]] | NDArray[np.float64], reached: Mapping[float, float], end_s: float
+) -> None:
     """Draw coverage over time.
 
     Parameters

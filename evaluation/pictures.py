@@ -171,7 +171,8 @@ def _list_robots(axes: Axes, episode: Episode) -> None:
     counted = max(int(world.counted[0]), 1)
     endings = [env.scorer.ended_because.get(agent, "still at work") for agent in env.possible_agents]
     robots = [
-        (reason, f"{way:.1f} m", f"{100.0 * seen / counted:.0f} %") for reason, way, seen in zip(endings, world.travelled, world.seen, strict=True)
+        (reason, f"{way:.1f} m", f"{100.0 * seen / counted:.0f} %")
+        for reason, way, seen in zip(endings, world.travelled, world.seen, strict=True)
     ]
     reasons = Counter(entry.reason.replace("_", " ") for entry in episode.given_up)
     given_up = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common()) or "nothing"

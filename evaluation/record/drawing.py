@@ -67,13 +67,13 @@ class TrackFrames:
         self._record, self._display = record, record.display
         display = record.display
         known = display.map_at(math.inf) != UNKNOWN
-        self._view = view_around(known, display.origin, display.resolution, size)
+        self.view = view_around(known, display.origin, display.resolution, size)
         self._agents = [f"robot_{robot}" for robot in range(display.poses.shape[1])]
         self._colours = team_colours(len(self._agents))
 
     def draw(self, time_s: float) -> Frame:
         """Return the frame at a time: the team's map, the ways of the last minute, targets as rings, robots with their headings."""
-        display, view = self._display, self._view
+        display, view = self._display, self.view
         levels = display.map_at(time_s)[view.rows, view.columns]
         frame = enlarged(_PALETTE[_blocks(levels, view)], view)
         recent = (display.times >= time_s - RECENT_S) & (display.times <= time_s + 1e-9)
@@ -95,11 +95,11 @@ class TrackFrames:
                 targets[event["agent"]] = None if event["x"] is None else (event["x"], event["y"])
             elif event["kind"] == "ended":
                 targets[event["agent"]] = None
-        radius = max(round(0.12 * self._view.scale), 5)
+        radius = max(round(0.12 * self.view.scale), 5)
         for agent, pose, colour in zip(self._agents, poses, self._colours, strict=True):
             target = targets.get(agent)
             if target is not None:
-                here, there = (tuple(int(value) for value in point) for point in self._view.pixels(np.array([pose[:2], target])))
+                here, there = (tuple(int(value) for value in point) for point in self.view.pixels(np.array([pose[:2], target])))
                 cv2.line(frame, here, there, colour, 1, cv2.LINE_AA, SHIFT)
                 cv2.circle(frame, there, radius << SHIFT, EXPLORED, -1, cv2.LINE_AA, SHIFT)
                 cv2.circle(frame, there, radius << SHIFT, colour, 2, cv2.LINE_AA, SHIFT)

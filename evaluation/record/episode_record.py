@@ -100,8 +100,8 @@ def check_header(header: Any) -> None:  # noqa: ANN401
         raise ValueError("its header is not an object with the number of its format")
     if number > FORMAT:
         raise NewerFormatError(
-            f"is an episode record of format {number}, written by lidarium {header.get('version')}; this is lidarium {lidarium.__version__}, "
-            f"which reads formats up to {FORMAT}: use the newer version"
+            f"is an episode record of format {number}, written by lidarium {header.get('version')}; "
+            f"this is lidarium {lidarium.__version__}, which reads formats up to {FORMAT}: use the newer version"
         )
     for name, (wanted, is_good) in _WANTED.items():
         if name not in header:

@@ -2,6 +2,8 @@
 
 import io
 import json
+import struct
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -18,6 +20,9 @@ from lidarium.mapping.map_files import check_file
 _HEADER, _EVENTS = "header.json", "events.json"
 _ARRAYS = ("commands", "pose_steps", "poses", "coverage", "map_steps", "map_counts", "map_places", "map_free", "map_occupied")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
+_DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError, EOFError, KeyError, ValueError, RuntimeError)
+"""What readers of zips, arrays and JSON raise over bytes that are not as they were written."""
+
 _UNITS = 1e3
 """Steps of positions and headings in a metre and a radian."""
 
@@ -72,7 +77,7 @@ def read_record(path: Path) -> EpisodeRecord:
             return _unpacked(header, events, arrays)
     except NewerFormatError as error:
         raise ValueError(f"{path} {error}") from error
-    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, ValueError, NotImplementedError) as error:
+    except _DAMAGE as error:
         raise ValueError(f"{path} is not a whole episode record: {_reason(error)}; want a file that lidarium run --record wrote") from error
 
 
@@ -90,10 +95,9 @@ def _json(content: Any) -> bytes:  # noqa: ANN401
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    with archive.open(f"{name}.npy") as member:
+    # Read as a whole first, which looks at the checksum: nothing damaged is parsed.
+    with io.BytesIO(archive.read(f"{name}.npy")) as member:
         array: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
-        # What lies behind the array is read too, so that the checksum of the member is looked at.
-        member.read()
     return array
 
 

@@ -1,5 +1,6 @@
 """Records an episode as it runs: what re-runs it, and what can be shown of it."""
 
+import json
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -145,7 +146,8 @@ class Recorder:
             "floor_sha256": env.floor.sha256,
             "robots": settings.robots,
             "time_step": settings.time_step,
-            "settings": asdict(settings),
+            # As it comes back from JSON: tuples are lists.
+            "settings": json.loads(json.dumps(asdict(settings))),
             "settings_sha256": settings_sha256(settings),
             "starts": world.starts.tolist(),
             "noise_seed": env.seed,

@@ -9,6 +9,21 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
 
+_ARRAYS = (
+    "steps",
+    "poses",
+    "believed",
+    "velocities",
+    "ranges",
+    "bumpers",
+    "contacts",
+    "travelled",
+    "collisions",
+    "seen",
+    "team_seen",
+    "counted",
+)
+
 
 def state_sha256(env: ExplorationEnv) -> str:
     """Return a hash of the state of an environment's world, to the bit.
@@ -19,9 +34,7 @@ def state_sha256(env: ExplorationEnv) -> str:
     """
     world = env.world
     digest = hashlib.sha256()
-    for name in (
-        "steps", "poses", "believed", "velocities", "ranges", "bumpers", "contacts", "travelled", "collisions", "seen", "team_seen", "counted",
-    ):  # fmt: skip
+    for name in _ARRAYS:
         _add(digest, name, getattr(world, name))
     for name in ("masks", "team_masks", "counted_masks"):
         for mask in getattr(world, name):

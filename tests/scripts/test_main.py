@@ -69,7 +69,7 @@ def test_help_comes_without_loading_the_kernels():
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "floors list", "floors show", "floors generate", "floors import", "floors prepare", "bench", "show"]
+    "command", ["run", "floors list", "floors show", "floors generate", "floors import", "floors prepare", "bench", "show", "replay"]
 )
 def test_every_command_has_seed_out_and_json(command, capsys):
     assert main([*command.split(), "--help"]) == 0

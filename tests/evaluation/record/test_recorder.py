@@ -8,7 +8,7 @@ import pytest
 import lidarium
 from lidarium.envs.settings import make_settings
 from lidarium.evaluation.record import Recorder
-from lidarium.evaluation.result import in_floor_frame, team_log_odds
+from lidarium.evaluation.result import team_log_odds
 from lidarium.evaluation.runner import run_episode
 from lidarium.evaluation.watching import WatchedExploration
 from lidarium.mapping.occupancy import three_levels
@@ -49,6 +49,19 @@ class Sends:
         return {"robot_0": np.array([0.05 * (1 + self.decisions // 3), 0.0], np.float32), "robot_1": None}
 
 
+class Rams:
+    """Drives into walls and teammates at full speed, backs off and comes again."""
+
+    level, shares_map = "velocity", True
+
+    def reset(self, team, seed):
+        self.steps = 0
+
+    def act(self, observations):
+        self.steps += 1
+        return {agent: np.array([1.0 if self.steps % 50 < 40 else -0.5, 0.0], np.float32) for agent in observations}
+
+
 @pytest.mark.parametrize(
     "setup",
     [
@@ -84,7 +97,7 @@ def test_between_samples_the_map_is_that_of_the_last_one(apartment_record):
 
 def test_poses_come_five_times_a_second_and_at_the_end(recorded):
     log = MapLog()
-    record, env = recorded("random_walk", horizon_s=5.1, watchers=[log])
+    record, _ = recorded("random_walk", horizon_s=5.1, watchers=[log])
     times, poses = record.display.times, record.display.poses
     np.testing.assert_allclose(times, [*np.arange(26) * 0.2, 5.1])
     for time, recorded_poses in zip(times[1:], poses[1:], strict=True):
@@ -101,7 +114,7 @@ def test_coverage_is_the_scorers_curve(recorded):
 
 
 def test_decisions_tell_where_a_robot_was_sent_and_when(recorded):
-    record, env = recorded(Sends(), horizon_s=15.0)
+    record, _ = recorded(Sends(), horizon_s=15.0)
     told = [event for event in record.display.events if event["kind"] == "decision"]
     assert {event["agent"] for event in told} == {"robot_0"}
     first = record.display.poses[0, 0]
@@ -128,13 +141,14 @@ def test_what_is_given_up_is_told_once_with_its_place(recorded):
 
 
 def test_contacts_are_told_when_they_begin(recorded):
-    record, env = recorded("random_walk", floor="scene_room", robots=3, horizon_s=60.0)
+    record, env = recorded(Rams(), floor="scene_room", robots=3, horizon_s=30.0)
     told = [event["agent"] for event in record.display.events if event["kind"] == "contact"]
+    assert told
     assert [told.count(agent) for agent in env.possible_agents] == env.world.collisions.tolist()
 
 
 def test_endings_close_the_events(recorded):
-    record, env = recorded(horizon_s=3.0)
+    record, _ = recorded(horizon_s=3.0)
     assert record.display.events[-2:] == [
         {"time_s": 3.0, "kind": "ended", "agent": "robot_0", "reason": "horizon"},
         {"time_s": 3.0, "kind": "ended", "agent": "robot_1", "reason": "horizon"},
@@ -154,13 +168,13 @@ def test_others_add_events_of_their_own():
 
 
 def test_the_header_names_no_machine_path_but_the_users_own(recorded):
-    record, env = recorded(horizon_s=1.0)
+    record, _ = recorded(horizon_s=1.0)
     assert record.header["floor_source"] == "apartment"
     assert "/" not in str({name: value for name, value in record.header.items() if name != "settings"})
 
 
 def test_a_recorded_episode_is_the_same_as_one_that_is_not(recorded):
-    record, env = recorded(horizon_s=20.0, noise="datasheet", known_starts=False)
+    _, env = recorded(horizon_s=20.0, noise="datasheet", known_starts=False)
     alone = WatchedExploration("apartment", env.settings)
     run_episode(lidarium.policy("nearest_frontier"), alone, 3)
     np.testing.assert_array_equal(alone.world.poses, env.world.poses)
@@ -185,10 +199,3 @@ def test_an_episode_broken_off_within_a_step_is_recorded_without_its_last_state(
 def test_a_recorder_that_saw_nothing_has_no_record():
     with pytest.raises(ValueError, match="has seen no episode"):
         Recorder().finish()
-
-
-def test_positions_of_events_are_those_of_the_policys_map_frame(recorded):
-    record, env = recorded(Sends(), horizon_s=4.0)
-    event = next(event for event in record.display.events if event["kind"] == "decision")
-    x, y = in_floor_frame(env, "robot_0", 0.0, 0.0)
-    assert math.hypot(event["x"] - x, event["y"] - y) < 1.0

@@ -40,9 +40,7 @@ class Leaves:
     def act(self, observations):
         self.steps += 1
         spin = np.array([0.3, 0.7], np.float32)
-        return {
-            agent: Stop(self.reasons[int(agent[-1])]) if self.steps > 5 * (int(agent[-1]) + 1) else spin for agent in observations
-        }
+        return {agent: Stop(self.reasons[int(agent[-1])]) if self.steps > 5 * (int(agent[-1]) + 1) else spin for agent in observations}
 
 
 def assert_same(again, env):
@@ -97,7 +95,7 @@ def test_a_goal_that_is_reached_ends_a_robot_again():
     record = recorder.finish()
     assert record.header["endings"][0][1:] == ["robot_0", "reached"]
     assert_same(rerun(record, floor), env)
-    with pytest.raises(ValueError, match="is not found.*name the floor"):
+    with pytest.raises(ValueError, match=r"is not found.*name the floor"):
         rerun(record)
 
 
