@@ -99,7 +99,7 @@ def view_around(shown: NDArray[np.bool_], origin: tuple[float, float], resolutio
     size : int
         Longer side [pixels].
     """
-    rows, columns = (_span(shown.any(axis=axis), math.ceil(_MARGIN / resolution)) for axis in (1, 0))
+    rows, columns = (_span(np.asarray(shown.any(axis=axis)), math.ceil(_MARGIN / resolution)) for axis in (1, 0))
     tall, wide = ((span.stop - span.start) * resolution for span in (rows, columns))
     scale = size / max(tall, wide)
     corner = (origin[0] + columns.start * resolution, origin[1] + rows.start * resolution)

@@ -40,7 +40,7 @@ class Film:
         """Take the first frame."""
         self._take(env)
 
-    def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
+    def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
         """Take a frame where it is time for one."""
         self._take(env)
 

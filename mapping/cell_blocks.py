@@ -15,6 +15,8 @@ from numba.extending import intrinsic
 from lidarium.mapping.kernels import kernel
 
 _BYTE, _SUM = ir.IntType(8), ir.VectorType(ir.IntType(16), 64)
+_uniform: Any = types.UniTuple
+_BITS = _uniform(types.uint64, 2)
 _BLOCK = ir.VectorType(_BYTE, 64)
 _MASK = ir.VectorType(ir.IntType(1), 64)
 
@@ -79,7 +81,7 @@ def _sign_bits(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
         below, above = (builder.bitcast(builder.icmp_signed(order, sums, zero), ir.IntType(64)) for order in ("<", ">"))
         return context.make_tuple(builder, signature.return_type, (below, above))
 
-    return types.UniTuple(types.uint64, 2)(types.int64), generate
+    return _BITS(types.int64), generate
 
 
 _signs: Any = intrinsic(_sign_bits)

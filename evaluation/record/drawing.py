@@ -172,7 +172,7 @@ def _blocks(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
 def _counts(events: list[dict[str, Any]]) -> dict[str, int]:
     """Count the events of each kind but endings, which are listed by themselves."""
     names = {"decision": "decisions", "contact": "contacts", "given_up": "given up on the way", "message": "messages", "merge": "merges"}
-    kinds = [event["kind"] for event in events if event["kind"] != "ended"]
+    kinds = [str(event["kind"]) for event in events if event["kind"] != "ended"]
     return {names.get(kind, kind): kinds.count(kind) for kind in dict.fromkeys(kinds)}
 
 

@@ -95,7 +95,7 @@ def check_header(header: Any) -> None:  # noqa: ANN401
     ValueError
         Where a key is missing or has a bad value.
     """
-    number = header.get("format") if isinstance(header, dict) else None
+    number: Any = header.get("format") if isinstance(header, dict) else None
     if not _is_count(number):
         raise ValueError("its header is not an object with the number of its format")
     if number > FORMAT:

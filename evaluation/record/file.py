@@ -68,8 +68,9 @@ def read_record(path: Path) -> EpisodeRecord:
     """
     path = Path(path)
     check_file(path)
+    content = path.read_bytes()
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
             header = json.loads(archive.read(_HEADER))
             check_header(header)
             events = json.loads(archive.read(_EVENTS))

@@ -68,7 +68,9 @@ class Recorder:
         self._live, self._decided_at = len(env.agents), 0
         self._targets: list[tuple[float, float] | None] = [None] * settings.robots
         self._given_up: set[GivenUp] = set()
+        self._last_given_up: list[GivenUp] = []
         self._map_steps = max(round(MAP_PERIOD_S / settings.time_step), 1)
+        self._steps_to_sample = self._map_steps
         self._maps = MapSampler(env, MAP_PERIOD_S)
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
@@ -77,7 +79,9 @@ class Recorder:
         world = env.world
         if world.collisions.tobytes() != self._told_collisions:
             self._note_contacts(env)
-        if int(world.steps[0]) % self._map_steps == 0:
+        self._steps_to_sample -= 1
+        if not self._steps_to_sample:
+            self._steps_to_sample = self._map_steps
             self._maps.sample()
 
     def outcome(self, env: ExplorationEnv) -> None:
@@ -95,11 +99,8 @@ class Recorder:
         self._decided_at = int(env.world.steps[0])
         if orders is not None:
             self._note_targets(env, orders, time_s)
-        for entry in given_up:
-            if entry not in self._given_up:
-                self._given_up.add(entry)
-                place = _rounded(in_floor_frame(env, entry.agent, entry.x, entry.y))
-                self.note("given_up", time_s, entry.agent, **place, size_m=round(entry.size_m, 3), reason=entry.reason)
+        if given_up and given_up != self._last_given_up:
+            self._note_given_up(env, given_up, time_s)
 
     def note(self, kind: str, time_s: float, agent: str | None, **details: Any) -> None:  # noqa: ANN401
         """Add an event, such as a message or a merge.
@@ -189,6 +190,15 @@ class Recorder:
             if target != self._targets[robot]:
                 self._targets[robot] = target
                 self.note("decision", time_s, agent, **_rounded(None if target is None else in_floor_frame(env, agent, *target)))
+
+    def _note_given_up(self, env: ExplorationEnv, given_up: Sequence[GivenUp], time_s: float) -> None:
+        """Note what is given up for the first time; what was seen later from elsewhere may leave the list, and come back."""
+        self._last_given_up = list(given_up)
+        for entry in self._last_given_up:
+            if entry not in self._given_up:
+                self._given_up.add(entry)
+                place = _rounded(in_floor_frame(env, entry.agent, entry.x, entry.y))
+                self.note("given_up", time_s, entry.agent, **place, size_m=round(entry.size_m, 3), reason=entry.reason)
 
     def _note_contacts(self, env: ExplorationEnv) -> None:
         collisions = env.world.collisions

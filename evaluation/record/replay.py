@@ -81,7 +81,7 @@ def drive_again(record: EpisodeRecord, floor: str | Path | Floor | None = None, 
 
 def is_same(record: EpisodeRecord, env: ExplorationEnv) -> bool:
     """Whether an environment is in the state in which a record ends, to the bit."""
-    return state_sha256(env) == record.header["final_sha256"]
+    return bool(state_sha256(env) == record.header["final_sha256"])
 
 
 def first_difference(record: EpisodeRecord, env: ExplorationEnv) -> str:

@@ -47,7 +47,7 @@ def state_sha256(env: ExplorationEnv) -> str:
 
 def _add(digest: "hashlib._Hash", name: str, array: NDArray[Any]) -> None:
     digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
-    digest.update(np.ascontiguousarray(array))
+    digest.update(np.ascontiguousarray(array).data)
 
 
 def _add_map(digest: "hashlib._Hash", log_odds: NDArray[np.int8]) -> None:
