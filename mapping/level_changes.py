@@ -1,8 +1,9 @@
 """The three-level map of a team as two bits per cell, and what changes in it.
 
 A cell is free where the sum of the robots' log-odds is below 0, occupied where it is above, and else unknown. Two planes of
-bits hold that, one word for 64 cells of a row; what changed is told by words: which one, and which of its bits flipped. Only
-what the robots can have seen since the last look is looked at again.
+bits hold which cells are known and which are occupied, one word for 64 cells of a row; what changed is told by words: which one,
+and which of its bits flipped. So a wall that noise moves to and fro flips bits of one plane only. Only what the robots can have
+seen since the last look is looked at again.
 """
 
 import math
@@ -40,16 +41,16 @@ def _spans(poses: Array, last: Array, reach: float, frame: Array) -> Array:
 
 
 @kernel
-def _note_word(sums: int, where: np.uint64, row: int, word: int, free: Array, occupied: Array, change: Array) -> bool:
+def _note_word(sums: int, where: np.uint64, row: int, word: int, known: Array, occupied: Array, change: Array) -> bool:
     """Compare 64 sums, int16 at an address, with a word of the planes in the bits ``where``; write into ``change`` (3,) what flipped."""
     is_free, is_occupied = sign_bits(sums)
-    flipped_free, flipped_occupied = (is_free ^ free[row, word]) & where, (is_occupied ^ occupied[row, word]) & where
-    if not flipped_free | flipped_occupied:
+    flipped_known, flipped_occupied = ((is_free | is_occupied) ^ known[row, word]) & where, (is_occupied ^ occupied[row, word]) & where
+    if not flipped_known | flipped_occupied:
         return False
-    free[row, word] ^= flipped_free
+    known[row, word] ^= flipped_known
     occupied[row, word] ^= flipped_occupied
-    change[0] = row * free.shape[1] + word
-    change[1], change[2] = flipped_free, flipped_occupied
+    change[0] = word * known.shape[0] + row
+    change[1], change[2] = flipped_known, flipped_occupied
     return True
 
 
@@ -62,7 +63,7 @@ def _add_row(address: int, total: Array) -> None:
 
 
 @kernel
-def note_changes(maps: Array, poses: Array, last: Array, reach: float, frame: Array, free: Array, occupied: Array, changes: Array) -> int:
+def note_changes(maps: Array, poses: Array, last: Array, reach: float, frame: Array, known: Array, occupied: Array, changes: Array) -> int:
     """Bring the planes of a team's map up to date where its robots' maps, all on one lattice, may have changed.
 
     Parameters
@@ -75,17 +76,17 @@ def note_changes(maps: Array, poses: Array, last: Array, reach: float, frame: Ar
         How far from either place a robot can have seen [m].
     frame : (3,) float64
         Lower left corner x, y and side of a cell of the lattice [m].
-    free, occupied : (rows, words) uint64
+    known, occupied : (rows, words) uint64
         The planes; updated.
     changes : (rows * words, 3) uint64
-        Result: number of each changed word (row * words + column), its flipped bits in ``free`` and in ``occupied``; ascending.
+        Result: place of each changed word (column of words * rows + row), its flipped bits in ``known`` and in ``occupied``.
 
     Returns
     -------
     int
         Number of changed words.
     """
-    rows, words = free.shape
+    rows, words = known.shape
     spans = _spans(poses, last, reach, frame)
     total = np.empty(words * 64, np.int16)
     found = 0
@@ -101,7 +102,7 @@ def note_changes(maps: Array, poses: Array, last: Array, reach: float, frame: Ar
         for robot in range(maps.shape[0]):
             _add_row(maps[robot, 0] + (row * words + low) * 64, sums)
         for word in range(low, high):
-            if _note_word(sums.ctypes.data + (word - low) * 128, _ALL, row, word, free, occupied, changes[found]):
+            if _note_word(sums.ctypes.data + (word - low) * 128, _ALL, row, word, known, occupied, changes[found]):
                 found += 1
     return found
 
@@ -144,14 +145,14 @@ def _add_laid_group(log_odds: Array, lay: Array, resolution: float, row: int, fi
 
 @kernel
 def note_laid_changes(
-    maps: Array, before: Array, lays: Array, poses: Array, last: Array, reach: float, resolution: float, free: Array, occupied: Array,
+    maps: Array, before: Array, lays: Array, poses: Array, last: Array, reach: float, resolution: float, known: Array, occupied: Array,
     changes: Array,
 ) -> int:  # fmt: skip
     """Bring the planes of a team's map up to date, as ``note_changes``, where each robot's map is in the frame of its own start.
 
     Parameters
     ----------
-    maps, reach, free, occupied, changes
+    maps, reach, known, occupied, changes
         As for ``note_changes``; columns of the maps are a multiple of 8.
     before : (robots,) int64
         Addresses of the maps as they were at the last look, blank at the first; updated.
@@ -168,7 +169,7 @@ def note_laid_changes(
     int
         Number of changed words.
     """
-    rows, words = free.shape
+    rows, words = known.shape
     stale = np.zeros((rows, words * (64 // _GROUP)), np.uint8)
     frame = np.empty(3)
     for robot in range(maps.shape[0]):
@@ -190,15 +191,16 @@ def note_laid_changes(
                     part[:] = np.int16(0)
                     for robot in range(maps.shape[0]):
                         _add_laid_group(maps[robot], lays[robot], resolution, row, word * 64 + group * _GROUP, part)
-            if _note_word(sums.ctypes.data, where, row, word, free, occupied, changes[found]):
+            if _note_word(sums.ctypes.data, where, row, word, known, occupied, changes[found]):
                 found += 1
     return found
 
 
-def levels_of_planes(free: NDArray[np.uint64], occupied: NDArray[np.uint64]) -> NDArray[np.uint8]:
+def levels_of_planes(known: NDArray[np.uint64], occupied: NDArray[np.uint64]) -> NDArray[np.uint8]:
     """Return the three-level map of two planes (rows, words): 0 occupied, 127 unknown, 255 free, shape (rows, words * 64)."""
-    rows, words = free.shape
-    is_free, is_occupied = (
-        np.unpackbits(plane.astype("<u8").view(np.uint8), bitorder="little").reshape(rows, words * WORD) for plane in (free, occupied)
+    rows, words = known.shape
+    is_known, is_occupied = (
+        np.unpackbits(np.ascontiguousarray(plane, "<u8").view(np.uint8), bitorder="little").reshape(rows, words * WORD)
+        for plane in (known, occupied)
     )
-    return np.asarray(np.uint8(UNKNOWN) + is_free * np.uint8(FREE - UNKNOWN) - is_occupied * np.uint8(UNKNOWN - OCCUPIED), np.uint8)
+    return np.asarray(np.array([UNKNOWN, FREE, UNKNOWN, OCCUPIED], np.uint8)[is_known + 2 * is_occupied])

@@ -13,7 +13,7 @@ from lidarium.mapping.level_changes import levels_of_planes
 class MapChanges:
     """How the team's three-level map changed from sample to sample, beginning with a map of which nothing is known.
 
-    Two planes of bits hold the map, one of free and one of occupied cells; a word has 64 cells of a row, bit 0 the first one.
+    Two planes of bits hold the map, one of known and one of occupied cells; a word has 64 cells of a row, bit 0 the first one.
 
     Attributes
     ----------
@@ -24,8 +24,8 @@ class MapChanges:
     counts : (samples,) int64
         Number of words that each sample changed.
     places : (changes,) int64
-        Which words, row * words + word, ascending within a sample; the samples one after the other.
-    free, occupied : (changes,) uint64
+        Which words, word of the row * rows + row, ascending within a sample; the samples one after the other.
+    known, occupied : (changes,) uint64
         Which bits of the words flipped.
     """
 
@@ -34,7 +34,7 @@ class MapChanges:
     times: NDArray[np.float64]
     counts: NDArray[np.int64]
     places: NDArray[np.int64]
-    free: NDArray[np.uint64]
+    known: NDArray[np.uint64]
     occupied: NDArray[np.uint64]
 
     def levels_at(self, time_s: float) -> NDArray[np.uint8]:
@@ -42,10 +42,10 @@ class MapChanges:
         samples = int(np.searchsorted(self.times, time_s + 1e-9, side="right"))
         changes = int(self.counts[:samples].sum())
         planes = np.zeros((2, self.rows * self.words), np.uint64)
-        for plane, flipped in zip(planes, (self.free, self.occupied), strict=True):
+        for plane, flipped in zip(planes, (self.known, self.occupied), strict=True):
             np.bitwise_xor.at(plane, self.places[:changes], flipped[:changes])
-        free, occupied = planes.reshape(2, self.rows, self.words)
-        return levels_of_planes(free, occupied)
+        known, occupied = planes.reshape(2, self.words, self.rows)
+        return levels_of_planes(known.T, occupied.T)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

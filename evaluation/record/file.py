@@ -18,7 +18,7 @@ from lidarium.evaluation.record.episode_record import EpisodeRecord, NewerFormat
 from lidarium.mapping.map_files import check_file
 
 _HEADER, _EVENTS = "header.json", "events.json"
-_ARRAYS = ("commands", "pose_steps", "poses", "coverage", "map_steps", "map_counts", "map_places", "map_free", "map_occupied")
+_ARRAYS = ("commands", "pose_steps", "poses", "coverage", "map_steps", "map_counts", "map_places", "map_known", "map_occupied")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError, EOFError, KeyError, ValueError, RuntimeError)
 """What readers of zips, arrays and JSON raise over bytes that are not as they were written."""
@@ -117,7 +117,7 @@ def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
         "map_steps": _steps(changes.times, time_step),
         "map_counts": changes.counts.astype(np.int32),
         "map_places": np.diff(changes.places.astype(np.int32), prepend=np.int32(0)),
-        "map_free": changes.free,
+        "map_known": changes.known,
         "map_occupied": changes.occupied,
     }
     return {name: np.ascontiguousarray(arrays[name], arrays[name].dtype.newbyteorder("<")) for name in _ARRAYS}
@@ -137,11 +137,11 @@ def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any
         "map_steps": (samples,),
         "map_counts": (samples,),
         "map_places": (changed,),
-        "map_free": (changed,),
+        "map_known": (changed,),
         "map_occupied": (changed,),
     }
     for name, shape in shapes.items():
-        kind = {"commands": np.float64, "map_free": np.uint64, "map_occupied": np.uint64}.get(name, np.int32)
+        kind = {"commands": np.float64, "map_known": np.uint64, "map_occupied": np.uint64}.get(name, np.int32)
         if arrays[name].shape != shape or arrays[name].dtype != kind:
             raise ValueError(f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of {np.dtype(kind)}")
     places = np.cumsum(arrays["map_places"], dtype=np.int64)
@@ -155,7 +155,7 @@ def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any
         arrays["map_steps"] * time_step,
         arrays["map_counts"].astype(np.int64),
         places,
-        arrays["map_free"],
+        arrays["map_known"],
         arrays["map_occupied"],
     )
     display = DisplayTrack(

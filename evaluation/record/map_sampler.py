@@ -39,7 +39,7 @@ class MapSampler:
         self.shape: tuple[int, int] = (world.counted_masks[0].shape[0], world.counted_masks[0].shape[1])
         self._world, self._time_step, self._resolution = world, settings.time_step, settings.occupancy.resolution
         self._frame = np.array([*self.origin, self._resolution])
-        self._free, self._occupied = np.zeros(self.shape, np.uint64), np.zeros(self.shape, np.uint64)
+        self._known, self._occupied = np.zeros(self.shape, np.uint64), np.zeros(self.shape, np.uint64)
         self._buffer = np.empty((self.shape[0] * self.shape[1], 3), np.uint64)
         # Between two samples a robot gets no further from both places than half of what it can drive.
         self._reach = settings.lidar.range_max + 0.5 * settings.robot.max_speed * period_s + 4 * self._resolution
@@ -58,7 +58,7 @@ class MapSampler:
         step = int(world.steps[0])
         if self._steps and step <= self._steps[-1]:
             return
-        planes = (self._free, self._occupied, self._buffer)
+        planes = (self._known, self._occupied, self._buffer)
         if self._is_laid:
             count = note_laid_changes(
                 world.belief_rows, self._before_at, self._lays, world.believed, self._last, self._reach, self._resolution, *planes
@@ -72,8 +72,11 @@ class MapSampler:
         """Return all samples so far."""
         changes = np.concatenate(self._changes)
         counts = np.array([len(change) for change in self._changes], np.int64)
-        places, free, occupied = changes[:, 0].astype(np.int64), changes[:, 1].copy(), changes[:, 2].copy()
-        return MapChanges(*self.shape, np.array(self._steps) * self._time_step, counts, places, free, occupied)
+        places = changes[:, 0].astype(np.int64)
+        # Words above each other are alike, so that in this order they take less room when they are compressed.
+        order = np.lexsort((places, np.repeat(np.arange(len(counts)), counts)))
+        times = np.array(self._steps) * self._time_step
+        return MapChanges(*self.shape, times, counts, places[order], changes[order, 1], changes[order, 2])
 
 
 def _lays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:

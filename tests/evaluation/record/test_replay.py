@@ -115,7 +115,7 @@ def test_whoever_looks_on_sees_the_episode_again(recorded, apartment_record):
     again = recorder.finish()
     np.testing.assert_array_equal(again.commands, apartment_record.commands)
     np.testing.assert_array_equal(again.display.poses, apartment_record.display.poses)
-    np.testing.assert_array_equal(again.display.changes.free, apartment_record.display.changes.free)
+    np.testing.assert_array_equal(again.display.changes.known, apartment_record.display.changes.known)
 
 
 def test_commands_that_differ_in_the_twelfth_digit_are_noticed(apartment_record):
