@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from lidarium.envs.episodes import begin, goal_of_robots, map_frames
+from lidarium.envs.episodes import Beginning, begin, goal_of_robots, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
 from lidarium.envs.onboard.perception import Perception
@@ -137,7 +137,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         chosen = read_options(options, self.settings.robots)
         if seed is not None or self._generator is None:
             self._generator = np.random.default_rng(seed)
-        beginning = begin(self._generator, self._choice, chosen, self.settings)
+        return self.start(begin(self._generator, self._choice, chosen, self.settings))
+
+    def start(self, beginning: Beginning) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Start an episode that begins as was drawn, or as one did before; returns what ``reset`` returns."""
         self.seed, self.floor, self.goal = beginning.seed, beginning.floor, beginning.goal
         self.world.place(0, beginning.tables, beginning.starts, beginning.seed, self.settings.known_starts)
         self._offsets[:] = map_frames(beginning, self.settings)

@@ -1,52 +1,40 @@
 """Pictures: what a run found on a floor, and floors themselves (PNG, drawn without a display)."""
 
-import io
 import math
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch
-from matplotlib.patheffects import Normal, Stroke
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.rendering import team_colours
-from lidarium.evaluation.output import whole_file
+from lidarium.evaluation.picture_parts import (
+    INK,
+    SOLID,
+    box_around,
+    draw_curve,
+    draw_start,
+    draw_ways,
+    drawn_together,
+    list_robots,
+    page,
+    rgb,
+    save_page,
+    show_cells,
+)
 from lidarium.evaluation.result import occupied_in_truth, team_log_odds
 from lidarium.evaluation.runner import Episode
 from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.grid_planning import centres_of
 
-INK, FAINT, SOLID = "#1f2937", "#6b7280", "#b6bec9"
 FRONTIER_COLOUR, GIVEN_UP_COLOUR, UNSEEN_COLOUR, UNCOUNTED_COLOUR = "#e11d48", "#7c3aed", "#ffd9a0", "#dfe3ea"
-DPI = 130
 _START_COLOUR = "#2563eb"
-_LISTED_ROBOTS = 16
-_WIDE = 2.1
-_MOST_PIXELS = 3000
-_MARGIN = 0.15
-
-
-@dataclass(frozen=True, slots=True)
-class _Box:
-    """What part of a raster is shown: rows, columns, and its extent in metres (x_min, x_max, y_min, y_max)."""
-
-    rows: slice
-    columns: slice
-    extent: tuple[float, float, float, float]
-
-    @property
-    def aspect(self) -> float:
-        x_min, x_max, y_min, y_max = self.extent
-        return (x_max - x_min) / (y_max - y_min)
 
 
 def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
@@ -65,18 +53,18 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
     if env.floor is None:
         raise ValueError("the episode was interrupted before it began, there is nothing to draw")
     x_min, y_min, x_max, y_max = env.floor.bounds
-    figure, floor_axes, curve_axes, team_axes = _page((x_max - x_min) / (y_max - y_min))
+    figure, floor_axes, curve_axes, team_axes = page((x_max - x_min) / (y_max - y_min))
     _draw_maps(floor_axes, episode)
-    _draw_ways(floor_axes, episode)
+    draw_ways(floor_axes, np.stack([poses for _, poses in scorer.track] + [env.world.poses]), env.settings.robot.radius)
     _draw_legend(figure, *_draw_frontiers(floor_axes, episode))
-    _draw_curve(curve_axes, episode)
+    draw_curve(curve_axes, scorer.curve, scorer.times, scorer.time)
     _list_robots(team_axes, episode)
     area = float(env.world.counted[0]) * env.settings.occupancy.resolution**2
     robots = "1 robot" if env.settings.robots == 1 else f"{env.settings.robots} robots"
     how = ", interrupted" if episode.is_interrupted else ""
     title = f"{env.floor.name}: {100 * scorer.coverage:.1f} % of {area:.0f} m² explored in {scorer.time:.1f} s{how}"
     subtitle = f"{robots}, {policy}, seed {episode.seed}, {float(env.world.travelled.sum()):.1f} m driven"
-    _save(path, figure, title, subtitle)
+    save_page(path, figure, title, subtitle)
 
 
 def save_floor_picture(path: Path, floor: Floor, height: float, resolution: float = 0.025) -> None:
@@ -92,17 +80,17 @@ def save_floor_picture(path: Path, floor: Floor, height: float, resolution: floa
         Height of the plane, and side of a cell [m].
     """
     raster = floor.raster(resolution, height, height)
-    box = _box_around(raster.solid == 0, raster.origin, resolution)
+    box = box_around(raster.solid == 0, raster.origin, resolution)
     figure = Figure(figsize=_floor_size(box.aspect), layout="constrained")
     axes = figure.add_subplot()
-    solid = _drawn_together((raster.solid[box.rows, box.columns] != 0).astype(np.uint8))
-    _show(axes, np.stack([_rgb("#ffffff"), _rgb(INK)])[solid], box, INK)
+    solid = drawn_together((raster.solid[box.rows, box.columns] != 0).astype(np.uint8))
+    show_cells(axes, np.stack([rgb("#ffffff"), rgb(INK)])[solid], box, INK)
     for k, (x, y, theta) in enumerate(floor.starts):
-        _draw_start(axes, k, float(x), float(y), _START_COLOUR)
+        draw_start(axes, k, float(x), float(y), _START_COLOUR)
         ahead = (x + 0.6 * math.cos(theta), y + 0.6 * math.sin(theta))
         axes.annotate("", ahead, (x, y), arrowprops={"arrowstyle": "->", "color": _START_COLOUR})
     x_min, y_min, x_max, y_max = floor.bounds
-    _save(path, figure, floor.name, f"{x_max - x_min:.1f} x {y_max - y_min:.1f} m, seen at a height of {height:g} m")
+    save_page(path, figure, floor.name, f"{x_max - x_min:.1f} x {y_max - y_min:.1f} m, seen at a height of {height:g} m")
 
 
 def frontiers_left(episode: Episode) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -127,68 +115,9 @@ def _moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np
     return np.asarray(points @ np.array([[cosine, sine], [-sine, cosine]]) + pose[:2])
 
 
-def _box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution: float) -> _Box:
-    spans, limits = [], []
-    for axis in (1, 0):
-        used = np.flatnonzero(free.any(axis=axis))
-        margin = math.ceil(_MARGIN / resolution)
-        low, high = max(int(used[0]) - margin, 0), min(int(used[-1]) + 1 + margin, free.shape[1 - axis])
-        spans.append(slice(low, high))
-        limits.append((origin[axis] + low * resolution, origin[axis] + high * resolution))
-    return _Box(spans[0], spans[1], (*limits[1], *limits[0]))
-
-
 def _floor_size(aspect: float) -> tuple[float, float]:
     width = min(max(9.0 * math.sqrt(aspect), 6.0), 16.0)
     return width, min(max(width / aspect + 0.8, 3.0), 14.0)
-
-
-def _page(aspect: float) -> tuple[Figure, Axes, Axes, Axes]:
-    """Lay the page out: the floor, and beside or (where it is wide) below it the curve and the team."""
-    if aspect > _WIDE:
-        width = 14.0
-        height = width / min(aspect, 8.0) + 1.0
-        figure = Figure(figsize=(width, height + 3.4), layout="constrained")
-        grid = figure.add_gridspec(2, 2, height_ratios=(height, 2.6), width_ratios=(1.3, 1.0))
-        return figure, figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
-    height = 8.0 if aspect > 1.0 else 9.0
-    width = max(height * aspect, 5.0)
-    figure = Figure(figsize=(width + 4.6, height + 0.6), layout="constrained")
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.25), width_ratios=(width, 4.2))
-    return figure, figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
-
-
-def _save(path: Path, figure: Figure, title: str, subtitle: str) -> None:
-    figure.suptitle(title, x=0.012, ha="left", fontsize=15, fontweight="bold", color=INK)
-    figure.axes[0].set_title(subtitle, loc="left", fontsize=10.5, color=FAINT)
-    save_figure(path, figure)
-
-
-def save_figure(path: Path, figure: Figure) -> None:
-    """Write a figure as a PNG file, whole or not at all."""
-    FigureCanvasAgg(figure)
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=DPI, facecolor="white")
-    with whole_file(path) as beside:
-        beside.write_bytes(content.getvalue())
-
-
-def _rgb(colour: str) -> NDArray[np.uint8]:
-    return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)], np.uint8)
-
-
-def _show(axes: Axes, picture: NDArray[np.uint8], box: _Box, outside: str) -> None:
-    axes.imshow(picture, origin="lower", extent=box.extent, interpolation="antialiased", zorder=0)
-    x_min, x_max, y_min, y_max = box.extent
-    axes.set_xlim(x_min - _MARGIN, x_max + _MARGIN)
-    axes.set_ylim(y_min - _MARGIN, y_max + _MARGIN)
-    axes.set_facecolor(outside)
-    axes.set_aspect("equal")
-    axes.xaxis.set_major_formatter("{x:g} m")
-    axes.yaxis.set_major_formatter("{x:g} m")
-    axes.tick_params(colors=FAINT, labelsize=8)
-    for side in axes.spines.values():
-        side.set_visible(False)
 
 
 def _draw_maps(axes: Axes, episode: Episode) -> None:
@@ -205,42 +134,9 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
     classes[counted] = 2
     classes[log_odds < 0] = 3
     classes[log_odds > 0] = 4
-    palette = np.stack([_rgb(colour) for colour in (UNCOUNTED_COLOUR, SOLID, UNSEEN_COLOUR, "#ffffff", INK)])
-    box = _box_around(~solid, origin, env.settings.occupancy.resolution)
-    _show(axes, palette[_drawn_together(classes[box.rows, box.columns])], box, SOLID)
-
-
-def _drawn_together(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Draw blocks of cells as one where there are more than the picture has pixels; the highest class shows."""
-    block = -(-max(classes.shape) // _MOST_PIXELS)
-    if block == 1:
-        return classes
-    rows, columns = (-(-side // block) * block for side in classes.shape)
-    padded = np.pad(classes, ((0, rows - classes.shape[0]), (0, columns - classes.shape[1])), mode="edge")
-    return np.asarray(padded.reshape(rows // block, block, columns // block, block).max(axis=1).max(axis=2))
-
-
-def _draw_ways(axes: Axes, episode: Episode) -> None:
-    env = episode.env
-    track = np.stack([poses for _, poses in env.scorer.track] + [env.world.poses])
-    radius = max(env.settings.robot.radius, 0.009 * float(np.ptp(axes.get_xlim())))
-    halo = [Stroke(linewidth=3.6, foreground="white", alpha=0.85), Normal()]
-    for robot, colour in enumerate(_hex_colours(env.settings.robots)):
-        axes.plot(track[:, robot, 0], track[:, robot, 1], color=colour, linewidth=1.7, zorder=4, path_effects=halo, solid_joinstyle="round")
-    for robot, colour in enumerate(_hex_colours(env.settings.robots)):
-        x, y, theta = (float(value) for value in env.world.poses[robot])
-        axes.add_patch(Circle((x, y), radius, facecolor=colour, edgecolor="white", linewidth=1.2, zorder=6))
-        axes.plot([x, x + radius * math.cos(theta)], [y, y + radius * math.sin(theta)], color="white", linewidth=1.6, zorder=7)
-        _draw_start(axes, robot, float(env.world.starts[robot, 0]), float(env.world.starts[robot, 1]), colour)
-
-
-def _draw_start(axes: Axes, number: int, x: float, y: float, colour: str) -> None:
-    axes.plot([x], [y], marker="o", markersize=13, markerfacecolor="white", markeredgecolor=colour, markeredgewidth=2, zorder=8)
-    axes.text(x, y, str(number), ha="center", va="center_baseline", fontsize=8, fontweight="bold", color=colour, zorder=9)
-
-
-def _hex_colours(robots: int) -> list[str]:
-    return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in team_colours(robots)]
+    palette = np.stack([rgb(colour) for colour in (UNCOUNTED_COLOUR, SOLID, UNSEEN_COLOUR, "#ffffff", INK)])
+    box = box_around(~solid, origin, env.settings.occupancy.resolution)
+    show_cells(axes, palette[drawn_together(classes[box.rows, box.columns])], box, SOLID)
 
 
 def _draw_frontiers(axes: Axes, episode: Episode) -> tuple[bool, bool]:
@@ -269,49 +165,15 @@ def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool) -> None:
     figure.legend(handles=entries, loc="outside lower left", ncols=columns, frameon=False, fontsize=8.5, labelcolor=INK, handlelength=1.2)
 
 
-def _draw_curve(axes: Axes, episode: Episode) -> None:
-    scorer = episode.env.scorer
-    times, shares = [time for time, _ in scorer.curve], [100.0 * share for _, share in scorer.curve]
-    end = max(scorer.time, 1.0)
-    axes.fill_between([*times, end], [*shares, shares[-1]], step="post", color="#16a34a", alpha=0.15, linewidth=0)
-    axes.step([*times, end], [*shares, shares[-1]], where="post", color="#16a34a", linewidth=1.8)
-    axes.plot(list(scorer.times.values()), [100.0 * share for share in scorer.times], "o", color="#16a34a", markersize=4)
-    reached = "\n".join(f"{100 * share:.0f} % at {time:.1f} s" for share, time in scorer.times.items())
-    axes.text(0.97, 0.05, reached, transform=axes.transAxes, ha="right", va="bottom", fontsize=8.5, color=INK)
-    axes.set_xlim(0.0, end)
-    axes.set_ylim(0.0, 104.0)
-    axes.set_title("coverage", loc="left", fontsize=10.5, color=INK)
-    axes.set_xlabel("simulated time [s]", fontsize=9, color=FAINT)
-    axes.set_ylabel("C_free [%]", fontsize=9, color=FAINT)
-    axes.tick_params(colors=FAINT, labelsize=8)
-    axes.grid(color="#e5e7eb", linewidth=0.8)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color("#d1d5db")
-
-
 def _list_robots(axes: Axes, episode: Episode) -> None:
     """List each robot's ending, way and share of F, and below what was given up."""
     env, world = episode.env, episode.env.world
-    axes.set_axis_off()
-    axes.set_xlim(0.0, 1.0)
-    shown = min(env.settings.robots, _LISTED_ROBOTS)
-    lines = max(shown + 5, 9)
-    axes.set_ylim(lines, -0.6)
-    style: dict[str, Any] = {"fontsize": 9, "va": "center", "color": INK}
-    heading: dict[str, Any] = {**style, "color": FAINT}
-    for x, text, side in ((0.0, "robot", "left"), (0.74, "drove", "right"), (1.0, "saw", "right")):
-        axes.text(x, 0.0, text, ha=side, **heading)
-    for robot, colour in enumerate(_hex_colours(env.settings.robots)[:shown]):
-        agent, line = env.possible_agents[robot], robot + 1.0
-        reason = env.scorer.ended_because.get(agent, "still at work")
-        axes.plot([0.018], [line], marker="o", markersize=8, color=colour, clip_on=False)
-        axes.text(0.06, line, f"{robot}  {reason.replace('_', ' ')}", ha="left", **style)
-        axes.text(0.74, line, f"{world.travelled[robot]:.1f} m", ha="right", **style)
-        axes.text(1.0, line, f"{100.0 * world.seen[robot] / max(int(world.counted[0]), 1):.0f} %", ha="right", **style)
-    line = shown + 1.0
-    if shown < env.settings.robots:
-        axes.text(0.06, line, f"and {env.settings.robots - shown} more", ha="left", **style)
+    counted = max(int(world.counted[0]), 1)
+    endings = [env.scorer.ended_because.get(agent, "still at work") for agent in env.possible_agents]
+    robots = [
+        (reason, f"{way:.1f} m", f"{100.0 * seen / counted:.0f} %")
+        for reason, way, seen in zip(endings, world.travelled, world.seen, strict=True)
+    ]
     reasons = Counter(entry.reason.replace("_", " ") for entry in episode.given_up)
     given_up = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common()) or "nothing"
-    axes.text(0.0, line + 1.0, f"collisions: {int(world.collisions.sum())}", ha="left", **style)
-    axes.text(0.0, line + 2.0, f"given up on the way: {given_up}", ha="left", **style)
+    list_robots(axes, ("drove", "saw"), robots, (f"collisions: {int(world.collisions.sum())}", f"given up on the way: {given_up}"))

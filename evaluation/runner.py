@@ -15,6 +15,7 @@ from lidarium.envs.onboard.state import DriveState
 from lidarium.envs.solo import at_level
 from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.waypoints import WaypointExploration
+from lidarium.evaluation.watching import WatchedExploration
 
 Progress = Callable[[ExplorationEnv], None]
 
@@ -120,6 +121,9 @@ def run_episode(
             episode.decision_seconds.append(time.perf_counter() - decided)
             observations = world.step(actions)[0]
             observations = {agent: observations[agent] for agent in env.agents}
+            if isinstance(env, WatchedExploration):
+                orders = driver.driver.orders() if isinstance(driver, WaypointExploration) else None
+                env.decided(orders, getattr(policy, "given_up", ()))
             if on_decision is not None:
                 on_decision(env)
     except KeyboardInterrupt:

@@ -14,7 +14,9 @@ from lidarium.envs.rendering import draw_frame
 from lidarium.evaluation.output import whole_file
 
 FRAMES_PER_SECOND = 20
-_LAST_FRAME_S = 1.5
+
+LAST_FRAME_S = 1.5
+"""How long a film holds its last picture [s]."""
 
 
 class Film:
@@ -38,7 +40,7 @@ class Film:
         """Take the first frame."""
         self._take(env)
 
-    def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
+    def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
         """Take a frame where it is time for one."""
         self._take(env)
 
@@ -53,7 +55,7 @@ class Film:
     def end(self, env: ExplorationEnv) -> None:
         """Hold the last picture for a moment."""
         frame = draw_frame(env, self._size)
-        for _ in range(round(_LAST_FRAME_S * FRAMES_PER_SECOND)):
+        for _ in range(round(LAST_FRAME_S * FRAMES_PER_SECOND)):
             self._writer.append_data(frame)
 
 
@@ -75,8 +77,14 @@ def film(path: Path, speed: float = 10.0, size: int = 960) -> Iterator[Film]:
     ValueError
         Where the speed is not positive.
     """
-    if not 0.0 < speed < float("inf"):
-        raise ValueError(f"speed of the film is {speed}; want more than 0 simulated seconds per second")
+    check_speed(speed)
+    with film_writer(path) as writer:
+        yield Film(writer, speed / FRAMES_PER_SECOND, size)
+
+
+@contextmanager
+def film_writer(path: Path) -> Iterator[Any]:
+    """Lend a writer of frames with ``append_data(frame)``; the film (mp4, H.264) appears when it is done, whole or not at all."""
     # Frames of one size throughout: no rescaling to multiples of 16, the frames' sides are even.
     options: dict[str, Any] = {
         "fps": FRAMES_PER_SECOND,
@@ -86,4 +94,16 @@ def film(path: Path, speed: float = 10.0, size: int = 960) -> Iterator[Film]:
         "output_params": ["-preset", "veryfast"],
     }
     with whole_file(path) as beside, imageio.get_writer(str(beside), **options) as writer:
-        yield Film(writer, speed / FRAMES_PER_SECOND, size)
+        yield writer
+
+
+def check_speed(speed: float) -> None:
+    """Check the speed of a film, simulated seconds per second.
+
+    Raises
+    ------
+    ValueError
+        Where it is not positive.
+    """
+    if not 0.0 < speed < float("inf"):
+        raise ValueError(f"speed of the film is {speed}; want more than 0 simulated seconds per second")

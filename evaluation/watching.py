@@ -1,14 +1,17 @@
 """An environment that shows every step of its world to those who watch: cameras, histories, records."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.policy import GivenUp
+from lidarium.envs.episodes import Beginning
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.onboard.state import Orders
 from lidarium.envs.settings import ExplorationSettings
 
 
@@ -23,6 +26,23 @@ class Watcher(Protocol):
 
     def outcome(self, env: ExplorationEnv) -> None:
         """Look after rewards and endings have been told, when ended agents have left."""
+
+
+class DecisionWatcher(Watcher, Protocol):
+    """Who looks on at decisions as well; a watcher with this method is shown them."""
+
+    def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
+        """Look back at a decision that has been carried out.
+
+        Parameters
+        ----------
+        env : ExplorationEnv
+            The environment.
+        orders : Orders or None
+            Where the robots were sent; None at the level of velocities.
+        given_up : sequence of GivenUp
+            All that the policy leaves unexplored by now.
+        """
 
 
 class WatchedExploration(ExplorationEnv):
@@ -46,11 +66,9 @@ class WatchedExploration(ExplorationEnv):
         super().__init__(floor, settings, image_resolution=image_resolution)
         self.watchers: list[Watcher] = list(watchers)
 
-    def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Start an episode, as ``ExplorationEnv.reset``."""
-        told = super().reset(seed, options)
+    def start(self, beginning: Beginning) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Start an episode, as ``ExplorationEnv.start``."""
+        told = super().start(beginning)
         for watcher in self.watchers:
             watcher.begin(self)
         return told
@@ -69,3 +87,10 @@ class WatchedExploration(ExplorationEnv):
         for watcher in self.watchers:
             watcher.outcome(self)
         return told
+
+    def decided(self, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
+        """Show a decision that has been carried out to the watchers that look at them; see ``DecisionWatcher``."""
+        for watcher in self.watchers:
+            look = getattr(watcher, "decision", None)
+            if look is not None:
+                look(self, orders, given_up)

@@ -159,6 +159,18 @@ def _least_sums(typing_context: Any, numbers: Any, costs: Any, low: Any, high: A
     return types.void(*(types.int64,) * 6), generate
 
 
+def _sign_bits(typing_context: Any, sums: Any) -> Any:  # noqa: ANN401
+    """Tell which cells of a block of sums are below and which are above 0."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        total = _load(builder, arguments[0], _SHORTS)
+        below, above = (builder.bitcast(builder.icmp_signed(order, total, _NO_SHORTS), _INT64) for order in "<>")
+        return context.make_tuple(builder, signature.return_type, (below, above))
+
+    pair: Any = types.UniTuple
+    return pair(types.uint64, 2)(types.int64), generate
+
+
 def _raise_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: ANN401
     """Raise the numbers of a block to those of another where these are greater."""
 
@@ -177,6 +189,7 @@ _differs: Any = intrinsic(_positive_differs)
 _count: Any = intrinsic(_count_steps)
 _least: Any = intrinsic(_least_sums)
 _raise: Any = intrinsic(_raise_block)
+_signs: Any = intrinsic(_sign_bits)
 
 
 @kernel(inline=True)
@@ -253,3 +266,9 @@ def write_least_sums(numbers: int, costs: int, low: int, high: int, cap: int, re
 def raise_block(block: int, other: int) -> None:
     """Raise the uint16 of a block to those of another where these are greater."""
     _raise(block, other)
+
+
+@kernel(inline=True)
+def sign_bits(address: int) -> tuple[np.uint64, np.uint64]:
+    """Return which of the 64 int16 at an address are below 0, and which are above, bit 0 the first one."""
+    return _signs(address)  # type: ignore[no-any-return]

@@ -8,13 +8,14 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
-from lidarium.scripts import bench, evaluate, floors, report, reproduce, run, show
+from lidarium.scripts import bench, evaluate, floors, replay, report, reproduce, run, show
 from lidarium.scripts.bench import Bench
 from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
 from lidarium.scripts.report import Report
 from lidarium.scripts.reproduce import Reproduce
+from lidarium.scripts.replay import Replay
 from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
 
@@ -23,6 +24,7 @@ Choice = (
     | Annotated[Evaluate, subcommand("evaluate")]
     | Annotated[Report, subcommand("report")]
     | Annotated[Reproduce, subcommand("reproduce")]
+    | Annotated[Replay, subcommand("replay")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -33,6 +35,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Evaluate: evaluate.execute,
     Report: report.execute,
     Reproduce: reproduce.execute,
+    Replay: replay.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.envs.settings import ExplorationSettings
+    from lidarium.evaluation.record import Recorder
     from lidarium.evaluation.runner import Episode
 
 DEFAULT_FOLDER = Path("runs")
@@ -23,7 +24,7 @@ NAMED_GIVEN_UP = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Run(Command):
-    """Let a team explore a floor; writes its figures, its map, a picture and, if asked for, a film."""
+    """Let a team explore a floor; writes its figures, its map, a picture and, if asked for, a record and a film."""
 
     floor: str = "apartment"
     """name in the catalogue, building:SEED, set:NAME, or a file of any format that the importers know"""
@@ -47,6 +48,8 @@ class Run(Command):
     """share of the floor at which the run ends"""
     starts: str | None = None
     """where the robots start: x,y,theta of each in metres and radians, separated by semicolons"""
+    record: bool = False
+    """write a record of the run, episode.npz, which `lidarium replay` runs again to the bit or draws"""
     video: bool = False
     """write a film of the run, run.mp4"""
     video_speed: float = 10.0
@@ -66,7 +69,8 @@ def execute(command: Run) -> Answer:
 
     check_writable(command.out or DEFAULT_FOLDER)
     policy = lidarium.policy(command.policy)
-    env = _environment(command)
+    recorder = _recorder(command)
+    env = _environment(command, recorder)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
     episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
     if env.floor is None or not env.scorer.track:
@@ -76,7 +80,7 @@ def execute(command: Run) -> Answer:
     from lidarium.evaluation.result import result_of
 
     result = result_of(episode, command.policy)
-    files = _write(command, episode, result, folder)
+    files = _write(command, episode, result, folder, recorder)
     return Answer(result, _summary(command, episode, result, folder, files), INTERRUPTED if episode.is_interrupted else 0)
 
 
@@ -94,12 +98,22 @@ def _settings(command: Run) -> "ExplorationSettings":
     )
 
 
-def _environment(command: Run) -> "ExplorationEnv":
+def _recorder(command: Run) -> "Recorder | None":
+    if not command.record:
+        return None
+    from lidarium.evaluation.record import Recorder
+
+    return Recorder(command.policy, command.seed, command.floor, command.resolution)
+
+
+def _environment(command: Run, recorder: "Recorder | None") -> "ExplorationEnv":
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.evaluation.watching import WatchedExploration
 
-    kind = WatchedExploration if command.video else ExplorationEnv
-    return kind(command.floor, _settings(command), image_resolution=command.resolution)
+    if not command.video and recorder is None:
+        return ExplorationEnv(command.floor, _settings(command), image_resolution=command.resolution)
+    watchers = [] if recorder is None else [recorder]
+    return WatchedExploration(command.floor, _settings(command), image_resolution=command.resolution, watchers=watchers)
 
 
 def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
@@ -149,7 +163,7 @@ def _film(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, A
             progress.tell(current)
 
         episode = run_episode(policy, env, command.seed, options, on_decision, raise_interrupt=False)
-        env.watchers.clear()
+        env.watchers[:] = [watcher for watcher in env.watchers if watcher not in camera]
         if camera and not episode.is_interrupted:
             camera[0].end(env)
         return episode
@@ -159,8 +173,8 @@ def _folder(command: Run, floor: str) -> Path:
     return command.out or DEFAULT_FOLDER / file_name(f"{floor}-{command.policy}-{command.seed}")
 
 
-def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Path) -> list[str]:
-    """Write the figures first, then the map, then the picture; return the files' names."""
+def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, recorder: "Recorder | None") -> list[str]:
+    """Write the figures first, then the record, the map and the picture; return the files' names."""
     import numpy as np
 
     from lidarium.evaluation.output import write_json
@@ -170,10 +184,15 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
     from lidarium.mapping.occupancy import three_levels
 
     write_json(folder / "result.json", result)
+    if recorder is not None:
+        from lidarium.evaluation.record import write_record
+
+        write_record(folder / "episode.npz", recorder.finish(is_interrupted=episode.is_interrupted))
     log_odds, (x, y) = team_log_odds(episode.env)
     write_ros_map(folder, "map", three_levels(np.sign(log_odds).astype(np.int8)), (x, y, 0.0), command.map_resolution)
     save_run_picture(folder / "run.png", episode, command.policy)
-    return ["result.json", "map.yaml", "map.pgm", "run.png", *(["run.mp4"] if command.video else [])]
+    asked_for = [*(["episode.npz"] if recorder is not None else []), *(["run.mp4"] if command.video else [])]
+    return ["result.json", "map.yaml", "map.pgm", "run.png", *asked_for]
 
 
 def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]) -> str:

@@ -114,6 +114,10 @@ class TeamDriver:
         stopped = changed[drives.passing[changed] < 0]
         drives.has_path[stopped], drives.states[stopped], drives.stood[stopped], drives.counts[stopped] = False, IDLE, 0, 0
 
+    def orders(self) -> Orders:
+        """Return the targets that all robots have; the arrays are the driver's own."""
+        return Orders(self.drives.is_ordered, self.drives.targets, self.drives.target_headings)
+
     def states(self) -> NDArray[np.int8]:
         """Return the numbers of what all robots' driving is about, (rows,); ``DRIVE_STATES`` names them."""
         return np.asarray(drive_states(self.drives))

@@ -78,9 +78,9 @@ def page(folder: Path, command: str) -> str:
         "# Leaderboard",
         f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python {platform.python_version()}. "
         "Simulated time; perfect poses, no noise, the URG laser (240 deg, 5.6 m), maps of 2.5 cm, known starts, cut at 1,800 s. "
-        " Starts are drawn by the seed, the same for every policy. An entry of time is the median with its 95 % interval; "
-        "runs that did not get there count as never. The difference is that of the restricted means to `nearest_frontier`, pair by pair, with its "
-        "95 % interval; in bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm).",
+        "Starts are drawn by the seed, the same for every policy. An entry of time is the median with its 95 % interval; "
+        "runs that did not get there count as never. The difference is that of the restricted means to `nearest_frontier`, pair by "
+        "pair, with its 95 % interval; in bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm).",
     ]
     for kind, about in KINDS.items():
         if not (folder / kind / "episodes.jsonl").exists():
@@ -97,7 +97,8 @@ def _table(groups: Iterable[Mapping[str, Any]]) -> str:
     for group in groups:
         by_team.setdefault(group["robots"], []).append(group)
     lines = [
-        "| robots | policy | runs | reached 99 % | time to 90 % [s] | time to 99 % [s] | less the baseline [s] | path of all [m] | overlap [%] |",
+        "| robots | policy | runs | reached 99 % | time to 90 % [s] | time to 99 % [s] | less the baseline [s] | path of all [m] | "
+        "overlap [%] |",
         "|---:|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for robots, members in sorted(by_team.items()):

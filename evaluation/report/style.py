@@ -12,7 +12,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import ArrayLike
 
 from lidarium.envs.rendering import team_colours
-from lidarium.evaluation.pictures import FAINT, INK, save_figure
+from lidarium.evaluation.picture_parts import FAINT, INK, save_figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4b4b4b")
 """Okabe and Ito, Color universal design (2008), without yellow, which is pale on white."""

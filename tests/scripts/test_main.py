@@ -58,7 +58,7 @@ def rewritten(path, **changes):
 def test_help_names_the_commands(capsys):
     assert main(["--help"]) == 0
     told = capsys.readouterr().out
-    assert all(name in told for name in ("run", "report", "floors", "bench", "show"))
+    assert all(name in told for name in ("run", "evaluate", "replay", "report", "reproduce", "floors", "bench", "show"))
 
 
 def test_help_comes_without_loading_the_kernels():
@@ -69,7 +69,21 @@ def test_help_comes_without_loading_the_kernels():
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "report", "floors list", "floors show", "floors generate", "floors import", "floors prepare", "bench", "show"]
+    "command",
+    [
+        "run",
+        "evaluate",
+        "replay",
+        "report",
+        "reproduce",
+        "floors list",
+        "floors show",
+        "floors generate",
+        "floors import",
+        "floors prepare",
+        "bench",
+        "show",
+    ],
 )
 def test_every_command_has_seed_out_and_json(command, capsys):
     assert main([*command.split(), "--help"]) == 0

@@ -1,0 +1,8 @@
+"""Records of episodes: written as they run, run again to the bit by the same version, shown by any."""
+
+from lidarium.evaluation.record.display import DisplayTrack as DisplayTrack
+from lidarium.evaluation.record.episode_record import EpisodeRecord as EpisodeRecord
+from lidarium.evaluation.record.file import read_record as read_record
+from lidarium.evaluation.record.file import write_record as write_record
+from lidarium.evaluation.record.recorder import Recorder as Recorder
+from lidarium.evaluation.record.replay import rerun as rerun

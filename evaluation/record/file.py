@@ -1,0 +1,184 @@
+"""Records as files: a zip of a header, events and compressed arrays, which ``numpy.load`` opens as well."""
+
+import io
+import json
+import struct
+import tokenize
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.evaluation.output import whole_file
+from lidarium.evaluation.record.display import DisplayTrack, MapChanges
+from lidarium.evaluation.record.episode_record import EpisodeRecord, NewerFormatError, check_header
+from lidarium.mapping.map_files import check_file
+
+_HEADER, _EVENTS = "header.json", "events.json"
+_ARRAYS = ("commands", "pose_steps", "poses", "coverage", "map_steps", "map_counts", "map_places", "map_known", "map_occupied")
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+_DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError, EOFError, KeyError, ValueError, RuntimeError)
+"""What readers of zips, arrays and JSON raise over bytes that are not as they were written."""
+
+_UNITS = 1e3
+"""Steps of positions and headings in a metre and a radian."""
+
+
+def write_record(path: Path, record: EpisodeRecord) -> None:
+    """Write a record; the file is there whole or not at all, and the same record gives the same file.
+
+    Parameters
+    ----------
+    path : Path
+        The file, by custom an ``.npz``.
+    record : EpisodeRecord
+        What a ``Recorder`` made.
+
+    Raises
+    ------
+    ValueError
+        Where an event holds what JSON cannot.
+    OSError
+        Where nothing can be written there.
+    """
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        _add(archive, _HEADER, _json(record.header))
+        _add(archive, _EVENTS, _json(record.display.events))
+        for name, array in _packed(record).items():
+            with io.BytesIO() as member:
+                np.lib.format.write_array(member, array, allow_pickle=False)
+                _add(archive, f"{name}.npy", member.getvalue())
+    with whole_file(path) as beside:
+        beside.write_bytes(content.getvalue())
+
+
+def read_record(path: Path) -> EpisodeRecord:
+    """Read a record of this version or an older one.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is no such file.
+    ValueError
+        Where it is no record, damaged, cut short, or of a newer format than this version knows.
+    """
+    path = Path(path)
+    check_file(path)
+    content = path.read_bytes()
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            header = json.loads(archive.read(_HEADER))
+            check_header(header)
+            events = json.loads(archive.read(_EVENTS))
+            arrays = {name: _array(archive, name) for name in _ARRAYS}
+            return _unpacked(header, events, arrays)
+    except NewerFormatError as error:
+        raise ValueError(f"{path} {error}") from error
+    except _DAMAGE as error:
+        raise ValueError(f"{path} is not a whole episode record: {_reason(error)}; want a file that lidarium run --record wrote") from error
+
+
+def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
+    member = zipfile.ZipInfo(name, _EPOCH)
+    member.compress_type = zipfile.ZIP_DEFLATED
+    archive.writestr(member, content)
+
+
+def _json(content: Any) -> bytes:  # noqa: ANN401
+    try:
+        return json.dumps(content, allow_nan=False, ensure_ascii=False).encode()
+    except TypeError as error:
+        raise ValueError(f"an event or the header of the record holds what JSON cannot: {error}") from error
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    # Read as a whole first, which looks at the checksum: nothing damaged is parsed.
+    with io.BytesIO(archive.read(f"{name}.npy")) as member:
+        array: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
+    return array
+
+
+def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a record as they are in the file: times as steps, poses and places as differences of whole numbers."""
+    display, time_step = record.display, float(record.header["time_step"])
+    changes, counted = display.changes, max(int(record.header["counted_cells"]), 1)
+    poses = np.rint(display.poses * _UNITS).astype(np.int32)
+    arrays: dict[str, NDArray[Any]] = {
+        "commands": record.commands,
+        "pose_steps": _steps(display.times, time_step),
+        "poses": np.diff(poses, axis=0, prepend=np.int32(0)),
+        "coverage": np.stack(
+            [_steps(display.coverage[:, 0], time_step), np.rint(display.coverage[:, 1] * counted).astype(np.int32)], axis=1
+        ),
+        "map_steps": _steps(changes.times, time_step),
+        "map_counts": changes.counts.astype(np.int32),
+        "map_places": np.diff(changes.places.astype(np.int32), prepend=np.int32(0)),
+        "map_known": changes.known,
+        "map_occupied": changes.occupied,
+    }
+    return {name: np.ascontiguousarray(arrays[name], arrays[name].dtype.newbyteorder("<")) for name in _ARRAYS}
+
+
+def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any]]) -> EpisodeRecord:  # noqa: ANN401
+    """Make a record of what a file holds, checked."""
+    steps, robots, time_step = header["steps"], header["robots"], header["time_step"]
+    (rows, words), counted = header["map_shape"], max(header["counted_cells"], 1)
+    poses, samples = len(arrays["pose_steps"]), len(arrays["map_counts"])
+    changed = len(arrays["map_places"])
+    shapes = {
+        "commands": (steps, robots, 2),
+        "pose_steps": (poses,),
+        "poses": (poses, robots, 3),
+        "coverage": (len(arrays["coverage"]), 2),
+        "map_steps": (samples,),
+        "map_counts": (samples,),
+        "map_places": (changed,),
+        "map_known": (changed,),
+        "map_occupied": (changed,),
+    }
+    for name, shape in shapes.items():
+        kind = {"commands": np.float64, "map_known": np.uint64, "map_occupied": np.uint64}.get(name, np.int32)
+        if arrays[name].shape != shape or arrays[name].dtype != kind:
+            raise ValueError(f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of {np.dtype(kind)}")
+    places = np.cumsum(arrays["map_places"], dtype=np.int64)
+    if int(arrays["map_counts"].sum()) != changed or (changed and not 0 <= int(places.min()) <= int(places.max()) < rows * words):
+        raise ValueError(f"the changes of the map do not fit a map of {rows} x {words} words")
+    if not (poses and samples) or not isinstance(events, list) or not all(_is_event(event) for event in events):
+        raise ValueError("it has no poses, no map or no list of events")
+    changes = MapChanges(
+        rows,
+        words,
+        arrays["map_steps"] * time_step,
+        arrays["map_counts"].astype(np.int64),
+        places,
+        arrays["map_known"],
+        arrays["map_occupied"],
+    )
+    display = DisplayTrack(
+        arrays["pose_steps"] * time_step,
+        np.cumsum(arrays["poses"], axis=0, dtype=np.int64) / _UNITS,
+        np.stack([arrays["coverage"][:, 0] * time_step, arrays["coverage"][:, 1] / counted], axis=1),
+        (header["map_origin"][0], header["map_origin"][1]),
+        header["map_resolution"],
+        changes,
+        events,
+    )
+    return EpisodeRecord(header, arrays["commands"], display)
+
+
+def _steps(times: NDArray[np.float64], time_step: float) -> NDArray[np.int32]:
+    return np.rint(times / time_step).astype(np.int32)
+
+
+def _is_event(event: Any) -> bool:  # noqa: ANN401
+    return (
+        isinstance(event, dict) and isinstance(event.get("kind"), str) and isinstance(event.get("time_s"), int | float) and "agent" in event
+    )
+
+
+def _reason(error: Exception) -> str:
+    return str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error) or type(error).__name__

@@ -1,0 +1,88 @@
+"""Samples the team's three-level map as the changes since the sample before."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.evaluation.record.display import MapChanges
+from lidarium.mapping.level_changes import note_changes, note_laid_changes
+
+
+class MapSampler:
+    """Follows the team's map of an episode; the first sample is taken when it is made.
+
+    The map is the sign of the sum of the robots' log-odds, those that do not know their starts laid over the floor by their true
+    starts, as in ``result.json`` and the map files.
+
+    Parameters
+    ----------
+    env : ExplorationEnv
+        After ``reset``.
+    period_s : float
+        Longest time between samples [s].
+
+    Attributes
+    ----------
+    origin : (x, y)
+        Lower left corner of cell (0, 0) in the floor's frame [m].
+    shape : (rows, words)
+        Rows of the map, and words of 64 cells in a row.
+    """
+
+    def __init__(self, env: ExplorationEnv, period_s: float) -> None:
+        world, settings = env.world, env.settings
+        tables = world.floors[0]
+        assert tables is not None
+        self.origin: tuple[float, float] = tables.laser.origin
+        self.shape: tuple[int, int] = (world.counted_masks[0].shape[0], world.counted_masks[0].shape[1])
+        self._world, self._time_step, self._resolution = world, settings.time_step, settings.occupancy.resolution
+        self._frame = np.array([*self.origin, self._resolution])
+        self._known, self._occupied = np.zeros(self.shape, np.uint64), np.zeros(self.shape, np.uint64)
+        self._buffer = np.empty((self.shape[0] * self.shape[1], 3), np.uint64)
+        # Between two samples a robot gets no further from both places than half of what it can drive.
+        self._reach = settings.lidar.range_max + 0.5 * settings.robot.max_speed * period_s + 4 * self._resolution
+        self._last = world.believed[:, :2].copy()
+        self._is_laid = not settings.known_starts
+        self._lays = _lays_of(env, self.origin)
+        self._before = [np.zeros(log_odds.shape, np.int8) for log_odds in world.log_odds] if self._is_laid else []
+        self._before_at = np.array([log_odds.ctypes.data for log_odds in self._before], np.int64)
+        self._steps: list[int] = []
+        self._changes: list[NDArray[np.uint64]] = []
+        self.sample()
+
+    def sample(self) -> None:
+        """Take a sample; once in a step."""
+        world = self._world
+        step = int(world.steps[0])
+        if self._steps and step <= self._steps[-1]:
+            return
+        planes = (self._known, self._occupied, self._buffer)
+        if self._is_laid:
+            count = note_laid_changes(
+                world.belief_rows, self._before_at, self._lays, world.believed, self._last, self._reach, self._resolution, *planes
+            )
+        else:
+            count = note_changes(world.belief_rows, world.believed, self._last, self._reach, self._frame, *planes)
+        self._steps.append(step)
+        self._changes.append(self._buffer[:count].copy())
+
+    def changes(self) -> MapChanges:
+        """Return all samples so far."""
+        changes = np.concatenate(self._changes)
+        counts = np.array([len(change) for change in self._changes], np.int64)
+        places = changes[:, 0].astype(np.int64)
+        # Words above each other are alike, so that in this order they take less room when they are compressed.
+        order = np.lexsort((places, np.repeat(np.arange(len(counts)), counts)))
+        times = np.array(self._steps) * self._time_step
+        return MapChanges(*self.shape, times, counts, places[order], changes[order, 1], changes[order, 2])
+
+
+def _lays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
+    """Return how maps in the frames of the starts lie over the floor's lattice, as ``note_laid_changes`` takes it."""
+    world = env.world
+    return np.array([
+        (*origin, x, y, math.cos(theta), math.sin(theta), *own_origin)
+        for (x, y, theta), own_origin in zip(world.starts, world.origins, strict=True)
+    ])  # fmt: skip

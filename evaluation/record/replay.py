@@ -1,0 +1,149 @@
+"""Runs a recorded episode again, from its beginning and the speeds that its robots were driven at."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lidarium
+from lidarium.envs.episodes import Beginning
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.catalogue import is_file_name, load_floor
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings import ExplorationSettings, RewardSettings
+from lidarium.envs.simulation.floor_cache import floor_tables
+from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.robots import Robot
+from lidarium.evaluation.record.episode_record import EpisodeRecord
+from lidarium.evaluation.record.state import state_sha256
+from lidarium.evaluation.result import settings_sha256
+from lidarium.evaluation.watching import WatchedExploration, Watcher
+from lidarium.mapping.occupancy import OccupancySettings
+
+_PARTS: dict[str, type] = {"robot": Robot, "lidar": Lidar, "occupancy": OccupancySettings, "reward": RewardSettings}
+
+
+def rerun(record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()) -> ExplorationEnv:
+    """Run a recorded episode again and check that it ends in the same state, to the bit.
+
+    Parameters
+    ----------
+    record : EpisodeRecord
+        The record, made by this version.
+    floor : str, Path, Floor or None
+        The floor, where the one that the record names is not found any more.
+    watchers : iterable of Watcher
+        Who looks on.
+
+    Returns
+    -------
+    ExplorationEnv
+        The environment at the end of the episode.
+
+    Raises
+    ------
+    ValueError
+        Where the record is of another version, its floor is not found or has changed, its settings are not whole, or the final
+        state is another one.
+    """
+    env = drive_again(record, floor, watchers)
+    if not is_same(record, env):
+        raise ValueError(f"the episode does not run as it was recorded: {first_difference(record, env)}")
+    return env
+
+
+def drive_again(record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()) -> ExplorationEnv:
+    """Run a recorded episode again, as `rerun`, without a look at how it ends."""
+    header = record.header
+    if header["version"] != lidarium.__version__:
+        raise ValueError(
+            f"the record is of lidarium {header['version']}, this is {lidarium.__version__}; only the version that recorded an episode "
+            f"runs it again, its pictures and films can be drawn by any"
+        )
+    if header["final_sha256"] is None:
+        raise ValueError("the episode was broken off within a time step, its last state is not known; pictures and films can be drawn")
+    settings = settings_of(header)
+    there = find_floor(header, floor)
+    tables = floor_tables(there, settings.raster_resolution, settings.lidar.height, settings.robot.height)
+    goal = None if header["goal"] is None else (header["goal"][0], header["goal"][1])
+    env = WatchedExploration(there, settings, watchers=watchers)
+    env.start(Beginning(there, tables, np.array(header["starts"], np.float64), header["noise_seed"], goal))
+    endings: dict[int, list[tuple[str, str]]] = {}
+    for step, agent, reason in header["endings"]:
+        endings.setdefault(step, []).append((agent, reason))
+    for step, commands in enumerate(np.array(record.commands, np.float64), 1):
+        env.drive_at(commands)
+        if step in endings:
+            _end(env, endings[step])
+    return env
+
+
+def is_same(record: EpisodeRecord, env: ExplorationEnv) -> bool:
+    """Whether an environment is in the state in which a record ends, to the bit."""
+    return bool(state_sha256(env) == record.header["final_sha256"])
+
+
+def first_difference(record: EpisodeRecord, env: ExplorationEnv) -> str:
+    """Tell when and where a re-run first leaves the recorded ways, and what the record was made with."""
+    made_with = ", ".join(f"{name} {version}" for name, version in record.header.get("made_with", {}).items())
+    display = record.display
+    for time_s, poses in env.scorer.track:
+        apart = np.hypot(*(poses - display.poses_at(time_s))[:, :2].T)
+        # Recorded positions are rounded to a millimetre.
+        if apart.max() > 1e-3:
+            robot = env.possible_agents[int(apart.argmax())]
+            return f"{robot} is {apart.max():.3f} m off at {time_s:.1f} s (recorded with {made_with})"
+    return f"the ways are the same to a millimetre, the final state is not to the bit (recorded with {made_with})"
+
+
+def settings_of(header: dict[str, Any]) -> ExplorationSettings:
+    """Return the settings of a record.
+
+    Raises
+    ------
+    ValueError
+        Where they are not whole, or not those that were hashed.
+    """
+    try:
+        parts = {name: kind(**header["settings"][name]) for name, kind in _PARTS.items()}
+        settings = ExplorationSettings(**{**header["settings"], **parts})
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"the settings of the record are not those of lidarium {lidarium.__version__}: {error}") from error
+    found = settings_sha256(settings)
+    if found != header["settings_sha256"]:
+        raise ValueError(f"the settings of the record have the hash {found}, not {header['settings_sha256']} as recorded")
+    return settings
+
+
+def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) -> Floor:
+    """Return the floor of a record: the given one, else what the record names.
+
+    Raises
+    ------
+    ValueError
+        Where it is not found, or is not the one of the record.
+    """
+    names = [floor] if floor is not None else list(dict.fromkeys(name for name in (header["floor_source"], header["floor"]) if name))
+    tried = []
+    for name in names:
+        is_file = not isinstance(name, Floor) and is_file_name(name)
+        try:
+            found = load_floor(name, header["image_resolution"] if is_file else None)
+        except (ValueError, OSError) as error:
+            tried.append(str(error))
+            continue
+        if found.sha256 == header["floor_sha256"]:
+            return found
+        what = f"floor {found.name!r}" if isinstance(name, Floor) else str(name)
+        tried.append(f"{what} has the hash {found.sha256[:12]}, the record's floor has {header['floor_sha256'][:12]}")
+    raise ValueError(f"the floor {header['floor']!r} of the record is not found: {'; '.join(tried)}; name the floor that was recorded")
+
+
+def _end(env: ExplorationEnv, endings: list[tuple[str, str]]) -> None:
+    """Let robots end as they did; the horizon ends them by itself."""
+    horizon = env.settings.horizon_steps
+    for agent, reason in endings:
+        if reason != "horizon" or horizon is None or int(env.world.steps[0]) < horizon:
+            env.stop(agent, reason)
+    env.outcome()

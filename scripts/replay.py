@@ -1,0 +1,139 @@
+"""`lidarium replay`: a recorded episode, run again to the bit, or drawn by any version."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from lidarium.scripts.common import DONE, NO, Answer, Command, table, tell
+
+if TYPE_CHECKING:
+    from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.evaluation.record import EpisodeRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replay(Command):
+    """Run a recorded episode again and tell whether it ends in the same state to the bit, or draw what its record shows."""
+
+    file: Annotated[Positional[Path], arg(metavar="FILE")]
+    """episode.npz of `lidarium run --record`"""
+    floor: str | None = None
+    """the floor that was recorded, where the one that the record names is not found"""
+    picture: Path | None = None
+    """draw the record as a PNG file instead of running it again; works for records of other versions too"""
+    video: Path | None = None
+    """film the record as an mp4 file instead of running it again; works for records of other versions too"""
+    video_speed: float = 10.0
+    """simulated seconds per second of the film"""
+
+
+def execute(command: Replay) -> Answer:
+    """Run a record again, or draw it.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError, OSError
+        Where the record, its floor or a place to write to is no good; nothing is written then.
+    """
+    from lidarium.evaluation.output import check_writable, write_json
+    from lidarium.evaluation.record import read_record
+
+    for folder in (command.out, *(path.parent for path in (command.picture, command.video) if path is not None)):
+        if folder is not None:
+            check_writable(folder)
+    record = read_record(command.file)
+    is_drawn = command.picture is not None or command.video is not None
+    answer = _drawn(command, record) if is_drawn else _run_again(command, record)
+    if command.out is not None:
+        write_json(command.out / "replay.json", answer.result)
+    return answer
+
+
+def _about(command: Replay, record: "EpisodeRecord") -> dict[str, Any]:
+    header = record.header
+    names = ("version", "floor", "robots", "policy", "seed", "interrupted")
+    return {"record": str(command.file), **{name: header[name] for name in names}}
+
+
+def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
+    from lidarium.evaluation.record.drawing import save_track_film, save_track_picture
+    from lidarium.evaluation.video import check_speed
+
+    check_speed(command.video_speed)
+    files = []
+    if command.picture is not None:
+        save_track_picture(command.picture, record)
+        files.append(str(command.picture))
+    if command.video is not None:
+        tell(f"filming {record.display.times[-1]:.0f} s")
+        save_track_film(command.video, record, command.video_speed)
+        files.append(str(command.video))
+    display = record.display
+    result = {
+        **_about(command, record),
+        "time_s": round(float(display.times[-1]), 6),
+        "coverage_final": round(float(display.coverage[-1, 1]), 9),
+        "files": files,
+    }
+    facts = [
+        ("explored", f"{100.0 * result['coverage_final']:.2f} % in {result['time_s']:.1f} s of simulated time"),
+        ("files", ", ".join(files)),
+    ]
+    return Answer(result, "\n".join([_title(result), table(facts)]))
+
+
+def _run_again(command: Replay, record: "EpisodeRecord") -> Answer:
+    from lidarium.evaluation.record.replay import drive_again, first_difference, is_same
+    from lidarium.evaluation.record.state import state_sha256
+
+    env = drive_again(record, command.floor)
+    same = is_same(record, env)
+    result = {
+        **_about(command, record),
+        "same": same,
+        "final_sha256": state_sha256(env),
+        "recorded_sha256": record.header["final_sha256"],
+        **_figures(env),
+    }
+    verdict = "the same as recorded, to the bit" if same else f"not as recorded: {first_difference(record, env)}"
+    ended = [
+        (agent, reason or "still at work", f"{length:.1f} m")
+        for (agent, reason), length in zip(result["ended_because"].items(), result["path_m"], strict=True)
+    ]
+    facts = [
+        ("final state", verdict),
+        ("explored", f"{100.0 * result['coverage_final']:.2f} % in {result['time_s']:.1f} s of simulated time"),
+        ("together", f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions"),
+        ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
+    ]
+    text = "\n".join([_title(result), table(facts), "", table(ended, ("robot", "ended because", "drove"))])
+    return Answer(result, text, DONE if same else NO)
+
+
+def _figures(env: "ExplorationEnv") -> dict[str, Any]:
+    """Return the main figures of an episode, as ``result.json`` has them."""
+    from lidarium.envs.scorer import THRESHOLDS
+    from lidarium.evaluation.metrics import overlap
+    from lidarium.evaluation.result import iou_of
+
+    scorer, world = env.scorer, env.world
+    times = {f"t{round(100 * share)}_s": scorer.times.get(share) for share in THRESHOLDS}
+    return {
+        "coverage_final": round(scorer.coverage, 9),
+        "time_s": round(scorer.time, 6),
+        **{name: None if time is None else round(time, 6) for name, time in times.items()},
+        "path_m": [round(float(length), 6) for length in world.travelled],
+        "overlap": round(overlap(world.masks), 9),
+        "collisions": int(world.collisions.sum()),
+        "ended_because": {agent: scorer.ended_because.get(agent) for agent in env.possible_agents},
+        "iou_occupied": round(iou_of(env), 9),
+    }
+
+
+def _title(result: dict[str, Any]) -> str:
+    who = result["policy"] or "an unnamed policy"
+    seed = "" if result["seed"] is None else f", seed {result['seed']}"
+    how = " (interrupted)" if result["interrupted"] else ""
+    return f"{result['floor']}: {who}{seed}, recorded by lidarium {result['version']}{how}"
