@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.rendering import team_colours
+from lidarium.evaluation.beliefs import team_log_odds
 from lidarium.evaluation.output import whole_file
-from lidarium.evaluation.result import occupied_in_truth, team_log_odds
 from lidarium.evaluation.runner import Episode
+from lidarium.evaluation.truth import occupied_in_truth
 from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.grid_planning import centres_of
 

@@ -1,4 +1,4 @@
-"""Blocks of 64 cells at once: log-odds lowered and raised under masks of bits.
+"""Blocks of 64 cells at once: log-odds lowered and raised under masks of bits, and told apart by their signs.
 
 A word of bits says which cells of a block are meant. LLVM turns the operations on vectors of 64 bytes into what the machine
 has, whatever the width of its registers; numba cannot write them as loops, since it keeps no bit per lane.
@@ -68,3 +68,33 @@ def update_block(address: int, seen: np.uint64, hits: np.uint64, hit: int, miss:
         Bounds of lowered and of raised cells.
     """
     _update(address, seen, hits, hit, miss, minimum, maximum)
+
+
+def _compare_block(predicate: str) -> Any:  # noqa: ANN401
+    """Return an intrinsic that says which cells of a block are less (``<``) or more (``>``) than 0."""
+
+    def compare(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
+        def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+            block = builder.load(builder.inttoptr(arguments[0], _BLOCK.as_pointer()), align=1)
+            zero = ir.Constant(_BLOCK, [0] * 64)
+            return builder.bitcast(builder.icmp_signed(predicate, block, zero), ir.IntType(64))
+
+        return types.uint64(types.int64), generate
+
+    return intrinsic(compare)
+
+
+_negative: Any = _compare_block("<")
+_positive: Any = _compare_block(">")
+
+
+@kernel(inline=True)
+def negative_cells(address: int) -> np.uint64:
+    """Return which of the 64 int8 at an address are less than 0, bit 0 the first one."""
+    return _negative(address)  # type: ignore[no-any-return]
+
+
+@kernel(inline=True)
+def positive_cells(address: int) -> np.uint64:
+    """Return which of the 64 int8 at an address are more than 0, bit 0 the first one."""
+    return _positive(address)  # type: ignore[no-any-return]

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.envs.settings import ExplorationSettings
+    from lidarium.evaluation.history import History
     from lidarium.evaluation.runner import Episode
+    from lidarium.evaluation.watching import WatchedExploration
 
 DEFAULT_FOLDER = Path("runs")
 
@@ -66,7 +68,7 @@ def execute(command: Run) -> Answer:
 
     check_writable(command.out or DEFAULT_FOLDER)
     policy = lidarium.policy(command.policy)
-    env = _environment(command)
+    env, history = _environment(command)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
     episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
     if env.floor is None or not env.scorer.track:
@@ -75,7 +77,7 @@ def execute(command: Run) -> Answer:
     folder = _folder(command, env.floor.name)
     from lidarium.evaluation.result import result_of
 
-    result = result_of(episode, command.policy)
+    result = result_of(episode, command.policy, history)
     files = _write(command, episode, result, folder)
     return Answer(result, _summary(command, episode, result, folder, files), INTERRUPTED if episode.is_interrupted else 0)
 
@@ -94,12 +96,12 @@ def _settings(command: Run) -> "ExplorationSettings":
     )
 
 
-def _environment(command: Run) -> "ExplorationEnv":
-    from lidarium.envs.exploration import ExplorationEnv
+def _environment(command: Run) -> "tuple[WatchedExploration, History]":
+    from lidarium.evaluation.history import History
     from lidarium.evaluation.watching import WatchedExploration
 
-    kind = WatchedExploration if command.video else ExplorationEnv
-    return kind(command.floor, _settings(command), image_resolution=command.resolution)
+    history = History()
+    return WatchedExploration(command.floor, _settings(command), image_resolution=command.resolution, watchers=[history]), history
 
 
 def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
@@ -116,7 +118,7 @@ def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
     return starts
 
 
-def _explore(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, Any]) -> "Episode":  # noqa: ANN401
+def _explore(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any]) -> "Episode":  # noqa: ANN401
     """Run the episode under a progress bar and, if asked for, a camera."""
     from lidarium.evaluation.runner import run_episode
 
@@ -129,12 +131,10 @@ def _explore(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str
         progress.close()
 
 
-def _film(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
+def _film(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
     from lidarium.evaluation.runner import run_episode
     from lidarium.evaluation.video import Film, film
-    from lidarium.evaluation.watching import WatchedExploration
 
-    assert isinstance(env, WatchedExploration)
     with ExitStack() as stack:
         camera: list[Film] = []
 
@@ -149,7 +149,7 @@ def _film(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, A
             progress.tell(current)
 
         episode = run_episode(policy, env, command.seed, options, on_decision, raise_interrupt=False)
-        env.watchers.clear()
+        env.watchers = [watcher for watcher in env.watchers if watcher not in camera]
         if camera and not episode.is_interrupted:
             camera[0].end(env)
         return episode
@@ -163,9 +163,9 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
     """Write the figures first, then the map, then the picture; return the files' names."""
     import numpy as np
 
+    from lidarium.evaluation.beliefs import team_log_odds
     from lidarium.evaluation.output import write_json
     from lidarium.evaluation.pictures import save_run_picture
-    from lidarium.evaluation.result import team_log_odds
     from lidarium.mapping.map_files import write_ros_map
     from lidarium.mapping.occupancy import three_levels
 
