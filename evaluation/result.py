@@ -152,8 +152,8 @@ def _map_figures(env: ExplorationEnv) -> dict[str, Any]:
     """Return how much of the floor the maps know in the end, and how well they agree with the truth."""
     truth, maps = truth_of(env), maps_on_floor(env)
     team = np.sum(maps, axis=0, dtype=np.int16)
-    known, believed = (maps != 0).any(axis=0), team > 0
-    sensed = unpack_bits(env.world.team_masks[0], team.shape[1])
+    known, believed, believed_free = (np.asarray(cells) for cells in ((maps != 0).any(axis=0), team > 0, team < 0))
+    sensed = unpack_bits(env.world.team_masks[0], maps.shape[2])
     own_least, own_mean = metrics.own_coverage(free_as_held(env, maps), truth.counted)
     return {
         "c_known_final": round(metrics.known_coverage(known, truth.knowable), 9),
@@ -163,7 +163,7 @@ def _map_figures(env: ExplorationEnv) -> dict[str, Any]:
         "balance": round(metrics.balance([metrics.known_coverage(own != 0, truth.knowable) for own in maps]), 9),
         "iou_occupied": round(metrics.occupied_iou(believed, truth.occupied, sensed), 9),
         "f1_occupied": round(metrics.occupied_f1(believed, truth.occupied, wanted=metrics.surface(truth.occupied, sensed)), 9),
-        "free_error_rate": round(metrics.free_error_rate(team < 0, truth.occupied), 9),
+        "free_error_rate": round(metrics.free_error_rate(believed_free, truth.occupied), 9),
     }
 
 

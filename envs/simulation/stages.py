@@ -111,6 +111,7 @@ def _score(
     world: WorldArrays, row: int, first: int, robots: int, lengths: Array, directions: Array, ends: Array, bits: Array
 ) -> tuple[int, int, int, int]:
     """Fill the area that the true beams have seen and add it to the robot's mask; returns the box that holds bits."""
+    box: tuple[int, int, int, int]
     box, row_offset, word_offset = _seen_area(world, row, first, robots, lengths, directions, ends, bits)
     masks = world.masks[row]
     own, counted = word_grid_at(masks[0], masks[3], masks[4]), word_grid_at(masks[2], masks[3], masks[4])
