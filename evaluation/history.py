@@ -54,8 +54,6 @@ class Curves:
         Shares of F that were sensed, of all that can be known, and of F and its surface that the team's map knows.
     c_own : (samples, robots) float64
         Share of F that each robot holds to be free, by its own map or, where it reaches the robot, the team's.
-    known_shares : (samples, robots) float64
-        ``C_known`` of each robot's own map.
     lengths : (samples, robots) float64
         Length of each robot's path [m].
     seen_once, seen_twice : (decisions,) int64
@@ -68,7 +66,6 @@ class Curves:
     c_known: NDArray[np.float64]
     c_valid: NDArray[np.float64]
     c_own: NDArray[np.float64]
-    known_shares: NDArray[np.float64]
     lengths: NDArray[np.float64]
     seen_once: NDArray[np.int64]
     seen_twice: NDArray[np.int64]
@@ -149,9 +146,7 @@ class History:
         self._tally.take_in(env)
         decisions = self._decisions + 1 if int(world.steps[0]) > 0 else 0
         self.milestones.append(
-            Milestone(
-                scorer.time, scorer.coverage, decisions, world.travelled.copy(), overlap(world.masks), self._tally.known_shares.copy()
-            )
+            Milestone(scorer.time, scorer.coverage, decisions, world.travelled.copy(), overlap(world.masks), self._tally.known_shares)
         )
 
     def milestone(self, share: float) -> Milestone | None:
@@ -177,7 +172,6 @@ class History:
             team[:, KNOWABLE],
             team[:, VALID],
             np.repeat(held[:, :, COUNTED], robots // held.shape[1], axis=1) / sizes[COUNTED],
-            counts[:, :-1, KNOWABLE] / sizes[KNOWABLE],
             np.stack(self._lengths),
             footprints[:, 0],
             footprints[:, 1],

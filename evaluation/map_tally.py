@@ -81,29 +81,35 @@ def _free_of_sum(world: WorldArrays, first: int, robots: int, line: int, word: i
 
 
 @kernel(inline=True)
-def _recount(truth: Array, bits: Array, counts: Array, who: int, i: int, j: int, known: np.uint64, free: np.uint64) -> None:
-    """Put new bits of a word, known and free, in place of the old ones, and change the counts by the difference."""
-    for kind in (KNOWABLE, VALID):
-        counts[who, kind] += count_bits(known & truth[kind, i, j]) - count_bits(bits[who, i, j, KNOWN] & truth[kind, i, j])
-    counts[who, COUNTED] += count_bits(free & truth[COUNTED, i, j]) - count_bits(bits[who, i, j, FREE] & truth[COUNTED, i, j])
-    bits[who, i, j, KNOWN], bits[who, i, j, FREE] = known, free
-
-
-@kernel(inline=True)
 def _sum_up(
     world: WorldArrays, first: int, robots: int, shares: bool, truth: Array, bits: Array, disputed: Array, counts: Array, i: int, j: int
 ) -> None:
-    """Bring a word of the team's map up to date."""
+    """Bring a word of the team's map up to date, and the counts by the difference."""
     known, free, occupied = np.uint64(0), np.uint64(0), np.uint64(0)
     for robot in range(robots):
         known |= bits[robot, i, j, KNOWN]
         free |= bits[robot, i, j, FREE]
         occupied |= bits[robot, i, j, KNOWN] & ~bits[robot, i, j, FREE]
-    disputed[i, j] = free & occupied & truth[COUNTED, i, j]
-    free &= ~occupied
-    if shares and disputed[i, j] != np.uint64(0):
-        free |= _free_of_sum(world, first, robots, i, j, disputed[i, j])
-    _recount(truth, bits, counts, robots, i, j, known, free)
+    old = bits[robots, i, j, KNOWN]
+    if known != old:
+        for kind in (KNOWABLE, VALID):
+            counts[robots, kind] += count_bits(known & truth[kind, i, j]) - count_bits(old & truth[kind, i, j])
+        bits[robots, i, j, KNOWN] = known
+    if shares:
+        disputed[i, j] = free & occupied & truth[COUNTED, i, j]
+        free &= ~occupied
+        if disputed[i, j] != np.uint64(0):
+            free |= _free_of_sum(world, first, robots, i, j, disputed[i, j])
+        _recount_free(truth, bits, counts, robots, i, j, free)
+
+
+@kernel(inline=True)
+def _recount_free(truth: Array, bits: Array, counts: Array, who: int, i: int, j: int, free: np.uint64) -> None:
+    """Put new bits of free cells in place of the old ones, and change the count by the difference."""
+    old = bits[who, i, j, FREE]
+    if free != old:
+        counts[who, COUNTED] += count_bits(free & truth[COUNTED, i, j]) - count_bits(old & truth[COUNTED, i, j])
+        bits[who, i, j, FREE] = free
 
 
 @kernel
@@ -137,7 +143,8 @@ def _take_in(
     disputed : (rows, words) uint64
         Cells of F of which one map says that they are free, and another that they are not. Updated.
     counts : (robots + 1, 3) int64
-        Known cells within ``KNOWABLE`` and ``VALID``, free cells within ``COUNTED``. Updated.
+        Of the team, known cells within ``KNOWABLE`` and ``VALID``; free cells within ``COUNTED`` of the map that all robots share, else
+        of each robot's. Updated.
     poses, ways : (robots, 3) float64 and (robots,) float64
         Where each robot stood at the last call, and how far it had driven by then. Updated.
     changes : (robots, 4) int64
@@ -160,8 +167,11 @@ def _take_in(
                     place = address + i * columns + 64 * j
                     negative, positive = negative_cells(place), positive_cells(place)
                 has_changed = negative != own[i, j, FREE] or (negative | positive) != own[i, j, KNOWN]
-                if has_changed:
-                    _recount(truth, bits, counts, robot, i, j, negative | positive, negative)
+                own[i, j, KNOWN] = negative | positive
+                if shares:
+                    own[i, j, FREE] = negative
+                else:
+                    _recount_free(truth, bits, counts, robot, i, j, negative)
                 # What is disputed may be settled by another sum, though no map has changed its mind.
                 if has_changed or (shares and disputed[i, j] != np.uint64(0)):
                     _sum_up(world, first, robots, shares, truth, bits, disputed, counts, i, j)
@@ -194,8 +204,10 @@ class MapTally:
     Attributes
     ----------
     counts : (robots + 1, 3) int64
-        Known cells within those that can be known and within F and its surface, and free cells within F; of each robot's own map,
-        and of the team's at the end.
+        In the last row the cells within those that can be known, and within F and its surface, that the team's map knows. Cells of F
+        that are free: in the last row by the sum of the maps where all robots share it, else by each robot's own map in its row.
+    shares : bool
+        Whether all robots share the sum of the maps.
     sizes : (3,) int64
         All cells that can be known, of F and its surface, and of F.
     """
@@ -225,5 +237,6 @@ class MapTally:
 
     @property
     def known_shares(self) -> NDArray[np.float64]:
-        """``C_known`` of each robot's own map, shape (robots,)."""
-        return self.counts[:-1, KNOWABLE] / max(int(self.sizes[KNOWABLE]), 1)
+        """``C_known`` of each robot's own map when the maps were taken in last, shape (robots,)."""
+        known = np.bitwise_count(self._bits[:-1, :, :, KNOWN] & self._truth[KNOWABLE]).sum(axis=(1, 2), dtype=np.int64)
+        return np.asarray(known / max(int(self.sizes[KNOWABLE]), 1))

@@ -40,7 +40,6 @@ class Whole:
                 metrics.known_coverage(known, truth.knowable),
                 metrics.valid_coverage(known, truth.counted, truth.occupied),
                 *(metrics.free_coverage(own, truth.counted) for own in held),
-                *(metrics.known_coverage(own != 0, truth.knowable) for own in maps),
             )
         )
 
@@ -66,7 +65,7 @@ def test_curves_are_those_of_whole_maps(options):
     whole = Whole()
     _, history = watched(whole, **options)
     curves = history.curves
-    sampled = np.column_stack([curves.times, curves.c_free, curves.c_known, curves.c_valid, curves.c_own, curves.known_shares])
+    sampled = np.column_stack([curves.times, curves.c_free, curves.c_known, curves.c_valid, curves.c_own])
     assert len(whole.rows) > 10
     np.testing.assert_allclose(sampled[: len(whole.rows)], whole.rows, rtol=0.0, atol=1e-12)
 
@@ -93,6 +92,15 @@ def test_thresholds_are_noted_in_the_step_that_reaches_them():
         assert 0 < milestone.decisions <= len(episode.decision_seconds)
     lengths = np.array([milestone.lengths for milestone in history.milestones])
     assert (np.diff(lengths, axis=0) >= 0.0).all()
+
+
+@pytest.mark.parametrize("known_starts", [True, False])
+def test_a_milestone_has_what_each_map_knew(known_starts):
+    episode, history = watched(known_starts=known_starts, stop_coverage=0.85)
+    truth, maps = truth_of(episode.env), maps_on_floor(episode.env)
+    [milestone] = history.milestones
+    assert milestone.known_shares == pytest.approx([metrics.known_coverage(own != 0, truth.knowable) for own in maps])
+    assert milestone.overlap == metrics.overlap(episode.env.world.masks)
 
 
 def test_a_lone_robot_overlaps_with_nobody():
