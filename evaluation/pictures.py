@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.floors.floor import Floor
+from lidarium.evaluation.beliefs import team_log_odds
 from lidarium.evaluation.picture_parts import (
     INK,
     SOLID,
@@ -28,8 +29,8 @@ from lidarium.evaluation.picture_parts import (
     save_page,
     show_cells,
 )
-from lidarium.evaluation.result import occupied_in_truth, team_log_odds
 from lidarium.evaluation.runner import Episode
+from lidarium.evaluation.truth import occupied_in_truth
 from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.grid_planning import centres_of
 

@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import lidarium
 from lidarium.agents.policy import GivenUp
@@ -15,11 +14,17 @@ from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scorer import THRESHOLDS
 from lidarium.envs.settings import ExplorationSettings
-from lidarium.evaluation.metrics import decision_percentiles, occupied_iou, overlap
+from lidarium.evaluation import metrics
+from lidarium.evaluation.beliefs import free_as_held, maps_on_floor
+from lidarium.evaluation.history import History
 from lidarium.evaluation.runner import Episode
+from lidarium.evaluation.truth import truth_of
+
+MEASURED_KEYS = ("decision_ms", "peak_mb", "steps_per_s")
+"""Keys of a result that tell of the machine; all others are the same in every run."""
 
 
-def result_of(episode: Episode, policy: str | None = None) -> dict[str, Any]:
+def result_of(episode: Episode, policy: str | None = None, history: History | None = None) -> dict[str, Any]:
     """Return the figures of an episode, finished or interrupted, as ``result.json`` has them.
 
     Parameters
@@ -28,6 +33,8 @@ def result_of(episode: Episode, policy: str | None = None) -> dict[str, Any]:
         What `run_episode` left; its environment must have been reset.
     policy : str or None
         Name of the policy; that of its class where None.
+    history : History or None
+        What watched the episode; where None, the figures over time that need one are None.
 
     Returns
     -------
@@ -43,7 +50,10 @@ def result_of(episode: Episode, policy: str | None = None) -> dict[str, Any]:
     env, settings, scorer, world = episode.env, episode.env.settings, episode.env.scorer, episode.env.world
     if env.floor is None:
         raise ValueError("the episode was interrupted before it began, there is no result")
+    if history is not None and not history.has_begun:
+        history = None
     steps = max(int(world.steps[0]), 0)
+    collisions = int(world.collisions.sum())
     return {
         "floor": env.floor.name,
         "robots": settings.robots,
@@ -56,21 +66,104 @@ def result_of(episode: Episode, policy: str | None = None) -> dict[str, Any]:
         "interrupted": episode.is_interrupted,
         "coverage_final": round(scorer.coverage, 9),
         "time_s": round(scorer.time, 6),
-        **{f"t{round(100 * share)}_s": _time(scorer.times.get(share)) for share in THRESHOLDS},
-        "path_m": [round(float(length), 6) for length in world.travelled],
-        "overlap": round(overlap(world.masks), 9),
-        "collisions": int(world.collisions.sum()),
+        **{f"t{round(100 * share)}_s": _rounded(scorer.times.get(share), 6) for share in THRESHOLDS},
+        **_success(env),
+        **_at_thresholds(history),
+        "path_m": [round(float(length), 9) for length in world.travelled],
+        "path_balance": round(metrics.path_balance(world.travelled), 9),
+        "overlap": round(metrics.overlap(world.masks), 9),
+        **_overlaps(history),
+        "collisions": collisions,
+        "collisions_per_km": _rounded(metrics.collisions_per_km(collisions, world.travelled), 6),
         "ended_because": {agent: scorer.ended_because.get(agent) for agent in env.possible_agents},
         "given_up": [_entry(env, given_up) for given_up in episode.given_up],
-        # The localizer is the truth: no error.
-        "ate_m": [0.0] * settings.robots,
-        "iou_occupied": round(iou_of(env), 9),
+        **_pose_errors(env, history),
+        **_map_figures(env),
         "merges": {"accepted": 0, "correct": 0, "false": 0, "first_correct_s": None},
-        "decision_ms": decision_percentiles(episode.decision_seconds),
+        "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
+        "peak_mb": _rounded(metrics.peak_megabytes(), 1),
         "steps_per_s": round(steps / episode.wall_seconds, 3) if episode.wall_seconds > 0.0 else None,
         "version": lidarium.__version__,
         "floor_sha256": env.floor.sha256,
         "settings_sha256": settings_sha256(settings),
+    }
+
+
+def _success(env: ExplorationEnv) -> dict[str, Any]:
+    """Return whether the run reached what stops it, and the area under its curve of coverage."""
+    settings = env.settings
+    times, coverage = np.array(env.scorer.curve).reshape(-1, 2).T
+    stop = THRESHOLDS[-1] if settings.stop_coverage is None else settings.stop_coverage
+    horizon = None if settings.horizon_steps is None else settings.horizon_steps * settings.time_step
+    return {
+        "success": metrics.is_success(times, coverage, stop, horizon),
+        "auc": None if horizon is None else round(metrics.area_under_curve(times, coverage, horizon), 9),
+    }
+
+
+def _at_thresholds(history: History | None) -> dict[str, Any]:
+    """Return ways and decisions until each threshold of coverage."""
+    milestones = [] if history is None else history.milestones
+    coverage = [milestone.coverage for milestone in milestones]
+    lengths = np.array([milestone.lengths for milestone in milestones])
+    decisions = [milestone.decisions for milestone in milestones]
+    names = {share: str(round(100 * share)) for share in THRESHOLDS}
+    return {
+        **{f"d{name}_m": _rounded(metrics.distance_to(lengths, coverage, share), 9) for share, name in names.items()},
+        **{f"d_sum{name}_m": _rounded(metrics.distance_sum_to(lengths, coverage, share), 9) for share, name in names.items()},
+        **{f"n{name}": metrics.decisions_to(decisions, coverage, share) for share, name in names.items()},
+    }
+
+
+def _overlaps(history: History | None) -> dict[str, Any]:
+    """Return the overlaps as the reference projects take them, each when they take it."""
+    nearly, mostly, whole = (None if history is None else history.milestone(share) for share in (0.85, 0.95, 0.99))
+    curves = None if history is None else history.curves
+    return {
+        "overlap_eb": None if whole is None else round(metrics.overlap_of_maps(whole.known_shares), 9),
+        "overlap_mx_85": None if nearly is None else round(nearly.overlap, 9),
+        "overlap_mx_95": None if mostly is None else round(mostly.overlap, 9),
+        "overlap_mv": None if curves is None else round(metrics.instant_overlap(curves.seen_once, curves.seen_twice), 9),
+    }
+
+
+def _pose_errors(env: ExplorationEnv, history: History | None) -> dict[str, Any]:
+    """Return ATE and RPE of each robot; frames agree where starts are known, else the best fit brings them together."""
+    robots = env.settings.robots
+    if history is None:
+        # The localizer is the truth: no error.
+        return {"ate_m": [0.0] * robots, "rpe_m": None, "rpe_rad": None}
+    times, poses = zip(*env.scorer.track, strict=True)
+    # An interrupted step may have left one more of the one than of the other.
+    known = min(len(poses), len(history.believed))
+    true, believed = np.stack(poses[:known]), history.believed[:known]
+    steps = max(round(1.0 / (times[1] - times[0])), 1) if len(times) > 1 else 1
+    relative = [metrics.relative_error(believed[:, robot], true[:, robot], steps) for robot in range(robots)]
+    return {
+        "ate_m": [
+            round(metrics.absolute_error(believed[:, robot], true[:, robot], not env.settings.known_starts), 9) for robot in range(robots)
+        ],
+        "rpe_m": [None if error is None else round(error[0], 9) for error in relative],
+        "rpe_rad": [None if error is None else round(error[1], 9) for error in relative],
+    }
+
+
+def _map_figures(env: ExplorationEnv) -> dict[str, Any]:
+    """Return how much of the floor the maps know in the end, and how well they agree with the truth."""
+    truth, maps = truth_of(env), maps_on_floor(env)
+    team = np.sum(maps, axis=0, dtype=np.int16)
+    known, believed, believed_free = (np.asarray(cells) for cells in ((maps != 0).any(axis=0), team > 0, team < 0))
+    sensed = unpack_bits(env.world.team_masks[0], maps.shape[2])
+    own_least, own_mean = metrics.own_coverage(free_as_held(env, maps), truth.counted)
+    return {
+        "c_known_final": round(metrics.known_coverage(known, truth.knowable), 9),
+        "c_valid_final": round(metrics.valid_coverage(known, truth.counted, truth.occupied), 9),
+        "c_own_min_final": round(own_least, 9),
+        "c_own_mean_final": round(own_mean, 9),
+        "balance": round(metrics.balance([metrics.known_coverage(own != 0, truth.knowable) for own in maps]), 9),
+        "iou_occupied": round(metrics.occupied_iou(believed, truth.occupied, sensed), 9),
+        "f1_occupied": round(metrics.occupied_f1(believed, truth.occupied, wanted=metrics.surface(truth.occupied, sensed)), 9),
+        "free_error_rate": round(metrics.free_error_rate(believed_free, truth.occupied), 9),
     }
 
 
@@ -83,50 +176,6 @@ def settings_sha256(settings: ExplorationSettings) -> str:
     """Return a hash of all settings that can change a result: of their JSON with sorted keys, without ``threads``."""
     values = {name: value for name, value in asdict(settings).items() if name != "threads"}
     return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
-
-
-def team_log_odds(env: ExplorationEnv) -> tuple[NDArray[np.int16], tuple[float, float]]:
-    """Return the sum of the robots' maps, and the lower left corner of its cell (0, 0) in the floor's frame [m].
-
-    The lattice is that of the scorer's masks. Maps of robots that do not know their starts are laid over it by their true
-    starts: with true poses that is the best fit of the trajectories.
-    """
-    world, settings = env.world, env.settings
-    tables = world.floors[0]
-    assert tables is not None
-    origin, resolution = tables.laser.origin, settings.occupancy.resolution
-    if settings.known_starts:
-        return np.asarray(np.sum(world.log_odds, axis=0, dtype=np.int16)), origin
-    rows, words = world.counted_masks[0].shape
-    total = np.zeros((rows, words * 64), np.int16)
-    y, x = np.meshgrid(*((np.arange(size) + 0.5) * resolution for size in total.shape), indexing="ij")
-    for row, log_odds in enumerate(world.log_odds):
-        start_x, start_y, theta = world.starts[row]
-        east, north = x + origin[0] - start_x, y + origin[1] - start_y
-        own_x = math.cos(theta) * east + math.sin(theta) * north - world.origins[row, 0]
-        own_y = math.cos(theta) * north - math.sin(theta) * east - world.origins[row, 1]
-        columns, lines = (np.floor(own / resolution).astype(np.int64) for own in (own_x, own_y))
-        is_inside = (lines >= 0) & (lines < log_odds.shape[0]) & (columns >= 0) & (columns < log_odds.shape[1])
-        total[is_inside] += log_odds[lines[is_inside], columns[is_inside]]
-    return total, origin
-
-
-def occupied_in_truth(env: ExplorationEnv) -> NDArray[np.bool_]:
-    """Return the truth on the lattice of the maps: cells of which any of the world's cells is solid; free beyond the world's raster."""
-    tables = env.world.floors[0]
-    assert tables is not None
-    raster = tables.laser
-    multiple = round(env.settings.occupancy.resolution / raster.resolution)
-    rows, words = env.world.counted_masks[0].shape
-    solid = np.zeros((rows * multiple, words * 64 * multiple), np.bool_)
-    solid[: raster.solid.shape[0], : raster.solid.shape[1]] = raster.solid
-    return np.asarray(solid.reshape(rows, multiple, words * 64, multiple).any(axis=(1, 3)))
-
-
-def iou_of(env: ExplorationEnv) -> float:
-    """Return ``iou_occupied`` of the team's map."""
-    believed = np.asarray(team_log_odds(env)[0] > 0)
-    return occupied_iou(believed, occupied_in_truth(env), unpack_bits(env.world.team_masks[0], believed.shape[1]))
 
 
 def in_floor_frame(env: ExplorationEnv, agent: str, x: float, y: float) -> tuple[float, float]:
@@ -147,5 +196,5 @@ def _entry(env: ExplorationEnv, given_up: GivenUp) -> dict[str, Any]:
     return {"agent": given_up.agent, "x": round(x, 4), "y": round(y, 4), "size_m": round(given_up.size_m, 4), "reason": given_up.reason}
 
 
-def _time(seconds: float | None) -> float | None:
-    return None if seconds is None else round(seconds, 6)
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)

@@ -21,7 +21,7 @@ class Watcher(Protocol):
     def begin(self, env: ExplorationEnv) -> None:
         """Look at an episode after its reset, when the scan at the start is taken."""
 
-    def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
+    def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
         """Look at the world after a time step that was driven at ``commands`` (robots, 2) [m/s, rad/s]."""
 
     def outcome(self, env: ExplorationEnv) -> None:

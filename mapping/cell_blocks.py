@@ -159,6 +159,24 @@ def _least_sums(typing_context: Any, numbers: Any, costs: Any, low: Any, high: A
     return types.void(*(types.int64,) * 6), generate
 
 
+def _negative_block(typing_context: Any, block: Any) -> Any:  # noqa: ANN401
+    """Tell which log-odds of a block are less than 0."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        return builder.bitcast(builder.icmp_signed("<", _load(builder, arguments[0], _BYTES), _NO_BYTES), _INT64)
+
+    return types.uint64(types.int64), generate
+
+
+def _positive_block(typing_context: Any, block: Any) -> Any:  # noqa: ANN401
+    """Tell which log-odds of a block are more than 0."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        return builder.bitcast(builder.icmp_signed(">", _load(builder, arguments[0], _BYTES), _NO_BYTES), _INT64)
+
+    return types.uint64(types.int64), generate
+
+
 def _sign_bits(typing_context: Any, sums: Any) -> Any:  # noqa: ANN401
     """Tell which cells of a block of sums are below and which are above 0."""
 
@@ -190,6 +208,8 @@ _count: Any = intrinsic(_count_steps)
 _least: Any = intrinsic(_least_sums)
 _raise: Any = intrinsic(_raise_block)
 _signs: Any = intrinsic(_sign_bits)
+_negative: Any = intrinsic(_negative_block)
+_positive: Any = intrinsic(_positive_block)
 
 
 @kernel(inline=True)
@@ -272,3 +292,15 @@ def raise_block(block: int, other: int) -> None:
 def sign_bits(address: int) -> tuple[np.uint64, np.uint64]:
     """Return which of the 64 int16 at an address are below 0, and which are above, bit 0 the first one."""
     return _signs(address)  # type: ignore[no-any-return]
+
+
+@kernel(inline=True)
+def negative_cells(address: int) -> np.uint64:
+    """Return which of the 64 int8 at an address are less than 0, bit 0 the first one."""
+    return _negative(address)  # type: ignore[no-any-return]
+
+
+@kernel(inline=True)
+def positive_cells(address: int) -> np.uint64:
+    """Return which of the 64 int8 at an address are more than 0, bit 0 the first one."""
+    return _positive(address)  # type: ignore[no-any-return]

@@ -31,11 +31,11 @@ Array = NDArray[Any]
 
 _numba_config: Any = config
 
-PACKAGE_FOLDERS = ("mapping", "envs")
+PACKAGE_FOLDERS = ("mapping", "envs", "evaluation")
 
 
 def _source_folders() -> list[Path]:
-    """Folders whose kernels call each other: this one and its neighbour of the environments."""
+    """Folders whose kernels call each other: this one and its neighbours."""
     here = Path(__file__).resolve().parent
     return [here.parent / name for name in PACKAGE_FOLDERS]
 

@@ -13,9 +13,9 @@ from lidarium.scripts.bench import Bench
 from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
+from lidarium.scripts.replay import Replay
 from lidarium.scripts.report import Report
 from lidarium.scripts.reproduce import Reproduce
-from lidarium.scripts.replay import Replay
 from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
 

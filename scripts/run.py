@@ -13,8 +13,10 @@ if TYPE_CHECKING:
 
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.envs.settings import ExplorationSettings
+    from lidarium.evaluation.history import History
     from lidarium.evaluation.record import Recorder
     from lidarium.evaluation.runner import Episode
+    from lidarium.evaluation.watching import WatchedExploration
 
 DEFAULT_FOLDER = Path("runs")
 
@@ -70,7 +72,7 @@ def execute(command: Run) -> Answer:
     check_writable(command.out or DEFAULT_FOLDER)
     policy = lidarium.policy(command.policy)
     recorder = _recorder(command)
-    env = _environment(command, recorder)
+    env, history = _environment(command, recorder)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
     episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
     if env.floor is None or not env.scorer.track:
@@ -79,7 +81,7 @@ def execute(command: Run) -> Answer:
     folder = _folder(command, env.floor.name)
     from lidarium.evaluation.result import result_of
 
-    result = result_of(episode, command.policy)
+    result = result_of(episode, command.policy, history)
     files = _write(command, episode, result, folder, recorder)
     return Answer(result, _summary(command, episode, result, folder, files), INTERRUPTED if episode.is_interrupted else 0)
 
@@ -106,14 +108,13 @@ def _recorder(command: Run) -> "Recorder | None":
     return Recorder(command.policy, command.seed, command.floor, command.resolution)
 
 
-def _environment(command: Run, recorder: "Recorder | None") -> "ExplorationEnv":
-    from lidarium.envs.exploration import ExplorationEnv
-    from lidarium.evaluation.watching import WatchedExploration
+def _environment(command: Run, recorder: "Recorder | None") -> "tuple[WatchedExploration, History]":
+    from lidarium.evaluation.history import History
+    from lidarium.evaluation.watching import WatchedExploration, Watcher
 
-    if not command.video and recorder is None:
-        return ExplorationEnv(command.floor, _settings(command), image_resolution=command.resolution)
-    watchers = [] if recorder is None else [recorder]
-    return WatchedExploration(command.floor, _settings(command), image_resolution=command.resolution, watchers=watchers)
+    history = History()
+    watchers: list[Watcher] = [history] if recorder is None else [history, recorder]
+    return WatchedExploration(command.floor, _settings(command), image_resolution=command.resolution, watchers=watchers), history
 
 
 def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
@@ -130,7 +131,7 @@ def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
     return starts
 
 
-def _explore(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, Any]) -> "Episode":  # noqa: ANN401
+def _explore(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any]) -> "Episode":  # noqa: ANN401
     """Run the episode under a progress bar and, if asked for, a camera."""
     from lidarium.evaluation.runner import run_episode
 
@@ -143,12 +144,10 @@ def _explore(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str
         progress.close()
 
 
-def _film(command: Run, policy: Any, env: "ExplorationEnv", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
+def _film(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
     from lidarium.evaluation.runner import run_episode
     from lidarium.evaluation.video import Film, film
-    from lidarium.evaluation.watching import WatchedExploration
 
-    assert isinstance(env, WatchedExploration)
     with ExitStack() as stack:
         camera: list[Film] = []
 
@@ -177,9 +176,9 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
     """Write the figures first, then the record, the map and the picture; return the files' names."""
     import numpy as np
 
+    from lidarium.evaluation.beliefs import team_log_odds
     from lidarium.evaluation.output import write_json
     from lidarium.evaluation.pictures import save_run_picture
-    from lidarium.evaluation.result import team_log_odds
     from lidarium.mapping.map_files import write_ros_map
     from lidarium.mapping.occupancy import three_levels
 

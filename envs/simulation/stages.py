@@ -36,10 +36,10 @@ ROUND_UP = 1.0 + 1.2e-7
 
 
 @kernel
-def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
-    """Take the scan of one robot: the world's ranges as the sensor tells, and ``lengths`` of the true beams [map cells]."""
+def _measure(world: WorldArrays, row: int, first: int, robots: int, directions: Array, ranges: Array, lengths: Array) -> None:
+    """Take the scan of one robot without noise: ``ranges`` [m], inf for no return, and ``lengths`` of the beams [map cells]."""
     robot, episode = row - first, first // robots
-    sensor, frame, poses, ranges = world.sensor, world.frames[episode], world.poses, world.ranges[row]
+    sensor, frame, poses = world.sensor, world.frames[episode], world.poses
     resolution = frame[2]
     reach = sensor[RANGE_MAX] / resolution
     x, y, heading = (poses[row, 0] - frame[0]) / resolution, (poses[row, 1] - frame[1]) / resolution, poses[row, 2]
@@ -51,19 +51,27 @@ def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Ar
             other_x, other_y = (poses[first + other, 0] - frame[0]) / resolution, (poses[first + other, 1] - frame[1]) / resolution
             radius = world.bodies[other, 0] / resolution
             cut_by_disc(x, y, heading, angle_first, increment, directions, other_x, other_y, radius, reach, lengths)
-    beams = lengths.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     longest = sensor[RANGE_MAX]
-    for beam in range(beams):
+    for beam in range(lengths.shape[0]):
         met = lengths[beam] < reach
         true_range = np.float32(lengths[beam] * resolution * ROUND_UP)
         ranges[beam] = true_range if met else np.float32(np.inf)
         lengths[beam] = min(true_range, longest) * scale if met else longest * scale
+
+
+@kernel
+def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
+    """Take the scan of one robot: the world's ranges as the sensor tells, and ``lengths`` of the true beams [map cells]."""
+    sensor, ranges = world.sensor, world.ranges[row]
+    _measure(world, row, first, robots, directions, ranges, lengths)
     if _is_noisy(sensor):
+        beams = lengths.shape[0]
+        episode = first // robots
         noise = np.empty(beams, np.float32)
-        fill_gaussian(stream_key(world.seeds[episode], robot, world.steps[episode]), world.noise_table, noise)
+        fill_gaussian(stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise)
         floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
-        low, high = np.float32(sensor[RANGE_MIN]), np.float32(longest - RANGE_GAP)
+        low, high = np.float32(sensor[RANGE_MIN]), np.float32(sensor[RANGE_MAX] - RANGE_GAP)
         for beam in range(beams):
             true_range = ranges[beam]
             noisy = true_range + max(floor_deviation, share * true_range) * noise[beam]
@@ -82,12 +90,12 @@ def _window_corner(x: float, y: float, reach: float) -> tuple[int, int]:
     return int(math.floor(y)) - margin, ((int(math.floor(x)) - margin) >> 6) << 6
 
 
-@kernel
-def _score(
+@kernel(inline=True)
+def _seen_area(
     world: WorldArrays, row: int, first: int, robots: int, lengths: Array, directions: Array, ends: Array, bits: Array
-) -> tuple[int, int, int, int]:
-    """Fill the area that the true beams have seen and add it to the robot's mask; returns the box that holds bits."""
-    sensor, frame, masks = world.sensor, world.frames[first // robots], world.masks[row]
+) -> tuple[tuple[int, int, int, int], int, int]:
+    """Fill the area that the true beams have seen; returns the box that holds bits, and the row and word of the masks where it begins."""
+    sensor, frame = world.sensor, world.frames[first // robots]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     x, y = (world.poses[row, 0] - frame[0]) * scale, (world.poses[row, 1] - frame[1]) * scale
     row_offset, column_offset = _window_corner(x, y, sensor[RANGE_MAX] * scale)
@@ -96,9 +104,53 @@ def _score(
     box: tuple[int, int, int, int] = fill_scan_polygon(
         lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits
     )
+    return box, row_offset, column_offset >> 6
+
+
+@kernel
+def _score(
+    world: WorldArrays, row: int, first: int, robots: int, lengths: Array, directions: Array, ends: Array, bits: Array
+) -> tuple[int, int, int, int]:
+    """Fill the area that the true beams have seen and add it to the robot's mask; returns the box that holds bits."""
+    box: tuple[int, int, int, int]
+    box, row_offset, word_offset = _seen_area(world, row, first, robots, lengths, directions, ends, bits)
+    masks = world.masks[row]
     own, counted = word_grid_at(masks[0], masks[3], masks[4]), word_grid_at(masks[2], masks[3], masks[4])
-    world.seen[row] += mark_seen(own, counted, bits, box, row_offset, column_offset >> 6, world.boxes[row])
+    world.seen[row] += mark_seen(own, counted, bits, box, row_offset, word_offset, world.boxes[row])
     return box
+
+
+@kernel
+def footprint(world: WorldArrays, row: int, first: int, robots: int, bits: Array) -> tuple[tuple[int, int, int, int], int, int]:
+    """Fill the area that a robot's true beams see from where it stands now, and change nothing in the world.
+
+    Parameters
+    ----------
+    world : WorldArrays
+        The world after a step.
+    row, first, robots : int
+        The robot's row, the first row of its episode, and the size of its team.
+    bits : (window rows, words) uint64
+        Zero on entry; of the shape of ``window_rows`` and ``window_words``.
+
+    Returns
+    -------
+    box : tuple of int
+        row_low, row_high, word_low, word_high of the window that may hold bits, high ends exclusive.
+    row_offset, word_offset : int
+        Place of the window in the scorer's masks.
+    """
+    sensor, beams = world.sensor, world.ranges.shape[1]
+    directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
+    if _is_noisy(sensor):
+        _measure(world, row, first, robots, directions, np.empty(beams, np.float32), lengths)
+    else:
+        # The sensor told the true ranges: nothing has to be cast again.
+        scale = 1.0 / sensor[MAP_RESOLUTION]
+        beam_directions(world.poses[row, 2], world.unit_vectors, directions)
+        for beam in range(beams):
+            lengths[beam] = min(world.ranges[row, beam], sensor[RANGE_MAX]) * scale
+    return _seen_area(world, row, first, robots, lengths, directions, ends, bits)  # type: ignore[no-any-return]
 
 
 @kernel

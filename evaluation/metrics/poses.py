@@ -1,0 +1,90 @@
+"""How far believed poses are from the true ones.
+
+Poses are x, y, theta [m, m, rad] of one robot at the same times.
+
+References
+----------
+Best fit: Umeyama (PAMI 1991), without scale. ATE and RPE: Sturm et al., A benchmark for the evaluation of RGB-D SLAM systems (IROS
+2012).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Poses = NDArray[np.float64]
+"""Poses in the order of time, (times, 3) float64 [m, m, rad]."""
+
+
+def wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return angles in (-pi, pi] [rad]."""
+    return np.asarray(math.pi - np.mod(math.pi - np.asarray(angles, np.float64), 2.0 * math.pi))
+
+
+def best_transform(points: NDArray[np.float64], onto: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the motion x, y, theta that brings points nearest to others: ``min sum |R(theta) p_k + (x, y) - q_k|^2``, shape (3,).
+
+    Parameters
+    ----------
+    points, onto : (times, 2 or more) float64
+        Positions x, y first [m], at least one.
+    """
+    p, q = np.asarray(points, np.float64)[:, :2], np.asarray(onto, np.float64)[:, :2]
+    p_mean, q_mean = p.mean(axis=0), q.mean(axis=0)
+    p, q = p - p_mean, q - q_mean
+    theta = math.atan2(float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum()))
+    cosine, sine = math.cos(theta), math.sin(theta)
+    x = q_mean[0] - (cosine * p_mean[0] - sine * p_mean[1])
+    y = q_mean[1] - (sine * p_mean[0] + cosine * p_mean[1])
+    return np.array([x, y, theta])
+
+
+def moved(poses: Poses, transform: NDArray[np.float64]) -> Poses:
+    """Return poses moved by a transform x, y, theta [m, m, rad]."""
+    cosine, sine = math.cos(transform[2]), math.sin(transform[2])
+    x, y, theta = np.asarray(poses, np.float64).T
+    return np.stack([cosine * x - sine * y + transform[0], sine * x + cosine * y + transform[1], wrapped(theta + transform[2])], axis=1)
+
+
+def absolute_error(believed: Poses, true: Poses, is_aligned: bool = True) -> float:
+    """Return ``ATE = sqrt(mean_k |t_k - S b_k|^2)``, S the best motion of the believed positions onto the true ones [m].
+
+    Parameters
+    ----------
+    believed, true : (times, 3) float64
+        Believed and true poses at the same times, at least one.
+    is_aligned : bool
+        False where both are in one frame: S is the identity then.
+    """
+    fitted = moved(believed, best_transform(believed, true)) if is_aligned else np.asarray(believed, np.float64)
+    gaps = fitted[:, :2] - np.asarray(true, np.float64)[:, :2]
+    return math.sqrt(float((gaps**2).sum(axis=1).mean()))
+
+
+def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, float] | None:
+    """Return RPE: ``sqrt(mean |trans(E_k)|^2)`` [m] and ``mean |angle(E_k)|`` [rad]; None where the poses do not span the steps.
+
+    ``E_k = (Q_k^-1 Q_(k+d))^-1 (P_k^-1 P_(k+d))`` of true poses Q and believed ones P; no frames have to agree.
+
+    Parameters
+    ----------
+    believed, true : (times, 3) float64
+        Believed and true poses at the same times.
+    steps : int
+        d, at least 1: commonly as many as make a second.
+    """
+    if len(believed) <= steps:
+        return None
+    motion, truth = _motions(believed, steps), _motions(true, steps)
+    # The rotation of Q_k^-1 Q_(k+d) turns the gap of translations and leaves its length.
+    gaps = motion[:, :2] - truth[:, :2]
+    return math.sqrt(float((gaps**2).sum(axis=1).mean())), float(np.abs(wrapped(motion[:, 2] - truth[:, 2])).mean())
+
+
+def _motions(poses: Poses, steps: int) -> Poses:
+    """Return the motions from each pose to the one so many steps later, in the frame of the former."""
+    before, after = np.asarray(poses, np.float64)[:-steps], np.asarray(poses, np.float64)[steps:]
+    cosine, sine = np.cos(before[:, 2]), np.sin(before[:, 2])
+    x, y = (after - before)[:, :2].T
+    return np.stack([cosine * x + sine * y, cosine * y - sine * x, after[:, 2] - before[:, 2]], axis=1)
