@@ -8,7 +8,7 @@ leaves the same lines, though in another order.
 import json
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -60,7 +60,7 @@ class Campaign:
     done: int = 0
     total: int = 0
 
-    def run(self) -> Iterator[dict[str, Any]]:
+    def run(self) -> Generator[dict[str, Any], None, None]:
         """Run what is missing, and yield each episode's line when it is on the disk.
 
         Raises
@@ -113,12 +113,10 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     result = result_of(episode, trial.policy, history)
     if records is not None:
         write_record(records / f"{trial.file_name}.npz", recorder.finish())
-    about = {
-        KEY: trial.key,
-        "variant": trial.variant,
-        "starts": [[round(float(number), 6) for number in start] for start in env.world.starts],
-    }
-    return {**about, **result, "wall_s": round(time.perf_counter() - began, 4)}
+    where = [[round(float(number), 6) for number in start] for start in env.world.starts]
+    record = None if records is None else f"{RECORDS_FOLDER}/{trial.file_name}.npz"
+    about = {KEY: trial.key, "variant": trial.variant, "starts": where, "record": record}
+    return {**about, **result, "decisions": len(episode.decision_seconds), "wall_s": round(time.perf_counter() - began, 4)}
 
 
 def drawn_starts(floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None) -> list[list[float]] | None:

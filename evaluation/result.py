@@ -20,9 +20,6 @@ from lidarium.evaluation.history import History
 from lidarium.evaluation.runner import Episode
 from lidarium.evaluation.truth import truth_of
 
-MEASURED_KEYS = ("decision_ms", "peak_mb", "steps_per_s")
-"""Keys of a result that tell of the machine; all others are the same in every run."""
-
 
 def result_of(episode: Episode, policy: str | None = None, history: History | None = None) -> dict[str, Any]:
     """Return the figures of an episode, finished or interrupted, as ``result.json`` has them.
@@ -78,7 +75,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         "ended_because": {agent: scorer.ended_because.get(agent) for agent in env.possible_agents},
         "given_up": [_entry(env, given_up) for given_up in episode.given_up],
         **_pose_errors(env, history),
-        **_map_figures(env),
+        **map_figures(env),
         "merges": {"accepted": 0, "correct": 0, "false": 0, "first_correct_s": None},
         "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
         "peak_mb": _rounded(metrics.peak_megabytes(), 1),
@@ -148,7 +145,7 @@ def _pose_errors(env: ExplorationEnv, history: History | None) -> dict[str, Any]
     }
 
 
-def _map_figures(env: ExplorationEnv) -> dict[str, Any]:
+def map_figures(env: ExplorationEnv) -> dict[str, Any]:
     """Return how much of the floor the maps know in the end, and how well they agree with the truth."""
     truth, maps = truth_of(env), maps_on_floor(env)
     team = np.sum(maps, axis=0, dtype=np.int16)

@@ -44,6 +44,9 @@ def _call(builder: Any, name: str, first: Any, second: Any) -> Any:  # noqa: ANN
     return builder.call(function, [first, second])
 
 
+_alloca: Any = cgutils.alloca_once_value
+
+
 def _load(builder: Any, address: Any, kind: Any) -> Any:  # noqa: ANN401
     return builder.load(builder.inttoptr(address, kind.as_pointer()), align=1)
 
@@ -148,7 +151,7 @@ def _least_sums(typing_context: Any, numbers: Any, costs: Any, low: Any, high: A
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         numbers_at, costs_at, first, last, most, result_at = arguments
         caps = _splat(builder, most, _SHORTS)
-        least = cgutils.alloca_once_value(builder, caps)
+        least = _alloca(builder, caps)
         with cgutils.for_range_slice(builder, first, last, ir.Constant(_INT64, 1), intp=_INT64) as (k, _):
             offset = builder.shl(k, ir.Constant(_INT64, 1))
             number = _load(builder, builder.add(numbers_at, offset), _SHORTS)

@@ -104,8 +104,8 @@ def _changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window
 def _that_differ(log_odds: Array, closeness: Array, limit: int, place: int, cells: int) -> np.uint64:
     """Tell which of up to 64 cells from a place in the grid on became occupied or free."""
     if place + BLOCK <= log_odds.size:
-        differing = cells_that_differ(log_odds.ctypes.data + place, closeness.ctypes.data + 2 * place, limit)
-        return differing & (np.uint64(0xFFFFFFFFFFFFFFFF) >> np.uint64(BLOCK - cells))
+        found: np.uint64 = cells_that_differ(log_odds.ctypes.data + place, closeness.ctypes.data + 2 * place, limit)
+        return found & (np.uint64(0xFFFFFFFFFFFFFFFF) >> np.uint64(BLOCK - cells))
     differing, beliefs, known = np.uint64(0), log_odds.reshape(-1), closeness.reshape(-1)
     for k in range(cells):
         differing |= np.uint64((beliefs[place + k] > 0) != (known[place + k] == limit)) << np.uint64(k)

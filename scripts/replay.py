@@ -116,7 +116,7 @@ def _figures(env: "ExplorationEnv") -> dict[str, Any]:
     """Return the main figures of an episode, as ``result.json`` has them."""
     from lidarium.envs.scorer import THRESHOLDS
     from lidarium.evaluation.metrics import overlap
-    from lidarium.evaluation.result import iou_of
+    from lidarium.evaluation.result import map_figures
 
     scorer, world = env.scorer, env.world
     times = {f"t{round(100 * share)}_s": scorer.times.get(share) for share in THRESHOLDS}
@@ -128,7 +128,7 @@ def _figures(env: "ExplorationEnv") -> dict[str, Any]:
         "overlap": round(overlap(world.masks), 9),
         "collisions": int(world.collisions.sum()),
         "ended_because": {agent: scorer.ended_because.get(agent) for agent in env.possible_agents},
-        "iou_occupied": round(iou_of(env), 9),
+        **map_figures(env),
     }
 
 

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 
-from lidarium.evaluation.pictures import FAINT, INK
+from lidarium.evaluation.picture_parts import FAINT, INK
 from lidarium.evaluation.report.episodes import Row, pair_key_of
 from lidarium.evaluation.report.groups import Group
 from lidarium.evaluation.report.records import Entry, Key, Track, read_track, record_key

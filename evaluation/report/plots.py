@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from lidarium.evaluation.pictures import FAINT, INK
+from lidarium.evaluation.picture_parts import FAINT, INK
 from lidarium.evaluation.report.episodes import pair_key_of
 from lidarium.evaluation.report.figures import TIMES, VALUES
 from lidarium.evaluation.report.groups import Group, times_to
