@@ -124,7 +124,7 @@ def _figures(env: "ExplorationEnv") -> dict[str, Any]:
         "coverage_final": round(scorer.coverage, 9),
         "time_s": round(scorer.time, 6),
         **{name: None if time is None else round(time, 6) for name, time in times.items()},
-        "path_m": [round(float(length), 6) for length in world.travelled],
+        "path_m": [round(float(length), 9) for length in world.travelled],
         "overlap": round(overlap(world.masks), 9),
         "collisions": int(world.collisions.sum()),
         "ended_because": {agent: scorer.ended_because.get(agent) for agent in env.possible_agents},

@@ -15,7 +15,7 @@ from lidarium.mapping.clearance import ClearanceField
 from lidarium.mapping.clearance_updates import Window, update_closeness
 from lidarium.mapping.frontiers import FrontierMap, update_frontiers
 from lidarium.mapping.grid_planning import SearchSpace
-from lidarium.mapping.kernels import Array, int8_grid_at, int32_table_at, kernel, uint8_grid_at, uint16_grid_at
+from lidarium.mapping.kernels import Array, int8_at, int8_grid_at, int32_table_at, kernel, uint8_grid_at, uint16_grid_at
 
 CLEARANCE_LIMIT = 0.6
 """Clearance is told exactly up to this [m]."""
@@ -160,15 +160,35 @@ def extend_window(known: Array, window: Array) -> None:
 
 @kernel
 def _sum_maps(beliefs: Array, window: Array, total: Array) -> None:
-    """Write the sum of maps of one shape into ``total`` within a window, cut to [-127, 127]; columns are multiples of 64."""
+    """Write the sum of maps of one shape into ``total`` within a window and nowhere else, cut to [-127, 127]."""
     columns = total.shape[1]
-    first, end = window[2] // BLOCK * BLOCK, window[3]
+    width = window[3] - window[2]
     for row in range(window[0], window[1]):
-        for place in range(row * columns + first, row * columns + end, BLOCK):
-            target = total.ctypes.data + place
-            sum_blocks(beliefs[0, 0] + place, beliefs[1, 0] + place, target)
-            for k in range(2, beliefs.shape[0]):
-                sum_blocks(target, beliefs[k, 0] + place, target)
+        first = row * columns + window[2]
+        if width < BLOCK:
+            for place in range(first, first + width):
+                _sum_cell(beliefs, place, total)
+            continue
+        for place in range(first, first + width - BLOCK, BLOCK):
+            _sum_block(beliefs, place, total)
+        # The last block may overlap the one before, whose cells it sums anew.
+        _sum_block(beliefs, first + width - BLOCK, total)
+
+
+@kernel(inline=True)
+def _sum_block(beliefs: Array, place: int, total: Array) -> None:
+    target = total.ctypes.data + place
+    sum_blocks(beliefs[0, 0] + place, beliefs[1, 0] + place, target)
+    for k in range(2, beliefs.shape[0]):
+        sum_blocks(target, beliefs[k, 0] + place, target)
+
+
+@kernel(inline=True)
+def _sum_cell(beliefs: Array, place: int, total: Array) -> None:
+    value = np.int64(int8_at(beliefs[0, 0] + place, 1)[0])
+    for k in range(1, beliefs.shape[0]):
+        value = min(max(value + np.int64(int8_at(beliefs[k, 0] + place, 1)[0]), -127), 127)
+    total.reshape(-1)[place] = np.int8(value)
 
 
 class TeamMaps(NamedTuple):

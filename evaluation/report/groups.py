@@ -14,6 +14,10 @@ from lidarium.evaluation.statistics import CensoredTimes
 from lidarium.evaluation.suite import DEFAULT_VARIANT
 
 
+_NAMES = ("seed", "key", "record")
+"""What tells a run from others, without saying what came of it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Group:
     """Episodes with one set of settings and one number of robots on the floors of one set.
@@ -158,7 +162,9 @@ def repeats(rows: Iterable[Row]) -> int:
 
     Where neither starts nor noise are drawn, a policy without chance does the same whatever the seed.
     """
-    said = [json.dumps({key: value for key, value in row.items() if key not in ("seed", *TIMINGS)}, sort_keys=True) for row in rows]
+    said = [
+        json.dumps({key: value for key, value in row.items() if key not in _NAMES and key not in TIMINGS}, sort_keys=True) for row in rows
+    ]
     return len(said) - len(set(said))
 
 

@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+from lidarium.envs.floors.catalogue import load_floor
 from lidarium.evaluation.campaign import Campaign, run_trial
 from lidarium.evaluation.episodes_file import TIMINGS, read_episodes
 from lidarium.evaluation.record import read_record, rerun
@@ -92,9 +93,10 @@ def test_other_settings_and_other_versions_are_refused(folder, tmp_path):
 
 
 def test_a_trial_that_fails_is_told_and_the_others_run(tmp_path):
-    free, solid = ((1.0, 1.5, 0.0), (2.0, 1.5, 0.0)), ((-9.0, -9.0, 0.0), (-8.0, -8.0, 0.0))
+    free = tuple(tuple(float(number) for number in start) for start in load_floor("apartment").starts[:2])
+    solid = ((-9.0, -9.0, 0.0), (-8.0, -8.0, 0.0))
     campaign = Campaign(suite(policies=("nearest_frontier",), seeds=(0,), starts={"apartment": (free, solid)}), tmp_path)
-    assert [line["starts"][0] for line in campaign.run()] == [[1.0, 1.5, 0.0]]
+    assert [line["starts"][0] for line in campaign.run()] == [[round(number, 6) for number in free[0]]]
     assert [(trial.start, type(error)) for trial, error in campaign.failures] == [(1, ValueError)]
     moved = suite(policies=("nearest_frontier",), seeds=(0,), starts={"apartment": (solid,)})
     with pytest.raises(ValueError, match="other starts on 'apartment'"):

@@ -7,8 +7,8 @@ import pytest
 
 import lidarium
 from lidarium.envs.settings import make_settings
+from lidarium.evaluation.beliefs import team_log_odds
 from lidarium.evaluation.record import Recorder
-from lidarium.evaluation.result import team_log_odds
 from lidarium.evaluation.runner import run_episode
 from lidarium.evaluation.watching import WatchedExploration
 from lidarium.mapping.occupancy import three_levels

@@ -11,7 +11,8 @@ import pytest
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings import make_settings
-from lidarium.evaluation.result import result_of, team_log_odds
+from lidarium.evaluation.beliefs import team_log_odds
+from lidarium.evaluation.result import result_of
 from lidarium.evaluation.runner import run_episode
 
 POLICIES = ("nearest_frontier", "random_walk", "utility_frontier")
