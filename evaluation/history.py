@@ -15,6 +15,9 @@ from lidarium.evaluation.map_tally import COUNTED, KNOWABLE, VALID, MapTally
 from lidarium.evaluation.metrics import overlap
 from lidarium.evaluation.truth import Truth, truth_of
 
+WHOLE = 0.99
+"""Coverage at which the overlap of maps is asked for."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Milestone:
@@ -30,8 +33,8 @@ class Milestone:
         Length of each robot's path until then [m].
     overlap : float
         Share of the seen cells that two robots or more had seen.
-    known_shares : (robots,) float64
-        ``C_known`` of each robot's own map.
+    known_shares : (robots,) float64 or None
+        ``C_known`` of each robot's own map; None below `WHOLE`, before which nobody asks for it.
     """
 
     time_s: float
@@ -39,7 +42,7 @@ class Milestone:
     decisions: int
     lengths: NDArray[np.float64]
     overlap: float
-    known_shares: NDArray[np.float64]
+    known_shares: NDArray[np.float64] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,10 +146,13 @@ class History:
         self._thresholds = len(scorer.times)
         if not scorer.times:
             return
-        self._tally.take_in(env)
+        known_shares = None
+        if scorer.coverage >= WHOLE:
+            self._tally.take_in(env)
+            known_shares = self._tally.known_shares
         decisions = self._decisions + 1 if int(world.steps[0]) > 0 else 0
         self.milestones.append(
-            Milestone(scorer.time, scorer.coverage, decisions, world.travelled.copy(), overlap(world.masks), self._tally.known_shares)
+            Milestone(scorer.time, scorer.coverage, decisions, world.travelled.copy(), overlap(world.masks), known_shares)
         )
 
     def milestone(self, share: float) -> Milestone | None:

@@ -13,6 +13,7 @@ from lidarium.evaluation.beliefs import shares_one_map
 from lidarium.evaluation.truth import Truth
 from lidarium.mapping.cell_blocks import negative_cells, positive_cells
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel
+from lidarium.mapping.occupancy import WORD
 
 KNOWABLE, VALID, COUNTED = range(3)
 """Places of the true masks, and of what is counted: known cells within the first and the second, free ones within the third."""
@@ -21,31 +22,7 @@ KNOWN, FREE = range(2)
 """Places of the bits of a map."""
 
 SLACK = 4
-"""Cells by which a map may change beyond the longest range: a hit lies in the cell beyond its beam, and lattices are not aligned."""
-
-
-@kernel
-def _looked_up(world: WorldArrays, row: int, episode: int, line: int, word: int, wanted: np.uint64) -> tuple[np.uint64, np.uint64]:
-    """Say which wanted cells of a word of the floor's lattice are negative and which positive in a map of a frame of its own."""
-    belief, start, origin, frame = world.maps[row], world.starts[row], world.origins[row], world.frames[episode]
-    log_odds = int8_grid_at(belief[0], belief[1], belief[2])
-    resolution = world.sensor[MAP_RESOLUTION]
-    cosine, sine = math.cos(start[2]), math.sin(start[2])
-    north = (line + 0.5) * resolution + frame[1] - start[1]
-    negative, positive = np.uint64(0), np.uint64(0)
-    while wanted != np.uint64(0):
-        bit = wanted & (~wanted + np.uint64(1))
-        wanted ^= bit
-        east = (word * 64 + count_bits(bit - np.uint64(1)) + 0.5) * resolution + frame[0] - start[0]
-        i = int(math.floor((cosine * north - sine * east - origin[1]) / resolution))
-        j = int(math.floor((cosine * east + sine * north - origin[0]) / resolution))
-        if 0 <= i < belief[1] and 0 <= j < belief[2]:
-            value = log_odds[i, j]
-            if value < 0:
-                negative |= bit
-            elif value > 0:
-                positive |= bit
-    return negative, positive
+"""Cells by which a map may change beyond the longest range: a hit lies in the cell beyond its beam."""
 
 
 @kernel
@@ -58,9 +35,8 @@ def _box(
     x, y = (pose[0] - frame[0]) / resolution, (pose[1] - frame[1]) / resolution
     row_low, row_high = max(int(math.floor(y - reach)), 0), min(int(math.ceil(y + reach)), shape[0])
     column_low, column_high = max(int(math.floor(x - reach)), 0), min(int(math.ceil(x + reach)), 64 * shape[1])
-    if not world.flags[row] & OWN_FRAME:
-        row_low, row_high = max(row_low, change[0]), min(row_high, change[1])
-        column_low, column_high = max(column_low, change[2]), min(column_high, change[3])
+    row_low, row_high = max(row_low, change[0]), min(row_high, change[1])
+    column_low, column_high = max(column_low, change[2]), min(column_high, change[3])
     return row_low, row_high, column_low >> 6, (column_high + 63) >> 6
 
 
@@ -78,6 +54,15 @@ def _free_of_sum(world: WorldArrays, first: int, robots: int, line: int, word: i
         if total < 0:
             free |= bit
     return free
+
+
+@kernel(inline=True)
+def _recount_free(truth: Array, bits: Array, counts: Array, who: int, i: int, j: int, free: np.uint64) -> None:
+    """Put new bits of free cells in place of the old ones, and change the count by the difference."""
+    old = bits[who, i, j, FREE]
+    if free != old:
+        counts[who, COUNTED] += count_bits(free & truth[COUNTED, i, j]) - count_bits(old & truth[COUNTED, i, j])
+        bits[who, i, j, FREE] = free
 
 
 @kernel(inline=True)
@@ -103,22 +88,98 @@ def _sum_up(
         _recount_free(truth, bits, counts, robots, i, j, free)
 
 
-@kernel(inline=True)
-def _recount_free(truth: Array, bits: Array, counts: Array, who: int, i: int, j: int, free: np.uint64) -> None:
-    """Put new bits of free cells in place of the old ones, and change the count by the difference."""
-    old = bits[who, i, j, FREE]
-    if free != old:
-        counts[who, COUNTED] += count_bits(free & truth[COUNTED, i, j]) - count_bits(old & truth[COUNTED, i, j])
-        bits[who, i, j, FREE] = free
+@kernel
+def _take_in_aligned(
+    world: WorldArrays,
+    first: int,
+    robot: int,
+    robots: int,
+    shares: bool,
+    truth: Array,
+    bits: Array,
+    disputed: Array,
+    counts: Array,
+    box: tuple[int, int, int, int],
+) -> None:
+    """Bring up to date what comes of a map on the floor's lattice, in a box of rows and words."""
+    own, address, columns = bits[robot], world.maps[first + robot, 0], world.maps[first + robot, 2]
+    for i in range(box[0], box[1]):
+        for j in range(box[2], box[3]):
+            if truth[KNOWABLE, i, j] == np.uint64(0):
+                continue
+            place = address + i * columns + 64 * j
+            negative = negative_cells(place)
+            known = negative | positive_cells(place)
+            has_changed = negative != own[i, j, FREE] or known != own[i, j, KNOWN]
+            own[i, j, KNOWN] = known
+            if shares:
+                own[i, j, FREE] = negative
+            else:
+                _recount_free(truth, bits, counts, robot, i, j, negative)
+            # What is disputed may be settled by another sum, though no map has changed its mind.
+            if has_changed or (shares and disputed[i, j] != np.uint64(0)):
+                _sum_up(world, first, robots, shares, truth, bits, disputed, counts, i, j)
+
+
+@kernel
+def _take_in_turned(
+    world: WorldArrays,
+    first: int,
+    robot: int,
+    robots: int,
+    truth: Array,
+    signs: Array,
+    bits: Array,
+    disputed: Array,
+    counts: Array,
+    change: Array,
+) -> None:
+    """Bring up to date what comes of a map in a frame of its own: lay each cell that has changed over the floor's lattice.
+
+    ``signs`` (rows, words, 2) are the bits on the map's own lattice. As in `beliefs.maps_on_floor`, a cell of the floor is what the cell
+    of the map says in which its centre lies.
+    """
+    row = first + robot
+    belief, start, origin, frame = world.maps[row], world.starts[row], world.origins[row], world.frames[first // robots]
+    resolution = world.sensor[MAP_RESOLUTION]
+    cosine, sine = math.cos(start[2]), math.sin(start[2])
+    for line in range(max(change[0], 0), min(change[1], belief[1])):
+        for word in range(max(change[2], 0) >> 6, (min(change[3], belief[2]) + 63) >> 6):
+            place = belief[0] + line * belief[2] + 64 * word
+            negative = negative_cells(place)
+            known = negative | positive_cells(place)
+            changed = (known ^ signs[line, word, KNOWN]) | (negative ^ signs[line, word, FREE])
+            signs[line, word, KNOWN], signs[line, word, FREE] = known, negative
+            while changed != np.uint64(0):
+                bit = changed & (~changed + np.uint64(1))
+                changed ^= bit
+                column = word * 64 + count_bits(bit - np.uint64(1))
+                own_x, own_y = (column + 0.5) * resolution + origin[0], (line + 0.5) * resolution + origin[1]
+                near_i = int(math.floor((sine * own_x + cosine * own_y + start[1] - frame[1]) / resolution))
+                near_j = int(math.floor((cosine * own_x - sine * own_y + start[0] - frame[0]) / resolution))
+                # The centres within a turned cell are no further than this from the cell that holds its own centre.
+                for i in range(max(near_i - 1, 0), min(near_i + 2, truth.shape[1])):
+                    for j in range(max(near_j - 1, 0), min(near_j + 2, 64 * truth.shape[2])):
+                        east, north = (j + 0.5) * resolution + frame[0] - start[0], (i + 0.5) * resolution + frame[1] - start[1]
+                        if int(math.floor((cosine * east + sine * north - origin[0]) / resolution)) != column:
+                            continue
+                        if int(math.floor((cosine * north - sine * east - origin[1]) / resolution)) != line:
+                            continue
+                        cell = np.uint64(1) << np.uint64(j & 63)
+                        own = bits[robot, i, j >> 6]
+                        own[KNOWN] = own[KNOWN] | cell if known & bit else own[KNOWN] & ~cell
+                        free = own[FREE] | cell if negative & bit else own[FREE] & ~cell
+                        _recount_free(truth, bits, counts, robot, i, j >> 6, free)
+                        _sum_up(world, first, robots, False, truth, bits, disputed, counts, i, j >> 6)
 
 
 @kernel
 def _take_in(
     table: Array,
     episode: int,
-    robots: int,
     shares: bool,
     truth: Array,
+    signs: Array,
     bits: Array,
     disputed: Array,
     counts: Array,
@@ -132,14 +193,17 @@ def _take_in(
     ----------
     table : (28, 3) int64
         The world's arrays.
-    episode, robots : int
-        Which episode, and the size of its team.
+    episode : int
+        Which episode.
     shares : bool
         Whether all robots hold the sum of the maps, which lie on one lattice then.
     truth : (3, rows, words) uint64
         The true masks.
+    signs : (robots, map rows, map words, 2) uint64
+        Which cells maps in frames of their own know, and which of them they say are free, on their own lattices; not used for maps
+        that lie on the floor's. Updated.
     bits : (robots + 1, rows, words, 2) uint64
-        Which cells each robot's own map knows, and which of them it says are free; those of the team at the end. Updated.
+        The same of each robot's own map on the floor's lattice; those of the team at the end. Updated.
     disputed : (rows, words) uint64
         Cells of F of which one map says that they are free, and another that they are not. Updated.
     counts : (robots + 1, 3) int64
@@ -148,39 +212,22 @@ def _take_in(
     poses, ways : (robots, 3) float64 and (robots,) float64
         Where each robot stood at the last call, and how far it had driven by then. Updated.
     changes : (robots, 4) int64
-        What part of each map has changed since, of ``note_changes``. Begun anew.
+        What part of each map has changed since, of ``_note_changes``. Begun anew.
     """
-    world = world_at(table)
+    world, robots = world_at(table), poses.shape[0]
     first = episode * robots
     for robot in range(robots):
-        row, own = first + robot, bits[robot]
-        row_low, row_high, word_low, word_high = _box(world, row, episode, poses[robot], ways[robot], changes[robot], truth[0].shape)
-        address, columns, is_own_frame = world.maps[row, 0], world.maps[row, 2], world.flags[row] & OWN_FRAME != 0
-        for i in range(row_low, row_high):
-            for j in range(word_low, word_high):
-                wanted = truth[KNOWABLE, i, j]
-                if wanted == np.uint64(0):
-                    continue
-                if is_own_frame:
-                    negative, positive = _looked_up(world, row, episode, i, j, wanted)
-                else:
-                    place = address + i * columns + 64 * j
-                    negative, positive = negative_cells(place), positive_cells(place)
-                has_changed = negative != own[i, j, FREE] or (negative | positive) != own[i, j, KNOWN]
-                own[i, j, KNOWN] = negative | positive
-                if shares:
-                    own[i, j, FREE] = negative
-                else:
-                    _recount_free(truth, bits, counts, robot, i, j, negative)
-                # What is disputed may be settled by another sum, though no map has changed its mind.
-                if has_changed or (shares and disputed[i, j] != np.uint64(0)):
-                    _sum_up(world, first, robots, shares, truth, bits, disputed, counts, i, j)
-    for robot in range(robots):
-        ways[robot] = world.travelled[first + robot]
+        row = first + robot
+        if world.flags[row] & OWN_FRAME:
+            _take_in_turned(world, first, robot, robots, truth, signs[robot], bits, disputed, counts, changes[robot])
+        else:
+            box = _box(world, row, episode, poses[robot], ways[robot], changes[robot], truth[0].shape)
+            _take_in_aligned(world, first, robot, robots, shares, truth, bits, disputed, counts, box)
+        ways[robot] = world.travelled[row]
         for axis in range(3):
-            poses[robot, axis] = world.poses[first + robot, axis]
-        changes[robot, 0], changes[robot, 1] = world.maps[first + robot, 1], 0
-        changes[robot, 2], changes[robot, 3] = world.maps[first + robot, 2], 0
+            poses[robot, axis] = world.poses[row, axis]
+        changes[robot, 0], changes[robot, 1] = world.maps[row, 1], 0
+        changes[robot, 2], changes[robot, 3] = world.maps[row, 2], 0
 
 
 @kernel
@@ -221,6 +268,8 @@ class MapTally:
         self.counts = np.zeros((robots + 1, 3), np.int64)
         self._poses, self._ways = world.poses.copy(), world.travelled.copy()
         self._changes = world.windows.copy()
+        map_rows, map_columns = (0, 0) if env.settings.known_starts else world.log_odds[0].shape
+        self._signs = np.zeros((robots, map_rows, map_columns // WORD, 2), np.uint64)
         self.shares = shares_one_map(env)
 
     def note_step(self, env: ExplorationEnv) -> None:
@@ -229,10 +278,9 @@ class MapTally:
 
     def take_in(self, env: ExplorationEnv) -> None:
         """Bring the counts up to date."""
-        world = env.world
         _take_in(
-            world.table, 0, env.settings.robots, self.shares, self._truth, self._bits, self._disputed, self.counts, self._poses,
-            self._ways, self._changes,
+            env.world.table, 0, self.shares, self._truth, self._signs, self._bits, self._disputed, self.counts, self._poses, self._ways,
+            self._changes,
         )  # fmt: skip
 
     @property

@@ -16,7 +16,7 @@ from lidarium.envs.scorer import THRESHOLDS
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.evaluation import metrics
 from lidarium.evaluation.beliefs import free_as_held, maps_on_floor
-from lidarium.evaluation.history import History
+from lidarium.evaluation.history import WHOLE, History
 from lidarium.evaluation.runner import Episode
 from lidarium.evaluation.truth import truth_of
 
@@ -114,10 +114,10 @@ def _at_thresholds(history: History | None) -> dict[str, Any]:
 
 def _overlaps(history: History | None) -> dict[str, Any]:
     """Return the overlaps as the reference projects take them, each when they take it."""
-    nearly, mostly, whole = (None if history is None else history.milestone(share) for share in (0.85, 0.95, 0.99))
+    nearly, mostly, whole = (None if history is None else history.milestone(share) for share in (0.85, 0.95, WHOLE))
     curves = None if history is None else history.curves
     return {
-        "overlap_eb": None if whole is None else round(metrics.overlap_of_maps(whole.known_shares), 9),
+        "overlap_eb": None if whole is None or whole.known_shares is None else round(metrics.overlap_of_maps(whole.known_shares), 9),
         "overlap_mx_85": None if nearly is None else round(nearly.overlap, 9),
         "overlap_mx_95": None if mostly is None else round(mostly.overlap, 9),
         "overlap_mv": None if curves is None else round(metrics.instant_overlap(curves.seen_once, curves.seen_twice), 9),

@@ -20,8 +20,9 @@ def surface(occupied: Mask, free: Mask) -> Mask:
 def widened(cells: Mask, by: int = 1) -> Mask:
     """Return the cells within ``by`` cells of given ones, diagonals included."""
     side = 2 * by + 1
-    grown = cv2.dilate(cells.astype(np.uint8), np.ones((side, side), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=(0.0,))
-    return np.asarray(grown != 0)
+    bytes_of = np.ascontiguousarray(cells).view(np.uint8)
+    grown = cv2.dilate(bytes_of, np.ones((side, side), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=(0.0,))
+    return np.asarray(grown, np.uint8).view(np.bool_)
 
 
 def occupied_f1(believed: Mask, occupied: Mask, tolerance: int = 1, wanted: Mask | None = None) -> float:

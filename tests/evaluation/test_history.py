@@ -6,6 +6,7 @@ import pytest
 import lidarium
 from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.floor import Floor, Raster
 from lidarium.envs.settings import make_settings
 from lidarium.evaluation import metrics
 from lidarium.evaluation.beliefs import free_as_held, maps_on_floor
@@ -95,10 +96,14 @@ def test_thresholds_are_noted_in_the_step_that_reaches_them():
 
 
 @pytest.mark.parametrize("known_starts", [True, False])
-def test_a_milestone_has_what_each_map_knew(known_starts):
-    episode, history = watched(known_starts=known_starts, stop_coverage=0.85)
+def test_the_last_milestone_has_what_each_map_knew(known_starts):
+    room = np.ones((30, 30), np.uint8)
+    room[1:-1, 1:-1] = 0
+    floor = Floor("room", (0.0, 0.0, 3.0, 3.0), cells=Raster(room, (0.0, 0.0), 0.1))
+    episode, history = watched(floor=floor, robots=2, known_starts=known_starts)
     truth, maps = truth_of(episode.env), maps_on_floor(episode.env)
-    [milestone] = history.milestones
+    milestone = history.milestone(0.99)
+    assert milestone.time_s == episode.env.scorer.time
     assert milestone.known_shares == pytest.approx([metrics.known_coverage(own != 0, truth.knowable) for own in maps])
     assert milestone.overlap == metrics.overlap(episode.env.world.masks)
 
