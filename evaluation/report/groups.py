@@ -13,7 +13,6 @@ from lidarium.evaluation.report.episodes import Row, pair_key_of, variant_of
 from lidarium.evaluation.statistics import CensoredTimes
 from lidarium.evaluation.suite import DEFAULT_VARIANT
 
-
 _NAMES = ("seed", "key", "record")
 """What tells a run from others, without saying what came of it."""
 

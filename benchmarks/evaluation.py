@@ -1,0 +1,201 @@
+"""What an evaluation costs beside its episodes, how two workers compare with one, and what survives a killed program.
+
+    python benchmarks/evaluation.py                                   # prints the tables
+    python benchmarks/evaluation.py --out docs/results/evaluation.md  # and writes them
+
+Costs are CPU time of one process, of episodes run in turn: bare (environment and policy), with the history for the metrics, with the
+record as well, and as a whole trial with its figures, its record and its line on the disk. Ratios are taken episode by episode.
+"""
+
+import argparse
+import random
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import lidarium
+from lidarium.benchmarks.speed.report import about, heading
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.evaluation.campaign import EPISODES_FILE, Campaign, run_trial
+from lidarium.evaluation.episodes_file import EpisodesFile, read_episodes
+from lidarium.evaluation.history import History
+from lidarium.evaluation.output import check_writable, write_text
+from lidarium.evaluation.record import Recorder
+from lidarium.evaluation.result import result_of
+from lidarium.evaluation.runner import run_episode
+from lidarium.evaluation.suite import Suite, Trial
+from lidarium.evaluation.watching import WatchedExploration
+
+SETTINGS = {"resolution": 0.025, "stop_coverage": 0.99, "horizon_s": 900.0}
+FLOORS = ("apartment", "building:17", "building:3000001")
+POLICIES = ("nearest_frontier", "explore_lite")
+TEAM = 3
+KILLS = 50
+
+
+def suite(seeds: int, floors: tuple[str, ...] = FLOORS) -> Suite:
+    """Return the suite that is measured."""
+    return Suite(policies=POLICIES, floors=floors, robots=(TEAM,), seeds=tuple(range(seeds)), variants={"default": SETTINGS})
+
+
+def ways(plan: Suite, trial: Trial, folder: Path) -> dict[str, Callable[[], Any]]:
+    """Return the ways in which a trial is run, each with more beside the episode than the one before."""
+    settings = plan.settings(trial.variant, trial.robots)
+
+    def bare() -> None:
+        run_episode(lidarium.policy(trial.policy), ExplorationEnv(trial.floor, settings), trial.seed)
+
+    def measured() -> None:
+        history = History()
+        env = WatchedExploration(trial.floor, settings, watchers=[history])
+        result_of(run_episode(lidarium.policy(trial.policy), env, trial.seed), trial.policy, history)
+
+    def recorded() -> None:
+        history, recorder = History(), Recorder(trial.policy, trial.seed, trial.floor)
+        env = WatchedExploration(trial.floor, settings, watchers=[history, recorder])
+        result_of(run_episode(lidarium.policy(trial.policy), env, trial.seed), trial.policy, history)
+        recorder.finish()
+
+    def unrecorded_trial() -> None:
+        line = run_trial(plan, trial)
+        with EpisodesFile(folder / EPISODES_FILE) as file:
+            file.append({**line, "key": str(time.monotonic_ns())})
+
+    def whole_trial() -> None:
+        line = run_trial(plan, trial, folder)
+        with EpisodesFile(folder / EPISODES_FILE) as file:
+            file.append({**line, "key": str(time.monotonic_ns())})
+
+    return {"bare": bare, "measured": measured, "recorded": recorded, "trial without record": unrecorded_trial, "whole trial": whole_trial}
+
+
+def costs(rounds: int) -> list[str]:
+    """Measure what is spent beside the episodes; returns lines of a table."""
+    plan = Suite(policies=POLICIES, floors=FLOORS, robots=(TEAM,), variants={"default": SETTINGS}, draws_starts=False)
+    lines = [
+        "| floor, policy | episode, bare [ms] | metrics | record | runner | all |",
+        "|---|---:|---:|---:|---:|---:|",
+    ]
+    with tempfile.TemporaryDirectory() as name:
+        for trial in plan.trials():
+            seconds: dict[str, list[float]] = {}
+            for turn in range(rounds + 1):
+                folder = Path(name) / f"{trial.file_name}-{turn}"
+                for way, run in ways(plan, trial, folder).items():
+                    began = time.process_time()
+                    run()
+                    if turn:
+                        seconds.setdefault(way, []).append(time.process_time() - began)
+            share = {
+                way: [100.0 * value / least for value, least in zip(values, seconds["bare"], strict=True)]
+                for way, values in seconds.items()
+            }
+            differences = (
+                ("measured", "bare"), ("recorded", "measured"), ("trial without record", "measured"), ("whole trial", "bare"),
+            )  # fmt: skip
+            cells = [
+                f"{statistics.median([a - b for a, b in zip(share[more], share[less], strict=True)]):+.1f} %" for more, less in differences
+            ]
+            lines.append(f"| {trial.floor}, {trial.policy} | {1e3 * statistics.median(seconds['bare']):.0f} | {' | '.join(cells)} |")
+            print(lines[-1], flush=True)
+    return lines
+
+
+def gain_of_workers(seeds: int, rounds: int) -> tuple[list[float], int]:
+    """Return how much faster two workers are than one, round by round, and how many episodes a round has."""
+    plan = suite(seeds)
+    gains = []
+    for _ in range(rounds):
+        seconds = []
+        for workers in (1, 2):
+            with tempfile.TemporaryDirectory() as name:
+                began = time.perf_counter()
+                finished = len(list(Campaign(plan, Path(name), workers).run()))
+                seconds.append(time.perf_counter() - began)
+        gains.append(seconds[0] / seconds[1])
+        print(f"one worker {seconds[0]:.1f} s, two {seconds[1]:.1f} s, {finished} episodes", flush=True)
+    return gains, finished
+
+
+def kills(count: int) -> tuple[int, int]:
+    """Kill an evaluation at random moments until it is through; returns how often it was killed, and its episodes.
+
+    Raises
+    ------
+    RuntimeError
+        Where an episode was lost, doubled or changed.
+    """
+    generator = random.Random(0)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        command = [
+            sys.executable, "-c", "from lidarium.scripts.main import main; import sys; sys.exit(main())", "evaluate", "--policies",
+            "random_walk", "nearest_frontier", "--floors", "apartment", "--robots", "1", "2", "--seeds", "200", "--horizon-s", "20",
+            "--map-resolution", "0.05", "--workers", "2", "--out", str(folder),
+        ]  # fmt: skip
+        before: list[dict[str, Any]] = []
+        for kill in range(count):
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(generator.uniform(1.0, 6.0))
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            after = read_episodes(folder / EPISODES_FILE)
+            if after[: len(before)] != before:
+                raise RuntimeError(f"episodes were lost or changed by kill {kill + 1}")
+            if len({line["key"] for line in after}) != len(after):
+                raise RuntimeError(f"episodes were doubled by kill {kill + 1}")
+            before = after
+            print(f"kill {kill + 1}: {len(after)} episodes", flush=True)
+        return count, len(before)
+
+
+def main() -> None:
+    """Measure, print, and write where asked to."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=7, help="repeats of every measurement of cost")
+    parser.add_argument("--seeds", type=int, default=10, help="seeds of the suite on which workers are compared")
+    parser.add_argument("--kills", type=int, default=KILLS, help="how often an evaluation is killed")
+    parser.add_argument("--out", type=Path, help="page to write")
+    chosen = parser.parse_args()
+    if chosen.out is not None:
+        check_writable(chosen.out.parent)
+    table = costs(chosen.rounds)
+    gains, episodes = gain_of_workers(chosen.seeds, 3)
+    killed, kept = kills(chosen.kills) if chosen.kills else (0, 0)
+    gain = statistics.median(gains)
+    page = [
+        *heading("Evaluation", about(f"python benchmarks/evaluation.py --out {chosen.out}")),
+        "",
+        "## What is spent beside the episodes",
+        "",
+        *table,
+        "",
+        f"CPU time of one process, {TEAM} robots, maps of 2.5 cm, medians over {chosen.rounds} rounds of ratios to the bare episode "
+        "(environment and policy alone). *Metrics*: the history that watches, and all figures of the line. *Record*: recording, without "
+        "writing. *Runner*: what the trial of a campaign has beside episode and metrics: settings, starts, the line on the disk. *All*: the "
+        "whole trial, with its record written.",
+        "",
+        "## Workers",
+        "",
+        f"Two workers are {gain:.2f} x as fast as one ({min(gains):.2f} to {max(gains):.2f}; to reach: 1.9 x) on {episodes} episodes, "
+        "with the start of their processes: " + ("reached." if gain >= 1.9 else "not reached."),
+        "",
+        "## Killed",
+        "",
+        f"An evaluation with two workers was killed (SIGKILL) {killed} times, 1 to 6 s after its start, and gone on with each time: "
+        f"{kept} episodes in the end, none lost, none doubled, none changed.",
+        "",
+    ]
+    print("\n".join(page))
+    if chosen.out is not None:
+        write_text(chosen.out, "\n".join(page))
+
+
+if __name__ == "__main__":
+    main()
