@@ -178,8 +178,8 @@ def main() -> None:
         "",
         f"CPU time of one process, {TEAM} robots, maps of 2.5 cm, medians over {chosen.rounds} rounds of ratios to the bare episode "
         "(environment and policy alone). *Metrics*: the history that watches, and all figures of the line. *Record*: recording, without "
-        "writing. *Runner*: what the trial of a campaign has beside episode and metrics: settings, starts, the line on the disk. *All*: the "
-        "whole trial, with its record written.",
+        "writing. *Runner*: what the trial of a campaign has beside episode and metrics: settings, starts, the line on the disk. *All*: "
+        "the whole trial, with its record written.",
         "",
         "## Workers",
         "",

@@ -185,9 +185,9 @@ def _sum_block(beliefs: Array, place: int, total: Array) -> None:
 
 @kernel(inline=True)
 def _sum_cell(beliefs: Array, place: int, total: Array) -> None:
-    value = np.int64(int8_at(beliefs[0, 0] + place, 1)[0])
+    value = int(int8_at(beliefs[0, 0] + place, 1)[0])
     for k in range(1, beliefs.shape[0]):
-        value = min(max(value + np.int64(int8_at(beliefs[k, 0] + place, 1)[0]), -127), 127)
+        value = min(max(value + int(int8_at(beliefs[k, 0] + place, 1)[0]), -127), 127)
     total.reshape(-1)[place] = np.int8(value)
 
 

@@ -1,0 +1,124 @@
+"""`lidarium evaluate` and `lidarium reproduce` from the command line."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from lidarium.evaluation.episodes_file import read_episodes
+from lidarium.scripts.main import main
+
+SHORT = ["--robots", "1", "--seeds", "2", "--horizon-s", "5", "--map-resolution", "0.05", "--workers", "1"]
+
+
+def evaluate(*arguments):
+    return main(["evaluate", *(str(argument) for argument in arguments)])
+
+
+def test_an_evaluation_writes_a_folder_and_tells_its_medians(tmp_path, capsys):
+    assert evaluate("--policies", "random_walk", "nearest_frontier", *SHORT, "--out", tmp_path) == 0
+    told = capsys.readouterr().out
+    assert "4 of 4 episodes finished" in told
+    assert "random_walk" in told
+    assert len(read_episodes(tmp_path / "episodes.jsonl")) == len(list((tmp_path / "records").glob("*.npz"))) == 4
+    assert evaluate("--policies", "random_walk", *SHORT, "--out", tmp_path, "--json") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["episodes"], result["finished"], result["failed"]) == (2, 2, [])
+    assert [row["policy"] for row in result["summary"]] == ["random_walk"]
+
+
+def test_a_file_says_what_to_run(tmp_path, capsys):
+    path = tmp_path / "suite.toml"
+    path.write_text('policies = ["random_walk"]\nfloors = ["apartment"]\n[settings]\nhorizon_s = 3.0\nresolution = 0.05\n')
+    assert evaluate(path, "--out", tmp_path / "out", "--workers", "1", "--no-records") == 0
+    (line,) = read_episodes(tmp_path / "out" / "episodes.jsonl")
+    assert line["time_s"] == 3.0
+    assert line["record"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--policies", "nearest_fronteer"], "did you mean 'nearest_frontier'"),
+        (["--floors", "appartment"], "did you mean 'apartment'"),
+        (["--seeds", "0"], "--seeds is 0"),
+        (["--workers", "-1"], "--workers is -1"),
+        (["--preset", "ariadn"], "did you mean 'ariadne'"),
+        (["--preset", "ariadne"], "give --data"),
+        (["none.toml"], "no suite none.toml"),
+        (["--noise", "loud"], "loud"),
+    ],
+)
+def test_bad_input_is_named_and_nothing_is_written(arguments, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert evaluate(*arguments, "--out", "out") == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_other_settings_in_a_folder_are_refused(tmp_path, capsys):
+    assert evaluate("--policies", "random_walk", *SHORT, "--out", tmp_path) == 0
+    before = (tmp_path / "episodes.jsonl").read_bytes()
+    assert evaluate("--policies", "random_walk", *SHORT, "--noise", "datasheet", "--out", tmp_path) == 2
+    assert "noise = none, this suite has noise = datasheet" in capsys.readouterr().err
+    assert (tmp_path / "episodes.jsonl").read_bytes() == before
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent as on Unix")
+def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, capsys):
+    arguments = [
+        "--policies",
+        "random_walk",
+        "--robots",
+        "1",
+        "--seeds",
+        "12",
+        "--horizon-s",
+        "400",
+        "--out",
+        str(tmp_path),
+        "--workers",
+        "2",
+    ]
+    code = "from lidarium.scripts.main import main; import sys; sys.exit(main())"
+    process = subprocess.Popen([sys.executable, "-c", code, "evaluate", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    ended = time.monotonic() + 60.0
+    while time.monotonic() < ended and not ((tmp_path / "episodes.jsonl").exists() and (tmp_path / "episodes.jsonl").stat().st_size):
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(30) == 130
+    kept = read_episodes(tmp_path / "episodes.jsonl")
+    assert kept
+    assert evaluate(*arguments) == 0
+    assert "12 of 12 episodes finished" in capsys.readouterr().out
+    assert read_episodes(tmp_path / "episodes.jsonl")[: len(kept)] == kept
+
+
+def test_the_leaderboard_is_made_by_one_command(tmp_path, capsys, monkeypatch):
+    from lidarium.evaluation.experiments import leaderboard
+
+    monkeypatch.setattr(leaderboard, "SETTINGS", {"resolution": 0.05, "horizon_s": 4.0})
+    monkeypatch.setattr(leaderboard, "TEAMS", (1,))
+    arguments = [
+        "reproduce",
+        "leaderboard",
+        "--every",
+        "100",
+        "--runs",
+        str(tmp_path / "runs"),
+        "--out",
+        str(tmp_path / "out"),
+        "--workers",
+        "1",
+    ]
+    assert main(arguments) == 0
+    page = (tmp_path / "out" / "leaderboard.md").read_text()
+    assert all(f"| `{policy}` |" in page for policy in leaderboard.POLICIES)
+    assert "Generated floors of the set `test` (2)" in page
+    assert main([*arguments, "--every", "0"]) == 2
+    assert main([*arguments, "--data", str(tmp_path)]) == 2
+    assert "no real floors below" in capsys.readouterr().err
