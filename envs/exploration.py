@@ -16,7 +16,7 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.options import FloorChoice, read_options
-from lidarium.envs.scorer import Scorer, is_near
+from lidarium.envs.scorer import Scorer, is_near, reward_weights
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
 from lidarium.envs.simulation.kinematic import KinematicWorld
@@ -98,6 +98,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self.settings.time_step,
             threads=self.settings.threads,
             scales=self.settings.egocentric_scales,
+            reward_weights=reward_weights(self.settings),
         )
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
         self._writer = ObservationWriter(self.settings, self.has_goal)
@@ -151,8 +152,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.world.step(self._commands, moves_bodies=False)
         self.scorer.start()
         self.perception.start(self.goal)
-        truths = self._truths()
-        infos = {agent: {"truth": truths[row]} for agent, row in self._rows.items()}
+        infos = self._infos(self.agents)
         if self.render_mode == "human":
             self.render()
         return self._observations(self.agents), infos
@@ -214,26 +214,18 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         observations = self._observations(live)
         rewards_of_rows = self.scorer.take_rewards()
         endings, is_truncated = self._endings(live)
-        truths = self._truths()
-        rewards, terminations, truncations, infos = {}, {}, {}, {}
-        for agent in live:
-            row = self._rows[agent]
-            reason = endings.get(agent)
-            info: dict[str, Any] = {"truth": truths[row]}
-            if reason is not None:
-                info["ended_because"] = reason
-            elif is_truncated:
-                info["ended_because"] = "horizon"
-            rewards[agent] = rewards_of_rows[row]
-            terminations[agent] = reason is not None
-            truncations[agent] = is_truncated and reason is None
-            infos[agent] = info
+        rows = self._rows
+        rewards = {agent: rewards_of_rows[rows[agent]] for agent in live}
+        infos = self._infos(live)
+        terminations, truncations = dict.fromkeys(live, False), dict.fromkeys(live, is_truncated)
         if endings or is_truncated:
             for agent in live:
+                if agent in endings:
+                    terminations[agent], truncations[agent] = True, False
                 if agent in endings or is_truncated:
-                    self.world.moves[self._rows[agent]] = 0
-                    self.world.flags[self._rows[agent]] |= ENDED
-                    self.scorer.ended_because[agent] = infos[agent]["ended_because"]
+                    infos[agent]["ended_because"] = self.scorer.ended_because[agent] = endings.get(agent, "horizon")
+                    self.world.moves[rows[agent]] = 0
+                    self.world.flags[rows[agent]] |= ENDED
             self.agents = [] if is_truncated else [agent for agent in live if agent not in endings]
         if self.render_mode == "human":
             self.render()
@@ -281,13 +273,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         rows = self._rows
         return {agent: {name: array[rows[agent]] for name, array in arrays.items()} for agent in agents}
 
-    def _truths(self) -> list[dict[str, Any]]:
-        """Return what a learner may not see, for every robot."""
-        coverage = self.scorer.coverage
-        return [
-            {"pose": pose, "coverage": coverage, "seen_cells": seen}
-            for pose, seen in zip(self.world.poses.copy(), self.world.seen.tolist(), strict=True)
-        ]
+    def _infos(self, agents: Sequence[str]) -> dict[str, dict[str, Any]]:
+        """Return what a learner may not see, by agent."""
+        rows, coverage, poses, seen = self._rows, self.scorer.coverage, self.world.poses.copy(), self.world.seen.tolist()
+        return {agent: {"truth": {"pose": poses[rows[agent]], "coverage": coverage, "seen_cells": seen[rows[agent]]}} for agent in agents}
 
     def state(self) -> NDArray[np.float64]:
         """Return the true state of the team: x, y, theta, speed and turn rate of each robot, shape (robots * 5,)."""

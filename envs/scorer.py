@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.kernels import kernel
 
 THRESHOLDS = (0.85, 0.90, 0.95, 0.99)
 """Shares of F of which the time is noted."""
@@ -18,15 +18,6 @@ TRACK_PERIOD_S = 0.2
 def is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> bool:
     """Whether a place is within a radius of the goal [m]; never of a goal that is nan."""
     return bool((x - goal_x) * (x - goal_x) + (y - goal_y) * (y - goal_y) <= radius * radius)
-
-
-@kernel
-def add_rewards(gains: Array, contacts: Array, travelled: Array, weights: Array, travelled_before: Array, rewards: Array) -> None:
-    """Add each robot's reward of a step: its share of the new cells less the prices of time, contact and energy."""
-    for robot in range(gains.shape[0]):
-        driven = travelled[robot] - travelled_before[robot]
-        travelled_before[robot] = travelled[robot]
-        rewards[robot] += weights[0] * gains[robot] - weights[1] - weights[2] * contacts[robot] - weights[3] * driven
 
 
 def reward_weights(settings: ExplorationSettings) -> NDArray[np.float64]:
@@ -63,9 +54,6 @@ class Scorer:
 
     def __init__(self, world: KinematicWorld, settings: ExplorationSettings) -> None:
         self._world, self._settings = world, settings
-        self._weights = reward_weights(settings)
-        self._rewards = np.zeros(settings.robots)
-        self._travelled = np.zeros(settings.robots)
         self.coverage = 0.0
         self.times: dict[float, float] = {}
         self.curve: list[tuple[float, float]] = []
@@ -76,16 +64,13 @@ class Scorer:
 
     def start(self) -> None:
         """Begin an episode with the scan taken at the start."""
-        self._rewards[:] = 0.0
-        self._travelled[:] = 0.0
+        self._world.rewards[:] = 0.0
         self.times, self.curve, self.track, self.ended_because = {}, [], [], {}
         self._last_seen = -1
         self._note()
 
     def advance(self) -> None:
         """Take in one step of the world."""
-        world = self._world
-        add_rewards(world.gains, world.contacts, world.travelled, self._weights, self._travelled, self._rewards)
         self._note()
 
     def _note(self) -> None:
@@ -115,6 +100,6 @@ class Scorer:
 
     def take_rewards(self) -> list[float]:
         """Return each robot's reward since the last call, and begin anew."""
-        rewards: list[float] = self._rewards.tolist()
-        self._rewards[:] = 0.0
+        rewards: list[float] = self._world.rewards.tolist()
+        self._world.rewards[:] = 0.0
         return rewards

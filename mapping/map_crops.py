@@ -42,20 +42,20 @@ def _write_row(log_odds: int, count: int, levels: int) -> None:
 
 @kernel
 def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
-    """Copy the cells around (row, column) into ``crop`` (side, side) as levels; unknown outside of the map."""
+    """Copy the cells around (row, column) into ``crop`` (side, side), contiguous, as levels; unknown outside of the map."""
     side = crop.shape[0]
     first_row, first_column = row - side // 2, column - side // 2
     rows, columns = log_odds.shape
     low, high = min(max(0, -first_column), side), max(min(side, columns - first_column), 0)
     for i in range(side):
-        target = crop[i]
-        map_row = first_row + i
+        map_row, target = first_row + i, crop.ctypes.data + i * side
         if map_row < 0 or map_row >= rows or low >= high:
-            target[:] = _UNKNOWN
+            crop[i, :] = _UNKNOWN
             continue
-        target[:low] = _UNKNOWN
-        target[high:] = _UNKNOWN
-        _write_row(log_odds.ctypes.data + map_row * columns + first_column + low, high - low, target.ctypes.data + low)
+        if low > 0 or high < side:
+            crop[i, :low] = _UNKNOWN
+            crop[i, high:] = _UNKNOWN
+        _write_row(log_odds.ctypes.data + map_row * columns + first_column + low, high - low, target + low)
 
 
 @kernel(inline=True)

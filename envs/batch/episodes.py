@@ -94,6 +94,7 @@ class EpisodeBatch:
             self.episodes,
             settings.threads,
             settings.egocentric_scales,
+            reward_weights(settings),
         )
         self._offsets, self._goals = np.zeros((self.rows, 2)), np.full((self.rows, 2), np.nan)
         self.perception = Perception(self.world, settings, self._offsets)
@@ -115,7 +116,7 @@ class EpisodeBatch:
             np.inf if horizon is None else horizon, np.inf if cover is None else cover, settings.goal_radius, settings.stop_on_contact
         )  # fmt: skip
         self._tally = Tally(
-            reward_weights(settings), np.zeros(self.rows), np.zeros(self.rows), self.world.counted, np.full((self.episodes, 2), np.nan),
+            self.world.counted, np.full((self.episodes, 2), np.nan),
             np.array(bounds, np.float64), self.live, np.zeros(self.rows, np.bool_),
         )  # fmt: skip
         self._commands = np.zeros((self.rows, 2))
@@ -123,7 +124,7 @@ class EpisodeBatch:
     @property
     def rewards(self) -> NDArray[np.float64]:
         """What each row has earned in the last step, (rows,)."""
-        return self._tally.rewards
+        return self.world.rewards
 
     @property
     def is_over(self) -> NDArray[np.bool_]:
@@ -176,13 +177,13 @@ class EpisodeBatch:
         for episode, start in drawn.items():
             self._place(episode, start)
         modes[beginning] = LOOKS
-        self._tally.rewards[:] = 0.0
+        self.world.rewards[:] = 0.0
         begun = np.zeros(self.rows, np.bool_)
         begun.reshape(self.episodes, robots)[beginning] = True
         seen = acted | begun
         self._turn_buffers(seen, is_same_step)
         self.run_kernel(modes, self._commands, seen)
-        self._tally.rewards[begun | ~acted], self._tally.travelled[begun] = 0.0, 0.0
+        self.world.rewards[begun | ~acted] = 0.0
         self.acted = acted
         self.reasons = endings(self.world, self.settings, self._tally.goals, acted, stopping)
         ended = self.reasons != 0

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.observations import Arrays, write_row
 from lidarium.envs.onboard.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
-from lidarium.envs.scorer import add_rewards, is_near
+from lidarium.envs.scorer import is_near
 from lidarium.envs.simulation.arrays import world_at
 from lidarium.envs.simulation.stepping import step_episode
 from lidarium.mapping.kernels import Array, kernel
@@ -19,16 +19,10 @@ decision along the robots' paths."""
 
 
 class Tally(NamedTuple):
-    """What an episode is scored by, and what ends it.
+    """What ends an episode.
 
     Attributes
     ----------
-    weights : (4,) float64
-        ``reward_weights``.
-    travelled : (rows,) float64
-        Length of each robot's path at its last reward [m].
-    rewards : (rows,) float64
-        What each robot has earned since the call before; added to.
     counted : (episodes,) int64
         Size of F.
     goals : (episodes, 2) float64
@@ -41,9 +35,6 @@ class Tally(NamedTuple):
         Scratch: who waited for an order already when a decision began.
     """
 
-    weights: NDArray[np.float64]
-    travelled: NDArray[np.float64]
-    rewards: NDArray[np.float64]
     counted: NDArray[np.int64]
     goals: NDArray[np.float64]
     bounds: NDArray[np.float64]
@@ -79,10 +70,6 @@ def _run_episode(
         if mode == DECIDES:
             follow_team(drives, following, first, last, world.believed, world.velocities, world.ranges, commands)
         step_episode(table, episode, robots, commands, mode != LOOKS, True)
-        add_rewards(
-            world.gains[first:last], world.contacts[first:last], world.travelled[first:last], tally.weights, tally.travelled[first:last],
-            tally.rewards[first:last],
-        )  # fmt: skip
         coverage = world.team_seen[episode] / max(tally.counted[episode], 1)
         if world.steps[episode] >= tally.bounds[0] or coverage >= tally.bounds[1]:
             break

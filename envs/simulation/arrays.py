@@ -58,6 +58,10 @@ class WorldArrays(NamedTuple):
         Left, centre, right; and whether the body touched anything.
     travelled, collisions : (rows,) float64, (rows,) int64
         Length of each robot's path [m], and how often it came into contact.
+    reward_weights : (4,) float64
+        What a new cell earns, and what a step, a contact and a metre cost.
+    rewarded, rewards : (rows,) float64
+        Length of each robot's path at its last reward [m], and what it has earned since rewards were last taken.
     """
 
     bodies: Array
@@ -88,10 +92,13 @@ class WorldArrays(NamedTuple):
     contacts: Array
     travelled: Array
     collisions: Array
+    reward_weights: Array
+    rewarded: Array
+    rewards: Array
 
 
 def table_of(arrays: WorldArrays) -> NDArray[np.int64]:
-    """Return where the arrays lie: address, rows and columns (1 for a vector) of each, shape (28, 3). The caller keeps them alive."""
+    """Return where the arrays lie: address, rows and columns (1 for a vector) of each, shape (31, 3). The caller keeps them alive."""
     return np.array([(array.ctypes.data, array.shape[0], array.size // max(array.shape[0], 1)) for array in arrays], np.int64)
 
 
@@ -137,4 +144,7 @@ def world_at(table: Array) -> WorldArrays:
         _vector(table, 25, np.uint8),
         _vector(table, 26, np.float64),
         _vector(table, 27, np.int64),
+        _vector(table, 28, np.float64),
+        _vector(table, 29, np.float64),
+        _vector(table, 30, np.float64),
     )

@@ -78,6 +78,8 @@ class KinematicWorld:
         1 for the serial kernels; more lets batches of 8 rows and more run on numba's threads, with the same result.
     scales : sequence of int
         Scales at which maps are pooled for observations [cells].
+    reward_weights : (4,) float64 or None
+        What a new cell earns, and what a step, a contact and a metre cost; nothing where None.
 
     Attributes
     ----------
@@ -87,6 +89,8 @@ class KinematicWorld:
         The last scans [m]; inf for no return.
     gains : (rows,) float64
         Cells credited to each robot in the last step.
+    rewards : (rows,) float64
+        What each robot has earned since this was last set to 0.
     seen : (rows,) int64
         Cells of F that each robot has seen.
     team_seen, counted : (episodes,) int64
@@ -106,6 +110,7 @@ class KinematicWorld:
         episodes: int = 1,
         threads: int = 1,
         scales: Sequence[int] = (),
+        reward_weights: NDArray[np.float64] | None = None,
     ) -> None:
         self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
         self.robots, self.episodes = len(robots), episodes
@@ -119,6 +124,8 @@ class KinematicWorld:
         self.moves, self.flags = np.ones(rows, np.uint8), np.zeros(rows, np.int64)
         self.travelled, self.collisions = np.zeros(rows), np.zeros(rows, np.int64)
         self.gains, self.seen = np.zeros(rows), np.zeros(rows, np.int64)
+        self._reward_weights = np.zeros(4) if reward_weights is None else np.array(reward_weights, np.float64)
+        self._rewarded, self.rewards = np.zeros(rows), np.zeros(rows)
         self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
         self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
         self.windows = np.zeros((rows, 4), np.int64)
@@ -183,6 +190,7 @@ class KinematicWorld:
         self.bumpers[first:last], self.contacts[first:last], self.moves[first:last] = 0, 0, 1
         self.ranges[first:last], self.seen[first:last], self.gains[first:last] = np.inf, 0, 0.0
         self.travelled[first:last], self.collisions[first:last] = 0.0, 0
+        self._rewarded[first:last], self.rewards[first:last] = 0.0, 0.0
         for row in range(first, last):
             self.masks[row] = np.zeros_like(counted)
             if known_starts:
@@ -245,7 +253,7 @@ class KinematicWorld:
             self.bodies, self._sensor, self._unit_vectors, GAUSSIAN_TABLE, self._increments, self._floor_rows, self._frames, self.seeds,
             self.steps, self.team_seen, self.moves, self.flags, self.poses, self.velocities, self.starts, self.believed, self.ranges,
             self.belief_rows, self.origins, self.windows, self._mask_rows, self._boxes, self.seen, self.gains, self.bumpers, self.contacts,
-            self.travelled, self.collisions,
+            self.travelled, self.collisions, self._reward_weights, self._rewarded, self.rewards,
         )  # fmt: skip
         self._table = table_of(arrays)
         is_parallel = self.threads > 1

@@ -9,7 +9,7 @@ import math
 
 import numba
 
-from lidarium.envs.coverage import share_news
+from lidarium.envs.coverage import add_rewards, share_news
 from lidarium.envs.simulation.arrays import ENDED, OWN_FRAME, TRUE_POSE, WorldArrays, world_at
 from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.stages import TIME_STEP, perceive_robot, sense_and_perceive
@@ -48,11 +48,15 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
 
 @kernel(spliced=True)
 def _share(world: WorldArrays, episode: int, robots: int) -> None:
-    """Credit the episode's robots with what they saw first, and count the step."""
-    first = episode * robots
+    """Credit the episode's robots with what they saw first, reward them, and count the step."""
+    first, last = episode * robots, (episode + 1) * robots
     team = word_grid_at(world.masks[first, 1], world.masks[first, 3], world.masks[first, 4])
     world.team_seen[episode] += share_news(world.masks[:, 0], team, world.boxes, first, robots, world.gains)
     world.steps[episode] += 1
+    add_rewards(
+        world.gains[first:last], world.contacts[first:last], world.travelled[first:last], world.reward_weights, world.rewarded[first:last],
+        world.rewards[first:last],
+    )  # fmt: skip
 
 
 @kernel

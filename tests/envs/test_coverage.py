@@ -35,8 +35,9 @@ def hall(rows=160, columns=240):
     return solid
 
 
-def team(robots, resolution=0.05, beams=181, noise=0.0):
-    return KinematicWorld([ROBOTS["kobuki"]] * robots, Lidar(beams=beams, noise_floor=noise), OccupancySettings(resolution=resolution))
+def team(robots, resolution=0.05, beams=181, noise=0.0, weights=None):
+    lidar, maps = Lidar(beams=beams, noise_floor=noise), OccupancySettings(resolution=resolution)
+    return KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, maps, reward_weights=weights)
 
 
 def starts_on(tables, count, generator, apart=0.6):
@@ -220,7 +221,7 @@ def test_noise_changes_the_map_and_not_the_score():
 
 def scored(weights, robots=2):
     options = ExplorationSettings(robots=robots, reward=weights)
-    world = team(robots)
+    world = team(robots, weights=reward_weights(options))
     world.place(0, tables_of(hall()), np.array([[1.0, 2.0, 0.0], [3.0, 2.0, math.pi]])[:robots], 1)
     scorer = Scorer(world, options)
     world.step(np.zeros((robots, 2)), moves_bodies=False)
