@@ -11,7 +11,7 @@ from lidarium.envs.coverage import count_bits, mark_seen, pack_bits, share_news,
 from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.floors.starts import swept_free_space
-from lidarium.envs.scorer import THRESHOLDS, Scorer
+from lidarium.envs.scorer import THRESHOLDS, Scorer, reward_weights
 from lidarium.envs.settings import ExplorationSettings, RewardSettings
 from lidarium.envs.simulation.floor_cache import floor_tables
 from lidarium.envs.simulation.floor_tables import FloorTables
