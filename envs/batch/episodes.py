@@ -166,30 +166,36 @@ class EpisodeBatch:
         """
         robots = self.robots
         modes = np.full(self.episodes, WAITS, np.int8)
-        if actions is not None:
+        # Most steps are of episodes of which none begins or has lost a robot: what concerns others costs nothing then.
+        begins = len(beginning) > 0
+        is_plain = actions is not None and not begins and bool(self.live.all())
+        if is_plain:
+            modes[:] = STEPS
+        elif actions is not None:
             modes[~self.is_over] = STEPS
             modes[beginning] = WAITS
-        acted = self.live & np.repeat(modes == STEPS, robots)
+        acted = self.live.copy() if is_plain else self.live & np.repeat(modes == STEPS, robots)
         stopping = np.zeros(self.rows, np.int8)
         if actions is not None:
             stopping = self.level.take(actions, acted, self._commands, modes)
-        drawn = self._draw(beginning, seeds, options or {})
-        for episode, start in drawn.items():
-            self._place(episode, start)
-        modes[beginning] = LOOKS
-        self.world.rewards[:] = 0.0
-        begun = np.zeros(self.rows, np.bool_)
-        begun.reshape(self.episodes, robots)[beginning] = True
-        seen = acted | begun
+        if begins:
+            for episode, start in self._draw(beginning, seeds, options or {}).items():
+                self._place(episode, start)
+            modes[beginning] = LOOKS
+        seen = acted.copy()
+        seen.reshape(self.episodes, robots)[beginning] = True
         self._turn_buffers(seen, is_same_step)
+        self.world.rewards[:] = 0.0
         self.run_kernel(modes, self._commands, seen)
-        self.world.rewards[begun | ~acted] = 0.0
+        if not is_plain:
+            self.world.rewards[~acted] = 0.0
         self.acted = acted
         self.reasons = endings(self.world, self.settings, self._tally.goals, acted, stopping)
-        ended = self.reasons != 0
-        self.live[ended] = False
-        self.world.moves[ended] = 0
-        self.world.flags[ended] |= ENDED
+        if self.reasons.any():
+            ended = self.reasons != 0
+            self.live[ended] = False
+            self.world.moves[ended] = 0
+            self.world.flags[ended] |= ENDED
         self._tell(seen)
 
     def run_kernel(self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]) -> None:
@@ -217,8 +223,6 @@ class EpisodeBatch:
     ) -> dict[int, Beginning]:
         """Draw how episodes begin, before anything of them is changed."""
         drawn: dict[int, Beginning] = {}
-        if not len(beginning):
-            return drawn
         generators = dict(enumerate(self._generators))
         for k, episode in enumerate(int(episode) for episode in beginning):
             seed = None if seeds is None else seeds[k]

@@ -116,8 +116,8 @@ class VelocityLevel:
     def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
         """Scale the shares; no robot ends of itself."""
         shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]")
-        commands[:] = 0.0
-        commands[live] = shares[live]
+        np.copyto(commands, shares)
+        commands[~live] = 0.0
         scale_shares(commands, self._limits)
         return np.zeros(len(live), np.int8)
 

@@ -108,7 +108,9 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
         over = batch.is_over
         masked = ~batch.live & ~np.repeat(over, batch.robots)
         batch.run(actions, np.flatnonzero(over))
-        truncated = batch.truncated | masked & np.repeat(batch.is_over, batch.robots)
+        truncated = batch.truncated
+        if masked.any():
+            truncated |= masked & np.repeat(batch.is_over, batch.robots)
         return batch.observations, batch.rewards.copy(), batch.terminated, truncated, self._infos(~masked)
 
     def _infos(self, active: NDArray[np.bool_]) -> dict[str, Any]:
