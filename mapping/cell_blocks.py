@@ -162,6 +162,17 @@ def _least_sums(typing_context: Any, numbers: Any, costs: Any, low: Any, high: A
     return types.void(*(types.int64,) * 6), generate
 
 
+def _same_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: ANN401
+    """Tell which numbers of two blocks are the same, and not 0."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        one, two = (_load(builder, address, _SHORTS) for address in arguments)
+        is_same = builder.and_(builder.icmp_signed("==", one, two), builder.icmp_signed("!=", two, _NO_SHORTS))
+        return builder.bitcast(is_same, _INT64)
+
+    return types.uint64(types.int64, types.int64), generate
+
+
 def _negative_block(typing_context: Any, block: Any) -> Any:  # noqa: ANN401
     """Tell which log-odds of a block are less than 0."""
 
@@ -211,6 +222,7 @@ _count: Any = intrinsic(_count_steps)
 _least: Any = intrinsic(_least_sums)
 _raise: Any = intrinsic(_raise_block)
 _signs: Any = intrinsic(_sign_bits)
+_same: Any = intrinsic(_same_block)
 _negative: Any = intrinsic(_negative_block)
 _positive: Any = intrinsic(_positive_block)
 
@@ -289,6 +301,13 @@ def write_least_sums(numbers: int, costs: int, low: int, high: int, cap: int, re
 def raise_block(block: int, other: int) -> None:
     """Raise the uint16 of a block to those of another where these are greater."""
     _raise(block, other)
+
+
+@kernel(inline=True)
+def same_cells(block: int, other: int) -> np.uint64:
+    """Tell which uint16 of two blocks are the same, and not 0."""
+    cells: np.uint64 = _same(block, other)
+    return cells
 
 
 @kernel(inline=True)

@@ -6,7 +6,7 @@ Computing 8, 2012); with a small largest distance the plain minimum along rows, 
 
 import numpy as np
 
-from lidarium.mapping.cell_blocks import BLOCK, cells_that_differ, count_steps, raise_block, write_least_sums
+from lidarium.mapping.cell_blocks import BLOCK, cells_that_differ, count_steps, raise_block, same_cells, write_least_sums
 from lidarium.mapping.kernels import Array, kernel
 
 Window = tuple[int, int, int, int]
@@ -35,41 +35,63 @@ def update_closeness(log_odds: Array, closeness: Array, limit: int, stamp: Array
     target = grown_window(_box_of(log_odds, changed), reach, log_odds.shape)
     first_block, last_block = target[2] // BLOCK, (target[3] - 1) // BLOCK + 1
     is_stale = np.zeros((last_block - first_block, target[1] - target[0]), np.bool_)
-    if added > STAMPS_PER_CELL * (target[1] - target[0]) * (target[3] - target[2]):
-        is_stale[:] = True
-    elif added < len(changed):
+    is_all = added > STAMPS_PER_CELL * (target[1] - target[0]) * (target[3] - target[2])
+    is_stale[:] = is_all
+    if not is_all and added < len(changed):
         for k in range(len(changed)):
             if log_odds[changed[k, 0], changed[k, 1]] <= 0:
-                low, high = max(changed[k, 0] - reach, target[0]) - target[0], min(changed[k, 0] + reach + 1, target[1]) - target[0]
-                for block in range(max(changed[k, 1] - reach, 0) // BLOCK, min(changed[k, 1] + reach, log_odds.shape[1] - 1) // BLOCK + 1):
-                    is_stale[block - first_block, low:high] = True
+                _mark_stale(closeness, stamp, changed[k, 0], changed[k, 1], target[0], first_block, is_stale)
     for block in range(first_block, last_block):
-        row, stale = 0, is_stale[block - first_block]
+        stale = is_stale[block - first_block]
+        row = _next_stale(stale, 0)
         while row < stale.size:
-            first = row
-            while row < stale.size and stale[row]:
-                row += 1
-            if row > first:
-                _recompute(log_odds, closeness, limit, reach, target[0] + first, target[0] + row, block * BLOCK)
-            row += 1
-    for k in range(len(changed)):
-        if log_odds[changed[k, 0], changed[k, 1]] > 0 and not _is_within(
-            is_stale, reach, changed[k, 0], changed[k, 1], target, log_odds.shape
-        ):
-            _stamp_at(closeness, stamp, changed[k, 0], changed[k, 1])
+            # Rows that share neighbours are computed together.
+            first, last, row = row, row, _next_stale(stale, row + 1)
+            while row < stale.size and row - last <= 2 * reach:
+                last, row = row, _next_stale(stale, row + 1)
+            _recompute(log_odds, closeness, limit, reach, target[0] + first, stale[first : last + 1], block * BLOCK)
+    if not is_all:
+        for k in range(len(changed)):
+            if log_odds[changed[k, 0], changed[k, 1]] > 0:
+                _stamp_at(closeness, stamp, changed[k, 0], changed[k, 1])
     return True
+
+
+@kernel(inline=True)
+def _next_stale(stale: Array, row: int) -> int:
+    """Return the first stale row from ``row`` on, as many as there are rows where there is none."""
+    while row < stale.size and not stale[row]:
+        row += 1
+    return row
 
 
 @kernel
-def _is_within(is_stale: Array, reach: int, row: int, column: int, target: Window, shape: tuple[int, int]) -> bool:
-    """Whether all that is near a cell has been computed anew."""
-    low, high = max(row - reach, target[0]) - target[0], min(row + reach + 1, target[1]) - target[0]
-    for block in range(max(column - reach, 0) // BLOCK, min(column + reach, shape[1] - 1) // BLOCK + 1):
-        stale = is_stale[block - target[2] // BLOCK]
-        for other in range(low, high):
-            if not stale[other]:
-                return False
-    return True
+def _mark_stale(closeness: Array, stamp: Array, row: int, column: int, first_row: int, first_block: int, is_stale: Array) -> None:
+    """Mark the rows of blocks in which the closeness of a cell may have come from one that ceased to be occupied.
+
+    Where it did not come from there it was greater, and the occupied cell from which it came is still there, or marks it itself.
+    """
+    rows, columns = closeness.shape
+    reach, first = stamp.shape[0] // 2, column - stamp.shape[0] // 2
+    is_inside = first >= 0 and first + stamp.shape[1] <= columns
+    low_block, high_block = max(first, 0) // BLOCK, min(column + reach, columns - 1) // BLOCK + 1
+    for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
+        if not is_inside:
+            is_stale[low_block - first_block : high_block - first_block, other - first_row] = True
+            continue
+        target = closeness.ctypes.data + 2 * (other * columns + first)
+        source = stamp.ctypes.data + 2 * (other - row + reach) * stamp.shape[1]
+        for chunk in range(0, stamp.shape[1], BLOCK):
+            same = same_cells(target + 2 * chunk, source + 2 * chunk)
+            if same == np.uint64(0):
+                continue
+            # The lanes lie in one block of columns, or in two.
+            place, border = (first + chunk) // BLOCK - first_block, BLOCK - (first + chunk) % BLOCK
+            near = same if border == BLOCK else same & ((np.uint64(1) << np.uint64(border)) - np.uint64(1))
+            if near != np.uint64(0):
+                is_stale[place, other - first_row] = True
+            if near != same:
+                is_stale[place + 1, other - first_row] = True
 
 
 @kernel
@@ -155,9 +177,10 @@ def _count_row(log_odds: Array, row: int, first: int, steps: Array, largest: int
 
 
 @kernel
-def _recompute(log_odds: Array, closeness: Array, limit: int, reach: int, row_low: int, row_high: int, column: int) -> None:
-    """Compute the closeness of a block of columns, from ``column`` on, in some rows from all occupied cells near them."""
+def _recompute(log_odds: Array, closeness: Array, limit: int, reach: int, row_low: int, stale: Array, column: int) -> None:
+    """Compute the closeness of a block of columns, from ``column`` on, in the stale rows from ``row_low`` on from all occupied cells."""
     rows, columns = log_odds.shape
+    row_high = row_low + stale.size
     first, far, cap = column - reach, reach + 1, np.uint16(limit)
     width = (BLOCK + 2 * reach + BLOCK - 1) // BLOCK * BLOCK
     costs, squared = np.empty(2 * reach + 1, np.uint16), np.full(far + 1, cap, np.uint16)
@@ -170,14 +193,14 @@ def _recompute(log_odds: Array, closeness: Array, limit: int, reach: int, row_lo
     below = np.empty((row_high - row_low, width), np.uint16)
     for row in range(max(row_low - reach, 0), row_high):
         _count_row(log_odds, row, first, steps, far)
-        if row >= row_low:
+        if row >= row_low and stale[row - row_low]:
             below[row - row_low, :] = steps
     steps[:] = far
     result = np.empty(BLOCK, np.uint16)
     used = min(BLOCK, columns - column)
     for row in range(min(row_high + reach, rows) - 1, row_low - 1, -1):
         _count_row(log_odds, row, first, steps, far)
-        if row >= row_high:
+        if row >= row_high or not stale[row - row_low]:
             continue
         squares = below[row - row_low]
         nearest = np.uint16(far)
