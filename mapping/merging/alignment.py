@@ -10,7 +10,7 @@ from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.map_files import FREE
 from lidarium.mapping.merging.corners import Corners
 from lidarium.mapping.merging.correspondence import Matches
-from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
 from lidarium.mapping.merging.rigid import Transform, fit
 
 INLIER_RULES = ("distance", "ratio")
@@ -185,16 +185,17 @@ def _is_alike(a: float, b: float, ratio: float) -> bool:
     return bool(high == 0.0 or (a * b > 0.0 and low / high > ratio))
 
 
-def wall_sample(walls: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return about so many of a map's walls, spread over all of them."""
-    if len(walls) <= count:
-        return walls
-    return walls[np.linspace(0, len(walls) - 1, count).astype(np.int64)]
+def wall_sample(walls: int, count: int) -> NDArray[np.int64]:
+    """Return the indices of so many of a map's walls, spread over all of them; of all where there are no more."""
+    return np.linspace(0, walls - 1, min(walls, count)).astype(np.int64)
 
 
-def rank_by_walls(a: DescribedMap, walls: NDArray[np.float64], proposals: NDArray[np.float64], near_m: float = 0.15) -> NDArray[np.int64]:
+def rank_by_walls(
+    a: DescribedMap, b: DescribedMap, proposals: NDArray[np.float64], samples: int, near_m: float = 0.15
+) -> NDArray[np.int64]:
     """Return for each proposal how many of map b's walls come to lie on walls of map a, less twice those that lie in its free space."""
     scores = np.empty(len(proposals), np.int64)
+    walls = b.walls[wall_sample(len(b.walls), samples)]
     _score_walls(a.levels, a.distance, 1.0 / a.resolution, walls, proposals, near_m, scores)
     return scores
 
@@ -242,7 +243,7 @@ def refine(
     p, q = a.corners.points[matches.first[candidate.inliers]], b.corners.points[matches.second[candidate.inliers]]
     for step in settings.refinements:
         if step == "walls":
-            transform = refine_on_walls(a, wall_sample(b.walls, settings.wall_samples), transform, settings.refinement_reach_m)
+            transform = refine_on_walls(a, b, transform, settings.refinement_reach_m, settings.wall_samples)
         elif step == "sweep" and len(p) > 0:
             transform = sweep_rotation(p, q, transform)
         elif step == "least_squares" and len(p) > 1:
@@ -266,20 +267,22 @@ def sweep_rotation(p: NDArray[np.float64], q: NDArray[np.float64], a_from_b: Tra
     return best
 
 
-def refine_on_walls(a: DescribedMap, walls: NDArray[np.float64], a_from_b: Transform, reach_m: float) -> Transform:
+def refine_on_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, reach_m: float, samples: int) -> Transform:
     """Return the transform that brings walls of map b nearest to those of map a, by steps of Gauss and Newton on the distance.
 
     Walls farther from any of map a than a reach, which shrinks to four cells, do not count: there the other map may know nothing.
     """
-    if len(walls) == 0:
+    sample = wall_sample(len(b.walls), samples)
+    if len(sample) == 0:
         return a_from_b
     pose = np.array([a_from_b.x, a_from_b.y, a_from_b.theta])
-    _descend(a.distance, 1.0 / a.resolution, walls, pose, reach_m, min(4.0 * a.resolution, reach_m))
+    walls, normals = b.walls[sample], b.normals[sample]
+    _descend(a.levels, a.distance, 1.0 / a.resolution, walls, normals, pose, reach_m, min(4.0 * a.resolution, reach_m))
     return Transform(*pose.tolist())
 
 
 @kernel
-def _descend(distance: Array, scale: float, walls: Array, pose: Array, reach: float, last_reach: float) -> None:
+def _descend(levels: Array, distance: Array, scale: float, walls: Array, normals: Array, pose: Array, reach: float, last_reach: float) -> None:
     """Move a pose so that the walls come to lie where the distance is small."""
     rounds = 16
     rows, columns = distance.shape
@@ -299,6 +302,10 @@ def _descend(distance: Array, scale: float, walls: Array, pose: Array, reach: fl
                 column, row = x * scale - 0.5, y * scale - 0.5
                 c, r = int(math.floor(column)), int(math.floor(row))
                 if c < 0 or r < 0 or c + 1 >= columns or r + 1 >= rows or distance[r, c] > limit:
+                    continue
+                ahead_x = FACING_DISTANCE_M * scale * (cosine * normals[i, 0] - sine * normals[i, 1])
+                ahead_y = FACING_DISTANCE_M * scale * (sine * normals[i, 0] + cosine * normals[i, 1])
+                if faces_away(levels, x * scale, y * scale, ahead_x, ahead_y):
                     continue
                 if turn == 0:
                     centre_x += x

@@ -13,6 +13,11 @@ from lidarium.mapping.merging.corners import Corners, CornerSettings, detect_cor
 from lidarium.mapping.merging.descriptors import Descriptors, DescriptorSettings, describe_corners
 
 MAX_SIDE = 20_000
+_FACING_REACH = 3
+_FAR = 1e6
+
+FACING_DISTANCE_M = 0.075
+"""How far before and behind a wall is looked to tell its side [m]; half of what thin walls measure."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,8 +36,10 @@ class DescribedMap:
         Theirs.
     walls : (n, 2) float64
         Centres of the occupied cells that border on a free one: what a laser has seen of walls [m].
+    normals : (n, 2) float64
+        Which way each of them faces: unit vectors towards the free space around it, zero where that has no side.
     distance : (rows, columns) float32
-        Distance to the nearest occupied cell [m]; large where there is none.
+        Distance to the nearest of these walls [m]; large where there is none.
     """
 
     levels: NDArray[np.uint8]
@@ -40,6 +47,7 @@ class DescribedMap:
     corners: Corners
     descriptors: Descriptors
     walls: NDArray[np.float64]
+    normals: NDArray[np.float64]
     distance: NDArray[np.float32]
 
 
@@ -75,7 +83,9 @@ def describe_map(
     check_resolution(resolution)
     corners = detect_corners(three, resolution, corner_settings)
     descriptors = describe_corners(three, resolution, corners, descriptor_settings)
-    return DescribedMap(three, float(resolution), corners, descriptors, _walls(three, resolution), _distance(three, resolution))
+    cells, normals = _walls(three)
+    distance = _distance(three.shape, cells, resolution)
+    return DescribedMap(three, float(resolution), corners, descriptors, (cells + 0.5) * resolution, normals, distance)
 
 
 def three_levels_of(levels: ArrayLike, settings: CornerSettings) -> NDArray[np.uint8]:
@@ -125,16 +135,23 @@ def resampled(levels: NDArray[np.uint8], resolution: float, wanted: float) -> ND
     return np.where(counts[OCCUPIED] > 0, OCCUPIED, coarse).astype(np.uint8).reshape(rows, columns)
 
 
-def _distance(levels: NDArray[np.uint8], resolution: float) -> NDArray[np.float32]:
-    if not (levels == OCCUPIED).any():
-        return np.full(levels.shape, np.float32(1e6))
-    return np.asarray(cv2.distanceTransform(np.minimum(levels, 1), cv2.DIST_L2, 5) * np.float32(resolution), np.float32)
-
-
-def _walls(levels: NDArray[np.uint8], resolution: float) -> NDArray[np.float64]:
+def _walls(levels: NDArray[np.uint8]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Return column and row of the walls' cells, and their normals."""
     cells = np.empty((int(np.count_nonzero(levels == OCCUPIED)), 2), np.int32)
     count = _find_walls(levels, cells)
-    return (cells[:count] + 0.5) * resolution
+    normals = np.zeros((count, 2))
+    _face(levels, cells, _FACING_REACH, normals)
+    return cells[:count], normals
+
+
+def _distance(shape: tuple[int, ...], cells: NDArray[np.int32], resolution: float) -> NDArray[np.float32]:
+    """Return the distance to the nearest of some cells [m]."""
+    if len(cells) == 0:
+        return np.full(shape, _FAR, np.float32)
+    mask = np.ones(shape, np.uint8)
+    # To the faces, not to any occupied cell: within a wall that noise has made thick, the distance still tells where its face is.
+    mask[cells[:, 1], cells[:, 0]] = 0
+    return np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, 5) * np.float32(resolution), np.float32)
 
 
 @kernel
@@ -153,3 +170,33 @@ def _find_walls(levels: Array, cells: Array) -> int:
                 cells[count, 0], cells[count, 1] = column, row
                 count += 1
     return count
+
+
+@kernel
+def _face(levels: Array, cells: Array, reach: int, normals: Array) -> None:
+    """Fill in the unit vector from each cell to the free ones of the square around it."""
+    rows, columns = levels.shape
+    for i in range(normals.shape[0]):
+        x, y = 0, 0
+        for row in range(max(cells[i, 1] - reach, 0), min(cells[i, 1] + reach + 1, rows)):
+            for column in range(max(cells[i, 0] - reach, 0), min(cells[i, 0] + reach + 1, columns)):
+                if levels[row, column] == FREE:
+                    x += column - cells[i, 0]
+                    y += row - cells[i, 1]
+        length = math.hypot(x, y)
+        if length > 0.0:
+            normals[i, 0], normals[i, 1] = x / length, y / length
+
+
+@kernel(inline=True)
+def faces_away(levels: Array, column: float, row: float, ahead_x: float, ahead_y: float) -> bool:
+    """Return whether a wall at a place [cells] that looks ahead would look into a wall of this map, and have its free space behind.
+
+    Then it is the other side of a wall that is being compared, a wall's thickness away from where it belongs.
+    """
+    rows, columns = levels.shape
+    x, y = int(math.floor(column - ahead_x)), int(math.floor(row - ahead_y))
+    if not (0 <= x < columns and 0 <= y < rows) or levels[y, x] != FREE:
+        return False
+    x, y = int(math.floor(column + ahead_x)), int(math.floor(row + ahead_y))
+    return not (0 <= x < columns and 0 <= y < rows) or levels[y, x] != FREE

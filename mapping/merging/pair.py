@@ -14,7 +14,6 @@ from lidarium.mapping.merging.alignment import (
     rank_by_walls,
     refine,
     refine_on_walls,
-    wall_sample,
 )
 from lidarium.mapping.merging.correlation import best_translations
 from lidarium.mapping.merging.correspondence import Matches, match_corners
@@ -179,7 +178,7 @@ def _corner_candidates(
         order = np.lexsort((_residuals(a, b, matches, proposals, is_inlier), -counts))
     else:
         # Walls tell more than corners which of many proposals is good, and cost little.
-        walls = rank_by_walls(a, wall_sample(b.walls, alignment.wall_samples), proposals)
+        walls = rank_by_walls(a, b, proposals, alignment.wall_samples // 2)
         order = np.lexsort((-counts, -walls))
         order = order[counts[order] >= wanted]
     chosen = distinct(proposals, order, _middle(b), alignment.candidates, (0.3, math.radians(4.0)))
@@ -202,8 +201,8 @@ def _by_correlation(
     transforms, values = best_translations(a, b, angles, settings.correlation, settings.validation.rival_distance_m)
     order = np.argsort(-values, kind="stable")
     chosen = distinct(transforms, order, _middle(b), count, (settings.validation.rival_distance_m, settings.validation.rival_angle))
-    walls = wall_sample(b.walls, settings.alignment.wall_samples)
-    refined = (refine_on_walls(a, walls, Transform(*transforms[k].tolist()), settings.alignment.refinement_reach_m) for k in chosen)
+    reach, samples = settings.alignment.refinement_reach_m, settings.alignment.wall_samples
+    refined = (refine_on_walls(a, b, Transform(*transforms[k].tolist()), reach, samples) for k in chosen)
     return [_judged(a, b, Candidate(transform, _NONE), settings) for transform in refined]
 
 
@@ -217,8 +216,8 @@ def _polished(a: DescribedMap, b: DescribedMap, judged: _Judged, settings: Merge
     if "walls" not in settings.alignment.refinements:
         return judged
     reach, start = 0.5 * settings.alignment.refinement_reach_m, judged.candidate.a_from_b
-    forth = refine_on_walls(a, b.walls, start, reach)
-    back = refine_on_walls(b, a.walls, start.inverse(), reach).inverse()
+    forth = refine_on_walls(a, b, start, reach, len(b.walls))
+    back = refine_on_walls(b, a, start.inverse(), reach, len(a.walls)).inverse()
     return _judged(a, b, Candidate(halfway(forth, back, judged.agreement.centre), judged.candidate.inliers), settings)
 
 
@@ -233,7 +232,7 @@ def _ambiguity(a: DescribedMap, b: DescribedMap, best: _Judged, judged: list[_Ju
     Rooms look alike most of all after quarter turns and shifts, so the best translations at these rotations are tried too.
     """
     validation, transform = settings.validation, best.candidate.a_from_b
-    others = judged + _by_correlation(a, b, transform.theta + _QUARTERS, 2 * settings.correlation.peaks, settings)
+    others = judged + _by_correlation(a, b, transform.theta + _QUARTERS, len(_QUARTERS) * settings.correlation.peaks, settings)
     for other in others:
         distance, angle = transform.difference(other.candidate.a_from_b, best.agreement.centre)
         if distance <= validation.rival_distance_m and angle <= validation.rival_angle:

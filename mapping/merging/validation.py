@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.map_files import FREE, UNKNOWN
-from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
 from lidarium.mapping.merging.rigid import Transform
 
 OCCUPIED_WEIGHT = 10.0
@@ -38,6 +38,9 @@ class ValidationSettings:
         Least area that both know [m2].
     least_wall_m : float
         Least length of walls that agree [m].
+    least_across_m : float
+        Least length of walls that hold the maps in the direction in which they are held least [m]: two straight corridors agree
+        wherever they are laid over each other.
     hit_rate : float
         Least share of the walls in the overlap that agree.
     score : float
@@ -62,13 +65,14 @@ class ValidationSettings:
     miss_distance_m: float = 0.175
     least_overlap_m2: float = 4.0
     least_wall_m: float = 6.0
+    least_across_m: float = 2.0
     hit_rate: float = 0.7
     score: float = 0.9
     most_contradiction_m: float = 0.4
     contradiction_share: float = 0.03
     rival_distance_m: float = 0.5
     rival_angle: float = math.radians(5.0)
-    rival_share: float = 0.6
+    rival_share: float = 0.5
     disc_radius_cells: int = 25
     disc_agreement: float = 0.90
 
@@ -78,7 +82,7 @@ class ValidationSettings:
         for name in ("hit_rate", "score", "contradiction_share", "rival_share", "disc_agreement"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
-        for name in ("hit_distance_m", "miss_distance_m", "least_overlap_m2", "least_wall_m", "most_contradiction_m", "rival_distance_m"):
+        for name in ("hit_distance_m", "miss_distance_m", "least_overlap_m2", "least_wall_m", "least_across_m", "most_contradiction_m", "rival_distance_m"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want zero or more")
         if self.disc_radius_cells < 1:
@@ -99,6 +103,8 @@ class Agreement:
         Length of walls that lie on walls, mean of both maps [m].
     wall_m : float
         Length of walls within what the other map knows, mean of both maps [m].
+    across_m : float
+        Length of walls that hold the maps in the direction in which they are held least: 0 for a straight wall, whatever its length [m].
     contradicting_m : float
         Length of walls in the free space of the other map, the sum of both maps [m].
     score : float
@@ -109,6 +115,7 @@ class Agreement:
     centre: tuple[float, float] = (0.0, 0.0)
     agreeing_m: float = 0.0
     wall_m: float = 0.0
+    across_m: float = 0.0
     contradicting_m: float = 0.0
     score: float = 0.0
 
@@ -143,17 +150,18 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
     side = a.resolution
     hit, miss = max(settings.hit_distance_m, 1.5 * side), max(settings.miss_distance_m, 2.5 * side)
     b_from_a = a_from_b.inverse()
-    walls = np.zeros(6, np.int64)
-    _count_walls(a.levels, a.distance, 1.0 / side, b.walls, _pose(a_from_b), hit, miss, walls[:3])
-    _count_walls(b.levels, b.distance, 1.0 / side, a.walls, _pose(b_from_a), hit, miss, walls[3:])
+    walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
+    _count_walls(a.levels, a.distance, 1.0 / side, b.walls, b.normals, _pose(a_from_b), hit, miss, walls[0], facing[0])
+    _count_walls(b.levels, b.distance, 1.0 / side, a.walls, a.normals, _pose(b_from_a), hit, miss, walls[1], facing[1])
     area = np.zeros(3)
     _count_overlap(a.levels, b.levels, side, _pose(a_from_b), area)
     both = float(area[0])
-    hits, soft, hard = (float(walls[k] + walls[3 + k]) for k in range(3))
+    hits, soft, hard = (float(count) for count in walls.sum(axis=0))
     met = hits + soft + hard
     score = 1.0 - OCCUPIED_WEIGHT * hard / (both + (OCCUPIED_WEIGHT - 1.0) * met) if both + met > 0.0 else 0.0
     centre = (float(area[1]) / both, float(area[2]) / both) if both > 0.0 else (0.0, 0.0)
-    return Agreement(both * side**2, centre, 0.5 * hits * side, 0.5 * met * side, hard * side, score)
+    across = 0.5 * side * sum(float(np.linalg.eigvalsh([[xx, xy], [xy, yy]])[0]) for xx, xy, yy in facing)
+    return Agreement(both * side**2, centre, 0.5 * hits * side, 0.5 * met * side, across, hard * side, score)
 
 
 def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | None:
@@ -168,6 +176,8 @@ def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | Non
         return f"contradiction: {share:.0f} % of the walls in the overlap agree, want {wanted:.0f} %"
     if agreement.agreeing_m < settings.least_wall_m:
         return f"small overlap: {agreement.agreeing_m:.1f} m of walls agree, want {settings.least_wall_m:g}"
+    if agreement.across_m < settings.least_across_m:
+        return f"ambiguous: {agreement.across_m:.1f} m of walls hold the maps in one direction, want {settings.least_across_m:g}"
     return None
 
 
@@ -201,18 +211,36 @@ def _pose(transform: Transform) -> tuple[float, float, float]:
 
 @kernel
 def _count_walls(
-    levels: Array, distance: Array, scale: float, walls: Array, pose: tuple[float, float, float], hit: float, miss: float, counts: Array
+    levels: Array,
+    distance: Array,
+    scale: float,
+    walls: Array,
+    normals: Array,
+    pose: tuple[float, float, float],
+    hit: float,
+    miss: float,
+    counts: Array,
+    facing: Array,
 ) -> None:
-    """Count the walls that agree, that miss by little, and that contradict."""
+    """Count the walls that agree, that miss by little, and that contradict; sum the squares of the normals of those that agree."""
     rows, columns = levels.shape
     cosine, sine = math.cos(pose[2]) * scale, math.sin(pose[2]) * scale
     x0, y0 = pose[0] * scale, pose[1] * scale
     for i in range(walls.shape[0]):
-        x = int(math.floor(cosine * walls[i, 0] - sine * walls[i, 1] + x0))
-        y = int(math.floor(sine * walls[i, 0] + cosine * walls[i, 1] + y0))
+        column = cosine * walls[i, 0] - sine * walls[i, 1] + x0
+        row = sine * walls[i, 0] + cosine * walls[i, 1] + y0
+        x, y = int(math.floor(column)), int(math.floor(row))
         if 0 <= x < columns and 0 <= y < rows:
             if distance[y, x] <= hit:
+                ahead_x = FACING_DISTANCE_M * (cosine * normals[i, 0] - sine * normals[i, 1])
+                ahead_y = FACING_DISTANCE_M * (sine * normals[i, 0] + cosine * normals[i, 1])
+                if faces_away(levels, column, row, ahead_x, ahead_y):
+                    counts[1] += 1
+                    continue
                 counts[0] += 1
+                facing[0] += normals[i, 0] * normals[i, 0]
+                facing[1] += normals[i, 0] * normals[i, 1]
+                facing[2] += normals[i, 1] * normals[i, 1]
             elif levels[y, x] == FREE:
                 counts[1 if distance[y, x] <= miss else 2] += 1
 
