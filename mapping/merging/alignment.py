@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.map_files import FREE
+from lidarium.mapping.map_files import FREE, OCCUPIED
 from lidarium.mapping.merging.corners import Corners
 from lidarium.mapping.merging.correspondence import Matches
-from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
+from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.rigid import Transform, fit
 
 INLIER_RULES = ("distance", "ratio")
@@ -56,7 +56,7 @@ class AlignmentSettings:
     candidates: int = 8
     refinements: tuple[str, ...] = ("least_squares", "walls")
     refinement_reach_m: float = 0.4
-    wall_samples: int = 600
+    wall_samples: int = 400
 
     def __post_init__(self) -> None:
         if self.inlier_rule not in INLIER_RULES:
@@ -223,15 +223,21 @@ def distinct(
 ) -> list[int]:
     """Return the first few of the proposals, in an order, that differ from one another by more than a distance [m] or an angle [rad]."""
     chosen: list[int] = []
-    transforms: list[Transform] = []
+    images = np.stack(
+        [
+            np.cos(proposals[:, 2]) * at[0] - np.sin(proposals[:, 2]) * at[1] + proposals[:, 0],
+            np.sin(proposals[:, 2]) * at[0] + np.cos(proposals[:, 2]) * at[1] + proposals[:, 1],
+        ],
+        axis=1,
+    )
+    is_near = np.zeros(len(proposals), np.bool_)
     for index in order.tolist():
-        transform = Transform(*proposals[index].tolist())
-        differences = (transform.difference(other, at) for other in transforms)
-        if all(distance > apart[0] or angle > apart[1] for distance, angle in differences):
+        if not is_near[index]:
             chosen.append(index)
-            transforms.append(transform)
             if len(chosen) == count:
                 break
+            turn = np.abs((proposals[:, 2] - proposals[index, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+            is_near |= (np.linalg.norm(images - images[index], axis=1) <= apart[0]) & (turn <= apart[1])
     return chosen
 
 
@@ -268,78 +274,94 @@ def sweep_rotation(p: NDArray[np.float64], q: NDArray[np.float64], a_from_b: Tra
 
 
 def refine_on_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, reach_m: float, samples: int) -> Transform:
-    """Return the transform that brings walls of map b nearest to those of map a, by steps of Gauss and Newton on the distance.
+    """Return the transform that brings walls of map b onto those of map a that face the same way, by least squares.
 
-    Walls farther from any of map a than a reach, which shrinks to four cells, do not count: there the other map may know nothing.
+    Each wall looks along its normal for the nearest wall of map a, as far as a reach, which shrinks to four cells; walls that find none
+    do not count: there the other map may know nothing.
     """
     sample = wall_sample(len(b.walls), samples)
     if len(sample) == 0:
         return a_from_b
     pose = np.array([a_from_b.x, a_from_b.y, a_from_b.theta])
-    walls, normals = b.walls[sample], b.normals[sample]
-    _descend(a.levels, a.distance, 1.0 / a.resolution, walls, normals, pose, reach_m, min(4.0 * a.resolution, reach_m))
+    _settle(a.levels, a.distance, a.resolution, b.walls[sample], b.normals[sample], pose, reach_m, min(4.0 * a.resolution, reach_m))
     return Transform(*pose.tolist())
 
 
 @kernel
-def _descend(levels: Array, distance: Array, scale: float, walls: Array, normals: Array, pose: Array, reach: float, last_reach: float) -> None:
-    """Move a pose so that the walls come to lie where the distance is small."""
-    rounds = 16
-    rows, columns = distance.shape
+def _settle(
+    levels: Array, distance: Array, side: float, walls: Array, normals: Array, pose: Array, reach: float, last_reach: float
+) -> None:
+    """Move a pose so that walls come to lie on walls along their normals."""
+    rounds = 10
+    count = walls.shape[0]
+    places, facing, gaps = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
     for step in range(rounds):
         # Half of the rounds narrow the reach, the others settle.
         share = min(2.0 * step / rounds, 1.0)
-        limit = reach * (last_reach / reach) ** share
+        steps = int(reach * (last_reach / reach) ** share / side)
         cosine, sine = math.cos(pose[2]), math.sin(pose[2])
-        xx, xy, yy, xt, yt, tt = 1e-9, 0.0, 1e-9, 0.0, 0.0, 1e-9
+        found, centre_x, centre_y = 0, 0.0, 0.0
+        for i in range(count):
+            x = (cosine * walls[i, 0] - sine * walls[i, 1] + pose[0]) / side
+            y = (sine * walls[i, 0] + cosine * walls[i, 1] + pose[1]) / side
+            u, v = cosine * normals[i, 0] - sine * normals[i, 1], sine * normals[i, 0] + cosine * normals[i, 1]
+            gap = _gap_to_wall(levels, distance, side, x, y, u, v, steps)
+            if gap <= steps:
+                places[found, 0], places[found, 1] = x, y
+                facing[found, 0], facing[found, 1] = u, v
+                gaps[found] = gap
+                found += 1
+                centre_x += x
+                centre_y += y
+        if found < 3:
+            return
+        centre_x /= found
+        centre_y /= found
+        xx, xy, yy, xt, yt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         bx, by, bt = 0.0, 0.0, 0.0
-        # Rotation about the middle of the walls that count, so that it does not mix with the translation.
-        centre_x, centre_y, weight = 0.0, 0.0, 0.0
-        for turn in range(2):
-            for i in range(walls.shape[0]):
-                x = cosine * walls[i, 0] - sine * walls[i, 1] + pose[0]
-                y = sine * walls[i, 0] + cosine * walls[i, 1] + pose[1]
-                column, row = x * scale - 0.5, y * scale - 0.5
-                c, r = int(math.floor(column)), int(math.floor(row))
-                if c < 0 or r < 0 or c + 1 >= columns or r + 1 >= rows or distance[r, c] > limit:
-                    continue
-                ahead_x = FACING_DISTANCE_M * scale * (cosine * normals[i, 0] - sine * normals[i, 1])
-                ahead_y = FACING_DISTANCE_M * scale * (sine * normals[i, 0] + cosine * normals[i, 1])
-                if faces_away(levels, x * scale, y * scale, ahead_x, ahead_y):
-                    continue
-                if turn == 0:
-                    centre_x += x
-                    centre_y += y
-                    weight += 1.0
-                    continue
-                u, v = column - c, row - r
-                d00, d01, d10, d11 = distance[r, c], distance[r, c + 1], distance[r + 1, c], distance[r + 1, c + 1]
-                value = (1.0 - v) * ((1.0 - u) * d00 + u * d01) + v * ((1.0 - u) * d10 + u * d11)
-                gx = ((1.0 - v) * (d01 - d00) + v * (d11 - d10)) * scale
-                gy = ((1.0 - u) * (d10 - d00) + u * (d11 - d01)) * scale
-                gt = gy * (x - centre_x) - gx * (y - centre_y)
-                xx += gx * gx
-                xy += gx * gy
-                yy += gy * gy
-                xt += gx * gt
-                yt += gy * gt
-                tt += gt * gt
-                bx -= gx * value
-                by -= gy * value
-                bt -= gt * value
-            if turn == 0:
-                if weight < 3.0:
-                    return
-                centre_x /= weight
-                centre_y /= weight
+        for i in range(found):
+            u, v, gap = facing[i, 0], facing[i, 1], gaps[i]
+            # Rotation about the middle of the walls that count, so that it does not mix with the translation.
+            t = v * (places[i, 0] - centre_x) - u * (places[i, 1] - centre_y)
+            xx += u * u
+            xy += u * v
+            yy += v * v
+            xt += u * t
+            yt += v * t
+            tt += t * t
+            bx += u * gap
+            by += v * gap
+            bt += t * gap
         # Damped a little, so that what no wall holds stays where it is.
-        damping = 1e-3 * (xx + yy)
-        hessian = np.array([[xx + damping, xy, xt], [xy, yy + damping, yt], [xt, yt, tt * 1.001 + 1e-9]])
+        damping = 1e-3 * found
+        hessian = np.array([[xx + damping, xy, xt], [xy, yy + damping, yt], [xt, yt, tt * 1.001 + damping]])
         move = np.linalg.solve(hessian, np.array([bx, by, bt]))
         cosine, sine = math.cos(move[2]), math.sin(move[2])
-        x, y = pose[0] - centre_x, pose[1] - centre_y
-        pose[0] = centre_x + cosine * x - sine * y + move[0]
-        pose[1] = centre_y + sine * x + cosine * y + move[1]
+        x, y = pose[0] / side - centre_x, pose[1] / side - centre_y
+        pose[0] = (centre_x + cosine * x - sine * y + move[0]) * side
+        pose[1] = (centre_y + sine * x + cosine * y + move[1]) * side
         pose[2] += move[2]
-        if share == 1.0 and abs(move[0]) + abs(move[1]) < 1e-5 and abs(move[2]) < 1e-6:
+        if share == 1.0 and abs(move[0]) + abs(move[1]) < 0.02 and abs(move[2]) < 1e-4:
             return
+
+
+@kernel(inline=True)
+def _gap_to_wall(levels: Array, distance: Array, side: float, x: float, y: float, u: float, v: float, steps: int) -> float:
+    """Return how far along the normal the nearest wall that faces the same way lies [cells], more than ``steps`` where there is none."""
+    rows, columns = levels.shape
+    column, row = int(math.floor(x)), int(math.floor(y))
+    # Near the border nothing is known; this spares a check of each step.
+    if not (steps < column < columns - steps - 1 and steps < row < rows - steps - 1):
+        return steps + 1.0
+    nearest = distance[row, column] / side - 1.5
+    if nearest > steps:
+        return steps + 1.0
+    for k in range(max(int(nearest), 0), steps + 1):
+        for sign in range(-1 if k > 0 else 1, 2, 2):
+            gap = float(sign * k)
+            if (
+                levels[int(y + gap * v), int(x + gap * u)] == OCCUPIED
+                and levels[int(y + (gap + 1.0) * v), int(x + (gap + 1.0) * u)] == FREE
+            ):
+                return gap
+    return steps + 1.0

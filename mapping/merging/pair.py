@@ -212,12 +212,12 @@ def _judged(a: DescribedMap, b: DescribedMap, candidate: Candidate, settings: Me
 
 
 def _polished(a: DescribedMap, b: DescribedMap, judged: _Judged, settings: MergeSettings) -> _Judged:
-    """Settle a transform on all walls, of b on those of a and of a on those of b, half way between the two."""
+    """Settle a transform on more walls, of b on those of a and of a on those of b, half way between the two."""
     if "walls" not in settings.alignment.refinements:
         return judged
-    reach, start = 0.5 * settings.alignment.refinement_reach_m, judged.candidate.a_from_b
-    forth = refine_on_walls(a, b, start, reach, len(b.walls))
-    back = refine_on_walls(b, a, start.inverse(), reach, len(a.walls)).inverse()
+    start, reach, samples = judged.candidate.a_from_b, 0.5 * settings.alignment.refinement_reach_m, 4 * settings.alignment.wall_samples
+    forth = refine_on_walls(a, b, start, reach, samples)
+    back = refine_on_walls(b, a, start.inverse(), reach, samples).inverse()
     return _judged(a, b, Candidate(halfway(forth, back, judged.agreement.centre), judged.candidate.inliers), settings)
 
 

@@ -19,6 +19,9 @@ from lidarium.mapping.merging.rigid import Transform
 OCCUPIED_WEIGHT = 10.0
 """How much more an occupied cell counts than a free one in the score."""
 
+STRIDE = 3
+"""Areas are counted on every so many-th cell."""
+
 TESTS = ("walls", "discs")
 
 
@@ -64,8 +67,8 @@ class ValidationSettings:
     hit_distance_m: float = 0.075
     miss_distance_m: float = 0.175
     least_overlap_m2: float = 4.0
-    least_wall_m: float = 6.0
-    least_across_m: float = 2.0
+    least_wall_m: float = 4.0
+    least_across_m: float = 1.0
     hit_rate: float = 0.7
     score: float = 0.9
     most_contradiction_m: float = 0.4
@@ -82,7 +85,8 @@ class ValidationSettings:
         for name in ("hit_rate", "score", "contradiction_share", "rival_share", "disc_agreement"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
-        for name in ("hit_distance_m", "miss_distance_m", "least_overlap_m2", "least_wall_m", "least_across_m", "most_contradiction_m", "rival_distance_m"):
+        lengths = ("hit_distance_m", "miss_distance_m", "least_wall_m", "least_across_m", "most_contradiction_m", "rival_distance_m")
+        for name in ("least_overlap_m2", *lengths):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want zero or more")
         if self.disc_radius_cells < 1:
@@ -247,23 +251,23 @@ def _count_walls(
 
 @kernel
 def _count_overlap(a: Array, b: Array, side: float, pose: tuple[float, float, float], found: Array) -> None:
-    """Count the cells known in both maps, from every second cell of every second row, and find their centroid in b [m]."""
+    """Count the cells known in both maps, from every so many-th cell of every so many-th row, and find their centroid in b [m]."""
     rows, columns = a.shape
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     count, column_sum, row_sum = 0, 0, 0
-    for row in range(0, b.shape[0], 2):
+    for row in range(0, b.shape[0], STRIDE):
         x = (cosine * 0.5 - sine * (row + 0.5)) + pose[0] / side
         y = (sine * 0.5 + cosine * (row + 0.5)) + pose[1] / side
-        for column in range(0, b.shape[1], 2):
+        for column in range(0, b.shape[1], STRIDE):
             if b[row, column] != UNKNOWN:
                 c, r = int(math.floor(x + cosine * column)), int(math.floor(y + sine * column))
                 if 0 <= c < columns and 0 <= r < rows and a[r, c] != UNKNOWN:
                     count += 1
                     column_sum += column
                     row_sum += row
-    found[0] = 4.0 * count
-    found[1] = 4.0 * (column_sum + 0.5 * count) * side
-    found[2] = 4.0 * (row_sum + 0.5 * count) * side
+    found[0] = 1.0 * count * STRIDE**2
+    found[1] = (column_sum + 0.5 * count) * side * STRIDE**2
+    found[2] = (row_sum + 0.5 * count) * side * STRIDE**2
 
 
 @kernel
