@@ -8,10 +8,11 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
-from lidarium.scripts import bench, floors, report, run, show
+from lidarium.scripts import bench, floors, merge, report, run, show
 from lidarium.scripts.bench import Bench
 from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
 from lidarium.scripts.floors import Floors
+from lidarium.scripts.merge import Merge
 from lidarium.scripts.report import Report
 from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
@@ -19,6 +20,7 @@ from lidarium.scripts.show import Show
 Choice = (
     Annotated[Run, subcommand("run")]
     | Annotated[Report, subcommand("report")]
+    | Annotated[Merge, subcommand("merge")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -27,6 +29,7 @@ Choice = (
 _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Run: run.execute,
     Report: report.execute,
+    Merge: merge.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,

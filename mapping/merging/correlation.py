@@ -24,7 +24,9 @@ class CorrelationSettings:
     Attributes
     ----------
     cell_m : float
-        Side of a coarse cell [m].
+        Side of a coarse cell [m]; larger for maps that would have more than ``most_cells`` along a side.
+    most_cells : int
+        Bound of time and memory [coarse cells].
     rotations : int
         Rotations around the circle that the fallback tries; 0 for no fallback.
     peaks : int
@@ -36,6 +38,7 @@ class CorrelationSettings:
     """
 
     cell_m: float = 0.15
+    most_cells: int = 256
     rotations: int = 72
     peaks: int = 3
     miss_weight: float = 1.0
@@ -44,8 +47,9 @@ class CorrelationSettings:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.cell_m) and self.cell_m > 0.0):
             raise ValueError(f"cell_m of correlation is {self.cell_m}; want a positive number")
-        if self.rotations < 0 or self.peaks < 1:
-            raise ValueError(f"rotations and peaks of correlation are {self.rotations} and {self.peaks}; want at least 0 and 1")
+        if self.rotations < 0 or self.peaks < 1 or self.most_cells < 16:
+            found = f"{self.rotations}, {self.peaks} and {self.most_cells}"
+            raise ValueError(f"rotations, peaks and most_cells of correlation are {found}; want at least 0, 1 and 16")
         if not (0.0 <= self.miss_weight < math.inf and 0.0 <= self.free_weight < math.inf):
             raise ValueError(f"miss_weight and free_weight of correlation are {self.miss_weight} and {self.free_weight}; want zero or more")
 
@@ -84,7 +88,8 @@ def best_translations(
     """
     if len(a.walls) == 0 or len(b.walls) == 0 or len(rotations) == 0:
         return np.zeros((0, 3)), np.zeros(0)
-    cell = max(settings.cell_m, a.resolution)
+    longest = max(*a.levels.shape, *b.levels.shape)
+    cell = a.resolution * max(settings.cell_m / a.resolution, 1.0, longest / settings.most_cells)
     first, second = _coarse(a, cell), _coarse(b, cell)
     reach = math.ceil(math.hypot(*second.free.shape)) + 2
     shape = tuple(scipy.fft.next_fast_len(side + reach, real=True) for side in first.free.shape)
@@ -112,7 +117,7 @@ def _coarse(described: DescribedMap, cell: float) -> _Coarse:
     rows, columns = described.levels.shape
     scale = described.resolution / cell
     shape = (max(math.ceil(rows * scale), 1), max(math.ceil(columns * scale), 1))
-    mask = np.asarray(cv2.compare(described.levels, FREE, cv2.CMP_EQ), np.uint8)
+    mask = (described.levels == FREE).astype(np.uint8) * np.uint8(255)
     turn = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])
     smooth = max(round(1.0 / scale), 1)
     free = cv2.warpAffine(cv2.blur(mask, (smooth, smooth), borderType=cv2.BORDER_CONSTANT), turn, shape[::-1], flags=cv2.INTER_NEAREST)

@@ -144,7 +144,7 @@ def _odd(cells: float) -> int:
 
 
 def _mask_of(levels: NDArray[np.uint8], level: int) -> NDArray[np.uint8]:
-    return np.asarray(cv2.compare(levels, level, cv2.CMP_EQ), np.uint8)
+    return (levels == level).astype(np.uint8) * np.uint8(255)
 
 
 def _smoothed(mask: NDArray[np.uint8], cells: int) -> NDArray[np.uint8]:

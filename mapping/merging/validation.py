@@ -50,8 +50,8 @@ class ValidationSettings:
         Least score.
     most_contradiction_m : float
         Length of contradicting walls that is excused [m].
-    contradiction_share : float
-        Share of the walls in the overlap that may contradict.
+    plenty_of_wall_m, contradiction_share : float
+        Of the walls in the overlap beyond this length [m], this share may contradict too: maps of whole buildings drift.
     rival_distance_m, rival_angle : float
         A transform is another one where it differs by more than this [m, rad].
     rival_share : float
@@ -71,8 +71,9 @@ class ValidationSettings:
     least_across_m: float = 1.0
     hit_rate: float = 0.7
     score: float = 0.9
-    most_contradiction_m: float = 0.4
-    contradiction_share: float = 0.03
+    most_contradiction_m: float = 0.5
+    plenty_of_wall_m: float = 80.0
+    contradiction_share: float = 0.1
     rival_distance_m: float = 0.5
     rival_angle: float = math.radians(5.0)
     rival_share: float = 0.5
@@ -85,8 +86,8 @@ class ValidationSettings:
         for name in ("hit_rate", "score", "contradiction_share", "rival_share", "disc_agreement"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
-        lengths = ("hit_distance_m", "miss_distance_m", "least_wall_m", "least_across_m", "most_contradiction_m", "rival_distance_m")
-        for name in ("least_overlap_m2", *lengths):
+        lengths = ("hit_distance_m", "miss_distance_m", "least_wall_m", "least_across_m", "most_contradiction_m", "plenty_of_wall_m")
+        for name in ("least_overlap_m2", "rival_distance_m", *lengths):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want zero or more")
         if self.disc_radius_cells < 1:
@@ -170,7 +171,7 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
 
 def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | None:
     """Return why a transform is refused, rivals aside, or None where nothing speaks against it."""
-    allowed = max(settings.most_contradiction_m, settings.contradiction_share * 2.0 * agreement.wall_m)
+    allowed = _excused(agreement, settings)
     if agreement.overlap_m2 < settings.least_overlap_m2:
         return f"small overlap: {agreement.overlap_m2:.1f} m2 known in both, want {settings.least_overlap_m2:g}"
     if agreement.contradicting_m > allowed or agreement.score < settings.score:
@@ -187,13 +188,17 @@ def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | Non
 
 def is_rival(agreement: Agreement, best: Agreement, settings: ValidationSettings) -> bool:
     """Return whether another transform explains the maps nearly as well as the best: as many walls agree and nothing contradicts."""
-    allowed = max(settings.most_contradiction_m, settings.contradiction_share * 2.0 * agreement.wall_m)
     return (
         agreement.overlap_m2 >= settings.least_overlap_m2
-        and agreement.contradicting_m <= allowed
+        and agreement.contradicting_m <= _excused(agreement, settings)
         and agreement.hit_rate >= settings.hit_rate
         and agreement.agreeing_m >= settings.rival_share * best.agreeing_m
     )
+
+
+def _excused(agreement: Agreement, settings: ValidationSettings) -> float:
+    """Return the length of walls that may contradict [m]."""
+    return settings.most_contradiction_m + settings.contradiction_share * max(agreement.wall_m - settings.plenty_of_wall_m, 0.0)
 
 
 def disc_agreement(a: DescribedMap, b: DescribedMap, a_from_b: Transform, points: NDArray[np.float64], radius_cells: int) -> float:
@@ -255,10 +260,10 @@ def _count_overlap(a: Array, b: Array, side: float, pose: tuple[float, float, fl
     rows, columns = a.shape
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     count, column_sum, row_sum = 0, 0, 0
-    for row in range(0, b.shape[0], STRIDE):
+    for row in range(STRIDE // 2, b.shape[0], STRIDE):
         x = (cosine * 0.5 - sine * (row + 0.5)) + pose[0] / side
         y = (sine * 0.5 + cosine * (row + 0.5)) + pose[1] / side
-        for column in range(0, b.shape[1], STRIDE):
+        for column in range(STRIDE // 2, b.shape[1], STRIDE):
             if b[row, column] != UNKNOWN:
                 c, r = int(math.floor(x + cosine * column)), int(math.floor(y + sine * column))
                 if 0 <= c < columns and 0 <= r < rows and a[r, c] != UNKNOWN:
