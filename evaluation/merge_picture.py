@@ -62,7 +62,7 @@ def _draw_group(axes: Axes, merged: Merged, group: list[str], fused: FusedMap, c
             ends = np.stack([first.apply(result.joined[0]), second.apply(result.joined[1])], axis=1)
             axes.plot(*ends.transpose(2, 1, 0), color="#e11d48", linewidth=1.2, marker="o", markersize=3.5, markerfacecolor="none")
             lines += len(ends)
-    handles = [Patch(color=tuple(channel / 255.0 for channel in colours[name]), label=name) for name in group]
+    handles = [Patch(color="#{:02x}{:02x}{:02x}".format(*colours[name]), label=name) for name in group]
     axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=min(len(group), 4), frameon=False, fontsize=8)
     axes.set_title(f"{' + '.join(group)}: {lines} matched corners" if len(group) <= 4 else f"{len(group)} maps", fontsize=9, color=INK)
     axes.set_xlabel(f"x in the frame of {group[0]} [m]", fontsize=8)

@@ -144,9 +144,7 @@ def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, An
 
 
 def _summary(merged: "Merged", files: list[str], out: Path) -> str:
-    lines = []
-    for group in merged.groups():
-        lines.append(f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}")
+    lines = [f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}" for group in merged.groups()]
     dropped = {(edge.a, edge.b) for edge in merged.tree.dropped}
     rows = []
     for (a, b), found in merged.pairs.items():

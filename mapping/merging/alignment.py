@@ -241,9 +241,7 @@ def distinct(
     return chosen
 
 
-def refine(
-    a: DescribedMap, b: DescribedMap, matches: Matches, candidate: Candidate, settings: AlignmentSettings
-) -> Candidate:
+def refine(a: DescribedMap, b: DescribedMap, matches: Matches, candidate: Candidate, settings: AlignmentSettings) -> Candidate:
     """Return a candidate with its transform made better by each of the settings' refinements in turn."""
     transform = candidate.a_from_b
     p, q = a.corners.points[matches.first[candidate.inliers]], b.corners.points[matches.second[candidate.inliers]]

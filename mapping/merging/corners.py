@@ -121,7 +121,7 @@ def detect_corners(levels: NDArray[np.uint8], resolution: float, settings: Corne
     count = _find_corners(np.ascontiguousarray(three), three.view(np.uint64), rows, columns, table, found)
     cells = found[:count, :2].astype(np.int64)
     codes = found[:count, 2]
-    points = (cells + 0.5) * resolution
+    points = np.asarray((cells + 0.5) * resolution, np.float64)
     angles = (table[codes].astype(np.float64) - 1.0) * STEP
     corners = Corners(cells, points, angles, np.bitwise_count(codes.astype(np.uint8)).astype(np.int64))
     corners = _separated(corners, settings.separation_m)
@@ -185,7 +185,7 @@ def _is_three_level(levels: Array) -> bool:
     for row in range(levels.shape[0]):
         for column in range(levels.shape[1]):
             level = levels[row, column]
-            others += np.int64((level != OCCUPIED) & (level != UNKNOWN) & (level != FREE))
+            others += int((level != OCCUPIED) & (level != UNKNOWN) & (level != FREE))
     return others == 0
 
 

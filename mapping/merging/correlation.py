@@ -64,7 +64,7 @@ class _Coarse:
 
 
 def best_translations(
-    a: DescribedMap, b: DescribedMap, rotations: NDArray[np.float64], settings: CorrelationSettings, apart_m: float = 0.5
+    a: DescribedMap, b: DescribedMap, rotations: NDArray[np.floating], settings: CorrelationSettings, apart_m: float = 0.5
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Find for each rotation of map b the translations under which its walls agree best with those of map a.
 
@@ -103,7 +103,7 @@ def best_translations(
         turned, free, corner = _turned(second, theta, reach)
         product = met_by_walls * np.conj(scipy.fft.rfft2(turned, shape))
         product += met_by_free * np.conj(scipy.fft.rfft2(_clear(free, turned), shape))
-        total = scipy.fft.irfft2(product, shape, overwrite_x=True)
+        total = np.asarray(scipy.fft.irfft2(product, shape, overwrite_x=True), np.float32)
         for row, column, value in _peaks(total, settings.peaks, math.ceil(apart_m / cell)):
             # A shift beyond what the first map spans is a negative one.
             down = row - shape[0] if row >= first.free.shape[0] else row
@@ -117,7 +117,7 @@ def _coarse(described: DescribedMap, cell: float) -> _Coarse:
     rows, columns = described.levels.shape
     scale = described.resolution / cell
     shape = (max(math.ceil(rows * scale), 1), max(math.ceil(columns * scale), 1))
-    mask = (described.levels == FREE).astype(np.uint8) * np.uint8(255)
+    mask = np.asarray((described.levels == FREE) * np.uint8(255), np.uint8)
     turn = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])
     smooth = max(round(1.0 / scale), 1)
     free = cv2.warpAffine(cv2.blur(mask, (smooth, smooth), borderType=cv2.BORDER_CONSTANT), turn, shape[::-1], flags=cv2.INTER_NEAREST)
@@ -130,7 +130,7 @@ def _drawn(walls: NDArray[np.float64], weight: float, shape: tuple[int, ...]) ->
     column = np.clip(walls[:, 0].astype(np.int64), 0, shape[1] - 1)
     row = np.clip(walls[:, 1].astype(np.int64), 0, shape[0] - 1)
     counts = np.bincount(row * shape[1] + column, minlength=shape[0] * shape[1]).reshape(shape[0], shape[1])
-    return np.minimum(counts * np.float32(weight), 1.0).astype(np.float32)
+    return np.asarray(np.minimum(counts * weight, 1.0), np.float32)
 
 
 def _clear(free: NDArray[np.float32], walls: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -111,6 +111,8 @@ def match_corners(
     if len(first) == 0 or len(second) == 0:
         return Matches(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
     difference = first.angles[:, None] - second.angles[None, :]
+    similarity: NDArray[np.floating]
+    shift: NDArray[np.floating]
     if settings.method == "descriptors":
         similarity, shift = compare_descriptors(first_descriptors, second_descriptors, settings)
     else:
@@ -194,7 +196,9 @@ def _distance_votes(first: NDArray[np.float64], second: NDArray[np.float64], tol
             continue
         # A length has a like one if the first not shorter than its lower bound is not longer than its upper bound.
         place = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
-        votes[:, j] = ((lengths[place] >= left * (1.0 - tolerance)) & (lengths[place] * (1.0 - tolerance) <= left) & (left > 0.0)).sum(axis=1)
+        votes[:, j] = ((lengths[place] >= left * (1.0 - tolerance)) & (lengths[place] * (1.0 - tolerance) <= left) & (left > 0.0)).sum(
+            axis=1
+        )
     return votes / max(len(first) - 1, 1)
 
 

@@ -85,7 +85,9 @@ def describe_map(
     descriptors = describe_corners(three, resolution, corners, descriptor_settings)
     cells, normals = _walls(three)
     distance = _distance(three.shape, cells, resolution)
-    return DescribedMap(three, float(resolution), corners, descriptors, (cells + 0.5) * resolution, normals, distance)
+    return DescribedMap(
+        three, float(resolution), corners, descriptors, np.asarray((cells + 0.5) * resolution, np.float64), normals, distance
+    )
 
 
 def three_levels_of(levels: ArrayLike, settings: CornerSettings) -> NDArray[np.uint8]:
@@ -128,7 +130,10 @@ def resampled(levels: NDArray[np.uint8], resolution: float, wanted: float) -> ND
         return levels
     ratio = resolution / wanted
     rows, columns = (math.ceil(side * ratio - 1e-9) for side in levels.shape)
-    row, column = (np.minimum(((np.arange(side) + 0.5) * ratio).astype(np.int64), count - 1) for side, count in zip(levels.shape, (rows, columns), strict=True))
+    row, column = (
+        np.minimum(((np.arange(side) + 0.5) * ratio).astype(np.int64), count - 1)
+        for side, count in zip(levels.shape, (rows, columns), strict=True)
+    )
     place = (row[:, None] * columns + column[None, :]).ravel()
     counts = {level: np.bincount(place[(levels == level).ravel()], minlength=rows * columns) for level in (OCCUPIED, UNKNOWN, FREE)}
     coarse = np.where(counts[FREE] > counts[UNKNOWN], FREE, UNKNOWN)

@@ -144,7 +144,7 @@ def _odd(cells: float) -> int:
 
 
 def _mask_of(levels: NDArray[np.uint8], level: int) -> NDArray[np.uint8]:
-    return (levels == level).astype(np.uint8) * np.uint8(255)
+    return np.asarray((levels == level) * np.uint8(255), np.uint8)
 
 
 def _smoothed(mask: NDArray[np.uint8], cells: int) -> NDArray[np.uint8]:
@@ -152,9 +152,7 @@ def _smoothed(mask: NDArray[np.uint8], cells: int) -> NDArray[np.uint8]:
 
 
 @kernel
-def _sample(
-    occupied: Array, free: Array, places: Array, angles: Array, radii: Array, worth: Array, values: Array, known: Array
-) -> None:
+def _sample(occupied: Array, free: Array, places: Array, angles: Array, radii: Array, worth: Array, values: Array, known: Array) -> None:
     """Fill values and known from the shares of occupied and free cells [of 255] at the nearest cell of each sample."""
     rows, columns = occupied.shape
     samples = values.shape[2]

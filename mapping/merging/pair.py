@@ -161,9 +161,7 @@ def _merge_by_discs(a: DescribedMap, b: DescribedMap, matches: Matches, settings
     )
 
 
-def _corner_candidates(
-    a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings
-) -> tuple[list[Candidate], str | None]:
+def _corner_candidates(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> tuple[list[Candidate], str | None]:
     """Return the most promising transforms that matches propose, or none and why."""
     alignment = settings.alignment
     if min(len(a.corners), len(b.corners)) < alignment.least_inliers:
@@ -194,9 +192,7 @@ def _residuals(
     return np.array([distance[row].mean() for distance, row in zip(distances, is_inlier, strict=True)])
 
 
-def _by_correlation(
-    a: DescribedMap, b: DescribedMap, angles: NDArray[np.float64], count: int, settings: MergeSettings
-) -> list[_Judged]:
+def _by_correlation(a: DescribedMap, b: DescribedMap, angles: NDArray[np.floating], count: int, settings: MergeSettings) -> list[_Judged]:
     """Judge the best of all translations at some rotations."""
     transforms, values = best_translations(a, b, angles, settings.correlation, settings.validation.rival_distance_m)
     order = np.argsort(-values, kind="stable")

@@ -18,7 +18,10 @@ ORIGINS = {"west": (-3.0, 2.0, 0.5), "east": (10.0, -4.0, 0.0)}
 def maps(tmp_path):
     """Two parts of one apartment as ROS maps with origins of their own, and the true transform between their ROS frames."""
     truth = about_middle(2.0, apartment())
-    levels = {"west": kept(apartment(), slice(0, 180), slice(0, 150)), "east": moved(kept(apartment(), slice(0, 180), slice(58, 220)), truth)}
+    levels = {
+        "west": kept(apartment(), slice(0, 180), slice(0, 150)),
+        "east": moved(kept(apartment(), slice(0, 180), slice(58, 220)), truth),
+    }
     paths = [write_ros_map(tmp_path / "in", name, levels[name], ORIGINS[name], RESOLUTION) for name in levels]
     west_from_east = Transform(*ORIGINS["west"]) @ truth.inverse() @ Transform(*ORIGINS["east"]).inverse()
     return [str(path) for path in paths], west_from_east
@@ -107,7 +110,12 @@ def test_maps_of_one_colour_are_refused(grey, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("key", "value", "word"),
-    [("resolution", 0.0, "resolution"), ("origin", [math.nan, 0.0, 0.0], "origin"), ("image", "gone.pgm", "gone.pgm"), ("origin", None, "origin")],
+    [
+        ("resolution", 0.0, "resolution"),
+        ("origin", [math.nan, 0.0, 0.0], "origin"),
+        ("image", "gone.pgm", "gone.pgm"),
+        ("origin", None, "origin"),
+    ],
 )
 def test_bad_headers_are_named(maps, tmp_path, capsys, key, value, word):
     (west, east), _ = maps

@@ -58,7 +58,7 @@ def test_least_squares_find_the_transform_of_exact_pairs(pose):
 
 
 def test_least_squares_want_pairs():
-    with pytest.raises(ValueError, match="pairs|shapes"):
+    with pytest.raises(ValueError, match="shapes"):
         fit(np.zeros((0, 2)), np.zeros((0, 2)))
 
 

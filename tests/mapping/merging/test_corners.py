@@ -80,7 +80,10 @@ def test_a_quarter_turn_of_the_map_turns_its_corners(size):
     # Counter-clockwise with row 0 below: column and row become minus row and column.
     turned = np.ascontiguousarray(np.rot90(levels, -1))
     before, after = detect_corners(levels, RESOLUTION, ALL), detect_corners(turned, RESOLUTION, ALL)
-    where = {(levels.shape[0] - 1 - y, x, round(angle + 4) % 16) for (x, y), angle in zip(before.cells.tolist(), before.angles / STEP, strict=True)}
+    where = {
+        (levels.shape[0] - 1 - y, x, round(angle + 4) % 16)
+        for (x, y), angle in zip(before.cells.tolist(), before.angles / STEP, strict=True)
+    }
     assert where == {(x, y, round(angle) % 16) for (x, y), angle in zip(after.cells.tolist(), after.angles / STEP, strict=True)}
     assert len(before)
 
