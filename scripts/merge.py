@@ -109,7 +109,7 @@ def _result(merged: "Merged", images: "dict[str, MapImage]") -> dict[str, Any]:
                 "b": b,
                 "accepted": is_used,
                 "reason": reason,
-                **(dict.fromkeys(("x", "y", "theta")) if between is None else _numbers(between)),
+                **_numbers(between),
                 "inliers": found.inliers,
                 "score": round(found.score, 6),
                 "overlap_m2": round(found.agreement.overlap_m2, 3),
@@ -119,7 +119,9 @@ def _result(merged: "Merged", images: "dict[str, MapImage]") -> dict[str, Any]:
     return {"world": world, "maps": maps, "pairs": pairs}
 
 
-def _numbers(transform: "Transform") -> dict[str, float]:
+def _numbers(transform: "Transform | None") -> dict[str, float | None]:
+    if transform is None:
+        return {"x": None, "y": None, "theta": None}
     return {"x": round(transform.x, 6), "y": round(transform.y, 6), "theta": round(transform.theta, 8)}
 
 

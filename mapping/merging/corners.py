@@ -117,7 +117,7 @@ def detect_corners(levels: NDArray[np.uint8], resolution: float, settings: Corne
     padded = cv2.copyMakeBorder(levels, 1, 1, _WORD, right, cv2.BORDER_CONSTANT, value=UNKNOWN)
     three = padded if _is_three_level(padded) else cv2.LUT(padded, _levels_of_greys(settings.occupied_below, settings.free_above))
     table = orientation_table(settings.rule, settings.neighbours)
-    found = np.empty((max(levels.size // 4, 1), 3), np.int32)
+    found = np.empty((levels.size // 2 + 1, 3), np.int32)
     count = _find_corners(np.ascontiguousarray(three), three.view(np.uint64), rows, columns, table, found)
     cells = found[:count, :2].astype(np.int64)
     codes = found[:count, 2]

@@ -6,11 +6,12 @@ from drawn_maps import RESOLUTION, SPREAD, about_middle, apartment, moved
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers, propose, refine_on_walls, sweep_rotation
+from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers, propose, sweep_rotation
 from lidarium.mapping.merging.corners import Corners, detect_corners
 from lidarium.mapping.merging.correspondence import METHODS, CorrespondenceSettings, Matches, match_corners
 from lidarium.mapping.merging.described_map import describe_map
 from lidarium.mapping.merging.rigid import Transform, fit, halfway, wrapped
+from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
 POSES = st.builds(Transform, st.floats(-5, 5), st.floats(-5, 5), st.floats(-3.1, 3.1))
 
