@@ -110,7 +110,7 @@ def costs(rounds: int) -> list[str]:
 def gain_of_workers(seeds: int, rounds: int) -> tuple[list[float], int]:
     """Return how much faster two workers are than one, round by round, and how many episodes a round has."""
     plan = suite(seeds)
-    gains = []
+    gains, finished = [], 0
     for _ in range(rounds):
         seconds = []
         for workers in (1, 2):

@@ -80,6 +80,36 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     return MapImage(np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header))
 
 
+def read_grey_map(path: Path, resolution: float) -> MapImage:
+    """Read a plain image as a map: black is occupied, white free, and what lies between is unknown.
+
+    Parameters
+    ----------
+    path : Path
+        The image; colours count as their mean.
+    resolution : float
+        Side of a cell [m].
+
+    Returns
+    -------
+    MapImage
+        The map, its origin at (0, 0).
+
+    Raises
+    ------
+    FileNotFoundError
+        If it is not there.
+    ValueError
+        If it cannot be read, or the resolution is not a positive number.
+    """
+    if not (math.isfinite(resolution) and resolution > 0.0):
+        raise ValueError(f"{path}: resolution is {resolution} m; want a positive number")
+    shades, opacity = _shades(read_image(Path(path)))
+    levels = _levels(shades, negate=False, low=0.196, high=0.65)
+    levels[opacity < 1.0] = UNKNOWN
+    return MapImage(np.ascontiguousarray(levels[::-1]), (0.0, 0.0, 0.0), resolution)
+
+
 def write_ros_map(folder: Path, name: str, levels: NDArray[np.uint8], origin: tuple[float, float, float], resolution: float) -> Path:
     """Write a map for ROS map_server: ``name.yaml`` and ``name.pgm``.
 

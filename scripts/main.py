@@ -8,11 +8,12 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
-from lidarium.scripts import bench, evaluate, floors, replay, report, reproduce, run, show
+from lidarium.scripts import bench, evaluate, floors, merge, replay, report, reproduce, run, show
 from lidarium.scripts.bench import Bench
 from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
+from lidarium.scripts.merge import Merge
 from lidarium.scripts.replay import Replay
 from lidarium.scripts.report import Report
 from lidarium.scripts.reproduce import Reproduce
@@ -25,6 +26,7 @@ Choice = (
     | Annotated[Report, subcommand("report")]
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Replay, subcommand("replay")]
+    | Annotated[Merge, subcommand("merge")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -36,6 +38,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Report: report.execute,
     Reproduce: reproduce.execute,
     Replay: replay.execute,
+    Merge: merge.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,

@@ -58,7 +58,7 @@ def rewritten(path, **changes):
 def test_help_names_the_commands(capsys):
     assert main(["--help"]) == 0
     told = capsys.readouterr().out
-    assert all(name in told for name in ("run", "evaluate", "replay", "report", "reproduce", "floors", "bench", "show"))
+    assert all(name in told for name in ("run", "evaluate", "merge", "replay", "report", "reproduce", "floors", "bench", "show"))
 
 
 def test_help_comes_without_loading_the_kernels():
@@ -73,6 +73,7 @@ def test_help_comes_without_loading_the_kernels():
     [
         "run",
         "evaluate",
+        "merge",
         "replay",
         "report",
         "reproduce",

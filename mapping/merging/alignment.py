@@ -1,0 +1,238 @@
+"""From matched corners to transforms: each match proposes one, the others vote, and the walls refine it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.merging.corners import Corners
+from lidarium.mapping.merging.correspondence import Matches
+from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.rigid import Transform, fit
+from lidarium.mapping.merging.wall_alignment import refine_on_walls
+
+INLIER_RULES = ("distance", "ratio")
+REFINEMENTS = ("sweep", "least_squares", "walls")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlignmentSettings:
+    """How a transform is found.
+
+    Attributes
+    ----------
+    inlier_rule : str
+        ``distance``: matched corners come together within the tolerance below; ``ratio``: their coordinates, in cells from the corner of
+        the map, differ by less than 8 % each (as it was printed: far from that corner a tolerance of half a metre, near it none).
+    tolerance_m : float
+        Distance at which corners come together beside the match that proposes the transform [m].
+    angle_uncertainty : float
+        Error of the proposed rotation [rad]; the tolerance grows with the distance by its tangent, and rotations of inliers differ by at
+        most twice as much.
+    ratio : float
+        Least quotient of coordinates for ``ratio``.
+    least_inliers : int
+        Fewest inliers of a transform, the proposing match among them; each corner takes part in one.
+    inlier_share : float
+        Fewest inliers as a share of the smaller number of corners.
+    candidates : int
+        Number of transforms that are refined and looked at more closely.
+    refinements : tuple of str
+        Done in this order: ``sweep`` of the rotation over 7 degrees to either side, ``least_squares`` of the inliers, ``walls`` on walls.
+    refinement_reach_m : float
+        Distance to walls within which ``walls`` pulls at first [m].
+    wall_samples : int
+        Number of wall cells that are compared while transforms are ranked and refined.
+    """
+
+    inlier_rule: str = "distance"
+    tolerance_m: float = 0.12
+    angle_uncertainty: float = math.radians(3.0)
+    ratio: float = 0.92
+    least_inliers: int = 3
+    inlier_share: float = 0.0
+    candidates: int = 8
+    refinements: tuple[str, ...] = ("least_squares", "walls")
+    refinement_reach_m: float = 0.4
+    wall_samples: int = 400
+
+    def __post_init__(self) -> None:
+        if self.inlier_rule not in INLIER_RULES:
+            raise ValueError(f"inlier_rule is {self.inlier_rule!r}; want one of {', '.join(INLIER_RULES)}")
+        if not set(self.refinements) <= set(REFINEMENTS):
+            raise ValueError(f"refinements are {self.refinements}; want some of {', '.join(REFINEMENTS)}")
+        for name, low, high in (
+            ("tolerance_m", 0.0, math.inf),
+            ("angle_uncertainty", 0.0, math.pi / 4.0),
+            ("ratio", 0.0, 1.0),
+            ("inlier_share", 0.0, 1.0),
+            ("refinement_reach_m", 1e-3, math.inf),
+        ):
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} of alignment is {getattr(self, name)}; want {low:g} to {high:.4g}")
+        if min(self.least_inliers, self.candidates, self.wall_samples) < 1:
+            raise ValueError("least_inliers, candidates and wall_samples of alignment want one or more each")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A transform that may join two maps.
+
+    Attributes
+    ----------
+    a_from_b : Transform
+        Maps points of map b into map a.
+    inliers : (n,) int64
+        Indices of the matches that agree with it; none where it was not found by corners.
+    """
+
+    a_from_b: Transform
+    inliers: NDArray[np.int64]
+
+
+def propose(first: Corners, second: Corners, matches: Matches) -> NDArray[np.float64]:
+    """Return the transform that each match proposes, shape (n, 3): x, y [m], theta [rad]."""
+    p, q = first.points[matches.first], second.points[matches.second]
+    cosine, sine = np.cos(matches.rotation), np.sin(matches.rotation)
+    x = p[:, 0] - (cosine * q[:, 0] - sine * q[:, 1])
+    y = p[:, 1] - (sine * q[:, 0] + cosine * q[:, 1])
+    return np.stack([x, y, matches.rotation], axis=1)
+
+
+def find_inliers(
+    first: Corners, second: Corners, matches: Matches, resolution: float, settings: AlignmentSettings
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Let the matches vote on the transform that each of them proposes.
+
+    Parameters
+    ----------
+    first, second : Corners
+        Of map a and map b.
+    matches : Matches
+        Between them.
+    resolution : float
+        Side of a cell [m].
+    settings : AlignmentSettings
+        Who agrees with whom.
+
+    Returns
+    -------
+    proposals : (n, 3) float64
+        x, y [m] and theta [rad] of ``a_from_b`` of each match.
+    is_inlier : (n, n) bool
+        Row: proposal, column: match that agrees with it; each corner takes part in at most one.
+    """
+    proposals = propose(first, second, matches)
+    is_inlier = np.zeros((len(matches), len(matches)), np.bool_)
+    tangent = math.tan(settings.angle_uncertainty)
+    _vote(
+        proposals,
+        first.points[matches.first],
+        second.points[matches.second],
+        matches.first,
+        matches.second,
+        (len(first), len(second)),
+        (settings.tolerance_m, tangent, 2.0 * settings.angle_uncertainty),
+        settings.ratio if settings.inlier_rule == "ratio" else 0.0,
+        resolution,
+        is_inlier,
+    )
+    return proposals, is_inlier
+
+
+@kernel
+def _vote(
+    proposals: Array,
+    p: Array,
+    q: Array,
+    first: Array,
+    second: Array,
+    counts: tuple[int, int],
+    tolerances: tuple[float, float, float],
+    ratio: float,
+    resolution: float,
+    is_inlier: Array,
+) -> None:
+    """Mark the inliers of each proposal; a ratio above 0 chooses the rule of coordinates."""
+    tolerance, tangent, angle = tolerances
+    first_taken_by, second_taken_by = np.full(counts[0], -1), np.full(counts[1], -1)
+    for k in range(proposals.shape[0]):
+        cosine, sine = math.cos(proposals[k, 2]), math.sin(proposals[k, 2])
+        is_inlier[k, k] = True
+        first_taken_by[first[k]], second_taken_by[second[k]] = k, k
+        for m in range(p.shape[0]):
+            if first_taken_by[first[m]] == k or second_taken_by[second[m]] == k:
+                continue
+            x = cosine * q[m, 0] - sine * q[m, 1] + proposals[k, 0]
+            y = sine * q[m, 0] + cosine * q[m, 1] + proposals[k, 1]
+            if ratio > 0.0:
+                agrees = _is_alike(x / resolution, p[m, 0] / resolution, ratio) and _is_alike(y / resolution, p[m, 1] / resolution, ratio)
+            else:
+                turn = abs((proposals[m, 2] - proposals[k, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+                reach = tolerance + math.hypot(q[m, 0] - q[k, 0], q[m, 1] - q[k, 1]) * tangent
+                agrees = turn <= angle and math.hypot(x - p[m, 0], y - p[m, 1]) <= reach
+            if agrees:
+                is_inlier[k, m] = True
+                first_taken_by[first[m]], second_taken_by[second[m]] = k, k
+
+
+@kernel(inline=True)
+def _is_alike(a: float, b: float, ratio: float) -> bool:
+    """Return whether the smaller coordinate is more than a share of the larger one."""
+    low, high = min(abs(a), abs(b)), max(abs(a), abs(b))
+    return bool(high == 0.0 or (a * b > 0.0 and low / high > ratio))
+
+
+def distinct(
+    proposals: NDArray[np.float64], order: NDArray[np.int64], at: NDArray[np.float64], count: int, apart: tuple[float, float]
+) -> list[int]:
+    """Return the first few of the proposals, in an order, that differ from one another by more than a distance [m] or an angle [rad]."""
+    chosen: list[int] = []
+    images = np.stack(
+        [
+            np.cos(proposals[:, 2]) * at[0] - np.sin(proposals[:, 2]) * at[1] + proposals[:, 0],
+            np.sin(proposals[:, 2]) * at[0] + np.cos(proposals[:, 2]) * at[1] + proposals[:, 1],
+        ],
+        axis=1,
+    )
+    is_near = np.zeros(len(proposals), np.bool_)
+    for index in order.tolist():
+        if not is_near[index]:
+            chosen.append(index)
+            if len(chosen) == count:
+                break
+            turn = np.abs((proposals[:, 2] - proposals[index, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+            is_near |= (np.linalg.norm(images - images[index], axis=1) <= apart[0]) & (turn <= apart[1])
+    return chosen
+
+
+def refine(a: DescribedMap, b: DescribedMap, matches: Matches, candidate: Candidate, settings: AlignmentSettings) -> Candidate:
+    """Return a candidate with its transform made better by each of the settings' refinements in turn."""
+    transform = candidate.a_from_b
+    p, q = a.corners.points[matches.first[candidate.inliers]], b.corners.points[matches.second[candidate.inliers]]
+    for step in settings.refinements:
+        if step == "walls":
+            transform = refine_on_walls(a, b, transform, settings.refinement_reach_m, settings.wall_samples)
+        elif step == "sweep" and len(p) > 0:
+            transform = sweep_rotation(p, q, transform)
+        elif step == "least_squares" and len(p) > 1:
+            transform = fit(q, p)
+    return Candidate(transform, candidate.inliers)
+
+
+def sweep_rotation(p: NDArray[np.float64], q: NDArray[np.float64], a_from_b: Transform) -> Transform:
+    """Return the transform with the rotation, of 29 within 7 degrees, that brings the inliers q of map b nearest to p of map a.
+
+    The translation follows from the centres of the inliers.
+    """
+    best, least = a_from_b, math.inf
+    for step in range(-14, 15):
+        turn = Transform(0.0, 0.0, a_from_b.theta + math.radians(0.5 * step))
+        x, y = (p.mean(axis=0) - turn.apply(q.mean(axis=0))).tolist()
+        moved = Transform(x, y, turn.theta)
+        error = float(np.linalg.norm(moved.apply(q) - p, axis=1).sum())
+        if error < least:
+            best, least = moved, error
+    return best

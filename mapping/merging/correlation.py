@@ -1,0 +1,164 @@
+"""Two maps laid over each other at all translations at once, for some rotations: slow, but it needs no corners.
+
+Maps are reduced to coarse counts of walls and of free space away from walls. Walls on walls count for a translation, walls in free space
+against it; the sums over all translations are correlations, products of spectra.
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from lidarium.mapping.map_files import FREE
+from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.rigid import Transform
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CorrelationSettings:
+    """How finely all transforms are tried.
+
+    Attributes
+    ----------
+    cell_m : float
+        Side of a coarse cell [m]; larger for maps that would have more than ``most_cells`` along a side.
+    most_cells : int
+        Bound of time and memory [coarse cells].
+    rotations : int
+        Rotations around the circle that the fallback tries; 0 for no fallback.
+    peaks : int
+        Translations that are kept for each rotation.
+    miss_weight : float
+        How much a wall in free space counts against one that lies on a wall.
+    free_weight : float
+        How much a cell that is free in both maps counts: walls seen from two sides alone are no sign of one place.
+    """
+
+    cell_m: float = 0.15
+    most_cells: int = 256
+    rotations: int = 72
+    peaks: int = 3
+    miss_weight: float = 1.0
+    free_weight: float = 0.03
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.cell_m) and self.cell_m > 0.0):
+            raise ValueError(f"cell_m of correlation is {self.cell_m}; want a positive number")
+        if self.rotations < 0 or self.peaks < 1 or self.most_cells < 16:
+            found = f"{self.rotations}, {self.peaks} and {self.most_cells}"
+            raise ValueError(f"rotations, peaks and most_cells of correlation are {found}; want at least 0, 1 and 16")
+        if not (0.0 <= self.miss_weight < math.inf and 0.0 <= self.free_weight < math.inf):
+            raise ValueError(f"miss_weight and free_weight of correlation are {self.miss_weight} and {self.free_weight}; want zero or more")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Coarse:
+    """A map in coarse cells: walls as points [coarse cells] with what each weighs, and free space."""
+
+    walls: NDArray[np.float64]
+    weight: float
+    free: NDArray[np.float32]
+
+
+def best_translations(
+    a: DescribedMap, b: DescribedMap, rotations: NDArray[np.floating], settings: CorrelationSettings, apart_m: float = 0.5
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Find for each rotation of map b the translations under which its walls agree best with those of map a.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        Maps of one resolution.
+    rotations : (n,) float64
+        Angles of b's axes in a [rad].
+    settings : CorrelationSettings
+        Coarseness.
+    apart_m : float
+        Translations of one rotation are at least so far apart [m].
+
+    Returns
+    -------
+    transforms : (n * peaks, 3) float64
+        x, y [m] and theta [rad] of ``a_from_b``.
+    values : (n * peaks,) float64
+        The walls that agree less those that do not [m].
+    """
+    if len(a.walls) == 0 or len(b.walls) == 0 or len(rotations) == 0:
+        return np.zeros((0, 3)), np.zeros(0)
+    longest = max(*a.levels.shape, *b.levels.shape)
+    cell = a.resolution * max(settings.cell_m / a.resolution, 1.0, longest / settings.most_cells)
+    first, second = _coarse(a, cell), _coarse(b, cell)
+    reach = math.ceil(math.hypot(*second.free.shape)) + 2
+    shape = tuple(scipy.fft.next_fast_len(side + reach, real=True) for side in first.free.shape)
+    walls = _drawn(first.walls, first.weight, first.free.shape)
+    near = cv2.GaussianBlur(walls, (3, 3), 0.8)
+    clear = _clear(first.free, walls)
+    met_by_walls = scipy.fft.rfft2(near - settings.miss_weight * clear, shape)
+    met_by_free = scipy.fft.rfft2(settings.free_weight * clear - settings.miss_weight * walls, shape)
+    transforms, values = [], []
+    for theta in rotations.tolist():
+        turned, free, corner = _turned(second, theta, reach)
+        product = met_by_walls * np.conj(scipy.fft.rfft2(turned, shape))
+        product += met_by_free * np.conj(scipy.fft.rfft2(_clear(free, turned), shape))
+        total = np.asarray(scipy.fft.irfft2(product, shape, overwrite_x=True), np.float32)
+        for row, column, value in _peaks(total, settings.peaks, math.ceil(apart_m / cell)):
+            # A shift beyond what the first map spans is a negative one.
+            down = row - shape[0] if row >= first.free.shape[0] else row
+            left = column - shape[1] if column >= first.free.shape[1] else column
+            transforms.append(((left + corner[0]) * cell, (down + corner[1]) * cell, theta))
+            values.append(value * cell)
+    return np.array(transforms), np.array(values)
+
+
+def _coarse(described: DescribedMap, cell: float) -> _Coarse:
+    rows, columns = described.levels.shape
+    scale = described.resolution / cell
+    shape = (max(math.ceil(rows * scale), 1), max(math.ceil(columns * scale), 1))
+    mask = np.asarray((described.levels == FREE) * np.uint8(255), np.uint8)
+    turn = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])
+    smooth = max(round(1.0 / scale), 1)
+    free = cv2.warpAffine(cv2.blur(mask, (smooth, smooth), borderType=cv2.BORDER_CONSTANT), turn, shape[::-1], flags=cv2.INTER_NEAREST)
+    # A wall of one cell's length weighs its share of a coarse cell.
+    return _Coarse(described.walls / cell, scale, np.asarray(free, np.float32) / np.float32(255.0))
+
+
+def _drawn(walls: NDArray[np.float64], weight: float, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return the walls counted in the cells of a grid, each cell at most as if one wall ran through it."""
+    column = np.clip(walls[:, 0].astype(np.int64), 0, shape[1] - 1)
+    row = np.clip(walls[:, 1].astype(np.int64), 0, shape[0] - 1)
+    counts = np.bincount(row * shape[1] + column, minlength=shape[0] * shape[1]).reshape(shape[0], shape[1])
+    return np.asarray(np.minimum(counts * weight, 1.0), np.float32)
+
+
+def _clear(free: NDArray[np.float32], walls: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return where space is free and no wall in the same cell or beside it."""
+    beside = cv2.dilate(walls, np.ones((3, 3), np.uint8))
+    return np.asarray(np.where((free > 0.9) & (beside == 0.0), 1.0, 0.0), np.float32)
+
+
+def _turned(coarse: _Coarse, theta: float, side: int) -> tuple[NDArray[np.float32], NDArray[np.float32], tuple[float, float]]:
+    """Return walls and free space turned into a grid, and where the map's own corner lies in it [cells]."""
+    rows, columns = coarse.free.shape
+    cosine, sine = math.cos(theta), math.sin(theta)
+    x = side / 2.0 - (cosine * columns / 2.0 - sine * rows / 2.0)
+    y = side / 2.0 - (sine * columns / 2.0 + cosine * rows / 2.0)
+    walls = Transform(x, y, theta).apply(coarse.walls)
+    # The centre of pixel (0, 0) is at (0.5, 0.5) of the grid.
+    shift_x, shift_y = x + 0.5 * (cosine - sine) - 0.5, y + 0.5 * (sine + cosine) - 0.5
+    free = cv2.warpAffine(coarse.free, np.array([[cosine, -sine, shift_x], [sine, cosine, shift_y]]), (side, side), flags=cv2.INTER_LINEAR)
+    return _drawn(walls, coarse.weight, (side, side)), np.asarray(free, np.float32), (x, y)
+
+
+def _peaks(total: NDArray[np.float32], count: int, apart: int) -> list[tuple[int, int, float]]:
+    """Return row, column and value of the largest entries that are apart from one another; the array is changed."""
+    found = []
+    rows, columns = total.shape
+    for _ in range(count):
+        row, column = divmod(int(total.argmax()), columns)
+        found.append((row, column, float(total[row, column])))
+        window = np.arange(-apart, apart + 1)
+        total[np.ix_((row + window) % rows, (column + window) % columns)] = -np.inf
+    return found

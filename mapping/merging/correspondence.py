@@ -1,0 +1,224 @@
+"""Which corners of one map may be which of another: three methods behind one call.
+
+Descriptors are compared under all rotations at once: a correlation along the angle is a product of spectra.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from lidarium.mapping.merging.corners import Corners
+from lidarium.mapping.merging.descriptors import Descriptors
+from lidarium.mapping.merging.rigid import wrapped
+
+METHODS = ("descriptors", "distances", "triplets")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CorrespondenceSettings:
+    """How corners are matched.
+
+    Attributes
+    ----------
+    method : str
+        ``descriptors``, ``distances`` (pairs of corners equally far apart in both maps) or ``triplets`` (corners whose two nearest
+        neighbours form the same triangle).
+    threshold : float
+        Similarity of two descriptors from which they match, 1 for equal ones.
+    margin : float
+        A match is at most so much less similar than the best of its corner.
+    per_corner : int
+        At most so many matches for a corner of the first map.
+    shift_window : float
+        How far the rotation may differ from the difference of the corners' angles [rad].
+    is_known_only : bool
+        Whether the similarity is taken over what is known in both descriptors, about zero; otherwise over all samples, about their mean.
+    least_known : float
+        Share of samples known in both from which descriptors are compared at all, with ``is_known_only``.
+    use_shift : bool
+        Whether the best shift refines a match's rotation; otherwise it is the difference of the corners' angles.
+    length_tolerance : float
+        Two lengths are equal where they differ by at most this share of the longer one.
+    """
+
+    method: str = "descriptors"
+    threshold: float = 0.55
+    margin: float = 0.10
+    per_corner: int = 5
+    shift_window: float = math.radians(24.0)
+    is_known_only: bool = True
+    least_known: float = 0.25
+    use_shift: bool = True
+    length_tolerance: float = 0.08
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise ValueError(f"method of correspondence is {self.method!r}; want one of {', '.join(METHODS)}")
+        for name, low, high in (("threshold", -1.0, 1.0), ("margin", 0.0, 2.0), ("shift_window", 0.0, math.pi), ("least_known", 0.0, 1.0)):
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} of correspondence is {getattr(self, name)}; want {low:g} to {high:.4g}")
+        if self.per_corner < 1:
+            raise ValueError(f"per_corner is {self.per_corner}; want one or more")
+        if not 0.0 < self.length_tolerance < 1.0:
+            raise ValueError(f"length_tolerance is {self.length_tolerance}; want more than 0 and less than 1")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matches:
+    """Pairs of corners that may be one.
+
+    Attributes
+    ----------
+    first, second : (n,) int64
+        Corners of map a and of map b.
+    similarity : (n,) float64
+        1 for equal surroundings.
+    rotation : (n,) float64
+        Angle of map b's axes in map a that the pair proposes [rad], in (-pi, pi].
+    """
+
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    similarity: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+def match_corners(
+    first: Corners, second: Corners, first_descriptors: Descriptors, second_descriptors: Descriptors, settings: CorrespondenceSettings
+) -> Matches:
+    """Match the corners of map a with those of map b.
+
+    Parameters
+    ----------
+    first, second : Corners
+        Of map a and of map b.
+    first_descriptors, second_descriptors : Descriptors
+        Theirs, of the same settings.
+    settings : CorrespondenceSettings
+        The method.
+
+    Returns
+    -------
+    Matches
+        In order of the first map's corners.
+    """
+    if len(first) == 0 or len(second) == 0:
+        return Matches(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+    difference = first.angles[:, None] - second.angles[None, :]
+    similarity: NDArray[np.floating]
+    shift: NDArray[np.floating]
+    if settings.method == "descriptors":
+        similarity, shift = compare_descriptors(first_descriptors, second_descriptors, settings)
+    else:
+        compare = _distance_votes if settings.method == "distances" else _triplet_similarity
+        similarity, shift = compare(first.points, second.points, settings.length_tolerance), np.zeros_like(difference)
+    # Of a corner seen at a in the first map and at b in the second, the second map is turned by a - b.
+    rotation = difference + shift if settings.use_shift else difference
+    threshold = settings.threshold if settings.method == "descriptors" else 0.0
+    i, j = _chosen(similarity, threshold, settings)
+    return Matches(i, j, similarity[i, j].astype(np.float64), np.array([wrapped(angle) for angle in rotation[i, j].tolist()]))
+
+
+def compare_descriptors(
+    first: Descriptors, second: Descriptors, settings: CorrespondenceSettings
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Compare each descriptor of a map with each of another under all shifts of the angle.
+
+    Returns
+    -------
+    similarity : (n, m) float32
+        The largest normalised correlation within the window of shifts, -1 where too little is known in both.
+    shift : (n, m) float32
+        Where it is [rad]: the first corner sees at an angle what the second sees at that angle less the shift.
+    """
+    columns = first.values.shape[2]
+    if settings.is_known_only:
+        # Where a sample is half known, so is its square; sums over what is known in both are three correlations.
+        product = _correlation(first.values, second.values)
+        first_energy = _correlation(first.values**2, second.known)
+        second_energy = _correlation(first.known, second.values**2)
+        known = _correlation(first.known, second.known)
+        is_comparable = known >= settings.least_known * first.values.shape[1] * columns
+        energy = np.maximum(first_energy * second_energy, 1e-12)
+        similarity = np.where(is_comparable, product / np.sqrt(energy), -1.0)
+    else:
+        similarity = _correlation(_standardised(first.values), _standardised(second.values))
+    reach = min(int(settings.shift_window / (2.0 * math.pi / columns) + 1e-9), columns // 2 - 1)
+    shifts = np.arange(-reach, reach + 1)
+    window = similarity[:, :, shifts % columns]
+    best = window.argmax(axis=2)
+    peak = np.take_along_axis(window, best[:, :, None], axis=2)[:, :, 0]
+    angle = shifts[best] * (2.0 * math.pi / columns)
+    return np.asarray(peak, np.float32), np.asarray(angle, np.float32)
+
+
+def _standardised(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    centred = values - values.mean(axis=(1, 2), keepdims=True)
+    return np.asarray(centred / np.maximum(np.sqrt((centred**2).sum(axis=(1, 2), keepdims=True)), 1e-9), np.float32)
+
+
+def _correlation(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return for all pairs and shifts the sum over rings and columns of first[column + shift] ... second[column], shape (n, m, columns)."""
+    columns = first.shape[2]
+    # One product of matrices for each frequency: (n, rings) by (rings, m).
+    left = np.ascontiguousarray(scipy.fft.rfft(first, axis=2).transpose(2, 0, 1))
+    right = np.ascontiguousarray(scipy.fft.rfft(second, axis=2).conj().transpose(2, 1, 0))
+    spectrum = np.matmul(left, right).transpose(1, 2, 0)
+    return np.asarray(scipy.fft.irfft(spectrum, n=columns, axis=2), np.float32)
+
+
+def _chosen(
+    similarity: NDArray[np.floating], threshold: float, settings: CorrespondenceSettings
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the pairs that are similar enough, near the best of their corner, and among its first few."""
+    best = similarity.max(axis=1, keepdims=True)
+    count = min(settings.per_corner, similarity.shape[1])
+    order = np.argsort(-similarity, axis=1, kind="stable")[:, :count]
+    values = np.take_along_axis(similarity, order, axis=1)
+    is_match = (values > 0.0) & (values >= threshold) & (values >= best - settings.margin)
+    i, rank = np.nonzero(is_match)
+    return i.astype(np.int64), order[i, rank].astype(np.int64)
+
+
+def _distance_votes(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    """Return for each pair of corners the share of the first one's distances that the second one has too, shape (n, m)."""
+    left, right = _distances(first), _distances(second)
+    votes = np.zeros((len(first), len(second)))
+    for j in range(len(second)):
+        lengths = np.sort(np.delete(right[j], j))
+        if len(lengths) == 0:
+            continue
+        # A length has a like one if the first not shorter than its lower bound is not longer than its upper bound.
+        place = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
+        votes[:, j] = ((lengths[place] >= left * (1.0 - tolerance)) & (lengths[place] * (1.0 - tolerance) <= left) & (left > 0.0)).sum(
+            axis=1
+        )
+    return votes / max(len(first) - 1, 1)
+
+
+def _triplet_similarity(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    """Return for each pair of corners how alike the triangles with their two nearest neighbours are, 0 where they are not, shape (n, m)."""
+    if len(first) < 3 or len(second) < 3:
+        return np.zeros((len(first), len(second)))
+    left, right = _triangles(first), _triangles(second)
+    longer = np.maximum(left[:, None], right[None])
+    difference = (np.abs(left[:, None] - right[None]) / np.maximum(longer, 1e-9)).max(axis=2)
+    return np.where(difference <= tolerance, 1.0 - difference, 0.0)
+
+
+def _triangles(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return distances to the nearest and second neighbour and between the two, shape (n, 3) [m]."""
+    distances = _distances(points)
+    order = np.argsort(distances + np.diag(np.full(len(points), np.inf)), axis=1, kind="stable")[:, :2]
+    rows = np.arange(len(points))
+    return np.stack([distances[rows, order[:, 0]], distances[rows, order[:, 1]], distances[order[:, 0], order[:, 1]]], axis=1)
+
+
+def _distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(points[:, None] - points[None], axis=2))

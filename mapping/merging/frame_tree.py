@@ -1,0 +1,189 @@
+"""How maps that were joined in pairs lie in common frames: the best forest of transforms that contradicts no other one.
+
+Maps are nodes, accepted transforms edges. Of each group of joined maps one is the root; the world's frame is that of the root of the
+group that was there first, and stays where it is while others join.
+"""
+
+import math
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from lidarium.mapping.merging.rigid import Transform
+
+Name = TypeVar("Name", bound=Hashable)
+
+
+@dataclass(frozen=True, slots=True)
+class Edge(Generic[Name]):
+    """A transform between two maps.
+
+    Attributes
+    ----------
+    a, b : hashable
+        Names of the maps.
+    a_from_b : Transform
+        Maps points of b into a.
+    weight : float
+        How much speaks for it; edges of more weight are kept before others.
+    centre : (x, y)
+        Where the maps overlap, in map b [m]; distances around cycles are taken there.
+    """
+
+    a: Name
+    b: Name
+    a_from_b: Transform
+    weight: float
+    centre: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(slots=True)
+class FrameTree(Generic[Name]):
+    """Maps and the transforms between them.
+
+    Attributes
+    ----------
+    cycle_distance_m, cycle_angle : float
+        By how much the transforms around a cycle may miss identity [m, rad]; else the cycle's weakest edge is dropped.
+    """
+
+    cycle_distance_m: float = 0.15
+    cycle_angle: float = math.radians(3.0)
+    _names: list[Name] = field(default_factory=list)
+    _edges: dict[frozenset[Name], Edge[Name]] = field(default_factory=dict)
+    _roots: list[Name] = field(default_factory=list)
+    _tree: dict[Name, dict[Name, Transform]] = field(default_factory=dict)
+    _dropped: list[Edge[Name]] = field(default_factory=list)
+
+    @property
+    def names(self) -> list[Name]:
+        """Maps in the order in which they came."""
+        return list(self._names)
+
+    @property
+    def dropped(self) -> list[Edge[Name]]:
+        """Edges that contradict stronger ones, and are not used."""
+        return list(self._dropped)
+
+    @property
+    def edges(self) -> list[Edge[Name]]:
+        """Edges that contradict none, whether or not the forest needs them."""
+        return [edge for edge in self._edges.values() if edge not in self._dropped]
+
+    def add_map(self, name: Name) -> None:
+        """Add a map that is not joined with any yet."""
+        if name not in self._tree:
+            self._names.append(name)
+            self._tree[name] = {}
+
+    def add_edge(self, edge: Edge[Name]) -> None:
+        """Add a transform; one between the same maps is replaced where the new one has more weight.
+
+        Raises
+        ------
+        ValueError
+            Where it joins a map with itself, or is not finite.
+        """
+        if edge.a == edge.b:
+            raise ValueError(f"an edge joins map {edge.a!r} with itself; want two maps")
+        pose = edge.a_from_b
+        if not all(map(math.isfinite, (pose.x, pose.y, pose.theta, edge.weight))):
+            raise ValueError(f"the edge between {edge.a!r} and {edge.b!r} is {edge}; want finite numbers")
+        self.add_map(edge.a)
+        self.add_map(edge.b)
+        pair = frozenset((edge.a, edge.b))
+        if pair not in self._edges or edge.weight > self._edges[pair].weight:
+            self._edges[pair] = edge
+            self._rebuild()
+
+    def remove_edge(self, a: Name, b: Name) -> None:
+        """Take the transform between two maps away, if there is one."""
+        if self._edges.pop(frozenset((a, b)), None) is not None:
+            self._rebuild()
+
+    def groups(self) -> list[list[Name]]:
+        """Return the maps that are joined with one another, each group with its root first; the world's first."""
+        found, seen = [], set()
+        for start in [*self._roots, *self._names]:
+            if start not in seen:
+                members = self._reached_from(start)
+                seen |= set(members)
+                found.append([start, *(name for name in self._names if name in members and name != start)])
+        return found
+
+    def lookup(self, target: Name, source: Name) -> Transform | None:
+        """Return the transform that maps points of one map into another, None where they are not joined.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such map.
+        """
+        for name in (target, source):
+            if name not in self._tree:
+                raise ValueError(f"there is no map {name!r}; want one of {', '.join(map(repr, self._names))}")
+        return self._reached_from(target).get(source)
+
+    def pose_in(self, target: Name, source: Name, pose: Transform) -> Transform | None:
+        """Return a robot's pose, known in its own map, in another map, None where they are not joined."""
+        transform = self.lookup(target, source)
+        return None if transform is None else transform @ pose
+
+    def _reached_from(self, start: Name) -> dict[Name, Transform]:
+        """Return the transform from each map of a group into one of its maps."""
+        reached = {start: Transform()}
+        waiting = [start]
+        for name in waiting:
+            for other, name_from_other in self._tree[name].items():
+                if other not in reached:
+                    reached[other] = reached[name] @ name_from_other
+                    waiting.append(other)
+        return reached
+
+    def _rebuild(self) -> None:
+        """Build the forest of most weight; drop the weakest edge of a cycle that does not close, until all close."""
+        self._dropped = []
+        while True:
+            usable = [edge for edge in self._edges.values() if edge not in self._dropped]
+            # Equal weights keep the order in which edges came.
+            usable.sort(key=lambda edge: -edge.weight)
+            left_over = self._grow(usable)
+            broken = [(self._misses(edge), edge) for edge in left_over]
+            worst = max(broken, key=lambda one: one[0], default=None)
+            if worst is None or worst[0] <= 1.0:
+                break
+            # The forest has the most weight, so the edge outside of it is the weakest of its cycle.
+            self._dropped.append(worst[1])
+        self._settle_roots()
+
+    def _grow(self, edges: Iterable[Edge[Name]]) -> list[Edge[Name]]:
+        """Join maps by edges in turn; return the edges between maps that were joined already."""
+        self._tree = {name: {} for name in self._names}
+        group = {name: {name} for name in self._names}
+        left_over = []
+        for edge in edges:
+            if edge.b in group[edge.a]:
+                left_over.append(edge)
+                continue
+            self._tree[edge.a][edge.b] = edge.a_from_b
+            self._tree[edge.b][edge.a] = edge.a_from_b.inverse()
+            joined = group[edge.a] | group[edge.b]
+            for name in joined:
+                group[name] = joined
+        return left_over
+
+    def _misses(self, edge: Edge[Name]) -> float:
+        """Return by how many times what is allowed an edge differs from the way through the forest."""
+        through = self._reached_from(edge.a)[edge.b]
+        distance, angle = through.difference(edge.a_from_b, edge.centre)
+        return max(distance / self.cycle_distance_m, angle / self.cycle_angle)
+
+    def _settle_roots(self) -> None:
+        """Keep the roots that there were, the older one where groups have become one; new groups get their first map."""
+        roots: list[Name] = []
+        taken: set[Name] = set()
+        for name in [*self._roots, *(name for name in self._names if self._tree[name])]:
+            if name not in taken and self._tree[name]:
+                roots.append(name)
+                taken |= set(self._reached_from(name))
+        self._roots = roots

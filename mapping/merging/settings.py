@@ -1,0 +1,89 @@
+"""All settings of merging in one place, and the two sets of them that have names."""
+
+import math
+from dataclasses import dataclass, field
+
+from lidarium.mapping.merging.alignment import AlignmentSettings
+from lidarium.mapping.merging.corners import CornerSettings
+from lidarium.mapping.merging.correlation import CorrelationSettings
+from lidarium.mapping.merging.correspondence import CorrespondenceSettings
+from lidarium.mapping.merging.descriptors import DescriptorSettings
+from lidarium.mapping.merging.validation import ValidationSettings
+
+MODES = ("default", "thesis")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MergeSettings:
+    """How maps are merged.
+
+    Attributes
+    ----------
+    corners, descriptors, correspondence, alignment, validation, correlation
+        Settings of each stage.
+    cycle_distance_m, cycle_angle : float
+        By how much transforms around a cycle of maps may miss identity [m, rad].
+    """
+
+    corners: CornerSettings = field(default_factory=CornerSettings)
+    descriptors: DescriptorSettings = field(default_factory=DescriptorSettings)
+    correspondence: CorrespondenceSettings = field(default_factory=CorrespondenceSettings)
+    alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
+    validation: ValidationSettings = field(default_factory=ValidationSettings)
+    correlation: CorrelationSettings = field(default_factory=CorrelationSettings)
+    cycle_distance_m: float = 0.15
+    cycle_angle: float = math.radians(3.0)
+
+    def __post_init__(self) -> None:
+        for name in ("cycle_distance_m", "cycle_angle"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise ValueError(f"{name} is {getattr(self, name)}; want a positive number")
+
+
+def merge_settings(mode: str = "default", resolution: float = 0.025) -> MergeSettings:
+    """Return the settings of a mode.
+
+    Parameters
+    ----------
+    mode : str
+        ``default``, or ``thesis`` for the rules of the thesis as they were printed: all corners, one ring band of 25 cells, similarity
+        over all samples, rotations in steps of 22.5 degrees, inliers by the ratio of coordinates, a sweep, the disc test, no fallback.
+    resolution : float
+        Side of a cell [m]; the thesis counts in cells.
+
+    Returns
+    -------
+    MergeSettings
+        The settings.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such mode.
+    """
+    if mode == "default":
+        return MergeSettings()
+    if mode != "thesis":
+        raise ValueError(f"mode of merging is {mode!r}; want one of {', '.join(MODES)}")
+    descriptors = DescriptorSettings(
+        variant="polar",
+        radius_min=resolution,
+        radius_max=25.0 * resolution,
+        radius_step=resolution,
+        columns=360,
+        occupied=1.0,
+        unknown=0.5,
+        free=0.0,
+    )
+    correspondence = CorrespondenceSettings(threshold=0.80, shift_window=math.radians(12.0), is_known_only=False, use_shift=False)
+    alignment = AlignmentSettings(
+        inlier_rule="ratio", least_inliers=3, angle_uncertainty=math.radians(22.5), candidates=1, refinements=("sweep",)
+    )
+    return MergeSettings(
+        corners=CornerSettings(separation_m=0.0, limit=0),
+        descriptors=descriptors,
+        correspondence=correspondence,
+        alignment=alignment,
+        validation=ValidationSettings(test="discs"),
+        correlation=CorrelationSettings(rotations=0),
+    )

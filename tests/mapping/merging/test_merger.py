@@ -1,0 +1,93 @@
+import itertools
+import math
+
+import numpy as np
+import pytest
+from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
+
+import lidarium
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.settings import make_settings
+from lidarium.evaluation.runner import run_episode
+from lidarium.mapping.map_files import FREE, UNKNOWN
+from lidarium.mapping.merging.merger import merge_maps
+from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.occupancy import three_levels
+
+
+def parts():
+    """Three turned parts of one apartment, and where they belong."""
+    slices = {"west": slice(0, 120), "middle": slice(40, 170), "east": slice(75, 220)}
+    poses = {"west": about_middle(0.4, apartment()), "middle": about_middle(2.9, apartment()), "east": about_middle(-1.3, apartment())}
+    maps = {}
+    for seed, (name, columns) in enumerate(slices.items()):
+        maps[name] = (noisy(moved(kept(apartment(), slice(0, 180), columns), poses[name]), seed), RESOLUTION)
+    return maps, poses
+
+
+@pytest.mark.parametrize("order", [("west", "middle", "east"), ("east", "west", "middle")])
+def test_many_maps_become_one_in_any_order(order):
+    maps, poses = parts()
+    maps["elsewhere"] = (room(blank(), 20, 20, 90, 130), RESOLUTION)
+    merged = merge_maps({name: maps[name] for name in (*order, "elsewhere")})
+    groups = merged.groups()
+    assert [sorted(group) for group in groups] == [["east", "middle", "west"], ["elsewhere"]]
+    for a, b in itertools.combinations(order, 2):
+        found = merged.tree.lookup(a, b)
+        assert found is not None
+        distance, angle = found.difference(poses[a] @ poses[b].inverse(), (8.0, 8.0))
+        assert distance < 0.1
+        assert angle < math.radians(1.0)
+    fused = merged.fused(groups[0])
+    assert np.count_nonzero(fused.levels == FREE) == pytest.approx(np.count_nonzero(apartment() == FREE), rel=0.05)
+    with pytest.raises(ValueError, match="not joined"):
+        merged.fused([groups[0][0], "elsewhere"])
+
+
+def test_maps_of_different_resolutions_are_brought_to_the_coarsest():
+    fine = np.repeat(np.repeat(apartment(), 2, axis=0), 2, axis=1)
+    merged = merge_maps({"fine": (fine, RESOLUTION / 2.0), "coarse": (apartment(), RESOLUTION)})
+    assert merged.resolution == RESOLUTION
+    assert len(merged.groups()) == 1
+
+
+@pytest.mark.parametrize(
+    ("maps", "message"),
+    [
+        ({}, "no maps"),
+        ({"hall": (blank(), 0.0)}, "'hall'.*resolution"),
+        ({"hall": (blank(), math.nan)}, "'hall'.*resolution"),
+        ({"hall": (np.zeros((0, 3), np.uint8), 0.1)}, "'hall'.*shape"),
+        ({"hall": (np.zeros((3, 3, 3), np.uint8), 0.1)}, "'hall'.*shape"),
+    ],
+)
+def test_bad_maps_are_named(maps, message):
+    with pytest.raises(ValueError, match=message):
+        merge_maps(maps)
+
+
+def driven(floor, start, seconds, seed):
+    """The map of a robot that starts somewhere, and its pose in the floor."""
+    chosen = make_settings(robots=1, known_starts=False, noise="datasheet", resolution=RESOLUTION, horizon_s=seconds)
+    env = ExplorationEnv(floor, chosen)
+    run_episode(lidarium.policy("nearest_frontier"), env, seed, {"starts": [start]})
+    belief = env.perception.belief("robot_0")
+    levels = three_levels(np.array(belief.map.log_odds))
+    rows, columns = np.nonzero(levels != UNKNOWN)
+    cut = levels[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    x, y = np.array(belief.map_origin) + np.array([columns.min(), rows.min()]) * RESOLUTION
+    return np.ascontiguousarray(cut), Transform(*start) @ Transform(float(x), float(y), 0.0)
+
+
+def test_maps_of_robots_that_start_apart_are_joined_where_they_met():
+    first, floor_from_first = driven("apartment", (2.5, 4.0, 0.0), 40.0, 1)
+    second, floor_from_second = driven("apartment", (8.5117, 5.0262, -0.966), 40.0, 2)
+    other, _ = driven("building:17", (17.025, 22.475, 1.58), 20.0, 3)
+    merged = merge_maps({"first": (first, RESOLUTION), "other": (other, RESOLUTION), "second": (second, RESOLUTION)})
+    assert merged.groups() == [["first", "second"], ["other"]]
+    found = merged.tree.lookup("first", "second")
+    assert found is not None
+    truth = floor_from_first.inverse() @ floor_from_second
+    distance, angle = found.difference(truth, merged.pairs["first", "second"].agreement.centre)
+    assert distance < 0.1
+    assert angle < math.radians(1.0)

@@ -1,0 +1,228 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.merging.described_map import describe_map, resampled
+from lidarium.mapping.merging.pair import described, merge_pair
+from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.merging.settings import MergeSettings, merge_settings
+from lidarium.mapping.merging.validation import ValidationSettings, compare, disc_agreement, why_refused
+
+
+def merged(a, b, resolution=RESOLUTION, mode="default"):
+    chosen = merge_settings(mode, resolution)
+    return merge_pair(described(a, resolution, chosen), described(b, resolution, chosen), chosen)
+
+
+def is_right(result, truth, at, distance=0.1, degrees=1.0):
+    assert result.a_from_b is not None
+    error, angle = result.a_from_b.difference(truth, at)
+    return error <= distance and angle <= math.radians(degrees)
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.floats(-math.pi, math.pi), st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), st.integers(0, 99))
+def test_a_turned_shifted_and_noisy_map_is_joined_where_it_belongs(theta, shift, seed):
+    truth = about_middle(theta, apartment(), shift=shift)
+    result = merged(noisy(moved(apartment(), truth), seed), noisy(apartment(), seed + 1))
+    assert result.is_accepted, result.reason
+    assert is_right(result, truth, (5.0, 4.0))
+
+
+@settings(max_examples=4, deadline=None)
+@given(st.integers(0, 40), st.integers(0, 40))
+def test_margins_of_unknown_cells_change_nothing_but_the_translation(rows, columns):
+    plain = merged(moved(apartment(), about_middle(0.6, apartment())), apartment())
+    padded = np.pad(apartment(), ((rows, 7), (columns, 5)), constant_values=UNKNOWN)
+    result = merged(moved(apartment(), about_middle(0.6, apartment())), padded)
+    assert plain.is_accepted
+    assert result.is_accepted
+    assert plain.a_from_b is not None
+    assert is_right(result, plain.a_from_b @ Transform(-columns * RESOLUTION, -rows * RESOLUTION), (5.0, 4.0), 0.03, 0.3)
+
+
+def test_the_order_of_the_maps_turns_the_transform_round():
+    a, b = kept(moved(apartment(), about_middle(1.1, apartment())), slice(0, 320), slice(0, 220)), apartment()
+    forth, back = merged(a, b), merged(b, a)
+    assert forth.is_accepted
+    assert back.is_accepted
+    assert back.a_from_b is not None
+    assert is_right(forth, back.a_from_b.inverse(), (5.0, 4.0), 0.05, 0.5)
+
+
+def test_parts_that_share_some_rooms_are_joined():
+    a, b = kept(apartment(), slice(0, 180), slice(0, 150)), kept(apartment(), slice(0, 180), slice(58, 220))
+    truth = about_middle(2.5, apartment())
+    result = merged(moved(a, truth), b)
+    assert result.is_accepted, result.reason
+    assert is_right(result, truth, (4.0, 4.0))
+
+
+@pytest.mark.parametrize("method", ["distances", "triplets"])
+def test_the_other_methods_of_matching_never_join_wrongly(method):
+    chosen = merge_settings()
+    chosen = replace(chosen, correspondence=replace(chosen.correspondence, method=method))
+    truth = about_middle(0.5, apartment())
+    a, b = described(moved(apartment(), truth), RESOLUTION, chosen), described(apartment(), RESOLUTION, chosen)
+    result = merge_pair(a, b, chosen)
+    assert result.is_accepted
+    assert is_right(result, truth, (5.0, 4.0))
+
+
+def test_without_corners_walls_alone_join_maps():
+    chosen = merge_settings()
+    chosen = replace(chosen, correspondence=replace(chosen.correspondence, threshold=1.0))
+    truth = about_middle(-0.8, apartment())
+    result = merge_pair(described(moved(apartment(), truth), RESOLUTION, chosen), described(apartment(), RESOLUTION, chosen), chosen)
+    assert result.found_by == "correlation"
+    assert result.is_accepted, result.reason
+    assert is_right(result, truth, (5.0, 4.0))
+
+
+def test_the_same_maps_give_the_same_result():
+    a, b = noisy(moved(apartment(), about_middle(0.3, apartment())), 5), apartment()
+    assert merged(a, b).a_from_b == merged(a, b).a_from_b
+
+
+def office():
+    """Another building."""
+    levels = blank(180, 220)
+    room(levels, 20, 10, 30, 190)
+    for column, width, depth in ((10, 40, 55), (53, 60, 50), (116, 30, 60), (149, 51, 45)):
+        room(levels, 53, column, depth, width)
+        levels[49:54, column + 12 : column + 30] = FREE
+    levels[70:80, 70:90] = OCCUPIED
+    return levels
+
+
+def test_unrelated_buildings_are_refused():
+    result = merged(apartment(), office())
+    assert not result.is_accepted
+    assert result.reason != "accepted"
+
+
+def test_a_mirrored_map_is_refused():
+    assert not merged(apartment(), np.ascontiguousarray(apartment()[:, ::-1])).is_accepted
+
+
+def test_a_square_room_is_ambiguous():
+    square = room(blank(160, 160), 30, 30, 100, 100)
+    result = merged(square, moved(square, about_middle(0.2, square)))
+    assert not result.is_accepted
+    assert result.reason.startswith("ambiguous")
+
+
+def test_a_straight_corridor_is_ambiguous():
+    corridor = blank(60, 300)
+    corridor[20:40, 10:290] = FREE
+    corridor[18:20, 10:290] = corridor[40:42, 10:290] = OCCUPIED
+    result = merged(corridor, kept(corridor, slice(0, 60), slice(50, 250)))
+    assert not result.is_accepted
+    assert "ambiguous" in result.reason
+
+
+def test_a_room_that_differs_by_a_metre_of_wall_is_refused():
+    changed = apartment()
+    changed[110:115, 83:105] = OCCUPIED
+    result = merged(moved(apartment(), about_middle(0.9, apartment())), changed)
+    assert not result.is_accepted
+    assert "contradiction" in result.reason
+
+
+def test_a_door_that_was_moved_is_refused():
+    changed = apartment()
+    changed[55:58, 110:128], changed[55:58, 86:104] = OCCUPIED, FREE
+    result = merged(moved(apartment(), about_middle(0.9, apartment())), changed)
+    assert not result.is_accepted
+    assert "contradiction" in result.reason
+
+
+@pytest.mark.parametrize("mode", ["default", "thesis"])
+@pytest.mark.parametrize(
+    "levels", [blank(), np.full((1, 1), FREE, np.uint8), np.full((1, 1), OCCUPIED, np.uint8), np.full((40, 40), FREE, np.uint8)]
+)
+def test_a_map_without_features_is_refused_with_a_reason(levels, mode):
+    for a, b in ((levels, apartment()), (apartment(), levels), (levels, levels)):
+        result = merged(a, b, mode=mode)
+        assert not result.is_accepted
+        assert "too few" in result.reason
+
+
+def test_the_score_of_a_map_with_itself_is_one():
+    a = describe_map(apartment(), RESOLUTION)
+    same = compare(a, a, Transform(), ValidationSettings())
+    assert (same.score, same.hit_rate, same.contradicting_m) == (1.0, 1.0, 0.0)
+    assert why_refused(same, ValidationSettings()) is None
+    shifted = compare(a, a, Transform(0.5, 0.0, 0.0), ValidationSettings())
+    assert shifted.score < 0.9
+    assert "contradiction" in str(why_refused(shifted, ValidationSettings()))
+
+
+def test_the_overlap_and_its_middle_are_measured():
+    a, b = describe_map(np.full((60, 60), FREE, np.uint8), 0.1), describe_map(np.full((60, 60), FREE, np.uint8), 0.1)
+    found = compare(a, b, Transform(3.0, 0.0, 0.0), ValidationSettings())
+    assert found.overlap_m2 == pytest.approx(18.0, rel=0.05)
+    assert found.centre == pytest.approx((1.5, 3.0), abs=0.1)
+
+
+def test_discs_count_cells_once_and_unknown_ones_too():
+    a = describe_map(apartment(), RESOLUTION)
+    points = a.corners.points
+    assert disc_agreement(a, a, Transform(), points, 25) == 1.0
+    assert disc_agreement(a, a, Transform(), np.concatenate([points, points]), 25) == 1.0
+    assert disc_agreement(a, a, Transform(0.5, 0.0, 0.0), points, 25) < 0.9
+    other = describe_map(kept(apartment(), slice(0, 60), slice(0, 80)), RESOLUTION)
+    assert disc_agreement(other, a, Transform(), points, 25) < 0.9
+
+
+def test_the_thesis_joins_an_easy_pair_and_not_two_buildings():
+    truth = about_middle(math.pi / 2.0, apartment())
+    result = merged(moved(apartment(), truth), apartment(), mode="thesis")
+    assert result.is_accepted, result.reason
+    assert is_right(result, truth, (5.0, 4.0), 0.3, 3.0)
+    assert not merged(apartment(), office(), mode="thesis").is_accepted
+
+
+def test_maps_of_two_resolutions_are_no_pair():
+    with pytest.raises(ValueError, match="resolution"):
+        merge_pair(describe_map(apartment(), 0.05), describe_map(apartment(), 0.1))
+
+
+def test_coarser_cells_keep_thin_walls():
+    levels = np.full((40, 40), FREE, np.uint8)
+    levels[:, 17] = OCCUPIED
+    coarse = resampled(levels, 0.025, 0.1)
+    assert coarse.shape == (10, 10)
+    assert (coarse[:, 4] == OCCUPIED).all()
+    assert (np.delete(coarse, 4, axis=1) == FREE).all()
+    assert resampled(levels, 0.1, 0.1) is levels
+
+
+@pytest.mark.parametrize(
+    ("levels", "resolution", "message"),
+    [
+        (np.zeros((0, 5), np.uint8), 0.1, "shape"),
+        (np.zeros((5, 5, 3), np.uint8), 0.1, "shape"),
+        (np.zeros((5, 5)), 0.1, "type"),
+        (np.zeros((5, 5), np.uint8), 0.0, "resolution"),
+        (np.zeros((5, 5), np.uint8), math.nan, "resolution"),
+    ],
+)
+def test_what_is_no_map_is_refused(levels, resolution, message):
+    with pytest.raises(ValueError, match=message):
+        describe_map(levels, resolution)
+
+
+def test_unknown_modes_and_settings_are_named():
+    with pytest.raises(ValueError, match="mode"):
+        merge_settings("printed")
+    with pytest.raises(ValueError, match="cycle_distance_m"):
+        MergeSettings(cycle_distance_m=0.0)
+    with pytest.raises(ValueError, match="hit_rate"):
+        ValidationSettings(hit_rate=2.0)

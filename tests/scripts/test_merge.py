@@ -1,0 +1,148 @@
+import json
+import math
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, room
+
+from lidarium.mapping.map_files import read_ros_map, write_ros_map
+from lidarium.mapping.merging.rigid import Transform
+from lidarium.scripts.main import main
+
+ORIGINS = {"west": (-3.0, 2.0, 0.5), "east": (10.0, -4.0, 0.0)}
+
+
+@pytest.fixture
+def maps(tmp_path):
+    """Two parts of one apartment as ROS maps with origins of their own, and the true transform between their ROS frames."""
+    truth = about_middle(2.0, apartment())
+    levels = {
+        "west": kept(apartment(), slice(0, 180), slice(0, 150)),
+        "east": moved(kept(apartment(), slice(0, 180), slice(58, 220)), truth),
+    }
+    paths = [write_ros_map(tmp_path / "in", name, levels[name], ORIGINS[name], RESOLUTION) for name in levels]
+    west_from_east = Transform(*ORIGINS["west"]) @ truth.inverse() @ Transform(*ORIGINS["east"]).inverse()
+    return [str(path) for path in paths], west_from_east
+
+
+@pytest.fixture
+def elsewhere(tmp_path):
+    return str(write_ros_map(tmp_path / "in", "elsewhere", room(blank(), 20, 20, 90, 130), (0.0, 0.0, 0.0), RESOLUTION))
+
+
+def test_two_maps_are_joined_in_the_ros_frame_of_the_first(maps, tmp_path, capsys):
+    paths, truth = maps
+    assert main(["merge", *paths, "--out", str(tmp_path / "out"), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result == json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["map.pgm", "map.yaml", "merge.png", "transforms.json"]
+    assert result["world"] == "west"
+    assert result["maps"]["west"] == {"x": 0.0, "y": 0.0, "theta": 0.0, "group": 0}
+    place = Transform(*ORIGINS["east"]).apply((8.0, 8.0))
+    (pair,) = result["pairs"]
+    for found in (result["maps"]["east"], pair):
+        distance, angle = Transform(found["x"], found["y"], found["theta"]).difference(truth, place)
+        assert distance < 0.05
+        assert angle < math.radians(0.5)
+    assert set(pair) == {"a", "b", "accepted", "reason", "x", "y", "theta", "inliers", "score", "overlap_m2", "time_ms"}
+    assert pair["accepted"] is True
+
+
+def test_the_fused_map_lies_in_the_worlds_frame(maps, tmp_path, capsys):
+    paths, _ = maps
+    assert main(["merge", *paths, "--out", str(tmp_path / "out")]) == 0
+    assert "joined: west, east" in capsys.readouterr().out
+    fused, west = read_ros_map(tmp_path / "out" / "map.yaml"), read_ros_map(tmp_path / "in" / "west.yaml")
+    assert fused.origin[2] == pytest.approx(0.5)
+    # The centres of the first map's free cells are free in the fused map.
+    rows, columns = np.nonzero(west.levels == 255)
+    points = Transform(*west.origin).apply(np.stack([columns + 0.5, rows + 0.5], axis=1) * RESOLUTION)
+    cells = np.floor(Transform(*fused.origin).inverse().apply(points) / RESOLUTION + 1e-6).astype(int)
+    assert (fused.levels[cells[:, 1], cells[:, 0]] == 255).mean() > 0.97
+
+
+def test_what_cannot_be_joined_is_refused_with_the_reason_of_each_pair(maps, elsewhere, tmp_path, capsys):
+    (west, _), _ = maps
+    assert main(["merge", west, elsewhere, "--out", str(tmp_path / "out")]) == 3
+    told = capsys.readouterr().out
+    assert "refused" in told
+    assert "nothing was written" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_of_three_maps_those_that_join_are_written(maps, elsewhere, tmp_path, capsys):
+    (west, east), _ = maps
+    assert main(["merge", elsewhere, west, east, "--out", str(tmp_path / "out"), "--json"]) == 3
+    result = json.loads(capsys.readouterr().out)
+    assert result["maps"]["elsewhere"] is None
+    assert result["world"] == "west"
+    assert [pair["accepted"] for pair in result["pairs"]] == [False, False, True]
+    assert (tmp_path / "out" / "map.yaml").exists()
+
+
+def test_plain_images_need_a_resolution(tmp_path, capsys):
+    for name, levels in (("one", apartment()), ("two", moved(apartment(), about_middle(1.0, apartment())))):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), levels[::-1])
+    paths = [str(tmp_path / "one.png"), str(tmp_path / "two.png")]
+    assert main(["merge", *paths, "--out", str(tmp_path / "out")]) == 2
+    assert "--resolution" in capsys.readouterr().err
+    assert main(["merge", *paths, "--resolution", str(RESOLUTION), "--out", str(tmp_path / "out")]) == 0
+
+
+def test_colours_are_read_as_greys_and_equal_names_are_numbered(tmp_path, capsys):
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        cv2.imwrite(str(tmp_path / folder / "map.png"), np.repeat(apartment()[::-1, :, None], 3, axis=2))
+    paths = [str(tmp_path / folder / "map.png") for folder in "ab"]
+    assert main(["merge", *paths, "--resolution", "0.05", "--json", "--out", str(tmp_path / "out")]) == 0
+    assert list(json.loads(capsys.readouterr().out)["maps"]) == ["map", "map-2"]
+
+
+@pytest.mark.parametrize("grey", [0, 127, 255])
+def test_maps_of_one_colour_are_refused(grey, tmp_path, capsys):
+    for name in "ab":
+        cv2.imwrite(str(tmp_path / f"{name}.png"), np.full((30, 30), grey, np.uint8))
+    assert main(["merge", str(tmp_path / "a.png"), str(tmp_path / "b.png"), "--resolution", "0.05", "--out", str(tmp_path / "out")]) == 3
+    assert "too few" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "word"),
+    [
+        ("resolution", 0.0, "resolution"),
+        ("origin", [math.nan, 0.0, 0.0], "origin"),
+        ("image", "gone.pgm", "gone.pgm"),
+        ("origin", None, "origin"),
+    ],
+)
+def test_bad_headers_are_named(maps, tmp_path, capsys, key, value, word):
+    (west, east), _ = maps
+    header = yaml.safe_load((tmp_path / "in" / "east.yaml").read_text())
+    (tmp_path / "in" / "east.yaml").write_text(yaml.safe_dump({**header, key: value}))
+    assert main(["merge", west, east, "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr()
+    assert word in told.err
+    assert "Traceback" not in told.err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["merge", "one.yaml"], "want two or more"),
+        (["merge", "one.yaml", "two.yaml"], "no file one.yaml"),
+        (["merge", "a.png", "b.png", "--resolution", "0"], "resolution is 0"),
+        (["merge", "a.png", "b.png", "--resolution", "nan"], "resolution is nan"),
+    ],
+)
+def test_bad_arguments_are_named(arguments, word, capsys, tmp_path):
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
+    assert word in capsys.readouterr().err
+
+
+def test_unknown_modes_are_named(maps, tmp_path, capsys):
+    (west, east), _ = maps
+    assert main(["merge", west, east, "--mode", "printed", "--out", str(tmp_path / "out")]) == 2
+    assert "mode" in capsys.readouterr().err
