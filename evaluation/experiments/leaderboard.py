@@ -88,7 +88,10 @@ def page(folder: Path, command: str) -> str:
         numbers = write_report(folder / kind, folder / kind / "report", BASELINE)
         floors = sorted({floor for group in numbers["groups"] for floor in group["floors"]})
         parts += [f"## {about[0].upper()}{about[1:]} ({len(floors)})", _table(numbers["groups"])]
-        parts += [f"- {warning}" for warning in _worth_telling(numbers["warnings"])]
+        if any("fewer than" in warning for warning in numbers["warnings"]):
+            parts.append(
+                "Fewer than 50 runs or pairs: such intervals hold the truth less often than they say ([how often](interval_coverage.md))."
+            )
     return "\n\n".join(parts) + "\n"
 
 
@@ -127,6 +130,8 @@ def _interval(figure: Mapping[str, Any]) -> str:
     def shown(value: float | None) -> str:
         return "never" if value is None else f"{value:.0f}"
 
+    if figure["low"] is None:
+        return f"{shown(figure['estimate'])} (too few for an interval)"
     return f"{shown(figure['estimate'])} ({shown(figure['low'])} to {shown(figure['high'])})"
 
 
@@ -134,14 +139,12 @@ def _difference(policy: str, group: Mapping[str, Any]) -> str:
     for comparison in group["comparisons"]:
         figure = comparison["difference"]
         if comparison["policy"] == policy and comparison["key"] == "t99_s" and figure is not None:
-            text = f"{figure['estimate']:+.0f} ({figure['low']:+.0f} to {figure['high']:+.0f})"
+            bounds = [figure["low"], figure["high"]]
+            # Of very few pairs there is an estimate alone.
+            text = f"{figure['estimate']:+.0f}" + ("" if None in bounds else f" ({bounds[0]:+.0f} to {bounds[1]:+.0f})")
             return f"**{text}**" if comparison["p_holm"] < CHANCE else text
     return "-"
 
 
 def _estimate(values: Mapping[str, Any], key: str) -> str:
     return f"{values[key]['median']['estimate']:.0f}"
-
-
-def _worth_telling(warnings: Iterable[str]) -> list[str]:
-    return [warning for warning in warnings if "fewer than" in warning or "repeat" in warning]
