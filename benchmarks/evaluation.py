@@ -8,7 +8,6 @@ record as well, and as a whole trial with its figures, its record and its line o
 """
 
 import argparse
-import random
 import signal
 import statistics
 import subprocess
@@ -18,6 +17,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import lidarium
 from lidarium.benchmarks.speed.report import about, heading
@@ -131,7 +132,7 @@ def kills(count: int) -> tuple[int, int]:
     RuntimeError
         Where an episode was lost, doubled or changed.
     """
-    generator = random.Random(0)
+    generator = np.random.default_rng(0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         command = [

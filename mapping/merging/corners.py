@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
 
 STEP = math.pi / 8.0
 """Corners open in multiples of this angle [rad]."""

@@ -12,9 +12,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from lidarium.mapping.map_files import FREE
 from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.occupancy import FREE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.corners import Corners, CornerSettings, detect_corners
 from lidarium.mapping.merging.descriptors import Descriptors, DescriptorSettings, describe_corners
+from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
 
 MAX_SIDE = 20_000
 _FACING_REACH = 3

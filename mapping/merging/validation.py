@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.map_files import FREE, UNKNOWN
 from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
 from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.occupancy import FREE, UNKNOWN
 
 OCCUPIED_WEIGHT = 10.0
 """How much more an occupied cell counts than a free one in the score."""
