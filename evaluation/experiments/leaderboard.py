@@ -90,7 +90,7 @@ def page(folder: Path, command: str) -> str:
         parts += [f"## {about[0].upper()}{about[1:]} ({len(floors)})", _table(numbers["groups"])]
         if any("fewer than" in warning for warning in numbers["warnings"]):
             parts.append(
-                "Fewer than 50 runs or pairs: such intervals may hold the truth less often than they say ([how often](interval_coverage.md))."
+                "Fewer than 50 runs or pairs: intervals may hold the truth less often than they say ([how often](interval_coverage.md))."
             )
     return "\n\n".join(parts) + "\n"
 

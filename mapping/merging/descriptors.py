@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.map_files import FREE, OCCUPIED
 from lidarium.mapping.merging.corners import Corners
+from lidarium.mapping.occupancy import FREE, OCCUPIED
 
 VARIANTS = ("two_rings", "polar", "log_polar")
 

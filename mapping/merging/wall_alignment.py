@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.map_files import FREE, OCCUPIED
 from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.occupancy import FREE, OCCUPIED
 
 
 def wall_sample(walls: int, count: int) -> NDArray[np.int64]:
