@@ -82,8 +82,15 @@ def page(folder: Path, command: str) -> str:
         "runs that did not get there count as never. The difference is that of the restricted means to `nearest_frontier`, pair by "
         "pair, with its 95 % interval; in bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm).",
     ]
+    is_run = {kind: (folder / kind / "episodes.jsonl").exists() for kind in KINDS}
+    if "--every" in command:
+        parts.append(
+            "A part of the floors of each kind, too few for firm words: the intervals say so. Without `--every` the command runs all."
+        )
+    if not all(is_run.values()):
+        parts.append(f"Not in it: {', '.join(about for kind, about in KINDS.items() if not is_run[kind])}.")
     for kind, about in KINDS.items():
-        if not (folder / kind / "episodes.jsonl").exists():
+        if not is_run[kind]:
             continue
         numbers = write_report(folder / kind, folder / kind / "report", BASELINE)
         floors = sorted({floor for group in numbers["groups"] for floor in group["floors"]})
