@@ -11,7 +11,7 @@ from lidarium.scripts.common import DONE, NO, Answer, Command, file_name, table
 if TYPE_CHECKING:
     from lidarium.mapping.map_files import MapImage
     from lidarium.mapping.merging.merger import Merged
-    from lidarium.mapping.merging.rigid import Transform
+    from lidarium.mapping.rigid import Transform
 
 DEFAULT_FOLDER = Path("merged")
 
@@ -80,7 +80,7 @@ def _read(command: Merge) -> "dict[str, MapImage]":
 
 def _corner(image: "MapImage") -> "Transform":
     """Return the transform from cells' metres into the map's ROS frame."""
-    from lidarium.mapping.merging.rigid import Transform
+    from lidarium.mapping.rigid import Transform
 
     return Transform(*image.origin)
 
@@ -130,7 +130,7 @@ def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, An
     from lidarium.evaluation.merge_picture import save_merge_picture
     from lidarium.evaluation.output import write_json
     from lidarium.mapping.map_files import write_ros_map
-    from lidarium.mapping.merging.rigid import Transform
+    from lidarium.mapping.rigid import Transform
 
     files = []
     joined = [group for group in merged.groups() if len(group) > 1]

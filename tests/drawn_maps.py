@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.rigid import Transform
 
 RESOLUTION = 0.05
 SPREAD = 320

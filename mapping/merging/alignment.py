@@ -10,8 +10,8 @@ from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.merging.corners import Corners
 from lidarium.mapping.merging.correspondence import Matches
 from lidarium.mapping.merging.described_map import DescribedMap
-from lidarium.mapping.merging.rigid import Transform, fit
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
+from lidarium.mapping.rigid import Transform, fit
 
 INLIER_RULES = ("distance", "ratio")
 REFINEMENTS = ("sweep", "least_squares", "walls")

@@ -13,8 +13,8 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from lidarium.mapping.merging.described_map import DescribedMap
-from lidarium.mapping.merging.rigid import Transform
 from lidarium.mapping.occupancy import FREE
+from lidarium.mapping.rigid import Transform
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.merging.corners import Corners
 from lidarium.mapping.merging.descriptors import Descriptors
-from lidarium.mapping.merging.rigid import wrapped
+from lidarium.mapping.rigid import wrapped
 
 METHODS = ("descriptors", "distances", "triplets")
 

@@ -9,7 +9,7 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.rigid import Transform
 
 Name = TypeVar("Name", bound=Hashable)
 

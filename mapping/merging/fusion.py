@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.merging.rigid import Transform
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.rigid import Transform
 
 OCCUPIED_LOG_ODDS, FREE_LOG_ODDS = 1.0, -0.6
 """What an occupied and a free cell of a three-level map add: one map that says occupied outweighs one that says free, not two."""

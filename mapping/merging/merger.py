@@ -11,8 +11,8 @@ from lidarium.mapping.merging.described_map import check_resolution, resampled, 
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.pair import PairResult, described, merge_pair
-from lidarium.mapping.merging.rigid import Transform
 from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.rigid import Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)

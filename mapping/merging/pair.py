@@ -11,10 +11,10 @@ from lidarium.mapping.merging.alignment import Candidate, distinct, find_inliers
 from lidarium.mapping.merging.correlation import best_translations
 from lidarium.mapping.merging.correspondence import Matches, match_corners
 from lidarium.mapping.merging.described_map import DescribedMap, describe_map
-from lidarium.mapping.merging.rigid import Transform, halfway
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.validation import Agreement, compare, disc_agreement, is_rival, why_refused
 from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_walls
+from lidarium.mapping.rigid import Transform, halfway
 
 NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))
 _QUARTERS = np.arange(4) * (math.pi / 2.0)

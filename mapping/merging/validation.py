@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
-from lidarium.mapping.merging.rigid import Transform
 from lidarium.mapping.occupancy import FREE, UNKNOWN
+from lidarium.mapping.rigid import Transform
 
 OCCUPIED_WEIGHT = 10.0
 """How much more an occupied cell counts than a free one in the score."""

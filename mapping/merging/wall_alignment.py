@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.merging.described_map import DescribedMap
-from lidarium.mapping.merging.rigid import Transform
 from lidarium.mapping.occupancy import FREE, OCCUPIED
+from lidarium.mapping.rigid import Transform
 
 
 def wall_sample(walls: int, count: int) -> NDArray[np.int64]:

@@ -8,7 +8,7 @@ import yaml
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, room
 
 from lidarium.mapping.map_files import read_ros_map, write_ros_map
-from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.rigid import Transform
 from lidarium.scripts.main import main
 
 ORIGINS = {"west": (-3.0, 2.0, 0.5), "east": (10.0, -4.0, 0.0)}

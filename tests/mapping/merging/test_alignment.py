@@ -10,8 +10,8 @@ from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers, 
 from lidarium.mapping.merging.corners import Corners, detect_corners
 from lidarium.mapping.merging.correspondence import METHODS, CorrespondenceSettings, Matches, match_corners
 from lidarium.mapping.merging.described_map import describe_map
-from lidarium.mapping.merging.rigid import Transform, fit, halfway, wrapped
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
+from lidarium.mapping.rigid import Transform, fit, halfway, wrapped
 
 POSES = st.builds(Transform, st.floats(-5, 5), st.floats(-5, 5), st.floats(-3.1, 3.1))
 

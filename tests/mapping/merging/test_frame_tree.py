@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
-from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.rigid import Transform
 
 A_FROM_B, B_FROM_C = Transform(1.0, 2.0, 0.3), Transform(-2.0, 0.5, 1.2)
 

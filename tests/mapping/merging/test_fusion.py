@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.fusion import fuse
-from lidarium.mapping.merging.rigid import Transform
+from lidarium.mapping.rigid import Transform
 
 
 def test_maps_that_agree_fuse_to_the_same_map_and_tell_who_saw_what():

@@ -11,8 +11,8 @@ from lidarium.envs.settings import make_settings
 from lidarium.evaluation.runner import run_episode
 from lidarium.mapping.map_files import FREE, UNKNOWN
 from lidarium.mapping.merging.merger import merge_maps
-from lidarium.mapping.merging.rigid import Transform
 from lidarium.mapping.occupancy import three_levels
+from lidarium.mapping.rigid import Transform
 
 
 def parts():

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.described_map import describe_map, resampled
 from lidarium.mapping.merging.pair import described, merge_pair
-from lidarium.mapping.merging.rigid import Transform
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 from lidarium.mapping.merging.validation import ValidationSettings, compare, disc_agreement, why_refused
+from lidarium.mapping.rigid import Transform
 
 
 def merged(a, b, resolution=RESOLUTION, mode="default"):

@@ -6,8 +6,8 @@ import pytest
 
 from lidarium.mapping.map_files import read_grey_map
 from lidarium.mapping.merging.pair import described, merge_pair
-from lidarium.mapping.merging.rigid import Transform
 from lidarium.mapping.merging.settings import merge_settings
+from lidarium.mapping.rigid import Transform
 
 
 def real_truth(pixel, resolution, rows_a, rows_b):
