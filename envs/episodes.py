@@ -1,4 +1,4 @@
-"""How an episode begins: its floor, where the robots start, its seed and its goal; drawn the same way alone and in a batch."""
+"""The world of episodes, and how one begins: floor, starts, seed and goal, drawn the same way alone and in a batch."""
 
 from dataclasses import dataclass
 
@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.starts import check_starts, draw_starts
 from lidarium.envs.options import FloorChoice, ResetOptions
+from lidarium.envs.scorer import reward_weights
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.floor_cache import floor_tables
 from lidarium.envs.simulation.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic import KinematicWorld
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +70,25 @@ def begin(generator: np.random.Generator, choice: FloorChoice, chosen: ResetOpti
         starts = draw_starts(tables.body, radius, settings.robots, generator, floor.starts)
     seed = int(generator.integers(2**63))
     return Beginning(floor, tables, starts, seed, (chosen.goal or floor.goal) if choice.has_goal else None)
+
+
+def make_world(settings: ExplorationSettings, episodes: int = 1) -> KinematicWorld:
+    """Return the world of so many episodes."""
+    return KinematicWorld(
+        [settings.robot] * settings.robots,
+        settings.lidar,
+        settings.occupancy,
+        settings.time_step,
+        episodes,
+        settings.threads,
+        settings.egocentric_scales,
+        reward_weights(settings),
+        settings.localization,
+        settings.odometry,
+        settings.faults,
+        settings.horizon_s,
+        settings.radio.is_ideal,
+    )
 
 
 def map_frames(beginning: Beginning, settings: ExplorationSettings) -> NDArray[np.float64]:

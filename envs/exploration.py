@@ -11,15 +11,15 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from lidarium.envs.episodes import Beginning, begin, goal_of_robots, map_frames
+from lidarium.envs.episodes import Beginning, begin, goal_of_robots, make_world, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
 from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.software import Software
 from lidarium.envs.options import FloorChoice, read_options
-from lidarium.envs.scorer import Scorer, is_near, reward_weights
+from lidarium.envs.scorer import Scorer, is_near
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
-from lidarium.envs.simulation.kinematic import KinematicWorld
 from lidarium.mapping.kernels import Array, kernel
 
 Observation = dict[str, NDArray[Any]]
@@ -90,16 +90,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.observation_spaces: dict[str, spaces.Space[Any]] = {agent: copy.deepcopy(space) for agent in self.possible_agents}
         self.action_spaces: dict[str, spaces.Space[Any]] = {agent: action_space() for agent in self.possible_agents}
         self._rows = {agent: row for row, agent in enumerate(self.possible_agents)}
-        team = [self.settings.robot] * self.settings.robots
-        self.world = KinematicWorld(
-            team,
-            self.settings.lidar,
-            self.settings.occupancy,
-            self.settings.time_step,
-            threads=self.settings.threads,
-            scales=self.settings.egocentric_scales,
-            reward_weights=reward_weights(self.settings),
-        )
+        self.world = make_world(self.settings)
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
         self._writer = ObservationWriter(self.settings, self.has_goal)
         self._horizon = self.settings.horizon_steps
@@ -113,6 +104,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.seed: int | None = None
         self.scorer = Scorer(self.world, self.settings)
         self.perception = Perception(self.world, self.settings, self._offsets)
+        self._software = Software(self.perception, self.settings)
         self._stopping: dict[str, str] = {}
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -149,9 +141,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._commands[:] = 0.0
         self._stopping.clear()
         self.agents = self.possible_agents[:]
-        self.world.step(self._commands, moves_bodies=False)
-        self.scorer.start()
         self.perception.start(self.goal)
+        self._software.start(0, beginning.seed)
+        self._software.step(self._commands, moves_bodies=False)
+        self.scorer.start()
         infos = self._infos(self.agents)
         if self.render_mode == "human":
             self.render()
@@ -198,7 +191,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
         """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s], without building observations."""
-        self.world.step(commands)
+        self._software.step(commands)
         self.scorer.advance()
 
     @property
@@ -241,7 +234,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Whether the next outcome ends some agent for what happened to it (the goal reached, a collision)."""
         settings = self.settings
         is_at_goal = self.goal is not None and any(self._is_at_goal(self._rows[agent]) for agent in self.agents)
-        return is_at_goal or (settings.stop_on_contact and bool(self.scorer.touched.any()))
+        has_failed = any(self.world.failed[self._rows[agent]] for agent in self.agents)
+        return is_at_goal or has_failed or (settings.stop_on_contact and bool(self.scorer.touched.any()))
 
     def _is_at_goal(self, row: int) -> bool:
         assert self.goal is not None
@@ -266,6 +260,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     endings[agent] = "reached"
         if settings.stop_on_contact and self.scorer.touched.any():
             endings |= {agent: "collision" for agent in live if self.scorer.touched[self._rows[agent]]}
+        if self.world.failed.any():
+            endings |= {agent: "failed" for agent in live if self.world.failed[self._rows[agent]]}
         return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
 
     def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:

@@ -66,7 +66,7 @@ def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None
     """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``."""
     table, offsets, goals, pools = known
     world = world_at(table)
-    ranges, believed, velocities, bumpers = world.ranges, world.believed, world.velocities, world.bumpers
+    ranges, believed, velocities, bumpers = world.ranges, world.believed, world.measured, world.bumpers
     beliefs, origins = world.maps, world.origins
     numbers, scales = limits
     scans, poses, motions, presses, maps, egocentric_maps, observed_goals = observed

@@ -7,8 +7,12 @@ from dataclasses import dataclass, field, replace
 from numbers import Integral
 from typing import Any
 
+from lidarium.envs.simulation.faults import NO_FAULTS, FaultSettings
 from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.odometry import ODOMETRY, OdometrySettings
+from lidarium.envs.simulation.radio import RADIO, RadioSettings
 from lidarium.envs.simulation.robots import ROBOTS, Robot
+from lidarium.mapping.localization.registry import localizer_names
 from lidarium.mapping.occupancy import OccupancySettings
 
 MAX_ROBOTS = 64
@@ -29,8 +33,24 @@ LIDARS: dict[str, Lidar] = {
 }
 """Lasers by name: the URG-04LX-UG01 as simulated in the theses, and two that look all around."""
 
-LOCALIZATIONS = ("truth",)
+KERNEL_LOCALIZATIONS = ("truth", "odometry")
+"""Who can say where a robot is within the kernels of a step: the truth, or the wheels alone."""
+
 BACKENDS = ("kinematic",)
+
+
+REALISM: dict[str, dict[str, Any]] = {
+    "ideal": {"noise": "none", "odometry": "ideal", "localization": "truth", "radio": "all", "faults": NO_FAULTS},
+    "lab": {"noise": "datasheet", "odometry": "typical", "localization": "slam", "radio": "all", "faults": NO_FAULTS},
+    "field": {
+        "noise": "datasheet",
+        "odometry": "poor",
+        "localization": "slam",
+        "radio": RadioSettings(kind="signal", shadowing=4.0, loss=0.05, latency_s=0.2),
+        "faults": FaultSettings(laser_dropout=6.0, blind_sector=6.0, stuck_wheel=2.0, dead_radio=1.0),
+    },
+}
+"""How real the world is, by name: what each preset stands for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +99,13 @@ class ExplorationSettings:
     known_starts : bool
         Whether the robots know where they start; otherwise each believes to start at (0, 0, 0).
     localization : str
-        Who says where the robot is: ``truth``.
+        Who says where the robot is: ``truth``, ``odometry`` or one of ``localizer_names``.
+    odometry : OdometrySettings
+        How well wheels tell the way.
+    radio : RadioSettings
+        How robots reach each other.
+    faults : FaultSettings
+        What goes wrong with them.
     backend : str
         The world: ``kinematic``.
     time_step : float
@@ -115,6 +141,9 @@ class ExplorationSettings:
     reward: RewardSettings = field(default_factory=RewardSettings)
     known_starts: bool = True
     localization: str = "truth"
+    odometry: OdometrySettings = ODOMETRY["ideal"]
+    radio: RadioSettings = RADIO["all"]
+    faults: FaultSettings = NO_FAULTS
     backend: str = "kinematic"
     time_step: float = 0.1
     horizon_s: float | None = 600.0
@@ -133,17 +162,15 @@ class ExplorationSettings:
         for name, kind in (("robots", Integral), ("map_cells", Integral), ("egocentric_cells", Integral), ("threads", Integral)):
             if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} is {getattr(self, name)!r}; want a whole number{' from 1 to 64' if name == 'robots' else ''}")
-        for name, wanted in (("robot", Robot), ("lidar", Lidar), ("occupancy", OccupancySettings), ("reward", RewardSettings)):
+        for name, wanted in PARTS.items():
             if not isinstance(getattr(self, name), wanted):
-                raise ValueError(
-                    f"{name} is {getattr(self, name)!r}; want {wanted.__name__}{' or its name' if name in ('robot', 'lidar') else ''}"
-                )
+                raise ValueError(f"{name} is {getattr(self, name)!r}; want {wanted.__name__}{' or its name' if name in _NAMES else ''}")
         if not 1 <= self.robots <= MAX_ROBOTS:
             raise ValueError(f"robots is {self.robots}; a team has 1 to {MAX_ROBOTS}")
         if not (math.isfinite(self.goal_radius) and self.goal_radius > 0.0):
             raise ValueError(f"goal_radius is {self.goal_radius} m; want more than 0")
-        if self.localization not in LOCALIZATIONS:
-            raise ValueError(f"localization is {self.localization!r}; want one of {', '.join(LOCALIZATIONS)}")
+        if self.localization not in localizations():
+            raise ValueError(f"localization is {self.localization!r}; want one of {', '.join(localizations())}")
         if self.backend not in BACKENDS:
             raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(BACKENDS)}")
         if not (math.isfinite(self.time_step) and self.time_step > 0.0):
@@ -173,6 +200,12 @@ class ExplorationSettings:
             raise ValueError(f"threads is {self.threads}; want at least 1")
 
     @property
+    def is_ideal(self) -> bool:
+        """Whether sensors, poses, radio and robots are perfect."""
+        is_plain = self.localization == "truth" and self.odometry.is_ideal and self.radio.is_ideal
+        return is_plain and not self.lidar.is_noisy and self.faults == NO_FAULTS
+
+    @property
     def agents(self) -> list[str]:
         """Names of the robots."""
         return [f"robot_{robot}" for robot in range(self.robots)]
@@ -186,6 +219,21 @@ class ExplorationSettings:
     def decision_steps(self) -> int:
         """Steps of a decision period."""
         return max(round(self.decision_period_s / self.time_step), 1)
+
+
+PARTS: dict[str, type] = {
+    "robot": Robot, "lidar": Lidar, "occupancy": OccupancySettings, "reward": RewardSettings, "odometry": OdometrySettings,
+    "radio": RadioSettings, "faults": FaultSettings,
+}  # fmt: skip
+"""Settings that are made of others."""
+
+_NAMES: dict[str, dict[str, Any]] = {"robot": ROBOTS, "lidar": LIDARS, "odometry": ODOMETRY, "radio": RADIO}
+"""Those of them that have names."""
+
+
+def localizations() -> tuple[str, ...]:
+    """Return the names of all who can say where a robot is."""
+    return (*KERNEL_LOCALIZATIONS, *localizer_names())
 
 
 def _observed(names: Iterable[str]) -> tuple[str, ...]:
@@ -228,8 +276,10 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     settings : ExplorationSettings or None
         Where to start from; the defaults where None.
     **options
-        Any attribute of ``ExplorationSettings``; ``robot`` and ``lidar`` also by name, ``noise`` (none, datasheet or thesis)
-        for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps) in place of ``horizon_s``.
+        Any attribute of ``ExplorationSettings``; ``robot``, ``lidar``, ``odometry`` and ``radio`` also by name, ``noise`` (none,
+        datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps) in place of
+        ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise, odometry, localization, radio and faults that is not given
+        itself.
 
     Returns
     -------
@@ -242,9 +292,13 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         Where an option has a bad value or is unknown.
     """
     base = settings or ExplorationSettings()
-    robot, lidar = options.pop("robot", base.robot), options.pop("lidar", base.lidar)
-    options["robot"] = _named("robot", robot, ROBOTS) if isinstance(robot, str) else robot
-    lidar = _named("lidar", lidar, LIDARS) if isinstance(lidar, str) else lidar
+    realism = options.pop("realism", None)
+    if realism is not None:
+        options = {**_named("realism", realism, REALISM), **options}
+    for name, table in _NAMES.items():
+        if isinstance(options.get(name), str):
+            options[name] = _named(name, options[name], table)
+    lidar = options.pop("lidar", base.lidar)
     noise = options.pop("noise", None)
     if noise is not None:
         noise_floor, noise_share = _named("noise", noise, NOISE)
@@ -261,7 +315,9 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     known = ExplorationSettings.__dataclass_fields__
     for name in options:
         if name not in known:
-            raise TypeError(f"unknown option {name!r}; known are {', '.join(sorted([*known, 'noise', 'resolution', 'max_cycles']))}")
+            raise TypeError(
+                f"unknown option {name!r}; known are {', '.join(sorted([*known, 'noise', 'realism', 'resolution', 'max_cycles']))}"
+            )
     return replace(base, **options)
 
 

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from lidarium.envs.coverage import count_bits, pack_bits
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.simulation.arrays import OWN_FRAME, WorldArrays, world_at
+from lidarium.envs.simulation.arrays import OWN_FRAME, TRUE_POSE, WorldArrays, world_at
 from lidarium.envs.simulation.stages import MAP_RESOLUTION, RANGE_MAX
-from lidarium.evaluation.beliefs import shares_one_map
+from lidarium.evaluation.beliefs import held_maps, shares_one_map
 from lidarium.evaluation.truth import Truth
 from lidarium.mapping.cell_blocks import negative_cells, positive_cells
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel
@@ -26,11 +26,25 @@ SLACK = 4
 
 
 @kernel
+def _cells_beyond(world: WorldArrays, row: int, episode: int) -> tuple[int, int]:
+    """Rows and columns by which a map on the floor's lattice begins before the masks."""
+    frame, origin, resolution = world.frames[episode], world.origins[row], world.sensor[MAP_RESOLUTION]
+    return int(round((frame[1] - origin[1]) / resolution)), int(round((frame[0] - origin[0]) / resolution))
+
+
+@kernel
 def _box(
     world: WorldArrays, row: int, episode: int, pose: Array, way: float, change: Array, shape: tuple[int, int]
 ) -> tuple[int, int, int, int]:
     """Rows and words that a robot's scans may have changed since it stood at a pose: row_low, row_high, word_low, word_high."""
     resolution, frame = world.sensor[MAP_RESOLUTION], world.frames[episode]
+    first_row, first_column = _cells_beyond(world, row, episode)
+    if not world.flags[row] & TRUE_POSE:
+        # Whoever does not know where he is may map what is far from there.
+        return (
+            max(change[0] - first_row, 0), min(change[1] - first_row, shape[0]), max(change[2] - first_column, 0) >> 6,
+            min((change[3] - first_column + 63) >> 6, shape[1]),
+        )  # fmt: skip
     reach = (world.sensor[RANGE_MAX] + world.travelled[row] - way) / resolution + SLACK
     x, y = (pose[0] - frame[0]) / resolution, (pose[1] - frame[1]) / resolution
     row_low, row_high = max(int(math.floor(y - reach)), 0), min(int(math.ceil(y + reach)), shape[0])
@@ -50,7 +64,8 @@ def _free_of_sum(world: WorldArrays, first: int, robots: int, line: int, word: i
         column, total = word * 64 + count_bits(bit - np.uint64(1)), 0
         for row in range(first, first + robots):
             belief = world.maps[row]
-            total += int8_grid_at(belief[0], belief[1], belief[2])[line, column]
+            first_row, first_column = _cells_beyond(world, row, first // robots)
+            total += int8_grid_at(belief[0], belief[1], belief[2])[line + first_row, column + first_column]
         if total < 0:
             free |= bit
     return free
@@ -102,7 +117,9 @@ def _take_in_aligned(
     box: tuple[int, int, int, int],
 ) -> None:
     """Bring up to date what comes of a map on the floor's lattice, in a box of rows and words."""
-    own, address, columns = bits[robot], world.maps[first + robot, 0], world.maps[first + robot, 2]
+    own, columns = bits[robot], world.maps[first + robot, 2]
+    first_row, first_column = _cells_beyond(world, first + robot, first // robots)
+    address = world.maps[first + robot, 0] + first_row * columns + first_column
     for i in range(box[0], box[1]):
         for j in range(box[2], box[3]):
             if truth[KNOWABLE, i, j] == np.uint64(0):
@@ -282,6 +299,9 @@ class MapTally:
             env.world.table, 0, self.shares, self._truth, self._signs, self._bits, self._disputed, self.counts, self._poses, self._ways,
             self._changes,
         )  # fmt: skip
+        if env.perception.hears:
+            for robot, held in enumerate(held_maps(env)):
+                self.counts[robot, COUNTED] = int(np.bitwise_count(pack_bits(held < 0) & self._truth[COUNTED]).sum())
 
     @property
     def known_shares(self) -> NDArray[np.float64]:

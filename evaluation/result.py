@@ -13,7 +13,7 @@ from lidarium.agents.policy import GivenUp
 from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scorer import THRESHOLDS
-from lidarium.envs.settings import ExplorationSettings
+from lidarium.envs.settings import REALISM, ExplorationSettings, make_settings
 from lidarium.evaluation import metrics
 from lidarium.evaluation.beliefs import free_as_held, maps_on_floor
 from lidarium.evaluation.history import WHOLE, History
@@ -127,6 +127,8 @@ def _overlaps(history: History | None) -> dict[str, Any]:
 def _pose_errors(env: ExplorationEnv, history: History | None) -> dict[str, Any]:
     """Return ATE and RPE of each robot; frames agree where starts are known, else the best fit brings them together."""
     robots = env.settings.robots
+    if history is None and env.settings.localization != "truth":
+        return {"ate_m": None, "rpe_m": None, "rpe_rad": None}
     if history is None:
         # The localizer is the truth: no error.
         return {"ate_m": [0.0] * robots, "rpe_m": None, "rpe_rad": None}
@@ -165,8 +167,11 @@ def map_figures(env: ExplorationEnv) -> dict[str, Any]:
 
 
 def realism_of(settings: ExplorationSettings) -> str:
-    """Return ``ideal`` where sensors and poses are perfect, else ``custom``."""
-    return "custom" if settings.lidar.is_noisy or settings.localization != "truth" else "ideal"
+    """Return the name of the preset of realism that the settings are of, ``custom`` where they are of none."""
+    for name in REALISM:
+        if make_settings(settings, realism=name) == settings:
+            return name
+    return "custom"
 
 
 def settings_sha256(settings: ExplorationSettings) -> str:

@@ -69,7 +69,7 @@ def note_changes(maps: Array, poses: Array, last: Array, reach: float, frame: Ar
     Parameters
     ----------
     maps : (robots, 3 or more) int64
-        Address, rows and columns of each robot's log-odds, int8.
+        Address of each robot's log-odds (int8) at the lattice's first cell, and rows and columns of its map, which may be larger.
     poses, last : (robots, 2 or more), (robots, 2) float64
         Where the robots are, and where they were at the last look (updated) [m].
     reach : float
@@ -100,7 +100,7 @@ def note_changes(maps: Array, poses: Array, last: Array, reach: float, frame: Ar
         sums = total[: (high - low) * 64]
         sums[:] = np.int16(0)
         for robot in range(maps.shape[0]):
-            _add_row(maps[robot, 0] + (row * words + low) * 64, sums)
+            _add_row(maps[robot, 0] + row * maps[robot, 2] + low * 64, sums)
         for word in range(low, high):
             if _note_word(sums.ctypes.data + (word - low) * 128, _ALL, row, word, known, occupied, changes[found]):
                 found += 1

@@ -36,6 +36,39 @@ class Command:
             raise ValueError(f"seed is {self.seed}; want zero or more")
 
 
+@dataclass(frozen=True, kw_only=True)
+class TeamCommand(Command):
+    """Options of commands that let a team explore."""
+
+    robot: str = "kobuki"
+    """body of the robots; `lidarium show robots` lists them"""
+    lidar: str = "urg"
+    """laser of the robots; `lidarium show lidars` lists them"""
+    realism: str = "ideal"
+    """how real the world is: ideal, lab or field; the options below change parts of it"""
+    noise: str | None = None
+    """noise of the laser's ranges: none, datasheet or thesis"""
+    odometry: str | None = None
+    """how well wheels tell the way: ideal, good, typical or poor"""
+    localization: str | None = None
+    """who says where a robot is: truth, odometry or a localizer; `lidarium show localizers` lists them"""
+    radio: str | None = None
+    """how robots reach each other: all, none, range, line_of_sight or signal"""
+    unknown_starts: bool = False
+    """robots do not know where they start, nor where the others do"""
+    map_resolution: float = 0.025
+    """side of a cell of the maps, a whole multiple of 0.025 [m]"""
+
+    @property
+    def team_options(self) -> dict[str, Any]:
+        """What the options say of a team, as ``make_settings`` takes it; what was left out is left out."""
+        given = {name: getattr(self, name) for name in ("noise", "odometry", "localization", "radio") if getattr(self, name) is not None}
+        starts = {"known_starts": False} if self.unknown_starts else {}
+        return {
+            "robot": self.robot, "lidar": self.lidar, "realism": self.realism, **given, **starts, "resolution": self.map_resolution
+        }  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True)
 class Answer:
     """What a command found.

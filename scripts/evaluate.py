@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, Command, counted, table, tell
+from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, table, tell
 
 if TYPE_CHECKING:
     from lidarium.evaluation.campaign import Campaign
@@ -19,7 +19,7 @@ DEFAULT_FOLDER = Path("runs/evaluation")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluate(Command):
+class Evaluate(TeamCommand):
     """Run policies x floors x robots x seeds; finished episodes are kept, and the same command goes on where it stopped."""
 
     suite: Positional[Path | None] = None
@@ -37,14 +37,6 @@ class Evaluate(Command):
     """sizes of teams"""
     seeds: int = 3
     """how many seeds, from --seed on; the same seed draws the same starts for every policy"""
-    robot: str = "kobuki"
-    """body of the robots; `lidarium show robots` lists them"""
-    lidar: str = "urg"
-    """laser of the robots; `lidarium show lidars` lists them"""
-    noise: str = "none"
-    """noise of the laser's ranges: none, datasheet or thesis"""
-    map_resolution: float = 0.025
-    """side of a cell of the maps, a whole multiple of 0.025 [m]"""
     horizon_s: float = 1800.0
     """simulated time after which an episode is cut [s]"""
     stop_coverage: float = 0.99
@@ -99,10 +91,7 @@ def _suite(command: Evaluate) -> "Suite":
 
         return preset_suite(command.preset, command.policies, seeds, command.data, command.floors)
     settings = {
-        "robot": command.robot,
-        "lidar": command.lidar,
-        "noise": command.noise,
-        "resolution": command.map_resolution,
+        **command.team_options,
         "horizon_s": command.horizon_s,
         "stop_coverage": command.stop_coverage,
     }

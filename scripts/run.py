@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lidarium.scripts.common import INTERRUPTED, Answer, Command, Progress, file_name, table, tell
+from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name, table, tell
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +25,7 @@ NAMED_GIVEN_UP = 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(Command):
+class Run(TeamCommand):
     """Let a team explore a floor; writes its figures, its map, a picture and, if asked for, a record and a film."""
 
     floor: str = "apartment"
@@ -34,16 +34,8 @@ class Run(Command):
     """number of robots"""
     policy: str = "nearest_frontier"
     """who decides; `lidarium show policies` lists them"""
-    robot: str = "kobuki"
-    """body of the robots; `lidarium show robots` lists them"""
-    lidar: str = "urg"
-    """laser of the robots; `lidarium show lidars` lists them"""
-    noise: str = "none"
-    """noise of the laser's ranges: none, datasheet or thesis"""
     resolution: float | None = None
     """metres per pixel, where the floor is a plain image"""
-    map_resolution: float = 0.025
-    """side of a cell of the maps, a whole multiple of 0.025 [m]"""
     horizon_s: float | None = None
     """simulated time after which the run is cut [s]; without it the run ends when the explorers do"""
     stop_coverage: float = 0.99
@@ -89,15 +81,7 @@ def execute(command: Run) -> Answer:
 def _settings(command: Run) -> "ExplorationSettings":
     from lidarium.envs.settings import make_settings
 
-    return make_settings(
-        robots=command.robots,
-        robot=command.robot,
-        lidar=command.lidar,
-        noise=command.noise,
-        resolution=command.map_resolution,
-        horizon_s=command.horizon_s,
-        stop_coverage=command.stop_coverage,
-    )
+    return make_settings(robots=command.robots, horizon_s=command.horizon_s, stop_coverage=command.stop_coverage, **command.team_options)
 
 
 def _recorder(command: Run) -> "Recorder | None":

@@ -1,4 +1,4 @@
-"""`lidarium show`: what can be chosen: policies, robots, lasers, settings."""
+"""`lidarium show`: what can be chosen: policies, robots, lasers, what makes a world real, settings."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
@@ -10,9 +10,9 @@ from lidarium.scripts.common import Answer, Command, table
 
 @dataclass(frozen=True, kw_only=True)
 class Show(Command):
-    """Tell what can be chosen: policies, robots, lidars, or all settings with their defaults."""
+    """Tell what can be chosen: policies, robots, lidars, what makes a world real, or all settings with their defaults."""
 
-    what: Positional[Literal["policies", "robots", "lidars", "settings"]]
+    what: Positional[Literal["policies", "robots", "lidars", "realism", "odometry", "localizers", "radios", "settings"]]
     """what to list"""
 
 
@@ -22,7 +22,7 @@ def execute(command: Show) -> Answer:
 
     if command.out is not None:
         check_writable(command.out)
-    result, text = {"policies": _policies, "robots": _robots, "lidars": _lidars, "settings": _settings}[command.what]()
+    result, text = _LISTS[command.what]()
     if command.out is not None:
         write_json(command.out / f"{command.what}.json", result)
     return Answer(result, text)
@@ -70,3 +70,55 @@ def _settings() -> tuple[dict[str, Any], str]:
         entries = {f"{name}.{part}": part_value for part, part_value in value.items()} if isinstance(value, dict) else {name: value}
         rows += [(entry, "none" if part_value is None else str(part_value)) for entry, part_value in entries.items()]
     return {"settings": values}, "\n".join(f"{entry:<32}{value}" for entry, value in rows)
+
+
+def _realism() -> tuple[dict[str, Any], str]:
+    from lidarium.envs.settings import REALISM, make_settings
+    from lidarium.envs.simulation.faults import KINDS
+
+    header = ("realism", "noise", "odometry", "localization", "radio", "faults [1/h]")
+    rows, values = [], {}
+    for name, preset in REALISM.items():
+        settings = make_settings(realism=name)
+        rates = {kind: rate for kind in KINDS[1:] if (rate := getattr(settings.faults, kind)) > 0.0}
+        faults = ", ".join(f"{kind} {rate:g}" for kind, rate in rates.items()) or "none"
+        rows.append((name, preset["noise"], preset["odometry"], settings.localization, settings.radio.kind, faults))
+        values[name] = {part: asdict(settings)[part] for part in ("lidar", "odometry", "localization", "radio", "faults")}
+    return {"realism": values}, table(rows, header, indent="")
+
+
+def _odometry() -> tuple[dict[str, Any], str]:
+    from lidarium.envs.simulation.odometry import ODOMETRY
+
+    values = {name: asdict(odometry) for name, odometry in ODOMETRY.items()}
+    return {"odometry": values}, _side_by_side(values)
+
+
+def _radios() -> tuple[dict[str, Any], str]:
+    from lidarium.envs.simulation.radio import RADIO
+
+    values = {name: asdict(radio) for name, radio in RADIO.items()}
+    return {"radios": values}, _side_by_side(values)
+
+
+def _localizers() -> tuple[dict[str, Any], str]:
+    from lidarium.mapping.localization.registry import LOCALIZERS
+
+    lines = {
+        "truth": "the true pose",
+        "odometry": "dead reckoning by the wheels",
+        **{name: entry.description for name, entry in LOCALIZERS.items()},
+    }
+    return {"localizers": lines}, table(lines.items(), indent="")
+
+
+def _side_by_side(values: dict[str, dict[str, Any]]) -> str:
+    """Return a table of settings, a column for each name."""
+    fields = next(iter(values.values()))
+    return table([(field, *(str(named[field]) for named in values.values())) for field in fields], ("", *values), indent="")
+
+
+_LISTS = {
+    "policies": _policies, "robots": _robots, "lidars": _lidars, "realism": _realism, "odometry": _odometry, "localizers": _localizers,
+    "radios": _radios, "settings": _settings,
+}  # fmt: skip

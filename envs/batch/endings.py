@@ -6,10 +6,10 @@ from numpy.typing import NDArray
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.kinematic import KinematicWorld
 
-REASONS = ("", "covered", "reached", "collision", "horizon", "no_frontier", "frontier_unreachable")
+REASONS = ("", "covered", "reached", "collision", "horizon", "no_frontier", "frontier_unreachable", "failed")
 """Why a robot ended, by number; 0 where it has not."""
 
-COVERED, REACHED, COLLISION, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE = range(1, len(REASONS))
+COVERED, REACHED, COLLISION, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE, FAILED = range(1, len(REASONS))
 
 
 def endings(
@@ -44,6 +44,7 @@ def endings(
         reasons[live & is_there] = REACHED
     if settings.stop_on_contact:
         reasons[live & (world.contacts != 0)] = COLLISION
+    reasons[live & (world.failed != 0)] = FAILED
     horizon = settings.horizon_steps
     if horizon is not None:
         is_late = world.steps >= horizon

@@ -13,16 +13,26 @@ from numpy.typing import NDArray
 
 from lidarium.envs.batch.endings import HORIZON, REASONS, endings
 from lidarium.envs.batch.levels import make_level
-from lidarium.envs.batch.running import LOOKS, STEPS, WAITS, Tally, run_parallel, run_serial
-from lidarium.envs.episodes import Beginning, begin, goal_of_robots, map_frames
+from lidarium.envs.batch.running import (
+    DECIDES,
+    LOOKS,
+    STEPS,
+    WAITS,
+    Tally,
+    begin_decisions,
+    follow_some,
+    note_ends,
+    run_parallel,
+    run_serial,
+)
+from lidarium.envs.episodes import Beginning, begin, goal_of_robots, make_world, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, observation_space
 from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.software import Software
 from lidarium.envs.options import FloorChoice, ResetOptions
-from lidarium.envs.scorer import reward_weights
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
-from lidarium.envs.simulation.kinematic import KinematicWorld
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -86,18 +96,10 @@ class EpisodeBatch:
         self.episodes, self.robots, self.settings = int(episodes), settings.robots, settings
         self.rows = self.episodes * self.robots
         self._choice = FloorChoice(floor, image_resolution)
-        self.world = KinematicWorld(
-            [settings.robot] * settings.robots,
-            settings.lidar,
-            settings.occupancy,
-            settings.time_step,
-            self.episodes,
-            settings.threads,
-            settings.egocentric_scales,
-            reward_weights(settings),
-        )
+        self.world = make_world(settings, self.episodes)
         self._offsets, self._goals = np.zeros((self.rows, 2)), np.full((self.rows, 2), np.nan)
         self.perception = Perception(self.world, settings, self._offsets)
+        self._software = Software(self.perception, settings)
         self.level = make_level(level, self.perception, settings)
         self._writer = ObservationWriter(settings, self._choice.has_goal)
         known = observation_space(settings, self._choice.has_goal).spaces
@@ -210,6 +212,9 @@ class EpisodeBatch:
         seen : (rows,) bool
             Whose observations are written.
         """
+        if self._software.is_staged:
+            self._run_staged(modes.copy(), commands, seen)
+            return
         threads = self.world.threads
         self.world.use_threads()
         run = run_parallel if threads > 1 else run_serial
@@ -217,6 +222,23 @@ class EpisodeBatch:
             self.world.table, self.robots, modes, commands, self.level.drives, self.level.following, self._tally,
             self.settings.decision_steps, seen, *self._writer.arguments(self.world, self._offsets, self.observations, self._goals), threads,
         )  # fmt: skip
+
+    def _run_staged(self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]) -> None:
+        """Run episodes as the kernel does, step by step with what runs on board between the stages of a step; ``modes`` is used up."""
+        decides = modes == DECIDES
+        left = np.where(decides, self.settings.decision_steps, 1)
+        begin_decisions(decides, self.robots, self.level.drives, self._tally)
+        looks = modes == LOOKS
+        if looks.any():
+            self._software.step(commands, moves_bodies=False, runs=looks)
+            modes[looks] = WAITS
+        while (runs := modes != WAITS).any():
+            follow_some(runs & decides, self.robots, self.world.table, self.level.drives, self.level.following, commands)
+            self._software.step(commands, runs=runs)
+            note_ends(modes, self.robots, self.world.table, self.level.drives, self._tally)
+            left[runs] -= 1
+            modes[left == 0] = WAITS
+        self._writer.write(self.world, self._offsets, self.observations, seen, self._goals)
 
     def _draw(
         self, beginning: NDArray[np.int64], seeds: Sequence[int | None] | None, options: Mapping[int, ResetOptions]
@@ -244,6 +266,7 @@ class EpisodeBatch:
         self._tally.goals[episode] = np.nan if start.goal is None else start.goal
         self._commands[rows], self.live[rows] = 0.0, True
         self.perception.start(start.goal, episode)
+        self._software.start(episode, start.seed)
         self.level.start(episode)
 
     def _new_buffers(self) -> Arrays:

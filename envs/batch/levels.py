@@ -107,7 +107,8 @@ class VelocityLevel:
         self._limits = np.array([settings.robot.max_speed, settings.robot.max_turn_rate])
         self.drives = no_drives(1)
         self.following = Following(
-            settings.lidar.unit_vectors, np.zeros(1), np.zeros(4), False, np.zeros(1, np.uint8), FORESIGHT_TIMES
+            settings.lidar.unit_vectors, np.zeros(1), np.zeros(4), False, np.zeros((1, 1), np.uint8), np.zeros((1, 3)),
+            np.zeros(1, np.uint8), FORESIGHT_TIMES,
         )  # fmt: skip
 
     def start(self, episode: int) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lidarium.envs.observations import Arrays, write_row
 from lidarium.envs.onboard.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
 from lidarium.envs.scorer import is_near
-from lidarium.envs.simulation.arrays import world_at
+from lidarium.envs.simulation.arrays import WorldArrays, world_at
 from lidarium.envs.simulation.stepping import step_episode
 from lidarium.mapping.kernels import Array, kernel
 
@@ -43,14 +43,58 @@ class Tally(NamedTuple):
 
 
 @kernel
-def _is_interrupted(poses: Array, contacts: Array, live: Array, goal: Array, radius: float, stops_on_contact: bool) -> bool:
-    """Whether something happened to a robot of the episode that ends it: the goal reached, a collision."""
+def _is_interrupted(poses: Array, contacts: Array, failed: Array, live: Array, goal: Array, radius: float, stops_on_contact: bool) -> bool:
+    """Whether something happened to a robot of the episode that ends it: the goal reached, a collision, a failure."""
     for robot in range(live.shape[0]):
+        if live[robot] and failed[robot] != 0:
+            return True
         if live[robot] and is_near(poses[robot, 0], poses[robot, 1], goal[0], goal[1], radius):
             return True
         if stops_on_contact and contacts[robot] != 0:
             return True
     return False
+
+
+@kernel
+def _ends(world: WorldArrays, episode: int, robots: int, drives: Drives, tally: Tally, decides: bool) -> bool:
+    """Whether an episode's run ends with the step that was just taken."""
+    first, last = episode * robots, (episode + 1) * robots
+    coverage = world.team_seen[episode] / max(tally.counted[episode], 1)
+    if world.steps[episode] >= tally.bounds[0] or coverage >= tally.bounds[1]:
+        return True
+    if _is_interrupted(
+        world.poses[first:last], world.contacts[first:last], world.failed[first:last], tally.live[first:last], tally.goals[episode],
+        tally.bounds[2], tally.bounds[3] != 0.0,
+    ):  # fmt: skip
+        return True
+    return bool(decides and any_newly_done(drives, first, last, tally.live, tally.waiting))
+
+
+@kernel
+def begin_decisions(decides: Array, robots: int, drives: Drives, tally: Tally) -> None:
+    """Note who waits for an order already in the episodes that ``decides`` (episodes,) names."""
+    for episode in range(decides.shape[0]):
+        if decides[episode]:
+            mark_waiting(drives, episode * robots, (episode + 1) * robots, tally.waiting)
+
+
+@kernel
+def follow_some(decides: Array, robots: int, table: Array, drives: Drives, following: Following, commands: Array) -> None:
+    """Give the robots of the episodes that ``decides`` (episodes,) names the speeds that follow their paths."""
+    world = world_at(table)
+    for episode in range(decides.shape[0]):
+        if decides[episode]:
+            first, last = episode * robots, (episode + 1) * robots
+            follow_team(drives, following, first, last, world.believed, world.measured, world.ranges, commands)
+
+
+@kernel
+def note_ends(modes: Array, robots: int, table: Array, drives: Drives, tally: Tally) -> None:
+    """Let the episodes wait whose run ends with the step that was just taken."""
+    world = world_at(table)
+    for episode in range(modes.shape[0]):
+        if modes[episode] != WAITS and _ends(world, episode, robots, drives, tally, modes[episode] == DECIDES):
+            modes[episode] = WAITS
 
 
 @kernel
@@ -68,17 +112,9 @@ def _run_episode(
         mark_waiting(drives, first, last, tally.waiting)
     for _ in range(longest if mode == DECIDES else 1):
         if mode == DECIDES:
-            follow_team(drives, following, first, last, world.believed, world.velocities, world.ranges, commands)
+            follow_team(drives, following, first, last, world.believed, world.measured, world.ranges, commands)
         step_episode(table, episode, robots, commands, mode != LOOKS, True)
-        coverage = world.team_seen[episode] / max(tally.counted[episode], 1)
-        if world.steps[episode] >= tally.bounds[0] or coverage >= tally.bounds[1]:
-            break
-        if _is_interrupted(
-            world.poses[first:last], world.contacts[first:last], tally.live[first:last], tally.goals[episode], tally.bounds[2],
-            tally.bounds[3] != 0.0,
-        ):  # fmt: skip
-            break
-        if mode == DECIDES and any_newly_done(drives, first, last, tally.live, tally.waiting):
+        if _ends(world, episode, robots, drives, tally, mode == DECIDES):
             break
 
 

@@ -75,7 +75,9 @@ class Following(NamedTuple):
     limits : (4,) float64
         Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
     knows_mates : bool
-        Whether teammates' poses are known.
+        Whether all teammates' poses are known at once.
+    contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
+        Where they are not: of whom each robot heard lately, and where they were then [m, rad].
     present : (robots,) uint8
         Which robots are bodies to keep clear of.
     foresight : (K,) float64
@@ -86,6 +88,8 @@ class Following(NamedTuple):
     radii: NDArray[np.float64]
     limits: NDArray[np.float64]
     knows_mates: bool
+    contact: NDArray[np.uint8]
+    heard: NDArray[np.float64]
     present: NDArray[np.uint8]
     foresight: NDArray[np.float64]
 
@@ -174,7 +178,8 @@ def follow_team(
         believed[first:last], velocities[first:last], ranges[first:last], following.unit_vectors, following.radii, following.limits,
         drives.paths[first:last], drives.room[first:last], drives.counts[first:last], drives.places[first:last],
         drives.headings[first:last], drives.states[first:last], drives.stood[first:last], drives.backing[first:last],
-        following.knows_mates, following.present, following.foresight, commands[first:last],
+        following.knows_mates, following.present, following.foresight, following.contact[first:last], following.heard[first:last],
+        commands[first:last],
     )  # fmt: skip
 
 

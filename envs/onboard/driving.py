@@ -99,6 +99,14 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, radii: Array, for
 
 
 @kernel
+def _gap_to_heard(robot: int, poses: Array, radii: Array, foresight: Array, contact: Array, heard: Array) -> float:
+    """How far the disc can go straight ahead before it meets a teammate that it heard of, taken to stand where it was [m]."""
+    known = heard.reshape((-1, 3)).copy()
+    known[robot] = poses[robot]
+    return _gap_to_mates(robot, known, np.zeros((poses.shape[0], 2)), radii, foresight, contact)  # type: ignore[no-any-return]
+
+
+@kernel
 def follow_paths(
     poses: Array,
     velocities: Array,
@@ -117,6 +125,8 @@ def follow_paths(
     knows_mates: bool,
     present: Array,
     foresight: Array,
+    contact: Array,
+    heard: Array,
     commands: Array,
 ) -> None:
     """Give each robot the speed and turn rate that follow its path.
@@ -149,6 +159,8 @@ def follow_paths(
         Which robots are bodies to keep clear of.
     foresight : (K,) float64
         Times at which the other is looked for, the first 0 [s].
+    contact, heard : (robots, robots) uint8, (robots, robots * 3) float64
+        Where not all teammates' poses are known: of whom each robot heard lately, and where they were then [m, rad].
     commands : (robots, 2) float64
         Result: speed and turn rate [m/s, rad/s].
     """
@@ -214,6 +226,9 @@ def follow_paths(
         allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * velocities[robot, 0], 0.0))
         if knows_mates:
             mate_gap = _gap_to_mates(robot, poses, velocities, radii, foresight, present)
+            allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * velocities[robot, 0], 0.0)))
+        elif contact[robot].sum() > 0:
+            mate_gap = _gap_to_heard(robot, poses, radii, foresight, contact[robot], heard[robot])
             allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * velocities[robot, 0], 0.0)))
         speed = min(speed, allowed)
         commands[robot, 0] = speed

@@ -161,6 +161,10 @@ def extend_window(known: Array, window: Array) -> None:
 @kernel
 def _sum_maps(beliefs: Array, window: Array, total: Array) -> None:
     """Write the sum of maps of one shape into ``total`` within a window and nowhere else, cut to [-127, 127]."""
+    if beliefs.shape[0] == 1:
+        alone = int8_grid_at(beliefs[0, 0], beliefs[0, 1], beliefs[0, 2])
+        total[window[0] : window[1], window[2] : window[3]] = alone[window[0] : window[1], window[2] : window[3]]
+        return
     columns = total.shape[1]
     width = window[3] - window[2]
     for row in range(window[0], window[1]):
@@ -223,12 +227,17 @@ class TeamMaps(NamedTuple):
 
 
 @kernel
+def sum_maps(record: Array, beliefs: Array, limit: int, stamp: Array, window: Array) -> None:
+    """Make the map of a record the sum of maps (maps, 3 or more) of its shape in a window (4,) in which these changed (kernel)."""
+    _sum_maps(beliefs, window, log_odds_of(record))
+    refresh_map(record, limit, stamp, window)
+
+
+@kernel
 def sum_team(maps: TeamMaps, episode: int, window: Array) -> None:
     """Bring the map of a team up to date in a window (4,) in which robots' own maps changed (kernel)."""
     first = episode * maps.robots
-    record = maps.shared[episode]
-    _sum_maps(maps.beliefs[first : first + maps.robots], window, log_odds_of(record))
-    refresh_map(record, maps.limit, maps.stamp, window)
+    sum_maps(maps.shared[episode], maps.beliefs[first : first + maps.robots], maps.limit, maps.stamp, window)
 
 
 @kernel

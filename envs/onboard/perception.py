@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.exchange import NEVER, Exchange
 from lidarium.envs.onboard.navigation import (
     CLEARANCE_LIMIT,
     FLAGS,
@@ -18,8 +19,10 @@ from lidarium.envs.onboard.navigation import (
     RECORD,
     NavigationMap,
     TeamMaps,
+    extend_window,
     refresh_map,
     refresh_team,
+    sum_maps,
     sum_team,
 )
 from lidarium.envs.settings import ExplorationSettings
@@ -27,6 +30,7 @@ from lidarium.envs.simulation.arrays import ENDED
 from lidarium.envs.simulation.kinematic import KinematicWorld
 from lidarium.mapping.clearance import limit_of, stamp_of
 from lidarium.mapping.kernels import use_threads
+from lidarium.mapping.localization.localizer import Localizer
 from lidarium.mapping.path_search import SearchMemory
 
 
@@ -76,12 +80,12 @@ class Belief:
     @property
     def velocity(self) -> NDArray[np.float64]:
         """Speed and turn rate as odometry tells [m/s, rad/s], shape (2,)."""
-        return np.array(self._perception.world.velocities[self._row])
+        return np.array(self._perception.world.measured[self._row])
 
     @property
     def spread(self) -> NDArray[np.float64]:
-        """Standard deviation of the pose [m, m, rad], shape (3,); zero for the true localizer."""
-        return np.zeros(3)
+        """Standard deviation of the pose as the localizer tells [m, m, rad], shape (3,); zero where it claims to know."""
+        return self._perception.spread(self._row)
 
     @property
     def radius(self) -> float:
@@ -101,7 +105,7 @@ class Belief:
     @property
     def shared_map(self) -> NavigationMap | None:
         """The team's map, where it reached this robot; None with unknown starts."""
-        return self._perception.shared_map(self._perception.episode_of(self._row))
+        return self._perception.shared_map(self._row)
 
     @property
     def teammates(self) -> dict[str, Teammate]:
@@ -130,6 +134,14 @@ class Perception:
     ----------
     memory : SearchMemory
         For the searches of kernels, a piece for each thread.
+    knows_mates : bool
+        Whether all teammates' poses are known at once.
+    hears : bool
+        Whether a robot's map of the team is what reached it by radio.
+    exchanges : list of Exchange
+        The radio traffic of each episode; none where the radio is ideal.
+    localizers : list of Localizer or None
+        What tells each robot's pose, by row; None where kernels do.
     """
 
     def __init__(self, world: KinematicWorld, settings: ExplorationSettings, offsets: NDArray[np.float64]) -> None:
@@ -145,16 +157,23 @@ class Perception:
         self._fresh_at = np.full(self._episodes, -2, np.int64)
         self._threads = min(settings.threads, int(os.cpu_count() or 1))
         self.memory = SearchMemory(self._threads)
-        self._shares = settings.known_starts and settings.robots > 1
+        is_team = settings.known_starts and settings.robots > 1
+        self._shares, self.hears = is_team and settings.radio.is_ideal, is_team and not settings.radio.is_ideal
+        self.knows_mates = settings.known_starts and settings.radio.is_ideal
+        self.exchanges = [] if settings.radio.is_ideal else [Exchange(world, settings, episode) for episode in range(self._episodes)]
+        self.localizers: list[Localizer | None] = [None] * rows
+        self._heard: list[NavigationMap | None] = [None] * rows
+        self._heard_records = np.zeros((rows, RECORD), np.int64)
 
     def start(self, goal: tuple[float, float] | None = None, episode: int = 0) -> None:
         """Begin an episode."""
         first, last = episode * self._robots, (episode + 1) * self._robots
-        for navigation in (*self._own[first:last], self._shared[episode]):
+        for navigation in (*self._own[first:last], *self._heard[first:last], self._shared[episode]):
             if navigation is not None:
                 # Whoever still holds a map of the last episode may go on reading it.
                 navigation.keep_record_in(np.zeros(RECORD, np.int64))
         self._own[first:last], self._shared[episode] = [None] * self._robots, None
+        self._heard[first:last], self._heard_records[first:last] = [None] * self._robots, 0
         self._own_records[first:last], self._shared_records[episode] = 0, 0
         self._known[first:last] = [(rows, 0, columns, 0) for rows, columns in self.world.belief_rows[first:last, 1:3]]
         self._goals[episode], self._fresh_at[episode] = goal, -2
@@ -162,6 +181,14 @@ class Perception:
     @property
     def maps(self) -> TeamMaps:
         """The maps as kernels see them."""
+        if self.hears:
+            # What kernels bring up to date by themselves does not include what came by radio.
+            for episode in range(self._episodes):
+                self._refresh(episode)
+        return self._maps
+
+    @property
+    def _maps(self) -> TeamMaps:
         world, resolution = self.world, self.settings.occupancy.resolution
         limit = limit_of(CLEARANCE_LIMIT, resolution)
         return TeamMaps(
@@ -191,17 +218,20 @@ class Perception:
         if navigation is None:
             navigation = NavigationMap(self.world.log_odds[row], self.settings.occupancy.resolution)
             navigation.keep_record_in(self._own_records[row])
-            maps = self.maps
+            maps = self._maps
             refresh_map(navigation.record, maps.limit, maps.stamp, self._known[row])
             self._own[row] = navigation
         return navigation
 
-    def shared_map(self, episode: int = 0) -> NavigationMap | None:
-        """Return the team's map, up to date; a lone robot's is its own, with unknown starts there is none."""
+    def shared_map(self, row: int = 0) -> NavigationMap | None:
+        """Return the team's map as it reached a robot, up to date; a lone robot's is its own, with unknown starts there is none."""
         if not self.settings.known_starts:
             return None
+        if self.hears:
+            return self._heard_map(row)
         if not self._shares:
-            return self.own_map(episode)
+            return self.own_map(row)
+        episode = self.episode_of(row)
         self._refresh(episode)
         navigation = self._shared[episode]
         if navigation is None:
@@ -210,13 +240,35 @@ class Perception:
             navigation = NavigationMap(log_odds, self.settings.occupancy.resolution)
             navigation.keep_record_in(self._shared_records[episode])
             for row in range(first, first + self._robots):
-                sum_team(self.maps, episode, self._known[row])
+                sum_team(self._maps, episode, self._known[row])
             self._shared[episode] = navigation
         return navigation
 
+    def _heard_map(self, row: int) -> NavigationMap:
+        """Return the sum of a robot's own map and of the teammates' maps that reached it, up to date."""
+        self._refresh(self.episode_of(row))
+        navigation = self._heard[row]
+        if navigation is None:
+            log_odds = np.zeros(self.world.log_odds[row].shape, np.int8)
+            navigation = NavigationMap(log_odds, self.settings.occupancy.resolution)
+            navigation.keep_record_in(self._heard_records[row])
+            self._heard[row] = navigation
+            _, rows, columns = self.world.belief_rows[row, :3]
+            self._sum_heard(row, np.array([0, rows, 0, columns]))
+        return navigation
+
+    def _sum_heard(self, row: int, window: NDArray[np.int64]) -> None:
+        """Bring the sum of what reached a robot up to date in a window (4,)."""
+        episode, first = self.episode_of(row), self.episode_of(row) * self._robots
+        held = [
+            copy.ctypes.data for mate, copy in enumerate(self.exchanges[episode].copies[row - first]) if first + mate != row and copy.size
+        ]
+        beliefs = np.array([(address, *self.world.log_odds[row].shape) for address in (self.world.belief_rows[row, 0], *held)], np.int64)
+        sum_maps(self._heard_records[row], beliefs, self._maps.limit, self._maps.stamp, window)
+
     def planning_map(self, row: int, shares_map: bool) -> NavigationMap:
         """Return the map that a robot plans on, up to date: the team's where it reaches the robot, else its own."""
-        shared = self.shared_map(self.episode_of(row)) if shares_map else None
+        shared = self.shared_map(row) if shares_map else None
         return self.own_map(row) if shared is None else shared
 
     def provide_records(self, rows: NDArray[np.int64], shares_map: bool, *, with_frontiers: bool = False) -> tuple[NDArray[np.int64], int]:
@@ -229,8 +281,11 @@ class Perception:
         sharing : int
             How many rows share one record: that of a row is number ``row // sharing``.
         """
-        is_shared = shares_map and self._shares
-        records, sharing = (self._shared_records, self._robots) if is_shared else (self._own_records, 1)
+        records, sharing = self._own_records, 1
+        if shares_map and self._shares:
+            records, sharing = self._shared_records, self._robots
+        elif shares_map and self.hears:
+            records = self._heard_records
         places = np.unique(rows // sharing)
         for place in places[records[places, FLAGS if with_frontiers else LOG_ODDS] == 0]:
             navigation = self.planning_map(int(place) * sharing, shares_map)
@@ -240,8 +295,18 @@ class Perception:
 
     def _refresh(self, episode: int) -> None:
         """Take in what the maps of a team have changed since the last look."""
-        if self._fresh_at[episode] != self.world.steps[episode]:
-            refresh_team(self.maps, episode)
+        if self._fresh_at[episode] == self.world.steps[episode]:
+            return
+        if not self.hears:
+            refresh_team(self._maps, episode)
+            return
+        first = episode * self._robots
+        windows = self.world.windows[first : first + self._robots].copy()
+        refresh_team(self._maps, episode)
+        for robot, window in enumerate(windows):
+            extend_window(window, self.exchanges[episode].take_window(robot))
+            if self._heard[first + robot] is not None and window[0] < window[1] and window[2] < window[3]:
+                self._sum_heard(first + robot, window)
 
     def offset(self, row: int) -> NDArray[np.float64]:
         """Return the origin of a robot's map frame in the frame of its believed pose [m], shape (2,)."""
@@ -257,16 +322,42 @@ class Perception:
         x, y = self.world.origins[row] - self.offsets[row]
         return float(x), float(y)
 
+    def spread(self, row: int) -> NDArray[np.float64]:
+        """Return the standard deviation of a robot's pose as its localizer tells [m, m, rad], shape (3,)."""
+        localizer = self.localizers[row]
+        return np.zeros(3) if localizer is None else np.sqrt(np.maximum(np.diag(localizer.covariance), 0.0))
+
+    def pose_known_to(self, row: int, other: int) -> NDArray[np.float64]:
+        """Return the pose of a teammate as a robot knows it, in the frame of believed poses, shape (3,)."""
+        if self.knows_mates:
+            return np.asarray(self.world.believed[other])
+        return np.asarray(self.world.heard[row].reshape(-1, 3)[other % self._robots])
+
     def teammates(self, row: int) -> dict[str, Teammate]:
-        """Return what a robot knows of the others: with known starts and the ideal radio, where they are now."""
+        """Return what a robot knows of the others: with known starts and the ideal radio where they are now, else where they last said."""
         if not self.settings.known_starts:
             return {}
         first = self.episode_of(row) * self._robots
+        if self.hears:
+            return self._heard_teammates(row, first)
         return {
             agent: Teammate(self.pose_in_frame(other, row), 0.0, self.settings.robot.radius, bool(self.world.flags[other] & ENDED))
             for other, agent in enumerate(self.settings.agents, first)
             if other != row
         }
+
+    def _heard_teammates(self, row: int, first: int) -> dict[str, Teammate]:
+        """Return what a robot heard of the others."""
+        exchange, robot = self.exchanges[self.episode_of(row)], row - first
+        step, radius = int(self.world.steps[self.episode_of(row)]), self.settings.robot.radius
+        known = {}
+        for mate, agent in enumerate(self.settings.agents):
+            if mate != robot and exchange.heard_at[robot, mate] != NEVER:
+                x, y, theta = exchange.heard[robot, mate]
+                pose = np.array([x - self.offsets[row, 0], y - self.offsets[row, 1], theta])
+                age_s = float(step - exchange.heard_at[robot, mate]) * self.settings.time_step
+                known[agent] = Teammate(pose, age_s, radius, bool(exchange.heard_ended[robot, mate]))
+        return known
 
     def goal_of(self, row: int) -> NDArray[np.float64] | None:
         """Return the goal in a robot's map frame; None without a goal, and where the robot does not know its start."""
@@ -277,7 +368,8 @@ class Perception:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        for maps, records in ((self._own, self._own_records), (self._shared, self._shared_records)):
+        kinds = ((self._own, self._own_records), (self._shared, self._shared_records), (self._heard, self._heard_records))
+        for maps, records in kinds:
             for navigation, record in zip(maps, records, strict=True):
                 if navigation is not None:
                     navigation.keep_record_in(record)

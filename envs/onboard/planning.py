@@ -26,7 +26,9 @@ class Planning(NamedTuple):
     robots : int
         Robots of a team.
     knows_mates : bool
-        Whether teammates' poses are known.
+        Whether all teammates' poses are known at once.
+    contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
+        Where they are not: of whom each robot heard lately, and where they were then [m, rad].
     radius : float
         Of every body [m].
     resolution : float
@@ -49,6 +51,8 @@ class Planning(NamedTuple):
 
     robots: int
     knows_mates: bool
+    contact: NDArray[np.uint8]
+    heard: NDArray[np.float64]
     radius: float
     resolution: float
     tight: float
@@ -107,6 +111,8 @@ def _discs(planning: Planning, row: int, avoided: Array) -> Array:
     for mate in range(planning.robots):
         if avoided[mate]:
             x, y = planning.believed[first + mate, 0], planning.believed[first + mate, 1]
+            if not planning.knows_mates:
+                x, y = planning.heard[row, 3 * mate], planning.heard[row, 3 * mate + 1]
             discs[count, 0] = (y - planning.origins[row, 1]) / planning.resolution - 0.5
             discs[count, 1] = (x - planning.origins[row, 0]) / planning.resolution - 0.5
             discs[count, 2] = (planning.radius + planning.radius + MATE_DISTANCE) / planning.resolution
@@ -221,7 +227,7 @@ def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> N
     avoided, ended = np.zeros(planning.robots, np.bool_), np.zeros(planning.robots, np.bool_)
     for mate in range(planning.robots):
         other = first + mate
-        if planning.knows_mates and other != row:
+        if other != row and (planning.knows_mates or planning.contact[row, mate] != 0):
             ended[mate] = planning.has_ended[other]
             avoided[mate] = ended[mate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
     # First round all that stand; of these only those that have ended can never give way.

@@ -90,8 +90,8 @@ class TeamDriver:
         self.drives: Drives = no_drives(self._rows)
         limits = np.array([robot.cruise_speed, min(robot.max_turn_rate, 2.0), 0.8 * robot.max_acceleration, settings.time_step])
         self.following = Following(
-            settings.lidar.unit_vectors, np.full(settings.robots, robot.radius), limits, settings.known_starts,
-            np.ones(settings.robots, np.uint8), FORESIGHT_TIMES,
+            settings.lidar.unit_vectors, np.full(settings.robots, robot.radius), limits, perception.knows_mates,
+            perception.world.contact, perception.world.heard, np.ones(settings.robots, np.uint8), FORESIGHT_TIMES,
         )  # fmt: skip
         self._commands = np.zeros((self._rows, 2))
 
@@ -155,7 +155,7 @@ class TeamDriver:
     def commands(self) -> NDArray[np.float64]:
         """Return speed and turn rate of all robots for the next step, shape (rows, 2) [m/s, rad/s]."""
         world = self._perception.world
-        follow_teams(self.drives, self.following, world.believed, world.velocities, world.ranges, self._commands)
+        follow_teams(self.drives, self.following, world.believed, world.measured, world.ranges, self._commands)
         return self._commands
 
     def path(self, row: int) -> NDArray[np.float64]:
@@ -172,9 +172,10 @@ class TeamDriver:
         return slice(episode * self._settings.robots, (episode + 1) * self._settings.robots)
 
     def _mates(self, row: int) -> list[int]:
-        """Return the rows of a robot's teammates."""
-        first = row // self._settings.robots * self._settings.robots
-        return [other for other in range(first, first + self._settings.robots) if other != row]
+        """Return the rows of a robot's teammates, of those that it knows where they are."""
+        first, contact = row // self._settings.robots * self._settings.robots, self._perception.world.contact[row]
+        knows_all = self._perception.knows_mates
+        return [first + mate for mate in range(self._settings.robots) if first + mate != row and (knows_all or contact[mate])]
 
     def _live(self, episode: int) -> list[int]:
         team, flags = self._team(episode), self._perception.world.flags
@@ -186,7 +187,8 @@ class TeamDriver:
         records, sharing = perception.provide_records(rows, self.shares_map, with_frontiers=with_frontiers)
         world = perception.world
         return Planning(
-            settings.robots, settings.known_starts, settings.robot.radius, resolution, self._footprint.radius + 2 * resolution,
+            settings.robots, perception.knows_mates, world.contact, world.heard, settings.robot.radius, resolution,
+            self._footprint.radius + 2 * resolution,
             CLEARANCE_LIMIT, *self._passage, records, sharing, perception.memory.table, world.believed, world.origins, perception.offsets,
             world.flags & ENDED != 0,
         )  # fmt: skip
@@ -238,9 +240,7 @@ class TeamDriver:
         return row
 
     def _settle_team(self, episode: int) -> None:
-        """Resolve what blocks robots, one after the other; teammates that do not know of each other cannot."""
-        if not self._settings.known_starts:
-            return
+        """Resolve what blocks robots, one after the other; to one that knows of no teammate it is a wall."""
         live = self._live(episode)
         for row in live:
             if self.drives.states[row] == BLOCKED:
@@ -248,9 +248,9 @@ class TeamDriver:
 
     def _settle(self, row: int, live: list[int]) -> None:
         """Resolve that a teammate stands in a robot's way: drive round it, or one of the two gives way."""
-        drives, believed = self.drives, self._perception.world.believed
+        drives, here = self.drives, self._perception.world.believed[row, :2]
         reach = self._settings.robot.radius + NEAR + self._settings.robot.radius
-        near = [other for other in self._mates(row) if math.dist(believed[row, :2], believed[other, :2]) < reach]
+        near = [other for other in self._mates(row) if math.dist(here, self._perception.pose_known_to(row, other)[:2]) < reach]
         last = drives.cells[row, drives.counts[row] - 1]
         goal, heading = (int(last[0]), int(last[1])), float(drives.headings[row])
         if not near:
@@ -276,7 +276,8 @@ class TeamDriver:
             return False
         navigation = self._perception.planning_map(row, self.shares_map)
         others = self._mates(row)
-        bodies: list[Disc] = [(float(world.believed[other, 0]), float(world.believed[other, 1]), distance) for other in others]
+        poses = [self._perception.pose_known_to(row, other) for other in others]
+        bodies: list[Disc] = [(float(pose[0]), float(pose[1]), distance) for pose in poses]
         discs = discs_of(bodies, self._origin(row), navigation.resolution)
         cell = find_refuge(navigation, self._origin(row), self._cell(row), self._footprint, discs, self._remaining(to), distance + 0.02)
         if cell is None or not self._drive_to(row, cell, others):

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, grid_at, kernel, vector_at
 
-TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME = 1, 2, 4, 8
+TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME, DEAD_RECKONING, SOME_MATES = 1, 2, 4, 8, 16, 32
 """Flags of a row: the localizer knows the true pose; teammates' poses are known; the robot has ended (its body stands there, its
-sensors are off); it believes in the frame of its own start."""
+sensors are off); it believes in the frame of its own start; its localizer reckons from its odometry alone; the poses of those teammates
+are known that the radio told of."""
 
 
 class WorldArrays(NamedTuple):
@@ -21,7 +22,7 @@ class WorldArrays(NamedTuple):
 
     Attributes
     ----------
-    bodies : (robots, 6) float64
+    bodies : (robots, 8) float64
         ``Robot.numbers`` of each robot of a team.
     sensor : (10,) float64
         Numbers of the laser, the maps and the step, see ``stages``.
@@ -62,6 +63,17 @@ class WorldArrays(NamedTuple):
         What a new cell earns, and what a step, a contact and a metre cost.
     rewarded, rewards : (rows,) float64
         Length of each robot's path at its last reward [m], and what it has earned since rewards were last taken.
+    odometry_model : (7,) float64
+        ``OdometrySettings.numbers``; nothing (0,) where wheels tell the truth and nobody reckons with them.
+    wheels, odometry, measured : (rows, 7), (rows, 3), (rows, 2) float64
+        What the encoders are at, poses by dead reckoning since the start, and speeds and turn rates as the encoders tell; the last is
+        ``velocities`` itself where wheels tell the truth.
+    faults, failed : (rows, numbers) float64, (rows,) uint8
+        Faults of each robot, see ``faults``, and whether it is dead.
+    driven : (rows, 2) float64
+        Scratch: speeds and turn rates that drives make of what they are told.
+    contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
+        Of which teammates a robot knows the poses although not all are known (0 where all are), and these poses.
     """
 
     bodies: Array
@@ -95,10 +107,19 @@ class WorldArrays(NamedTuple):
     reward_weights: Array
     rewarded: Array
     rewards: Array
+    odometry_model: Array
+    wheels: Array
+    odometry: Array
+    measured: Array
+    faults: Array
+    failed: Array
+    driven: Array
+    contact: Array
+    heard: Array
 
 
 def table_of(arrays: WorldArrays) -> NDArray[np.int64]:
-    """Return where the arrays lie: address, rows and columns (1 for a vector) of each, shape (31, 3). The caller keeps them alive."""
+    """Return where the arrays lie: address, rows and columns (1 for a vector) of each, shape (40, 3). The caller keeps them alive."""
     return np.array([(array.ctypes.data, array.shape[0], array.size // max(array.shape[0], 1)) for array in arrays], np.int64)
 
 
@@ -147,4 +168,13 @@ def world_at(table: Array) -> WorldArrays:
         _vector(table, 28, np.float64),
         _vector(table, 29, np.float64),
         _vector(table, 30, np.float64),
+        _vector(table, 31, np.float64),
+        _grid(table, 32, np.float64),
+        _grid(table, 33, np.float64),
+        _grid(table, 34, np.float64),
+        _grid(table, 35, np.float64),
+        _vector(table, 36, np.uint8),
+        _grid(table, 37, np.float64),
+        _grid(table, 38, np.uint8),
+        _grid(table, 39, np.float64),
     )

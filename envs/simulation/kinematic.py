@@ -12,19 +12,25 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from lidarium.envs.coverage import pack_bits
 from lidarium.envs.floors.starts import swept_free_space
-from lidarium.envs.simulation.arrays import KNOWN_MATES, OWN_FRAME, TRUE_POSE, WorldArrays, table_of
+from lidarium.envs.simulation.arrays import DEAD_RECKONING, KNOWN_MATES, OWN_FRAME, SOME_MATES, TRUE_POSE, WorldArrays, table_of
+from lidarium.envs.simulation.faults import FAULT_NUMBERS, NO_FAULTS, FaultSettings, plan_faults
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE
+from lidarium.envs.simulation.odometry import ODOMETRY, WHEEL_NUMBERS, OdometrySettings, begin_wheels
 from lidarium.envs.simulation.robots import Robot
-from lidarium.envs.simulation.stepping import perceive_parallel, perceive_serial, step_rows, step_serial
+from lidarium.envs.simulation.stepping import perceive_parallel, perceive_serial, render_row, step_rows, step_serial
 from lidarium.envs.simulation.world import Sensed
 from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.map_crops import untouched
 from lidarium.mapping.occupancy import WORD, OccupancySettings
+
+LEAST_MARGIN = 8.0
+"""Maps of robots whose poses drift reach at least this far beyond the floor [m]."""
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""
@@ -80,15 +86,35 @@ class KinematicWorld:
         Scales at which maps are pooled for observations [cells].
     reward_weights : (4,) float64 or None
         What a new cell earns, and what a step, a contact and a metre cost; nothing where None.
+    localization : str
+        Who says where the robots are: ``truth``, ``odometry``, or another, which writes ``believed`` between the two stages.
+    odometry : OdometrySettings
+        How well wheels tell the way.
+    faults : FaultSettings
+        What goes wrong with the robots.
+    horizon_s : float or None
+        For how long faults are drawn [s].
+    knows_mates : bool
+        Whether, with known starts, all poses of teammates are known at once; otherwise those are that ``contact`` tells of.
 
     Attributes
     ----------
     poses, velocities, believed : (rows, 3), (rows, 2), (rows, 3) float64
         True poses and velocities; poses as the localizers believe, in the floor's axes where starts are known.
     ranges : (rows, beams) float32
-        The last scans [m]; inf for no return.
+        The last scans [m]; inf for no return, nan for an invalid beam.
+    odometry : (rows, 3) float64
+        Poses by dead reckoning since the start [m, rad]; kept where wheels do not tell the truth or somebody reckons with them.
+    measured : (rows, 2) float64
+        Speeds and turn rates as the encoders tell [m/s, rad/s]; ``velocities`` itself where they tell the truth.
+    failed : (rows,) uint8
+        Whether each robot is dead.
     gains : (rows,) float64
         Cells credited to each robot in the last step.
+    contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
+        Of which teammates a robot knows the pose although not all are known, and these poses [m, rad]; the radio writes them.
+    renderings : (rows,) int64
+        How often each map was rendered anew.
     rewards : (rows,) float64
         What each robot has earned since this was last set to 0.
     seen : (rows,) int64
@@ -111,6 +137,11 @@ class KinematicWorld:
         threads: int = 1,
         scales: Sequence[int] = (),
         reward_weights: NDArray[np.float64] | None = None,
+        localization: str = "truth",
+        odometry: OdometrySettings = ODOMETRY["ideal"],
+        faults: FaultSettings = NO_FAULTS,
+        horizon_s: float | None = None,
+        knows_mates: bool = True,
     ) -> None:
         self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
         self.robots, self.episodes = len(robots), episodes
@@ -126,6 +157,16 @@ class KinematicWorld:
         self.gains, self.seen = np.zeros(rows), np.zeros(rows, np.int64)
         self._reward_weights = np.zeros(4) if reward_weights is None else np.array(reward_weights, np.float64)
         self._rewarded, self.rewards = np.zeros(rows), np.zeros(rows)
+        self._is_true, self._odometry, self._faults, self._horizon_s = localization == "truth", odometry, faults, horizon_s
+        self._flags = {"truth": TRUE_POSE, "odometry": DEAD_RECKONING}.get(localization, 0)
+        is_plain = self._is_true and odometry.is_ideal
+        self._odometry_model = np.zeros(0) if is_plain else odometry.numbers
+        self._wheels, self.odometry = np.zeros((rows, WHEEL_NUMBERS)), np.zeros((rows, 3))
+        self.measured = self.velocities if is_plain else np.zeros((rows, 2))
+        self.faults, self.failed = np.zeros((rows, faults.capacity * FAULT_NUMBERS)), np.zeros(rows, np.uint8)
+        self._driven, self.renderings = np.zeros((rows, 2)), np.zeros(rows, np.int64)
+        self.contact, self.heard = np.zeros((rows, self.robots), np.uint8), np.zeros((rows, 3 * self.robots))
+        self._mate_flag = KNOWN_MATES if knows_mates else SOME_MATES
         self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
         self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
         self.windows = np.zeros((rows, 4), np.int64)
@@ -191,11 +232,17 @@ class KinematicWorld:
         self.ranges[first:last], self.seen[first:last], self.gains[first:last] = np.inf, 0, 0.0
         self.travelled[first:last], self.collisions[first:last] = 0.0, 0
         self._rewarded[first:last], self.rewards[first:last] = 0.0, 0.0
+        self._wheels[first:last] = begin_wheels(self._odometry, self.robots, seed)
+        self.odometry[first:last], self.measured[first:last], self.failed[first:last] = 0.0, 0.0, 0
+        self.faults[first:last] = self._plan_faults(floor, free, starts, seed)
         for row in range(first, last):
             self.masks[row] = np.zeros_like(counted)
-            if known_starts:
+            if known_starts and self._is_true:
                 self.believed[row], self.origins[row] = starts[row - first], floor.laser.origin
                 self.log_odds[row] = _blank_map(rows, words * WORD)
+            elif known_starts:
+                self.believed[row] = starts[row - first]
+                self.log_odds[row], self.origins[row] = self._blank_map_with_margin(floor, rows, words * WORD)
             else:
                 self.believed[row] = 0.0
                 self.log_odds[row], self.origins[row] = self._blank_map_around(floor)
@@ -207,7 +254,8 @@ class KinematicWorld:
             self._touched[row] = untouched(height if self.scales else 0, width)
         self._point_at(episode)
         self.starts[first:last] = starts
-        self.flags[first:last] = TRUE_POSE | (KNOWN_MATES if known_starts else OWN_FRAME)
+        self.contact[first:last], self.heard[first:last] = 0, 0.0
+        self.flags[first:last] = self._flags | (self._mate_flag if known_starts else OWN_FRAME)
         self.forget_changes(first, last)
 
     def _point_at(self, episode: int) -> None:
@@ -253,7 +301,8 @@ class KinematicWorld:
             self.bodies, self._sensor, self._unit_vectors, GAUSSIAN_TABLE, self._increments, self._floor_rows, self._frames, self.seeds,
             self.steps, self.team_seen, self.moves, self.flags, self.poses, self.velocities, self.starts, self.believed, self.ranges,
             self.belief_rows, self.origins, self.windows, self._mask_rows, self._boxes, self.seen, self.gains, self.bumpers, self.contacts,
-            self.travelled, self.collisions, self._reward_weights, self._rewarded, self.rewards,
+            self.travelled, self.collisions, self._reward_weights, self._rewarded, self.rewards, self._odometry_model, self._wheels,
+            self.odometry, self.measured, self.faults, self.failed, self._driven, self.contact, self.heard,
         )  # fmt: skip
         self._table = table_of(arrays)
         is_parallel = self.threads > 1
@@ -271,6 +320,40 @@ class KinematicWorld:
         half = math.ceil(math.ceil(diagonal / 32.0) * 32.0 / self.occupancy.resolution / WORD) * WORD
         origin = -half * self.occupancy.resolution
         return _blank_map(2 * half, 2 * half), (origin, origin)
+
+    def _blank_map_with_margin(self, floor: FloorTables, rows: int, columns: int) -> tuple[NDArray[np.int8], tuple[float, float]]:
+        """Return a map on the floor's lattice that reaches beyond it, for poses that drift, and its origin [m]."""
+        resolution = self.occupancy.resolution
+        margin = math.ceil(max(LEAST_MARGIN, 0.5 * math.hypot(rows, columns) * resolution) / resolution / WORD) * WORD
+        x, y = floor.laser.origin
+        return _blank_map(rows + 2 * margin, columns + 2 * margin), (x - margin * resolution, y - margin * resolution)
+
+    def _plan_faults(self, floor: FloorTables, free: NDArray[np.bool_], starts: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+        """Return the faults of an episode, kidnappings to places that the robots could have reached by themselves."""
+        if self._faults.capacity == 0:
+            return np.zeros((self.robots, 0))
+        x, y = floor.laser.origin
+        room = np.asarray(ndimage.distance_transform_edt(free)) * floor.laser.resolution
+        rows, columns = np.nonzero(room > self.bodies[:, 0].max() + floor.laser.resolution)
+        places = (np.stack([columns, rows], axis=1) + 0.5) * floor.laser.resolution + (x, y)
+        somewhere = np.asarray(places if len(places) else starts[:, :2], np.float64)
+        return plan_faults(self._faults, self.robots, seed, self.time_step, self._horizon_s, somewhere)
+
+    def render_anew(self, row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+        """Forget a robot's map and render it of scans (scans, beams) taken at ``poses`` (scans, 3) in the frame of its believed pose."""
+        log_odds, window = self.log_odds[row], self.windows[row]
+        used = (log_odds.view(np.uint64) != 0).reshape(len(log_odds), -1, WORD // 8).any(axis=2)
+        lines, columns = np.flatnonzero(used.any(axis=1)), np.flatnonzero(used.any(axis=0))
+        if lines.size:
+            low, high = int(lines[0]), int(lines[-1]) + 1
+            log_odds[low:high] = 0
+            touched = self._touched[row][low:high]
+            for word in columns.tolist() if touched.size else []:
+                touched[:, word // WORD] |= np.uint64(1 << word % WORD)
+            window[0], window[1] = min(window[0], low), max(window[1], high)
+            window[2], window[3] = min(window[2], WORD * columns[0]), max(window[3], WORD * (columns[-1] + 1))
+        render_row(self._table, row, self.robots, np.ascontiguousarray(poses), np.ascontiguousarray(ranges))
+        self.renderings[row] += 1
 
     def forget_changes(self, first: int, last: int) -> None:
         """Start anew to note what part of the maps changes, for rows ``first`` to ``last``."""
@@ -306,12 +389,12 @@ class KinematicWorld:
         """Run stage one alone and return what it brings; the arrays are the world's own, valid until the next step."""
         self.steps[:] = step
         self.step(commands, perceives=False)
-        return Sensed(self.ranges, self.velocities, self.bumpers, self.contacts, self.poses)
+        return Sensed(self.ranges, self.measured, self.bumpers, self.contacts, self.poses)
 
-    def perceive(self) -> None:
-        """Run stage two alone: update the maps from ``ranges`` at the believed poses."""
+    def perceive(self, runs: NDArray[np.bool_] | None = None) -> None:
+        """Run stage two alone, of all episodes or those with ``runs`` (episodes,): maps follow ``ranges`` at the believed poses."""
         self.use_threads()
-        self._perceive(self._table, self.robots, self.robots * self.episodes)
+        self._perceive(self._table, self.robots, self._everywhere if runs is None else runs)
 
     def coverage(self, episode: int) -> float:
         """Return the sensed share of F, ``C_free``."""

@@ -1,9 +1,13 @@
 """The robots of the catalogue: bodies and drives."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
+
+WHEEL_BASE, TICKS_PER_METRE = 6, 7
+"""Places in the numbers of a robot that kernels know."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +26,10 @@ class Robot:
         Limit of the turn rate [rad/s].
     max_acceleration, max_turn_acceleration : float
         Limits of the drive [m/s2, rad/s2].
+    wheel_base : float
+        Distance between the driven wheels [m].
+    ticks_per_metre : float
+        Ticks that the encoder of a wheel counts on a metre [1/m].
     """
 
     radius: float = 0.18
@@ -31,30 +39,59 @@ class Robot:
     max_turn_rate: float = 3.14
     max_acceleration: float = 1.0
     max_turn_acceleration: float = 6.0
+    wheel_base: float = 0.23
+    ticks_per_metre: float = 11724.0
 
     def __post_init__(self) -> None:
-        for name in ("radius", "height", "cruise_speed", "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration"):
-            value = getattr(self, name)
+        for field in fields(self):
+            value = getattr(self, field.name)
             if not (0.0 < value < float("inf")):
-                raise ValueError(f"{name} of the robot is {value}; want a number above 0")
+                raise ValueError(f"{field.name} of the robot is {value}; want a number above 0")
         if self.cruise_speed > self.max_speed:
             raise ValueError(f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s")
 
     @property
     def numbers(self) -> NDArray[np.float64]:
-        """What the kernels know of the body, shape (6,): radius, greatest speed, turn rate and their changes, height."""
-        return np.array([self.radius, self.max_speed, self.max_turn_rate, self.max_acceleration, self.max_turn_acceleration, self.height])
+        """What the kernels know, shape (8,): radius, greatest speed, turn rate and their changes, height, wheel base, ticks."""
+        return np.array([
+            self.radius, self.max_speed, self.max_turn_rate, self.max_acceleration, self.max_turn_acceleration, self.height,
+            self.wheel_base, self.ticks_per_metre,
+        ])  # fmt: skip
 
 
 ROBOTS: dict[str, Robot] = {
     "kobuki": Robot(),
     "pioneer": Robot(
-        radius=0.267, height=0.24, cruise_speed=0.5, max_speed=1.2, max_turn_rate=5.24, max_acceleration=0.8, max_turn_acceleration=3.0
+        radius=0.267,
+        height=0.24,
+        cruise_speed=0.5,
+        max_speed=1.2,
+        max_turn_rate=5.24,
+        max_acceleration=0.8,
+        max_turn_acceleration=3.0,
+        wheel_base=0.331,
+        ticks_per_metre=500 / (2 * math.pi * 0.0975),
     ),
     "service": Robot(
-        radius=0.30, height=1.2, cruise_speed=0.5, max_speed=1.0, max_turn_rate=1.8, max_acceleration=0.6, max_turn_acceleration=2.0
+        radius=0.30,
+        height=1.2,
+        cruise_speed=0.5,
+        max_speed=1.0,
+        max_turn_rate=1.8,
+        max_acceleration=0.6,
+        max_turn_acceleration=2.0,
+        wheel_base=0.45,
+        ticks_per_metre=4000.0,
     ),
     "point": Robot(
-        radius=0.01, height=0.5, cruise_speed=1.0, max_speed=1.0, max_turn_rate=6.28, max_acceleration=100.0, max_turn_acceleration=600.0
+        radius=0.01,
+        height=0.5,
+        cruise_speed=1.0,
+        max_speed=1.0,
+        max_turn_rate=6.28,
+        max_acceleration=100.0,
+        max_turn_acceleration=600.0,
+        wheel_base=0.02,
+        ticks_per_metre=100000.0,
     ),
 }

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from lidarium.envs.coverage import mark_seen
-from lidarium.envs.simulation.arrays import KNOWN_MATES, OWN_FRAME, TRUE_POSE, WorldArrays
+from lidarium.envs.simulation.arrays import KNOWN_MATES, OWN_FRAME, SOME_MATES, TRUE_POSE, WorldArrays
+from lidarium.envs.simulation.faults import blind_beams
 from lidarium.envs.simulation.lidar import cast_scan, cut_by_disc
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
@@ -58,6 +59,7 @@ def _measure(world: WorldArrays, row: int, first: int, robots: int, directions: 
         true_range = np.float32(lengths[beam] * resolution * ROUND_UP)
         ranges[beam] = true_range if met else np.float32(np.inf)
         lengths[beam] = min(true_range, longest) * scale if met else longest * scale
+    blind_beams(world.faults[row], world.steps[episode], angle_first, increment, ranges, lengths)
 
 
 @kernel
@@ -149,7 +151,8 @@ def footprint(world: WorldArrays, row: int, first: int, robots: int, bits: Array
         scale = 1.0 / sensor[MAP_RESOLUTION]
         beam_directions(world.poses[row, 2], world.unit_vectors, directions)
         for beam in range(beams):
-            lengths[beam] = min(world.ranges[row, beam], sensor[RANGE_MAX]) * scale
+            value = world.ranges[row, beam]
+            lengths[beam] = min(value, sensor[RANGE_MAX]) * scale if value == value else 0.0
     return _seen_area(world, row, first, robots, lengths, directions, ends, bits)  # type: ignore[no-any-return]
 
 
@@ -161,10 +164,14 @@ def _filter_mates(world: WorldArrays, row: int, first: int, robots: int, x: floa
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
     turn = 2.0 * math.pi / sensor[ANGLE_INCREMENT]
+    knows_all = world.flags[row] & KNOWN_MATES != 0
     for other in range(first, first + robots):
-        if other == row:
+        mate = other - first
+        if other == row or not (knows_all or world.contact[row, mate] != 0):
             continue
-        gap_x, gap_y = (believed[other, 0] - believed[row, 0]) * scale, (believed[other, 1] - believed[row, 1]) * scale
+        mate_x = believed[other, 0] if knows_all else world.heard[row, 3 * mate]
+        mate_y = believed[other, 1] if knows_all else world.heard[row, 3 * mate + 1]
+        gap_x, gap_y = (mate_x - believed[row, 0]) * scale, (mate_y - believed[row, 1]) * scale
         radius = world.bodies[other - first, 0] * scale + MATE_MARGIN
         if gap_x * gap_x + gap_y * gap_y > (reach + radius) ** 2:
             continue
@@ -176,6 +183,23 @@ def _filter_mates(world: WorldArrays, row: int, first: int, robots: int, x: floa
                 end_x, end_y = ends[0, beam] - x - gap_x, ends[1, beam] - y - gap_y
                 if end_x * end_x + end_y * end_y <= radius * radius:
                     is_hit[beam] = False
+
+
+@kernel
+def invalidate_mates(world: WorldArrays, row: int, first: int, robots: int, ranges: Array) -> None:
+    """Make the beams of a scan (beams,) invalid that met teammates, as far as the robot knows where these are."""
+    beams, scale = ranges.shape[0], 1.0 / world.sensor[MAP_RESOLUTION]
+    directions, ends, is_hit = np.empty((4, beams)), np.empty((2, beams)), np.empty(beams, np.bool_)
+    lengths = np.empty(beams)
+    beam_directions(world.believed[row, 2], world.unit_vectors, directions)
+    for beam in range(beams):
+        is_hit[beam] = ranges[beam] <= world.sensor[RANGE_MAX]
+        lengths[beam] = ranges[beam] * scale if is_hit[beam] else 0.0
+    scan_ends(lengths, directions, 0.0, 0.0, ends)
+    _filter_mates(world, row, first, robots, 0.0, 0.0, ends, is_hit)
+    for beam in range(beams):
+        if not is_hit[beam] and ranges[beam] <= world.sensor[RANGE_MAX]:
+            ranges[beam] = np.float32(np.nan)
 
 
 @kernel
@@ -198,6 +222,10 @@ def _update_map(
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
     x, y = (believed[0] - origin[0]) * scale, (believed[1] - origin[1]) * scale
+    if not (0.0 <= x < belief[2] and 0.0 <= y < belief[1]):
+        # Whoever takes himself to be beyond his map is lost.
+        world.failed[row] = 1
+        return
     is_hit = np.empty(beams, np.bool_)
     for beam in range(beams):
         is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
@@ -209,7 +237,7 @@ def _update_map(
             lengths[beam] = min(value * scale, reach) if value == value else 0.0
         scan_ends(lengths, directions, local_x, local_y, ends)
         box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits)
-    if world.flags[row] & KNOWN_MATES:
+    if world.flags[row] & (KNOWN_MATES | SOME_MATES):
         _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
     log_odds = int8_grid_at(belief[0], belief[1], belief[2])
     touched = word_grid_at(belief[3], belief[4], touched_words(belief[2]))

@@ -6,8 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
+from lidarium.evaluation.beliefs import cells_beyond
 from lidarium.evaluation.record.display import MapChanges
 from lidarium.mapping.level_changes import note_changes, note_laid_changes
+
+FAR = 1e5
+"""How far from a robot a map may have changed that was rendered anew [m]."""
 
 
 class MapSampler:
@@ -45,6 +49,12 @@ class MapSampler:
         self._reach = settings.lidar.range_max + 0.5 * settings.robot.max_speed * period_s + 4 * self._resolution
         self._last = world.believed[:, :2].copy()
         self._is_laid = not settings.known_starts
+        self._maps = world.belief_rows.copy()
+        if settings.known_starts:
+            for row in range(settings.robots):
+                first_row, first_column = cells_beyond(env, row)
+                self._maps[row, 0] += first_row * self._maps[row, 2] + first_column
+        self._renderings = world.renderings.copy()
         self._lays = _lays_of(env, self.origin)
         self._before = [np.zeros(log_odds.shape, np.int8) for log_odds in world.log_odds] if self._is_laid else []
         self._before_at = np.array([log_odds.ctypes.data for log_odds in self._before], np.int64)
@@ -59,12 +69,15 @@ class MapSampler:
         if self._steps and step <= self._steps[-1]:
             return
         planes = (self._known, self._occupied, self._buffer)
+        is_new = not np.array_equal(self._renderings, world.renderings)
+        reach = FAR if is_new else self._reach
+        self._renderings[:] = world.renderings
         if self._is_laid:
             count = note_laid_changes(
-                world.belief_rows, self._before_at, self._lays, world.believed, self._last, self._reach, self._resolution, *planes
+                world.belief_rows, self._before_at, self._lays, world.believed, self._last, reach, self._resolution, *planes
             )
         else:
-            count = note_changes(world.belief_rows, world.believed, self._last, self._reach, self._frame, *planes)
+            count = note_changes(self._maps, world.believed, self._last, reach, self._frame, *planes)
         self._steps.append(step)
         self._changes.append(self._buffer[:count].copy())
 

@@ -11,17 +11,12 @@ from lidarium.envs.episodes import Beginning
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue import is_file_name, load_floor
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.settings import ExplorationSettings, RewardSettings
+from lidarium.envs.settings import PARTS, ExplorationSettings
 from lidarium.envs.simulation.floor_cache import floor_tables
-from lidarium.envs.simulation.lidar import Lidar
-from lidarium.envs.simulation.robots import Robot
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.state import state_sha256
 from lidarium.evaluation.result import settings_sha256
 from lidarium.evaluation.watching import WatchedExploration, Watcher
-from lidarium.mapping.occupancy import OccupancySettings
-
-_PARTS: dict[str, type] = {"robot": Robot, "lidar": Lidar, "occupancy": OccupancySettings, "reward": RewardSettings}
 
 
 def rerun(record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()) -> ExplorationEnv:
@@ -106,7 +101,7 @@ def settings_of(header: dict[str, Any]) -> ExplorationSettings:
         Where they are not whole, or not those that were hashed.
     """
     try:
-        parts = {name: kind(**header["settings"][name]) for name, kind in _PARTS.items()}
+        parts = {name: kind(**header["settings"][name]) for name, kind in PARTS.items()}
         settings = ExplorationSettings(**{**header["settings"], **parts})
     except (KeyError, TypeError) as error:
         raise ValueError(f"the settings of the record are not those of lidarium {lidarium.__version__}: {error}") from error

@@ -3,6 +3,8 @@
 import pytest
 
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.simulation.faults import FaultSettings
+from lidarium.envs.simulation.radio import RadioSettings
 
 FLOORS = ("apartment", "building:3", "clinic", "building:17", "scene_room")
 CLOSET = Floor("closet", (0.0, 0.0, 2.0, 1.6))
@@ -31,3 +33,17 @@ def test_rows_are_the_same_at_the_horizon_and_in_the_episodes_after_it(compare, 
 def test_rows_are_the_same_when_all_is_covered_or_no_frontier_is_left(compare):
     assert compare("frontier", 2, 60, ["apartment"] * 4, stop_coverage=0.6, seed=1) >= 16
     assert compare("frontier", 1, 40, [CLOSET] * 2, stop_coverage=None, seed=1) >= 20
+
+
+@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"localization": "odometry", "odometry": "poor", "noise": "datasheet"},
+        {"radio": RadioSettings(kind="line_of_sight", reach=5.0, loss=0.2, latency_s=0.3)},
+        {"faults": FaultSettings(laser_dropout=400.0, stuck_wheel=400.0, kidnapping=400.0, dead_robot=200.0)},
+    ],
+    ids=["odometry", "radio", "faults"],
+)
+def test_rows_are_the_same_in_worlds_that_are_not_ideal(compare, level, options):
+    compare(level, 2, 12, FLOORS[:3], seed=6, **options)

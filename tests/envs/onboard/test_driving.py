@@ -54,7 +54,7 @@ class Drive:
             follow_paths(
                 world.believed, world.velocities, world.ranges, world.lidar.unit_vectors, world.bodies[:, 0].copy(), self.limits,
                 self.paths, self.margins, self.counts, self.places, self.headings, self.states, self.stood, self.backing,
-                self.knows_mates, self.present, FORESIGHT_TIMES, self.commands,
+                self.knows_mates, self.present, FORESIGHT_TIMES, world.contact, world.heard, self.commands,
             )  # fmt: skip
             world.step(self.commands)
             self.track.append(world.poses.copy())

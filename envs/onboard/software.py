@@ -1,0 +1,95 @@
+"""What happens on board between sensing and deciding: who tells where a robot is, and what the radio brings.
+
+In the ideal world the kernels of a step do all of it. Localizers and radios that are not kernels run here, between and after the two
+stages of a step, robot by robot.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.onboard.exchange import CONTACT_S, NEVER
+from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.settings import KERNEL_LOCALIZATIONS, ExplorationSettings
+from lidarium.envs.simulation.arrays import ENDED
+from lidarium.envs.simulation.stepping import ranges_without_mates
+from lidarium.mapping.localization.localizer import Sensing
+from lidarium.mapping.localization.registry import make_localizer
+
+LOCALIZER_STREAM = 0x6C6F6361
+"""Sets the draws of localizers apart from others of the same seed."""
+
+
+class Software:
+    """Steps a world together with the robots' software that is not in kernels.
+
+    Parameters
+    ----------
+    perception : Perception
+        What the robots know; it holds their localizers and radios.
+    settings : ExplorationSettings
+        The team of every episode.
+
+    Attributes
+    ----------
+    is_staged : bool
+        Whether anything runs here; otherwise a step is that of the world alone.
+    """
+
+    def __init__(self, perception: Perception, settings: ExplorationSettings) -> None:
+        self._perception, self._settings = perception, settings
+        self._localizes = settings.localization not in KERNEL_LOCALIZATIONS
+        self._beams = np.empty(settings.lidar.beams, np.float32)
+        self.is_staged = self._localizes or bool(perception.exchanges)
+
+    def start(self, episode: int, seed: int) -> None:
+        """Begin an episode, after its robots were placed; whatever is drawn comes from ``seed``."""
+        world, robots = self._perception.world, self._settings.robots
+        if self._localizes:
+            for robot in range(robots):
+                row = episode * robots + robot
+                localizer = make_localizer(self._settings.localization, self._settings.lidar)
+                draws = np.random.default_rng([seed, LOCALIZER_STREAM, robot])
+                localizer.reset(world.believed[row].copy(), int(draws.integers(2**63)))
+                self._perception.localizers[row] = localizer
+        if self._perception.exchanges:
+            self._perception.exchanges[episode].start(seed)
+
+    def step(self, commands: NDArray[np.float64], *, moves_bodies: bool = True, runs: NDArray[np.bool_] | None = None) -> None:
+        """Run a step of the world, as ``KinematicWorld.step``, and what belongs to it on board."""
+        world = self._perception.world
+        world.step(commands, moves_bodies=moves_bodies, perceives=not self._localizes, runs=runs)
+        if not self.is_staged:
+            return
+        episodes = range(world.episodes) if runs is None else np.flatnonzero(runs).tolist()
+        if self._localizes:
+            for episode in episodes:
+                self._localize(episode)
+            world.perceive(runs)
+        if self._perception.exchanges:
+            for episode in episodes:
+                self._exchange(episode)
+
+    def _localize(self, episode: int) -> None:
+        """Let the robots of an episode find out where they are."""
+        world, robots = self._perception.world, self._settings.robots
+        time_s = float(world.steps[episode]) * self._settings.time_step
+        for row in range(episode * robots, (episode + 1) * robots):
+            localizer = self._perception.localizers[row]
+            if localizer is None or world.flags[row] & ENDED:
+                continue
+            ranges_without_mates(world.table, row, robots, self._beams)
+            world.believed[row] = localizer.localize(Sensing(time_s, world.odometry[row].copy(), self._beams.copy()))
+            correction = localizer.take_correction()
+            if correction is not None:
+                world.render_anew(row, correction.poses, correction.ranges)
+
+    def _exchange(self, episode: int) -> None:
+        """Let the robots of an episode talk, and tell the kernels whom each has heard of lately."""
+        world, settings, exchange = self._perception.world, self._settings, self._perception.exchanges[episode]
+        exchange.step()
+        if not settings.known_starts:
+            return
+        rows = slice(episode * settings.robots, (episode + 1) * settings.robots)
+        age = int(world.steps[episode]) - exchange.heard_at
+        world.contact[rows] = (exchange.heard_at != NEVER) & (age * settings.time_step <= CONTACT_S + settings.radio.latency_s)
+        world.heard[rows] = exchange.heard.reshape(settings.robots, -1)
