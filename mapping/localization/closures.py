@@ -68,7 +68,7 @@ class ClosureFinder:
         self._maps.append(_Remembered(pyramid(finished.grid), finished.node, last_node, path))
 
     def find(
-        self, poses: NDArray[np.float64], points: NDArray[np.float64], covariance: NDArray[np.float64], path: float
+        self, poses: NDArray[np.float64], points: NDArray[np.float64], covariance: NDArray[np.float64], path: float, usual_score: float
     ) -> list[Closure]:
         """Return what the last node's scan recognises.
 
@@ -82,14 +82,17 @@ class ClosureFinder:
             How well its pose is known.
         path : float
             Way driven so far [m].
+        usual_score : float
+            Agreement of matches of late.
         """
         settings = self._settings
         variances = np.linalg.eigvalsh(covariance[:2, :2])
         reach_m = min(max(settings.deviations * float(np.sqrt(variances[-1])), settings.search_m), settings.most_m)
         reach_angle = min(max(settings.deviations * float(np.sqrt(covariance[2, 2])), settings.search_angle), settings.most_angle)
+        least_score = max(settings.least_score, settings.least_share * usual_score)
         closures = []
         for old in self._nearest(poses, path, settings.near_m + reach_m)[: settings.candidates]:
-            closure = self._recognised(old, poses, points, (reach_m, reach_angle))
+            closure = self._recognised(old, poses, points, (reach_m, reach_angle), least_score)
             if closure is not None:
                 closures += self._confirmed(closure, poses)
         return closures
@@ -106,17 +109,17 @@ class ClosureFinder:
         return [old for _, _, old in sorted(found, key=lambda entry: entry[:2])]
 
     def _recognised(
-        self, old: _Remembered, poses: NDArray[np.float64], points: NDArray[np.float64], reach: tuple[float, float]
+        self, old: _Remembered, poses: NDArray[np.float64], points: NDArray[np.float64], reach: tuple[float, float], least_score: float
     ) -> Closure | None:
         settings = self._settings
         around = relative(poses[old.node], poses[-1])
-        least = 0.6 * settings.least_score * settings.least_overlap
+        least = 0.6 * least_score * settings.least_overlap
         best, _ = place(old.coarse, points, around, reach, least, settings.evaluations)
         if best is None:
             return None
         weight = self._matching.independent_points / self._matching.deviation**2
         match = refine(old.coarse.grid, points, best.pose, best.pose, np.zeros((3, 3)), weight)
-        if match.score < settings.least_score or match.overlap < settings.least_overlap or match.contradiction > settings.most_contradiction:
+        if match.score < least_score or match.overlap < settings.least_overlap or match.contradiction > settings.most_contradiction:
             return None
         if reach[0] > settings.apart_m:
             apart = (best.pose, settings.apart_m, settings.apart_angle)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.localization.branch_and_bound import place, pyramid
 from lidarium.mapping.localization.scan_matching import Match, refine, search
-from lidarium.mapping.localization.settings import MatchingSettings, SubmapSettings
+from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.localization.submaps import AgreementGrid, Submap
 from lidarium.mapping.rigid import relative
 from lidarium.mapping.scans import ScanGeometry
@@ -57,15 +57,22 @@ class LocalMapper:
 
     Parameters
     ----------
-    matching, submaps : MatchingSettings, SubmapSettings
+    settings : SlamSettings
         How.
     geometry : ScanGeometry
         Which way the beams look.
+
+    Attributes
+    ----------
+    usual_score : float
+        Agreement of matches of late.
     """
 
-    def __init__(self, matching: MatchingSettings, submaps: SubmapSettings, geometry: ScanGeometry) -> None:
-        self._matching, self._submaps, self._geometry = matching, submaps, geometry
+    def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
+        self._matching, self._submaps, self._odometry = settings.matching, settings.submaps, settings.odometry
+        self._uses_odometry, self._geometry = settings.uses_odometry, geometry
         self._active: list[_Active] = []
+        self.usual_score = 0.0
 
     @property
     def node(self) -> int:
@@ -79,49 +86,67 @@ class LocalMapper:
         self._add(node, np.zeros(3), ranges)
         return ended
 
-    def match(
-        self, points: NDArray[np.float64], predicted: NDArray[np.float64], covariance: NDArray[np.float64] | None
-    ) -> Match | None:
+    def match(self, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64], failed: int) -> Match | None:
         """Return where a scan lies on the older local map; None where it does not match.
+
+        Near what odometry says it is searched first. Where that does not convince, odometry may be wrong (a wheel slips, the robot was
+        pushed), and the search goes farther, without it; what is found there has to be clearly better.
 
         Parameters
         ----------
         points : (n, 2) float64
             Points in the robot's frame [m].
         predicted : (3,) float64
-            Where odometry says the robot is, in the local map's frame [m, rad].
-        covariance : (3, 3) float64 or None
-            How well it knows; None where there is no odometry.
+            Where the robot should be, in the local map's frame [m, rad].
+        moved : (3,) float64
+            The motion since the last match that led there.
+        failed : int
+            How many scans in a row did not match before.
         """
         settings = self._matching
-        grid = self._active[0].submap.grid
-        if covariance is not None:
-            spread = np.sqrt(np.diag(covariance))
-            reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
-            reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
-            start = search(grid, points, predicted, reach_m, reach_angle)
-            found = refine(grid, points, start, predicted, np.linalg.inv(covariance), self._weight)
-            if self._is_good(found):
-                return found
-        start = self._search_widely(points, predicted)
-        if start is None:
-            return None
-        found = refine(grid, points, start, start, np.zeros((3, 3)), self._weight)
-        return found if self._is_good(found) else None
+        is_blind = not self._uses_odometry or failed >= settings.wide_after
+        near = self._match_near(points, predicted, moved) if self._uses_odometry else None
+        if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:
+            return self._noted(near)
+        distance = math.hypot(float(moved[0]), float(moved[1]))
+        reach = (settings.blind_m, settings.blind_angle)
+        if not is_blind:
+            # Twice the motion and more: also where a robot is that went back while odometry said forth.
+            reach = (min(settings.search_m + 2.2 * distance, reach[0]), min(settings.search_angle + 2.2 * abs(float(moved[2])), reach[1]))
+        far = self._match_far(points, predicted, reach)
+        good = [match for match in (near, far) if match is not None and self._is_good(match)]
+        if len(good) == 2:
+            return self._noted(good[1] if good[1].score > good[0].score + settings.better_by else good[0])
+        return self._noted(good[0]) if good else None
+
+    def _noted(self, match: Match) -> Match:
+        self.usual_score = match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
+        return match
 
     @property
     def _weight(self) -> float:
         return self._matching.independent_points / self._matching.deviation**2
 
     def _is_good(self, match: Match) -> bool:
-        return match.score >= self._matching.least_score and match.overlap >= self._matching.least_overlap
-
-    def _search_widely(self, points: NDArray[np.float64], predicted: NDArray[np.float64]) -> NDArray[np.float64] | None:
         settings = self._matching
-        coarse = pyramid(self._active[0].submap.finished())
+        least_score = max(settings.least_score, settings.least_share * self.usual_score)
+        agrees = match.score >= least_score and match.overlap >= settings.least_overlap
+        return agrees and match.contradiction <= settings.most_contradiction
+
+    def _match_near(self, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64]) -> Match:
+        settings, grid = self._matching, self._active[0].submap.grid
+        covariance = self._odometry.covariance(math.hypot(float(moved[0]), float(moved[1])), float(moved[2]))
+        spread = np.sqrt(np.diag(covariance))
+        reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
+        reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
+        start = search(grid, points, predicted, reach_m, reach_angle)
+        return refine(grid, points, start, predicted, np.linalg.inv(covariance), self._weight)
+
+    def _match_far(self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]) -> Match | None:
+        settings, oldest = self._matching, self._active[0].submap
         least = 0.5 * settings.least_score * settings.least_overlap
-        found, _ = place(coarse, points, predicted, (settings.blind_m, settings.blind_angle), least, settings.evaluations)
-        return None if found is None else found.pose
+        found, _ = place(pyramid(oldest.finished()), points, predicted, reach, least, settings.evaluations)
+        return None if found is None else refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), self._weight)
 
     def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:
         """Take in a scan at x, y, theta (3,) in the older local map's frame, so much way [m] after the last one.

@@ -70,6 +70,16 @@ class MatchingSettings:
         Standard deviation of how far a return is from full agreement with the map, which is 1.
     least_score, least_overlap : float
         Agreement, and share of the returns near what the local map has observed, below which a match does not count.
+    least_share : float
+        The same for agreement as a share of what matches have had of late.
+    most_contradiction : float
+        Share of the returns in free space of the local map above which a match does not count.
+    convincing_share : float
+        Agreement, as a share of what matches have had of late, below which the search goes farther than odometry says.
+    better_by : float
+        By how much more a match that is found there has to agree.
+    wide_after : int
+        After so many scans in a row that do not match, the search goes as far as where there is no odometry.
     lost_after : int
         After so many scans in a row that do not match, a new local map is begun.
     lost_m, lost_angle : float
@@ -90,8 +100,13 @@ class MatchingSettings:
     evaluations: int = 100_000
     independent_points: float = 50.0
     deviation: float = 0.3
-    least_score: float = 0.35
+    least_score: float = 0.2
+    least_share: float = 0.5
     least_overlap: float = 0.2
+    most_contradiction: float = 0.25
+    convincing_share: float = 0.75
+    better_by: float = 0.1
+    wide_after: int = 3
     lost_after: int = 8
     lost_m: float = 2.0
     lost_angle: float = 0.5
@@ -146,6 +161,8 @@ class ClosureSettings:
         At most so many placements are looked at in a search; one that is not over by then found nothing.
     least_score, least_overlap : float
         Agreement of a closure, and share of the returns near what the local map has observed.
+    least_share : float
+        Agreement of a closure as a share of what matches with growing local maps have had of late.
     most_contradiction : float
         Share of returns that may lie in free space of the local map.
     ambiguity : float
@@ -172,7 +189,8 @@ class ClosureSettings:
     most_angle: float = math.radians(20.0)
     deviations: float = 2.5
     evaluations: int = 60_000
-    least_score: float = 0.55
+    least_score: float = 0.4
+    least_share: float = 0.85
     least_overlap: float = 0.6
     most_contradiction: float = 0.12
     ambiguity: float = 0.9

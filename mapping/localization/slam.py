@@ -62,7 +62,7 @@ class Slam:
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
         """Begin anew at x, y, theta (3,) [m, rad]; nothing is drawn."""
         settings = self._settings
-        self._mapper = LocalMapper(settings.matching, settings.submaps, self._geometry)
+        self._mapper = LocalMapper(settings, self._geometry)
         self._finder = ClosureFinder(settings.closures, settings.matching)
         self.counts = SlamCounts()
         self._nodes = np.array(pose, np.float64)[None]
@@ -185,9 +185,7 @@ class Slam:
             self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
             self._note_key(ranges)
             return
-        distance = float(np.hypot(moved[0], moved[1]))
-        growth = self._settings.odometry.covariance(distance, float(moved[2])) if self._settings.uses_odometry else None
-        match = self._mapper.match(points, self._local, growth)
+        match = self._mapper.match(points, self._local, moved, self._failed)
         if match is None:
             self._fail(ranges)
             return
@@ -259,7 +257,7 @@ class Slam:
             self._finder.remember(finished, len(self._nodes) - 1, self._path)
 
     def _look_for_closures(self, points: NDArray[np.float64], time_s: float) -> None:
-        for closure in self._finder.find(self._nodes, points, self._node_covariance, self._path):
+        for closure in self._finder.find(self._nodes, points, self._node_covariance, self._path, self._mapper.usual_score):
             self._due.append((time_s + self._settings.closures.delay_s, closure))
 
     def _correct(self, time_s: float) -> None:
