@@ -82,3 +82,22 @@ def fit(source: NDArray[np.float64], target: NDArray[np.float64]) -> Transform:
     theta = math.atan2(float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum()))
     x, y = (target_centre - Transform(0.0, 0.0, theta).apply(source_centre)).tolist()
     return Transform(x, y, theta)
+
+
+def composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses x, y, theta (..., 3) given in the frames ``outer`` (..., 3), in the frame of these [m, rad]."""
+    cosine, sine = np.cos(outer[..., 2]), np.sin(outer[..., 2])
+    x, y = inner[..., 0], inner[..., 1]
+    return np.stack([cosine * x - sine * y + outer[..., 0], sine * x + cosine * y + outer[..., 1], _turned(outer, inner, 1.0)], axis=-1)
+
+
+def relative(frame: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses x, y, theta (..., 3) as seen from the frames (..., 3) [m, rad]: ``composed(frame, relative(frame, pose)) = pose``."""
+    cosine, sine = np.cos(frame[..., 2]), np.sin(frame[..., 2])
+    x, y = pose[..., 0] - frame[..., 0], pose[..., 1] - frame[..., 1]
+    return np.stack([cosine * x + sine * y, cosine * y - sine * x, _turned(pose, frame, -1.0)], axis=-1)
+
+
+def _turned(first: NDArray[np.float64], second: NDArray[np.float64], sign: float) -> NDArray[np.float64]:
+    """Return the first heading plus or minus the second, in (-pi, pi]."""
+    return np.asarray(math.pi - (math.pi - first[..., 2] - sign * second[..., 2]) % (2.0 * math.pi))

@@ -1,0 +1,94 @@
+"""How well a trajectory keeps known motions between pairs of times.
+
+References
+----------
+Kuemmerle et al., On measuring the accuracy of SLAM algorithms (Autonomous Robots 27, 2009), and their files of relations.
+"""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.rigid import relative
+from lidarium.mapping.trajectories import read_numbers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Relations:
+    """Motions that are known.
+
+    Attributes
+    ----------
+    begin, end : (relations,) float64
+        From when to when [s]; an end may be before its begin.
+    motions : (relations, 3) float64
+        Pose at the end as seen from that at the begin: x, y, theta [m, rad].
+    """
+
+    begin: NDArray[np.float64]
+    end: NDArray[np.float64]
+    motions: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class RelationErrors:
+    """By how much a trajectory misses relations.
+
+    Attributes
+    ----------
+    relations : int
+        How many there are.
+    translation_m, translation_sd_m : float
+        Mean length of the difference and its standard deviation [m].
+    rotation_rad, rotation_sd_rad : float
+        Mean angle of the difference and its standard deviation [rad].
+    translation_squared_m2, translation_squared_sd_m2, rotation_squared_rad2, rotation_squared_sd_rad2 : float
+        The same of their squares [m^2, rad^2].
+    """
+
+    relations: int
+    translation_m: float
+    translation_sd_m: float
+    rotation_rad: float
+    rotation_sd_rad: float
+    translation_squared_m2: float
+    translation_squared_sd_m2: float
+    rotation_squared_rad2: float
+    rotation_squared_sd_rad2: float
+
+    def as_dict(self) -> dict[str, float]:
+        """Return all numbers by name."""
+        return asdict(self)
+
+
+def read_relations(path: Path) -> Relations:
+    """Read ``t1 t2 dx dy dz roll pitch yaw`` a line, plain or gzipped; what leaves the plane is left out.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the file is not there.
+    ValueError
+        If it holds no relations.
+    """
+    table = read_numbers(path, 8, "a file of relations (t1 t2 dx dy dz roll pitch yaw)")
+    return Relations(table[:, 0].copy(), table[:, 1].copy(), table[:, [2, 3, 7]])
+
+
+def relation_errors(begin: NDArray[np.float64], end: NDArray[np.float64], relations: Relations) -> RelationErrors:
+    """Return by how much poses miss relations: the motion between the poses of each, as seen from the true one.
+
+    Parameters
+    ----------
+    begin, end : (relations, 3) float64
+        Poses at the relations' times: x, y, theta [m, rad].
+    relations : Relations
+        The true motions.
+    """
+    difference = relative(relations.motions, relative(begin, end))
+    translation, rotation = np.hypot(difference[:, 0], difference[:, 1]), np.abs(difference[:, 2])
+    values = [function(errors) for errors in (translation, rotation) for function in (np.mean, np.std)]
+    squares = [function(errors**2) for errors in (translation, rotation) for function in (np.mean, np.std)]
+    return RelationErrors(len(difference), *(float(value) for value in (*values, *squares)))

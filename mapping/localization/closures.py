@@ -1,0 +1,152 @@
+"""Recognises places: lays a scan on local maps of long ago, and doubts what it finds.
+
+A closure counts where its scan agrees with the local map, does not lie in its free space, has no second place that agrees nearly as
+well, and where it would move the robot far, only together with others that say the same.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.localization.branch_and_bound import Pyramid, place, pyramid
+from lidarium.mapping.localization.local_mapping import Finished
+from lidarium.mapping.localization.scan_matching import refine
+from lidarium.mapping.localization.settings import ClosureSettings, MatchingSettings
+from lidarium.mapping.rigid import composed, relative, wrapped
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Closure:
+    """A place recognised.
+
+    Attributes
+    ----------
+    old, new : int
+        Nodes of the graph.
+    measured : (3,) float64
+        The new node as seen from the old one: x, y, theta [m, rad].
+    covariance : (3, 3) float64
+        How well, in the old node's frame [m^2, m rad, rad^2].
+    score : float
+        Agreement, from 0 to 1.
+    """
+
+    old: int
+    new: int
+    measured: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    score: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Remembered:
+    coarse: Pyramid
+    node: int
+    last_node: int
+    path: float
+
+
+class ClosureFinder:
+    """Finished local maps, and what scans have to do with them.
+
+    Parameters
+    ----------
+    settings : ClosureSettings
+        How places are recognised.
+    matching : MatchingSettings
+        How scans are laid on maps.
+    """
+
+    def __init__(self, settings: ClosureSettings, matching: MatchingSettings) -> None:
+        self._settings, self._matching = settings, matching
+        self._maps: list[_Remembered] = []
+        self._doubtful: list[Closure] = []
+
+    def remember(self, finished: Finished, last_node: int, path: float) -> None:
+        """Take in a finished local map, whose scans end at a node, after so much way of the whole run [m]."""
+        self._maps.append(_Remembered(pyramid(finished.grid), finished.node, last_node, path))
+
+    def find(
+        self, poses: NDArray[np.float64], points: NDArray[np.float64], covariance: NDArray[np.float64], path: float, usual_score: float
+    ) -> list[Closure]:
+        """Return what the last node's scan recognises.
+
+        Parameters
+        ----------
+        poses : (nodes, 3) float64
+            The graph's poses [m, rad].
+        points : (n, 2) float64
+            The last node's scan in its own frame [m].
+        covariance : (3, 3) float64
+            How well its pose is known.
+        path : float
+            Way driven so far [m].
+        usual_score : float
+            Agreement of matches of late.
+        """
+        settings = self._settings
+        variances = np.linalg.eigvalsh(covariance[:2, :2])
+        reach_m = min(max(settings.deviations * float(np.sqrt(variances[-1])), settings.search_m), settings.most_m)
+        reach_angle = min(max(settings.deviations * float(np.sqrt(covariance[2, 2])), settings.search_angle), settings.most_angle)
+        least_score = max(settings.least_score, settings.least_share * usual_score)
+        closures = []
+        for old in self._nearest(poses, path, settings.near_m + reach_m)[: settings.candidates]:
+            closure = self._recognised(old, poses, points, (reach_m, reach_angle), least_score)
+            if closure is not None:
+                closures += self._confirmed(closure, poses)
+        return closures
+
+    def _nearest(self, poses: NDArray[np.float64], path: float, within: float) -> list[_Remembered]:
+        """Return local maps of long enough ago with a node as near as that, the nearest first."""
+        found = []
+        for old in self._maps:
+            if path - old.path >= self._settings.path_m:
+                gaps = poses[old.node : old.last_node + 1, :2] - poses[-1, :2]
+                distance = float(np.sqrt((gaps**2).sum(axis=1)).min())
+                if distance <= within:
+                    found.append((distance, old.node, old))
+        return [old for _, _, old in sorted(found, key=lambda entry: entry[:2])]
+
+    def _recognised(
+        self, old: _Remembered, poses: NDArray[np.float64], points: NDArray[np.float64], reach: tuple[float, float], least_score: float
+    ) -> Closure | None:
+        settings = self._settings
+        around = relative(poses[old.node], poses[-1])
+        least = 0.6 * least_score * settings.least_overlap
+        best, _ = place(old.coarse, points, around, reach, least, settings.evaluations)
+        if best is None:
+            return None
+        weight = self._matching.independent_points / self._matching.deviation**2
+        match = refine(old.coarse.grid, points, best.pose, best.pose, np.zeros((3, 3)), weight)
+        if match.score < least_score or match.overlap < settings.least_overlap or match.contradiction > settings.most_contradiction:
+            return None
+        if reach[0] > settings.apart_m:
+            apart = (best.pose, settings.apart_m, settings.apart_angle)
+            second, is_over = place(old.coarse, points, around, reach, settings.ambiguity * best.score, settings.evaluations, apart)
+            if second is not None or not is_over:
+                return None
+        floor = np.diag([settings.least_deviation_m**2, settings.least_deviation_m**2, settings.least_deviation_angle**2])
+        return Closure(old.node, len(poses) - 1, match.pose, match.covariance + floor, match.score)
+
+    def _confirmed(self, closure: Closure, poses: NDArray[np.float64]) -> list[Closure]:
+        """Return the closure, and those that waited for it; nothing where it has to wait for others itself."""
+        settings = self._settings
+        corrected = composed(poses[closure.old], closure.measured)
+        move = corrected - poses[closure.new]
+        if np.hypot(move[0], move[1]) <= settings.confirmed_beyond_m:
+            return [closure]
+        agreeing = [other for other in self._doubtful if self._agree(other, closure, poses)]
+        if len(agreeing) + 1 < settings.confirmations:
+            self._doubtful = [*self._doubtful[-20:], closure]
+            return []
+        self._doubtful = []
+        return [*agreeing, closure]
+
+    def _agree(self, first: Closure, second: Closure, poses: NDArray[np.float64]) -> bool:
+        """Whether two closures place the way between their new nodes as it was driven."""
+        ends = [composed(poses[closure.old], closure.measured) for closure in (first, second)]
+        driven = relative(poses[first.new], poses[second.new])
+        gap = relative(ends[0], ends[1]) - driven
+        settings = self._settings
+        return bool(np.hypot(gap[0], gap[1]) <= settings.agree_m and abs(wrapped(float(gap[2]))) <= settings.agree_angle)

@@ -1,0 +1,198 @@
+"""Where a robot is in its neighbourhood: scans are matched with local maps, and local maps begin and end on the way."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.localization.branch_and_bound import place, pyramid
+from lidarium.mapping.localization.scan_matching import Match, refine, search
+from lidarium.mapping.localization.settings import SlamSettings
+from lidarium.mapping.localization.submaps import AgreementGrid, Submap
+from lidarium.mapping.rigid import relative
+from lidarium.mapping.scans import ScanGeometry
+
+
+@dataclass(slots=True, eq=False)
+class _Active:
+    """A local map that still grows.
+
+    Attributes
+    ----------
+    submap : Submap
+        What it holds.
+    node : int
+        Node of the graph in whose frame it is.
+    in_older : (3,) float64
+        That node in the frame of the local map before.
+    path : float
+        Way driven since [m].
+    """
+
+    submap: Submap
+    node: int
+    in_older: NDArray[np.float64]
+    path: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finished:
+    """A local map that is finished.
+
+    Attributes
+    ----------
+    grid : AgreementGrid
+        What it holds.
+    node : int
+        Node of the graph in whose frame it is.
+    """
+
+    grid: AgreementGrid
+    node: int
+
+
+class LocalMapper:
+    """Two growing local maps, of which the older one says where the robot is.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        How.
+    geometry : ScanGeometry
+        Which way the beams look.
+
+    Attributes
+    ----------
+    usual_score : float
+        Agreement of matches of late.
+    """
+
+    def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
+        self._matching, self._submaps, self._odometry = settings.matching, settings.submaps, settings.odometry
+        self._uses_odometry, self._geometry = settings.uses_odometry, geometry
+        self._active: list[_Active] = []
+        self.usual_score = 0.0
+
+    @property
+    def node(self) -> int:
+        """Node in whose frame poses are now."""
+        return self._active[0].node
+
+    def begin(self, node: int, ranges: NDArray[np.float32]) -> list[Finished]:
+        """Begin anew at a node, by the scan taken there; return the local maps that this ends."""
+        ended = self._ended(self._active)
+        self._active = []
+        self._add(node, np.zeros(3), ranges)
+        return ended
+
+    def match(self, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64], failed: int) -> Match | None:
+        """Return where a scan lies on the older local map; None where it does not match.
+
+        Near what odometry says it is searched first. Where that does not convince, odometry may be wrong (a wheel slips, the robot was
+        pushed), and the search goes farther, without it; what is found there has to be clearly better.
+
+        Parameters
+        ----------
+        points : (n, 2) float64
+            Points in the robot's frame [m].
+        predicted : (3,) float64
+            Where the robot should be, in the local map's frame [m, rad].
+        moved : (3,) float64
+            The motion since the last match that led there.
+        failed : int
+            How many scans in a row did not match before.
+        """
+        settings = self._matching
+        is_blind = not self._uses_odometry or failed >= settings.wide_after
+        near = self._match_near(points, predicted, moved) if self._uses_odometry else None
+        if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:
+            return self._noted(near)
+        distance = math.hypot(float(moved[0]), float(moved[1]))
+        reach = (settings.blind_m, settings.blind_angle)
+        if not is_blind:
+            # Twice the motion and more: also where a robot is that went back while odometry said forth.
+            reach = (min(settings.search_m + 2.2 * distance, reach[0]), min(settings.search_angle + 2.2 * abs(float(moved[2])), reach[1]))
+        far = self._match_far(points, predicted, reach)
+        good = [match for match in (near, far) if match is not None and self._is_good(match)]
+        if len(good) == 2:
+            return self._noted(good[1] if good[1].score > good[0].score + settings.better_by else good[0])
+        return self._noted(good[0]) if good else None
+
+    def _noted(self, match: Match) -> Match:
+        self.usual_score = match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
+        return match
+
+    @property
+    def _weight(self) -> float:
+        return self._matching.independent_points / self._matching.deviation**2
+
+    def _is_good(self, match: Match) -> bool:
+        settings = self._matching
+        least_score = max(settings.least_score, settings.least_share * self.usual_score)
+        agrees = match.score >= least_score and match.overlap >= settings.least_overlap
+        return agrees and match.contradiction <= settings.most_contradiction
+
+    def _match_near(self, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64]) -> Match:
+        settings, grid = self._matching, self._active[0].submap.grid
+        covariance = self._odometry.covariance(math.hypot(float(moved[0]), float(moved[1])), float(moved[2]))
+        spread = np.sqrt(np.diag(covariance))
+        reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
+        reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
+        start = search(grid, points, predicted, reach_m, reach_angle)
+        return refine(grid, points, start, predicted, np.linalg.inv(covariance), self._weight)
+
+    def _match_far(self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]) -> Match | None:
+        settings, oldest = self._matching, self._active[0].submap
+        least = 0.5 * settings.least_score * settings.least_overlap
+        found, _ = place(pyramid(oldest.finished()), points, predicted, reach, least, settings.evaluations)
+        return None if found is None else refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), self._weight)
+
+    def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:
+        """Take in a scan at x, y, theta (3,) in the older local map's frame, so much way [m] after the last one.
+
+        Returns
+        -------
+        bool
+            Whether the robot has left what the local maps can hold; ``begin`` has to be called then.
+        """
+        for active in self._active:
+            pose = pose if active is self._active[0] else relative(active.in_older, pose)
+            active.path += path
+            if not active.submap.insert(pose, ranges, self._geometry, self._matching.range_m):
+                return False
+        return True
+
+    @property
+    def wants_another(self) -> bool:
+        """Whether it is time to begin another local map, at a new node."""
+        newest = self._active[-1]
+        is_full = newest.submap.scans >= max(self._submaps.least_scans // 2, 1) and newest.path >= 0.5 * self._submaps.path_m
+        return len(self._active) == 1 and is_full
+
+    def add(self, node: int, pose: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+        """Begin another local map at a node that lies at x, y, theta (3,) in the older one's frame, by the scan taken there."""
+        self._add(node, pose, ranges)
+
+    def hand_over(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[Finished]]:
+        """End the older local map where it is full; return poses (n, 3) of its frame in that of the new older one, and what ended."""
+        oldest = self._active[0]
+        is_full = oldest.submap.scans >= self._submaps.least_scans and oldest.path >= self._submaps.path_m
+        if len(self._active) < 2 or not is_full:
+            return poses, []
+        self._active = self._active[1:]
+        return relative(self._active[0].in_older, poses), self._ended([oldest])
+
+    def _add(self, node: int, in_older: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+        reach = min(self._matching.range_m, self._geometry.range_max) + 2.0 * self._submaps.path_m
+        active = _Active(Submap(self._submaps.resolution, reach), node, in_older.copy())
+        active.submap.insert(np.zeros(3), ranges, self._geometry, self._matching.range_m)
+        self._active.append(active)
+
+    def _ended(self, active: list[_Active]) -> list[Finished]:
+        return [Finished(one.submap.finished(), one.node) for one in active if one.submap.scans >= self._submaps.least_scans // 2]
+
+
+def way(motion: NDArray[np.float64]) -> float:
+    """Return how much of a way a motion x, y, theta (3,) is, turns counted with a metre a radian [m]."""
+    return math.hypot(float(motion[0]), float(motion[1])) + abs(float(motion[2]))

@@ -1,0 +1,298 @@
+"""Lays a scan on a local map: a search around where odometry says the robot is, then Gauss and Newton's method.
+
+The agreement of a point is the map's, smoothed by a cubic B-spline, which has a gradient everywhere and is not drawn to cells.
+
+References
+----------
+Search: Olson, Real-time correlative scan matching (ICRA 2009). Refinement: Kohlbrecher et al., A flexible and scalable SLAM system
+with full 3D motion estimation (SSRR 2011), here with an agreement that keeps fractions of cells, and odometry as a prior.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.localization.submaps import AgreementGrid
+
+FULL_AGREEMENT = 0.5
+"""Smoothed agreement in the middle of a thin wall that lies between cells."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Match:
+    """Where a scan lies on a local map.
+
+    Attributes
+    ----------
+    pose : (3,) float64
+        x, y, theta in the map's frame [m, rad].
+    score : float
+        Mean agreement, from 0 to 1, of the points that lie near what the map has observed.
+    overlap : float
+        Share of the points that do.
+    contradiction : float
+        Share of the points that lie in what the map knows to be free.
+    covariance : (3, 3) float64
+        Of the pose [m^2, m rad, rad^2].
+    """
+
+    pose: NDArray[np.float64]
+    score: float
+    overlap: float
+    contradiction: float
+    covariance: NDArray[np.float64]
+
+
+def search(
+    grid: AgreementGrid, points: NDArray[np.float64], around: NDArray[np.float64], reach_m: float, reach_angle: float
+) -> NDArray[np.float64]:
+    """Return the pose (3,) at which the points agree best with the map, of all within reach, in steps of a cell.
+
+    Parameters
+    ----------
+    grid : AgreementGrid
+        The map.
+    points : (n, 2) float64
+        Points in the robot's frame [m].
+    around : (3,) float64
+        Middle of the search: x, y, theta in the map's frame [m, rad].
+    reach_m, reach_angle : float
+        How far the search goes to each side [m, rad].
+    """
+    step = angle_step(points, grid.resolution)
+    steps, turns = math.ceil(reach_m / grid.resolution - 1e-9), math.ceil(reach_angle / step - 1e-9)
+    if len(points) == 0 or steps + turns == 0:
+        return around
+    found = np.empty(3)
+    _search(grid.levels, grid.column, grid.row, grid.resolution, points, around, steps, turns, step, found)
+    return found
+
+
+def angle_step(points: NDArray[np.float64], resolution: float) -> float:
+    """Return the turn by which far points move by a cell [rad]; of the farthest tenth no notice is taken."""
+    if len(points) == 0:
+        return math.radians(1.0)
+    far = float(np.quantile(np.hypot(points[:, 0], points[:, 1]), 0.9))
+    return min(max(resolution / max(far, resolution), math.radians(0.25)), math.radians(2.0))
+
+
+@kernel
+def _search(
+    levels: Array,
+    first_column: int,
+    first_row: int,
+    side: float,
+    points: Array,
+    around: Array,
+    steps: int,
+    turns: int,
+    step: float,
+    found: Array,
+) -> None:
+    rows, columns = levels.shape
+    width = 2 * steps + 1
+    sums = np.empty((width, width), np.int64)
+    best = -1.0
+    found[:] = around
+    for turn in range(-turns, turns + 1):
+        heading = around[2] + turn * step
+        cosine, sine = math.cos(heading) / side, math.sin(heading) / side
+        x0, y0 = around[0] / side - first_column - steps, around[1] / side - first_row - steps
+        sums[:] = 0
+        for k in range(points.shape[0]):
+            column = int(math.floor(cosine * points[k, 0] - sine * points[k, 1] + x0))
+            row = int(math.floor(sine * points[k, 0] + cosine * points[k, 1] + y0))
+            if column < 0 or row < 0 or column + width > columns or row + width > rows:
+                continue
+            for i in range(width):
+                for j in range(width):
+                    sums[i, j] += levels[row + i, column + j]
+        for i in range(width):
+            for j in range(width):
+                # Of equals the nearest to the prediction wins.
+                away = ((i - steps) ** 2 + (j - steps) ** 2) / (steps * steps + 1.0) + turn * turn / (turns * turns + 1.0)
+                score = sums[i, j] * (1.0 - 0.05 * away)
+                if score > best:
+                    best = score
+                    found[0], found[1], found[2] = around[0] + (j - steps) * side, around[1] + (i - steps) * side, heading
+
+
+def refine(
+    grid: AgreementGrid,
+    points: NDArray[np.float64],
+    start: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    information: NDArray[np.float64],
+    weight: float,
+) -> Match:
+    """Return the pose near a start at which the points agree best with the map.
+
+    Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a prior one.
+
+    Parameters
+    ----------
+    grid : AgreementGrid
+        The map.
+    points : (n, 2) float64
+        Points in the robot's frame [m].
+    start, prior : (3,) float64
+        Where to begin, and where odometry says the robot is: x, y, theta in the map's frame [m, rad].
+    information : (3, 3) float64
+        How much that counts [1/m^2, 1/(m rad), 1/rad^2]; zero for not at all.
+    weight : float
+        How much full disagreement of all points counts: independent points / variance of the disagreement of one.
+    """
+    pose, hessian, told = np.array(start, np.float64), np.empty((3, 3)), np.zeros(3)
+    count = len(points)
+    if count == 0:
+        return Match(pose, 0.0, 0.0, 0.0, _inverse(information))
+    _refine(grid.levels, grid.column, grid.row, grid.resolution, points, pose, prior, information, weight / count, hessian, told)
+    return Match(pose, *told.tolist(), _inverse(hessian))
+
+
+def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the covariance; a metre and a radian at most, for what nothing tells."""
+    return np.asarray(np.linalg.inv(information + np.eye(3)))
+
+
+@kernel(inline=True)
+def _spline_weights(t: float) -> tuple[float, float, float, float]:
+    """Weights of four neighbouring cells in a cubic B-spline, t from 0 to 1 between the middle two."""
+    u, square, cube = 1.0 - t, t * t, t * t * t
+    return u * u * u / 6.0, (3.0 * cube - 6.0 * square + 4.0) / 6.0, (-3.0 * cube + 3.0 * square + 3.0 * t + 1.0) / 6.0, cube / 6.0
+
+
+@kernel(inline=True)
+def _spline_slopes(t: float) -> tuple[float, float, float, float]:
+    """Derivatives of the weights."""
+    u, square = 1.0 - t, t * t
+    return -0.5 * u * u, 1.5 * square - 2.0 * t, -1.5 * square + t + 0.5, 0.5 * square
+
+
+@kernel(inline=True)
+def _agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
+    """Smoothed agreement at x, y [cells] and its slopes [1/cell]; zero where the map ends."""
+    u, v = x - 0.5, y - 0.5
+    column, row = int(math.floor(u)), int(math.floor(v))
+    if not (1 <= column < levels.shape[1] - 2 and 1 <= row < levels.shape[0] - 2):
+        return 0.0, 0.0, 0.0
+    across, across_slopes = _spline_weights(u - column), _spline_slopes(u - column)
+    along, along_slopes = _spline_weights(v - row), _spline_slopes(v - row)
+    value, slope_x, slope_y = 0.0, 0.0, 0.0
+    for i in range(4):
+        line, line_slope = 0.0, 0.0
+        for j in range(4):
+            level = max(float(levels[row + i - 1, column + j - 1]) - 1.0, 0.0)
+            line += across[j] * level
+            line_slope += across_slopes[j] * level
+        value += along[i] * line
+        slope_x += along[i] * line_slope
+        slope_y += along_slopes[i] * line
+    return value / 254.0, slope_x / 254.0, slope_y / 254.0
+
+
+@kernel
+def _normal_equations(
+    levels: Array, first_column: int, first_row: int, side: float, points: Array, pose: Array, hessian: Array, gradient: Array
+) -> float:
+    """Fill the normal equations of the points' disagreement at a pose; return the sum of its squares."""
+    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+    hessian[:], gradient[:] = 0.0, 0.0
+    cost = 0.0
+    for k in range(points.shape[0]):
+        x, y = cosine * points[k, 0] - sine * points[k, 1], sine * points[k, 0] + cosine * points[k, 1]
+        value, slope_x, slope_y = _agreement(levels, (x + pose[0]) / side - first_column, (y + pose[1]) / side - first_row)
+        rest = 1.0 - value / FULL_AGREEMENT
+        cost += rest * rest
+        scale = 1.0 / (side * FULL_AGREEMENT)
+        a, b = slope_x * scale, slope_y * scale
+        c = b * x - a * y
+        gradient[0] += a * rest
+        gradient[1] += b * rest
+        gradient[2] += c * rest
+        hessian[0, 0] += a * a
+        hessian[0, 1] += a * b
+        hessian[0, 2] += a * c
+        hessian[1, 1] += b * b
+        hessian[1, 2] += b * c
+        hessian[2, 2] += c * c
+    hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
+    return cost
+
+
+@kernel
+def _refine(
+    levels: Array,
+    first_column: int,
+    first_row: int,
+    side: float,
+    points: Array,
+    pose: Array,
+    prior: Array,
+    information: Array,
+    weight: float,
+    hessian: Array,
+    told: Array,
+) -> None:
+    """Move a pose to where the cost is least (Levenberg and Marquardt); tell the Hessian and what ``_judge`` says."""
+    gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
+    trial = np.empty(3)
+    away = pose - prior
+    cost = weight * _normal_equations(levels, first_column, first_row, side, points, pose, hessian, gradient) + away @ information @ away
+    damping = 1e-3
+    for _ in range(30):
+        whole = weight * hessian + information
+        for k in range(3):
+            whole[k, k] += damping * whole[k, k] + 1e-9
+        move = np.linalg.solve(whole, weight * gradient - information @ away)
+        trial[:] = pose + move
+        trial_away = trial - prior
+        trial_cost = weight * _normal_equations(levels, first_column, first_row, side, points, trial, trial_hessian, trial_gradient)
+        trial_cost += trial_away @ information @ trial_away
+        if trial_cost < cost:
+            pose[:], away[:] = trial, trial_away
+            hessian[:], gradient[:] = trial_hessian, trial_gradient
+            is_still = abs(move[0]) + abs(move[1]) < 1e-4 and abs(move[2]) < 1e-5
+            cost, damping = trial_cost, 0.3 * damping
+            if is_still:
+                break
+        else:
+            damping *= 8.0
+            if damping > 1e3:
+                break
+    hessian[:] = weight * hessian + information
+    _judge(levels, first_column, first_row, side, points, pose, told)
+
+
+@kernel
+def _judge(levels: Array, first_column: int, first_row: int, side: float, points: Array, pose: Array, told: Array) -> None:
+    """Tell the mean agreement of the points near observed cells, the share of points that are, and that of those in free space."""
+    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+    agreeing, known, contradicting = 0.0, 0, 0
+    for k in range(points.shape[0]):
+        x = (cosine * points[k, 0] - sine * points[k, 1] + pose[0]) / side - first_column
+        y = (sine * points[k, 0] + cosine * points[k, 1] + pose[1]) / side - first_row
+        value, _, _ = _agreement(levels, x, y)
+        agreeing += min(value / FULL_AGREEMENT, 1.0)
+        if value > 0.0:
+            known += 1
+        else:
+            lowest, highest = _extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
+            known += highest > 0
+            contradicting += lowest == 1 and highest == 1
+    told[0], told[1], told[2] = agreeing / max(known, 1), known / points.shape[0], contradicting / points.shape[0]
+
+
+@kernel
+def _extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
+    """Return the lowest and the highest level within three cells; what lies outside of the map is not observed."""
+    rows, columns = levels.shape
+    lowest, highest = 255, 0
+    for i in range(row - 3, row + 4):
+        for j in range(column - 3, column + 4):
+            level = int(levels[i, j]) if 0 <= i < rows and 0 <= j < columns else 0
+            lowest, highest = min(lowest, level), max(highest, level)
+    return lowest, highest

@@ -1,0 +1,273 @@
+"""All settings of localization in one place."""
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometrySettings:
+    """By how much dead reckoning may err, in standard deviations.
+
+    Attributes
+    ----------
+    distance_share : float
+        Of a distance along and across it [m/m].
+    turn_share : float
+        Of a turn [rad/rad].
+    turn_per_metre : float
+        Of the heading over a distance [rad/m].
+    distance_floor, turn_floor : float
+        Of any motion at all [m, rad].
+    """
+
+    distance_share: float = 0.1
+    turn_share: float = 0.1
+    turn_per_metre: float = 0.05
+    distance_floor: float = 0.005
+    turn_floor: float = 0.002
+
+    def __post_init__(self) -> None:
+        _check_numbers(self)
+
+    def covariance(self, distance: float, turn: float) -> NDArray[np.float64]:
+        """Return the covariance (3, 3) of a motion by so much, in the frame in which it began [m, rad]."""
+        along = (self.distance_share * distance + self.distance_floor) ** 2
+        heading = (self.turn_share * abs(turn) + self.turn_per_metre * distance + self.turn_floor) ** 2
+        return np.diag([along, along, heading])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchingSettings:
+    """How scans are laid on the local map.
+
+    Attributes
+    ----------
+    distance_m, angle : float
+        A scan is matched after so much motion since the last one [m, rad].
+    beam_interval_s : float
+        Time between neighbouring beams; 0 for a scan taken at once [s].
+    range_m : float
+        Longest range that counts; a return beyond it says that the way there is free [m].
+    spacing_m : float
+        Returns that are nearer to each other than this count as one [m].
+    points : int
+        At most so many returns of a scan are matched.
+    search_m, search_angle : float
+        What the search around odometry reaches beyond its standard deviation [m, rad].
+    search_deviations : float
+        How many standard deviations of odometry the search reaches.
+    blind_m, blind_angle : float
+        What the search reaches where there is no odometry, or odometry leads nowhere [m, rad].
+    evaluations : int
+        At most so many placements, and blocks of them, are looked at in such a search.
+    independent_points : float
+        As how many independent measurements all returns of a scan count: neighbouring ones err together.
+    deviation : float
+        Standard deviation of how far a return is from full agreement with the map, which is 1.
+    least_score, least_overlap : float
+        Agreement, and share of the returns near what the local map has observed, below which a match does not count.
+    least_share : float
+        The same for agreement as a share of what matches have had of late.
+    most_contradiction : float
+        Share of the returns in free space of the local map above which a match does not count.
+    convincing_share : float
+        Agreement, as a share of what matches have had of late, below which the search goes farther than odometry says.
+    better_by : float
+        By how much more a match that is found there has to agree.
+    wide_after : int
+        After so many scans in a row that do not match, the search goes as far as where there is no odometry.
+    lost_after : int
+        After so many scans in a row that do not match, a new local map is begun.
+    lost_m, lost_angle : float
+        Standard deviation of the motion into such a new local map [m, rad].
+    """
+
+    distance_m: float = 0.1
+    angle: float = math.radians(5.0)
+    beam_interval_s: float = 0.0
+    range_m: float = 20.0
+    spacing_m: float = 0.08
+    points: int = 250
+    search_m: float = 0.05
+    search_angle: float = math.radians(1.0)
+    search_deviations: float = 2.0
+    blind_m: float = 1.2
+    blind_angle: float = math.radians(50.0)
+    evaluations: int = 100_000
+    independent_points: float = 50.0
+    deviation: float = 0.3
+    least_score: float = 0.2
+    least_share: float = 0.5
+    least_overlap: float = 0.2
+    most_contradiction: float = 0.25
+    convincing_share: float = 0.75
+    better_by: float = 0.1
+    wide_after: int = 3
+    lost_after: int = 8
+    lost_m: float = 2.0
+    lost_angle: float = 0.5
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, zero=("beam_interval_s", "distance_m", "angle", "search_m", "search_angle"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SubmapSettings:
+    """Local maps: each scan goes into two that overlap by half, and is matched with the older one.
+
+    Attributes
+    ----------
+    resolution : float
+        Side of a cell [m].
+    path_m : float
+        Way driven, turns counted with a metre a radian, after which a local map is finished [m].
+    least_scans : int
+        A local map holds at least so many scans.
+    """
+
+    resolution: float = 0.05
+    path_m: float = 8.0
+    least_scans: int = 10
+
+    def __post_init__(self) -> None:
+        _check_numbers(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClosureSettings:
+    """How places seen before are recognised.
+
+    Attributes
+    ----------
+    delay_s : float
+        Time after which a closure acts [s].
+    candidates : int
+        At most so many finished local maps are tried with a scan.
+    path_m : float
+        Way driven since a local map was finished before it is tried [m].
+    near_m : float
+        A local map is tried where one of its scans was taken as near as this, besides the uncertainty [m].
+    search_m, search_angle : float
+        What the search reaches at least [m, rad].
+    most_m, most_angle : float
+        What the search reaches at most [m, rad].
+    deviations : float
+        How many standard deviations of the pose the search reaches.
+    evaluations : int
+        At most so many placements are looked at in a search; one that is not over by then found nothing.
+    least_score, least_overlap : float
+        Agreement of a closure, and share of the returns near what the local map has observed.
+    least_share : float
+        Agreement of a closure as a share of what matches with growing local maps have had of late.
+    most_contradiction : float
+        Share of returns that may lie in free space of the local map.
+    ambiguity : float
+        A second place that agrees as well as this share of the best refutes a closure.
+    apart_m, apart_angle : float
+        By how much two places differ [m, rad].
+    least_deviation_m, least_deviation_angle : float
+        No closure is better than this [m, rad].
+    confirmed_beyond_m : float
+        A closure that would move the robot by more is taken only together with others that say the same [m].
+    confirmations : int
+        How many have to agree.
+    agree_m, agree_angle : float
+        By how much they may differ [m, rad].
+    """
+
+    delay_s: float = 1.0
+    candidates: int = 1
+    path_m: float = 10.0
+    near_m: float = 4.0
+    search_m: float = 0.25
+    search_angle: float = math.radians(4.0)
+    most_m: float = 4.0
+    most_angle: float = math.radians(20.0)
+    deviations: float = 2.5
+    evaluations: int = 60_000
+    least_score: float = 0.4
+    least_share: float = 0.85
+    least_overlap: float = 0.6
+    most_contradiction: float = 0.12
+    ambiguity: float = 0.9
+    apart_m: float = 0.5
+    apart_angle: float = math.radians(15.0)
+    least_deviation_m: float = 0.03
+    least_deviation_angle: float = math.radians(0.4)
+    confirmed_beyond_m: float = 0.4
+    confirmations: int = 3
+    agree_m: float = 0.3
+    agree_angle: float = math.radians(3.0)
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, zero=("delay_s", "path_m", "candidates"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GraphSettings:
+    """How the past is corrected.
+
+    Attributes
+    ----------
+    distance_m, angle : float
+        Way and turn between nodes [m, rad].
+    deviation_m, deviation_per_metre : float
+        Standard deviation of the motion between neighbouring nodes: at least, and more for each metre [m, m/m].
+    deviation_angle : float
+        The same of its turn [rad].
+    robust_scale : float
+        Residual, in standard deviations, from which on a closure counts less (Cauchy).
+    correct_beyond_m, correct_beyond_angle : float
+        Closures that contradict the poses by less wait until others come [m, rad].
+    waiting : int
+        As many closures that wait are enough.
+    iterations : int
+        At most so many steps of Gauss and Newton.
+    """
+
+    distance_m: float = 0.5
+    angle: float = math.radians(30.0)
+    deviation_m: float = 0.01
+    deviation_per_metre: float = 0.02
+    deviation_angle: float = math.radians(0.3)
+    robust_scale: float = 2.0
+    correct_beyond_m: float = 0.05
+    correct_beyond_angle: float = math.radians(1.0)
+    waiting: int = 20
+    iterations: int = 10
+
+    def __post_init__(self) -> None:
+        _check_numbers(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlamSettings:
+    """How a robot finds its pose and map at the same time.
+
+    Attributes
+    ----------
+    uses_odometry : bool
+        False where there is none: motion is then predicted to go on as before.
+    odometry, matching, submaps, closures, graph
+        Settings of each stage.
+    """
+
+    uses_odometry: bool = True
+    odometry: OdometrySettings = field(default_factory=OdometrySettings)
+    matching: MatchingSettings = field(default_factory=MatchingSettings)
+    submaps: SubmapSettings = field(default_factory=SubmapSettings)
+    closures: ClosureSettings = field(default_factory=ClosureSettings)
+    graph: GraphSettings = field(default_factory=GraphSettings)
+
+
+def _check_numbers(settings: Any, zero: tuple[str, ...] = ()) -> None:  # noqa: ANN401
+    """Raise ValueError where a number is not finite and positive (or zero, where that has a meaning)."""
+    for entry in fields(settings):
+        value = getattr(settings, entry.name)
+        if not math.isfinite(value) or value < 0.0 or (value == 0.0 and entry.name not in zero):
+            wanted = "zero or a positive number" if entry.name in zero else "a positive number"
+            raise ValueError(f"{entry.name} of {type(settings).__name__} is {value}; want {wanted}")

@@ -1,0 +1,285 @@
+"""Simultaneous localization and mapping with a planar lidar.
+
+Scans are matched with local maps; every half metre a node of a graph is set, and where a node's scan recognises a local map of long
+ago, all poses are brought to agree. Between matches odometry carries the pose.
+
+References
+----------
+The plan is that of Hess et al., Real-time loop closure in 2D LIDAR SLAM (ICRA 2016).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.localization.closures import Closure, ClosureFinder
+from lidarium.mapping.localization.local_mapping import Finished, LocalMapper, way
+from lidarium.mapping.localization.localizer import KeyScans, Sensing
+from lidarium.mapping.localization.odometry import compounded
+from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
+from lidarium.mapping.localization.scan_matching import Match
+from lidarium.mapping.localization.scan_points import at_last_beam, scan_points, thinned
+from lidarium.mapping.localization.settings import SlamSettings
+from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
+from lidarium.mapping.rigid import composed, relative
+from lidarium.mapping.scans import ScanGeometry
+
+
+@dataclass(slots=True)
+class SlamCounts:
+    """What a localizer has done so far."""
+
+    scans: int = 0
+    matches: int = 0
+    failures: int = 0
+    closures: int = 0
+    corrections: int = 0
+    restarts: int = 0
+
+
+class Slam:
+    """A localizer that makes a map to know where it is.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        How.
+    geometry : ScanGeometry
+        Which way the beams look.
+
+    Attributes
+    ----------
+    counts : SlamCounts
+        What was done so far.
+    """
+
+    def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
+        self._settings, self._geometry = settings, geometry
+        self._unit_vectors = geometry.unit_vectors
+        self.reset(np.zeros(3), 0)
+
+    def reset(self, pose: NDArray[np.float64], seed: int) -> None:
+        """Begin anew at x, y, theta (3,) [m, rad]; nothing is drawn."""
+        settings = self._settings
+        self._mapper = LocalMapper(settings, self._geometry)
+        self._finder = ClosureFinder(settings.closures, settings.matching)
+        self.counts = SlamCounts()
+        self._nodes = np.array(pose, np.float64)[None]
+        self._node_covariance = np.zeros((3, 3))
+        self._edges: list[tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]] = []
+        self._due: list[tuple[float, Closure]] = []
+        self._waiting = 0
+        self._key_places: list[tuple[int, NDArray[np.float64]]] = []
+        self._key_ranges: list[NDArray[np.float32]] = []
+        self._has_begun = False
+        self._last: Sensing | None = None
+        # Poses in the frame of the older local map: now, at the last match, at the last node.
+        self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._spread = np.zeros((3, 3))
+        self._velocity = np.zeros(3)
+        self._path, self._failed = 0.0, 0
+        self._is_corrected = False
+        self._map, self._mapped = OccupancyGrid(), 0
+
+    def localize(self, sensing: Sensing) -> NDArray[np.float64]:
+        """Take in what was sensed, later than all before; return x, y, theta of the robot, shape (3,) [m, rad].
+
+        Raises
+        ------
+        ValueError
+            Where the number of ranges is not that of the geometry.
+        """
+        if sensing.ranges.shape != (self._geometry.beams,):
+            raise ValueError(f"ranges have shape {sensing.ranges.shape}; want ({self._geometry.beams},), one per beam")
+        self.counts.scans += 1
+        self._correct(sensing.time_s)
+        motion = self._motion(sensing)
+        self._local = composed(self._local, motion)
+        period = sensing.time_s - self._last.time_s if self._last is not None else 0.0
+        self._last = sensing
+        matching = self._settings.matching
+        moved = relative(self._matched, self._local)
+        is_far = np.hypot(moved[0], moved[1]) >= matching.distance_m or abs(moved[2]) >= matching.angle
+        if is_far or not self._has_begun or not self._settings.uses_odometry:
+            ranges = at_last_beam(np.asarray(sensing.ranges, np.float32), self._geometry, motion, matching.beam_interval_s, period)
+            points = scan_points(ranges, self._unit_vectors, min(matching.range_m, self._geometry.range_max))
+            if len(points):
+                self._take(ranges, thinned(points, matching.spacing_m, matching.points), moved, sensing.time_s)
+        return self.pose
+
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """x, y, theta of the robot, shape (3,) [m, rad]."""
+        node, pose = self.place
+        return composed(self._nodes[node], pose)
+
+    @property
+    def place(self) -> tuple[int, NDArray[np.float64]]:
+        """The last node, and x, y, theta (3,) of the robot in its frame: later corrections of the node are the robot's as well."""
+        return len(self._nodes) - 1, relative(self._at_node, self._local)
+
+    @property
+    def nodes(self) -> NDArray[np.float64]:
+        """Poses of all nodes as they are now believed, shape (nodes, 3) [m, rad]."""
+        return self._nodes.copy()
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2]."""
+        moved = relative(self._matched, self._local)
+        spread = compounded(np.zeros(3), self._spread, moved, self._growth(moved))
+        node, pose = self.place
+        return compounded(self._nodes[node], self._node_covariance, pose, spread)
+
+    def take_correction(self) -> KeyScans | None:
+        """Return all scans at their poses, once after each time the past was corrected; else None."""
+        if not self._is_corrected:
+            return None
+        self._is_corrected = False
+        return self.key_scans
+
+    @property
+    def key_scans(self) -> KeyScans:
+        """All matched scans at the poses where they are now believed to have been taken."""
+        if not self._key_ranges:
+            return KeyScans(np.zeros((0, 3)), np.zeros((0, self._geometry.beams), np.float32))
+        numbers = np.array([node for node, _ in self._key_places])
+        poses = composed(self._nodes[numbers], np.stack([pose for _, pose in self._key_places]))
+        return KeyScans(poses, np.stack(self._key_ranges))
+
+    @property
+    def map(self) -> OccupancyGrid:
+        """The map of all matched scans, rendered anew after corrections."""
+        settings = OccupancySettings(resolution=self._settings.submaps.resolution)
+        if self._mapped == 0:
+            self._map = OccupancyGrid(settings)
+        for (node, pose), ranges in zip(self._key_places[self._mapped :], self._key_ranges[self._mapped :], strict=True):
+            self._map.integrate(composed(self._nodes[node], pose), ranges, self._geometry)
+        self._mapped = len(self._key_ranges)
+        return self._map
+
+    def finish(self) -> None:
+        """Let all closures act that were found so far."""
+        self._correct(np.inf)
+
+    def _motion(self, sensing: Sensing) -> NDArray[np.float64]:
+        """Return the motion since the last sensing, as odometry or else the last motion says."""
+        if self._last is None:
+            return np.zeros(3)
+        if not self._settings.uses_odometry:
+            return self._velocity
+        ends = np.stack([self._last.odometry, sensing.odometry])
+        return relative(ends[0], ends[1]) if np.isfinite(ends).all() else np.zeros(3)
+
+    def _growth(self, moved: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not moved.any():
+            return np.zeros((3, 3))
+        return self._settings.odometry.covariance(float(np.hypot(moved[0], moved[1])), float(moved[2]))
+
+    def _take(self, ranges: NDArray[np.float32], points: NDArray[np.float64], moved: NDArray[np.float64], time_s: float) -> None:
+        """Match a scan and take it into the maps."""
+        if not self._has_begun:
+            self._has_begun = True
+            self._finder_takes(self._mapper.begin(len(self._nodes) - 1, ranges))
+            self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
+            self._note_key(ranges)
+            return
+        match = self._mapper.match(points, self._local, moved, self._failed)
+        if match is None:
+            self._fail(ranges)
+            return
+        self.counts.matches += 1
+        self._failed = 0
+        driven = relative(self._matched, match.pose)
+        self._velocity = driven
+        self._path += way(driven)
+        self._local, self._matched, self._spread = match.pose, match.pose.copy(), match.covariance
+        if not self._mapper.insert(match.pose, way(driven), ranges):
+            self._begin_anew(ranges, self._motion_covariance(match.covariance, relative(self._at_node, self._local)))
+            return
+        since = relative(self._at_node, self._local)
+        graph = self._settings.graph
+        wants_another = self._mapper.wants_another
+        if wants_another or np.hypot(since[0], since[1]) >= graph.distance_m or abs(since[2]) >= graph.angle:
+            self._add_node(since, self._motion_covariance(match.covariance, since))
+            if wants_another:
+                self._mapper.add(len(self._nodes) - 1, self._local, ranges)
+            self._look_for_closures(points, time_s)
+        self._note_key(ranges)
+        poses, ended = self._mapper.hand_over(np.stack([self._local, self._matched, self._at_node]))
+        self._local, self._matched, self._at_node = poses[0], poses[1], poses[2]
+        self._finder_takes(ended)
+
+    def _motion_covariance(self, matched: NDArray[np.float64], since: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how well the motion between two nodes is known, both by matches."""
+        graph = self._settings.graph
+        along = (graph.deviation_m + graph.deviation_per_metre * float(np.hypot(since[0], since[1]))) ** 2
+        turned = np.eye(3)
+        cosine, sine = np.cos(self._at_node[2]), np.sin(self._at_node[2])
+        turned[:2, :2] = [[cosine, sine], [-sine, cosine]]
+        return np.asarray(np.diag([along, along, graph.deviation_angle**2]) + turned @ matched @ turned.T)
+
+    def _fail(self, ranges: NDArray[np.float32]) -> None:
+        """Go on by odometry; after too many failures begin anew."""
+        self.counts.failures += 1
+        self._failed += 1
+        self._velocity = np.zeros(3)
+        settings = self._settings.matching
+        if self._failed >= settings.lost_after:
+            self.counts.restarts += 1
+            self._begin_anew(ranges, np.diag([settings.lost_m**2, settings.lost_m**2, settings.lost_angle**2]))
+
+    def _begin_anew(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]) -> None:
+        """Begin new local maps at a new node here."""
+        self._failed = 0
+        self._add_node(relative(self._at_node, self._local), covariance)
+        self._finder_takes(self._mapper.begin(len(self._nodes) - 1, ranges))
+        self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._spread = np.zeros((3, 3))
+        self._note_key(ranges)
+
+    def _add_node(self, since: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
+        """Set a node where the robot is, so far from the last one."""
+        last = self._nodes[-1]
+        self._node_covariance = compounded(last, self._node_covariance, since, covariance)
+        self._edges.append((len(self._nodes) - 1, len(self._nodes), since, np.linalg.inv(covariance), False))
+        self._nodes = np.vstack([self._nodes, composed(last, since)])
+        self._at_node = self._local.copy()
+        self._spread = np.zeros((3, 3))
+
+    def _note_key(self, ranges: NDArray[np.float32]) -> None:
+        self._key_places.append(self.place)
+        self._key_ranges.append(ranges)
+
+    def _finder_takes(self, ended: list[Finished]) -> None:
+        for finished in ended:
+            self._finder.remember(finished, len(self._nodes) - 1, self._path)
+
+    def _look_for_closures(self, points: NDArray[np.float64], time_s: float) -> None:
+        for closure in self._finder.find(self._nodes, points, self._node_covariance, self._path, self._mapper.usual_score):
+            self._due.append((time_s + self._settings.closures.delay_s, closure))
+
+    def _correct(self, time_s: float) -> None:
+        """Let closures act whose time has come."""
+        acting = [closure for due, closure in self._due if due <= time_s]
+        if not acting and not (time_s == np.inf and self._waiting):
+            return
+        self._due = [(due, closure) for due, closure in self._due if due > time_s]
+        for closure in acting:
+            self._edges.append((closure.old, closure.new, closure.measured, np.linalg.inv(closure.covariance), True))
+        self.counts.closures += len(acting)
+        self._waiting += len(acting)
+        graph = self._settings.graph
+        edges = self._edge_arrays()
+        rest = residuals(self._nodes, edges)[-len(acting) :] if acting else np.zeros((1, 3))
+        is_wrong = (np.hypot(rest[:, 0], rest[:, 1]) > graph.correct_beyond_m).any() or (abs(rest[:, 2]) > graph.correct_beyond_angle).any()
+        if not (is_wrong or self._waiting >= graph.waiting or time_s == np.inf):
+            return
+        self._nodes, self._node_covariance = optimised(self._nodes, edges, graph.robust_scale, graph.iterations)
+        self.counts.corrections += 1
+        self._waiting, self._mapped, self._is_corrected = 0, 0, True
+
+    def _edge_arrays(self) -> Edges:
+        a, b, measured, information, is_robust = zip(*self._edges, strict=True)
+        return Edges(np.array(a), np.array(b), np.stack(measured), np.stack(information), np.array(is_robust))
