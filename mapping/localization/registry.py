@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 
 from lidarium.mapping.localization.localizer import Localizer
 from lidarium.mapping.scans import ScanGeometry
@@ -16,16 +15,25 @@ class Entry:
     ----------
     description : str
         What it does, in a line.
-    factory : str
-        Module and name of what makes one from the geometry of the laser's scans: ``module:name``.
+    make : callable
+        Makes one from the geometry of the laser's scans.
     """
 
     description: str
-    factory: str
+    make: Callable[[ScanGeometry], Localizer]
 
 
-LOCALIZERS: dict[str, Entry] = {}
-"""The localizers by name; their modules are imported when they are first made."""
+def _slam(geometry: ScanGeometry) -> Localizer:
+    from lidarium.mapping.localization.settings import SlamSettings
+    from lidarium.mapping.localization.slam import Slam
+
+    return Slam(SlamSettings(), geometry)
+
+
+LOCALIZERS: dict[str, Entry] = {
+    "slam": Entry("scans matched with local maps, places recognised, the past corrected", _slam),
+}
+"""The localizers by name; the modules of each are imported when it is first made."""
 
 
 def localizer_names() -> tuple[str, ...]:
@@ -43,6 +51,4 @@ def make_localizer(name: str, geometry: ScanGeometry) -> Localizer:
     """
     if name not in LOCALIZERS:
         raise ValueError(f"unknown localizer {name!r}; known are {', '.join(LOCALIZERS)}")
-    module, _, made_by = LOCALIZERS[name].factory.partition(":")
-    factory: Callable[[ScanGeometry], Localizer] = getattr(import_module(module), made_by)
-    return factory(geometry)
+    return LOCALIZERS[name].make(geometry)

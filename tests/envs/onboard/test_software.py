@@ -48,8 +48,8 @@ class Corrector(Reckoner):
 
 @pytest.fixture
 def localizers(monkeypatch):
-    monkeypatch.setitem(LOCALIZERS, "reckoner", Entry("for tests", f"{__name__}:Reckoner"))
-    monkeypatch.setitem(LOCALIZERS, "corrector", Entry("for tests", f"{__name__}:Corrector"))
+    monkeypatch.setitem(LOCALIZERS, "reckoner", Entry("for tests", Reckoner))
+    monkeypatch.setitem(LOCALIZERS, "corrector", Entry("for tests", Corrector))
 
 
 def explored(steps=150, seed=2, **options):
