@@ -5,7 +5,6 @@ pose is the true one, its map and its mask agree to the cell.
 """
 
 import math
-import mmap
 import os
 from collections.abc import Sequence
 from typing import Any
@@ -17,6 +16,7 @@ from scipy import ndimage
 from lidarium.envs.coverage import pack_bits
 from lidarium.envs.floors.starts import swept_free_space
 from lidarium.envs.simulation.arrays import DEAD_RECKONING, KNOWN_MATES, OWN_FRAME, SOME_MATES, TRUE_POSE, WorldArrays, table_of
+from lidarium.envs.simulation.belief_maps import blank_map, map_around_start, map_with_margin, wipe
 from lidarium.envs.simulation.faults import FAULT_NUMBERS, NO_FAULTS, FaultSettings, plan_faults
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.lidar import Lidar
@@ -28,9 +28,6 @@ from lidarium.envs.simulation.world import Sensed
 from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.map_crops import untouched
 from lidarium.mapping.occupancy import WORD, OccupancySettings
-
-LEAST_MARGIN = 8.0
-"""Maps of robots whose poses drift reach at least this far beyond the floor [m]."""
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""
@@ -55,14 +52,6 @@ def _within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
     wrapped = math.pi - np.mod(math.pi - headings, 2.0 * math.pi)
     poses[:, 2] = np.where((headings > -math.pi) & (headings <= math.pi), headings, wrapped)
     return poses
-
-
-def _blank_map(rows: int, columns: int) -> NDArray[np.int8]:
-    """Return a map of zeros of its own pages, which the system provides where they are touched.
-
-    What numpy allocates may come from memory that was used before, which has to be written over as a whole.
-    """
-    return np.frombuffer(mmap.mmap(-1, max(rows * columns, 1)), np.int8, rows * columns).reshape(rows, columns)
 
 
 class KinematicWorld:
@@ -239,13 +228,13 @@ class KinematicWorld:
             self.masks[row] = np.zeros_like(counted)
             if known_starts and self._is_true:
                 self.believed[row], self.origins[row] = starts[row - first], floor.laser.origin
-                self.log_odds[row] = _blank_map(rows, words * WORD)
+                self.log_odds[row] = blank_map(rows, words * WORD)
             elif known_starts:
                 self.believed[row] = starts[row - first]
-                self.log_odds[row], self.origins[row] = self._blank_map_with_margin(floor, rows, words * WORD)
+                self.log_odds[row], self.origins[row] = map_with_margin(floor, rows, words * WORD, self.occupancy.resolution)
             else:
                 self.believed[row] = 0.0
-                self.log_odds[row], self.origins[row] = self._blank_map_around(floor)
+                self.log_odds[row], self.origins[row] = map_around_start(floor, self.occupancy.resolution)
             height, width = self.log_odds[row].shape
             # At scale 1 a map is its own pooled map.
             self._pools[row] = [
@@ -309,25 +298,6 @@ class KinematicWorld:
         self._step = step_rows if is_parallel else step_serial
         self._perceive = perceive_parallel if is_parallel else perceive_serial
 
-    def _blank_map_around(self, floor: FloorTables) -> tuple[NDArray[np.int8], tuple[float, float]]:
-        """Return a map in the start's own frame that holds the whole floor, however it is turned, and its origin [m].
-
-        Memory is provided by the system only where it is touched.
-        """
-        rows, columns = floor.laser.solid.shape
-        # A square around the start, in steps of 32 m: its size and place tell nothing of the floor's shape.
-        diagonal = math.hypot(rows, columns) * floor.laser.resolution
-        half = math.ceil(math.ceil(diagonal / 32.0) * 32.0 / self.occupancy.resolution / WORD) * WORD
-        origin = -half * self.occupancy.resolution
-        return _blank_map(2 * half, 2 * half), (origin, origin)
-
-    def _blank_map_with_margin(self, floor: FloorTables, rows: int, columns: int) -> tuple[NDArray[np.int8], tuple[float, float]]:
-        """Return a map on the floor's lattice that reaches beyond it, for poses that drift, and its origin [m]."""
-        resolution = self.occupancy.resolution
-        margin = math.ceil(max(LEAST_MARGIN, 0.5 * math.hypot(rows, columns) * resolution) / resolution / WORD) * WORD
-        x, y = floor.laser.origin
-        return _blank_map(rows + 2 * margin, columns + 2 * margin), (x - margin * resolution, y - margin * resolution)
-
     def _plan_faults(self, floor: FloorTables, free: NDArray[np.bool_], starts: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
         """Return the faults of an episode, kidnappings to places that the robots could have reached by themselves."""
         if self._faults.capacity == 0:
@@ -341,17 +311,7 @@ class KinematicWorld:
 
     def render_anew(self, row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
         """Forget a robot's map and render it of scans (scans, beams) taken at ``poses`` (scans, 3) in the frame of its believed pose."""
-        log_odds, window = self.log_odds[row], self.windows[row]
-        used = (log_odds.view(np.uint64) != 0).reshape(len(log_odds), -1, WORD // 8).any(axis=2)
-        lines, columns = np.flatnonzero(used.any(axis=1)), np.flatnonzero(used.any(axis=0))
-        if lines.size:
-            low, high = int(lines[0]), int(lines[-1]) + 1
-            log_odds[low:high] = 0
-            touched = self._touched[row][low:high]
-            for word in columns.tolist() if touched.size else []:
-                touched[:, word // WORD] |= np.uint64(1 << word % WORD)
-            window[0], window[1] = min(window[0], low), max(window[1], high)
-            window[2], window[3] = min(window[2], WORD * columns[0]), max(window[3], WORD * (columns[-1] + 1))
+        wipe(self.log_odds[row], self._touched[row], self.windows[row])
         render_row(self._table, row, self.robots, np.ascontiguousarray(poses), np.ascontiguousarray(ranges))
         self.renderings[row] += 1
 

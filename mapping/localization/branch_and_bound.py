@@ -125,7 +125,16 @@ def place(
         avoided[:] = (pose[0] - around[0]) / side + steps, (pose[1] - around[1]) / side + steps, pose[2], distance / side, angle
     found = np.full(4, -1.0)
     is_over = _place(
-        coarse.maxima, coarse.shapes, points / side, headings, corner, 2 * steps + 1, 255.0 * least_score * len(points), evaluations, avoided, found
+        coarse.maxima,
+        coarse.shapes,
+        points / side,
+        headings,
+        corner,
+        2 * steps + 1,
+        255.0 * least_score * len(points),
+        evaluations,
+        avoided,
+        found,
     )
     if found[3] < 0.0:
         return None, is_over

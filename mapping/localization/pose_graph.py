@@ -108,9 +108,7 @@ def _cost(poses: NDArray[np.float64], edges: Edges, robust_scale: float) -> floa
     return float(np.where(edges.is_robust, scale * np.log1p(squares / scale), squares).sum())
 
 
-def _normal_equations(
-    poses: NDArray[np.float64], edges: Edges, robust_scale: float
-) -> tuple[scipy.sparse.csc_matrix, NDArray[np.float64]]:
+def _normal_equations(poses: NDArray[np.float64], edges: Edges, robust_scale: float) -> tuple[scipy.sparse.csc_matrix, NDArray[np.float64]]:
     """Return Hessian and gradient for all poses but the first."""
     rest = residuals(poses, edges)
     weights = np.where(edges.is_robust, 1.0 / (1.0 + _squares(rest, edges) / (robust_scale * robust_scale)), 1.0)

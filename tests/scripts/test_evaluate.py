@@ -64,7 +64,7 @@ def test_other_settings_in_a_folder_are_refused(tmp_path, capsys):
     assert evaluate("--policies", "random_walk", *SHORT, "--out", tmp_path) == 0
     before = (tmp_path / "episodes.jsonl").read_bytes()
     assert evaluate("--policies", "random_walk", *SHORT, "--noise", "datasheet", "--out", tmp_path) == 2
-    assert "noise = none, this suite has noise = datasheet" in capsys.readouterr().err
+    assert "noise = its default, this suite has noise = datasheet" in capsys.readouterr().err
     assert (tmp_path / "episodes.jsonl").read_bytes() == before
 
 

@@ -1,0 +1,184 @@
+"""How well robots know where they are in worlds that are not ideal, and how fast these are simulated.
+
+Every episode is one of `nearest_frontier` in the world of `realism="lab"`: datasheet noise, typical odometry, SLAM. Told are ATE (frames
+agree, since the start is known), the error of the last pose, wheels alone on the same way, IoU of occupied cells against the truth at
+5 cm with a cell's tolerance, and the wall time of a scan (a match and the map's update; a correction of the past and the rendering).
+
+    python benchmarks/realism.py [--seeds 3] [--horizon 600] [--floors apartment ...] [--out docs/results/realism.md]
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import lidarium
+from lidarium.benchmarks.speed.report import about, heading
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.settings import make_settings
+from lidarium.evaluation.history import History
+from lidarium.evaluation.output import write_text
+from lidarium.evaluation.result import result_of
+from lidarium.evaluation.runner import run_episode
+from lidarium.evaluation.watching import WatchedExploration
+from lidarium.mapping.localization.localizer import KeyScans, Sensing
+
+FLOORS = ("apartment", "clinic", "building:17", "building:23", "office:15")
+"""Floors of 50 to 430 m2."""
+
+TEAM = 5
+"""Robots of the team whose speed is told."""
+
+
+class TimedLocalizer:
+    """A localizer that notes how long each scan takes it."""
+
+    def __init__(self, localizer: Any, seconds: list[tuple[float, bool]]) -> None:  # noqa: ANN401 (any localizer)
+        self._localizer, self._seconds = localizer, seconds
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+        return getattr(self._localizer, name)
+
+    def localize(self, sensing: Sensing) -> NDArray[np.float64]:
+        """Time what the localizer does with a scan."""
+        began = time.perf_counter()
+        pose: NDArray[np.float64] = self._localizer.localize(sensing)
+        self._seconds.append((time.perf_counter() - began, False))
+        return pose
+
+    def take_correction(self) -> KeyScans | None:
+        """Note whether the scan before corrected the past."""
+        correction: KeyScans | None = self._localizer.take_correction()
+        if correction is not None:
+            self._seconds[-1] = (self._seconds[-1][0], True)
+        return correction
+
+
+class Watch:
+    """Watches localizers: how long each scan takes them, and where wheels alone would have taken the robots to be.
+
+    Attributes
+    ----------
+    seconds : list of (float, bool)
+        Wall time of each scan [s], and whether it corrected the past.
+    wheels : list of (robots,) float64
+        How far dead reckoning is off after each step [m].
+    """
+
+    def begin(self, env: ExplorationEnv) -> None:
+        """Begin a new episode."""
+        self.seconds: list[tuple[float, bool]] = []
+        self.wheels: list[NDArray[np.float64]] = []
+        env.perception.localizers[:] = [TimedLocalizer(localizer, self.seconds) for localizer in env.perception.localizers]
+
+    def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
+        """Note how far dead reckoning is off."""
+        world = env.world
+        cosine, sine = np.cos(world.starts[:, 2]), np.sin(world.starts[:, 2])
+        x, y = world.odometry[:, 0], world.odometry[:, 1]
+        reckoned = world.starts[:, :2] + np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
+        self.wheels.append(np.hypot(*(reckoned - world.poses[:, :2]).T))
+
+    def outcome(self, env: ExplorationEnv) -> None:
+        """Nothing has to be noted here."""
+
+
+def episode(floor: str, robots: int, seed: int, horizon_s: float) -> dict[str, Any]:
+    """Run one episode; return what is told of it."""
+    history, watch = History(), Watch()
+    settings = make_settings(robots=robots, realism="lab", horizon_s=horizon_s, resolution=0.05)
+    env = WatchedExploration(floor, settings, watchers=[history, watch])
+    result = result_of(run_episode(lidarium.policy("nearest_frontier"), env, seed=seed), "nearest_frontier", history)
+    last = np.hypot(*(env.world.believed - env.world.poses)[:, :2].T)
+    return {
+        "floor": result["floor"], "robots": robots, "seed": seed, "time_s": result["time_s"], "coverage": result["coverage_final"],
+        "way_m": result["path_m"], "ate_m": result["ate_m"], "last_m": last.tolist(),
+        "wheels_m": np.sqrt(np.mean(np.square(watch.wheels), axis=0)).tolist(), "iou": result["iou_occupied"], "seconds": watch.seconds,
+    }  # fmt: skip
+
+
+def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
+    """Return a line of the table for each floor and size of team: medians over robots and seeds, and the worst."""
+    for key in dict.fromkeys((told["floor"], told["robots"]) for told in episodes):
+        own = [told for told in episodes if (told["floor"], told["robots"]) == key]
+        ate, last, wheels, way = (np.concatenate([told[name] for told in own]) for name in ("ate_m", "last_m", "wheels_m", "way_m"))
+        coverage, iou = (np.array([told[name] for told in own]) for name in ("coverage", "iou"))
+        yield (
+            f"| {key[0]} | {key[1]} | {np.median(way):.0f} | {np.median(coverage):.3f} | {np.median(ate):.3f} ({ate.max():.3f}) "
+            f"| {np.median(last):.3f} ({last.max():.3f}) | {np.median(wheels):.2f} | {np.median(iou):.3f} ({iou.min():.3f}) |"
+        )
+
+
+def times_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
+    """Return lines that tell how long scans take."""
+    seconds = [entry for told in episodes for entry in told["seconds"]]
+    plain = 1e3 * np.array([time for time, is_corrected in seconds if not is_corrected])
+    corrected = 1e3 * np.array([time for time, is_corrected in seconds if is_corrected] or [np.nan])
+    # A scan that is not matched takes microseconds.
+    matched = plain[plain > 0.2]
+    yield f"A scan that is matched takes {np.median(matched):.2f} ms (95 % within {np.quantile(matched, 0.95):.2f} ms)."
+    yield f"One at which the past is corrected takes {np.nanmedian(corrected):.1f} ms ({np.nanmax(corrected):.1f} ms at most)."
+
+
+def team_rates(seeds: int) -> list[float]:
+    """Return the agent steps a second of five robots on one core in episodes of two minutes, `nearest_frontier` included."""
+    rates = []
+    for seed in range(seeds):
+        settings = make_settings(robots=TEAM, realism="lab", horizon_s=120.0, resolution=0.05, stop_coverage=None)
+        env = ExplorationEnv("building:17", settings)
+        run = run_episode(lidarium.policy("nearest_frontier"), env, seed=seed)
+        rates.append(int(env.world.steps[0]) * TEAM / run.wall_seconds)
+    return rates
+
+
+ABOUT = """World of `realism="lab"`: datasheet noise, typical odometry (5 % bias), SLAM; `nearest_frontier`, cells of 0.05 m. Medians over
+robots and seeds, in parentheses the worst. ATE is the root of the mean square over the whole episode, of poses as they were believed at
+the time; frames agree since starts are known, so the first error of a heading counts with all of its lever. IoU is of the team's map, as
+[metrics](../reference/metrics.md) defines it; in the ideal world it is 0.87 in the apartment."""
+
+HEADER = ("floor", "robots", "way [m]", "coverage", "ATE [m]", "last pose [m]", "wheels alone, ATE [m]", "IoU occupied")
+
+
+def page(episodes: list[dict[str, Any]], rates: list[float], command: str) -> str:
+    """Return the whole page."""
+    speed = (
+        f"Five robots on building:17 make {np.median(rates):.0f} agent steps a second on one core ({min(rates):.0f} to {max(rates):.0f}), "
+        "policy, maps and localizers included."
+    )
+    table = [f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER), *rows_of(episodes)]
+    lines = [*heading("Robots in worlds that are not ideal", about(command)), "", ABOUT, "", *table, "", *times_of(episodes), speed, ""]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure and write the page."""
+    parser = argparse.ArgumentParser(description="How well robots know where they are, and how fast they are simulated.")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--horizon", type=float, default=600.0, help="longest episode [s]")
+    parser.add_argument("--floors", nargs="+", default=list(FLOORS))
+    parser.add_argument("--robots", type=int, nargs="+", default=[1, 3])
+    parser.add_argument("--out", type=Path, default=Path("docs/results/realism.md"))
+    options = parser.parse_args()
+    episodes = []
+    rates = team_rates(options.seeds)
+    for floor in options.floors:
+        for robots in options.robots:
+            for seed in range(options.seeds):
+                told = episode(floor, robots, seed, options.horizon)
+                print(
+                    floor,
+                    robots,
+                    seed,
+                    *(f"{name} {np.max(told[name]):.3f}" for name in ("coverage", "ate_m", "last_m", "iou")),
+                    flush=True,
+                )
+                episodes.append(told)
+    write_text(options.out, page(episodes, rates, "python benchmarks/realism.py"))
+
+
+if __name__ == "__main__":
+    main()

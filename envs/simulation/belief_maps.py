@@ -1,0 +1,54 @@
+"""The maps that robots begin with: blank, large enough for the floor, of memory that the system provides where it is touched."""
+
+import math
+import mmap
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.simulation.floor_tables import FloorTables
+from lidarium.mapping.occupancy import WORD
+
+LEAST_MARGIN = 8.0
+"""Maps of robots whose poses drift reach at least this far beyond the floor [m]."""
+
+Map = tuple[NDArray[np.int8], tuple[float, float]]
+"""Log-odds (rows, columns), and where cell (0, 0) begins [m]."""
+
+
+def blank_map(rows: int, columns: int) -> NDArray[np.int8]:
+    """Return a map of zeros of its own pages, which the system provides where they are touched.
+
+    What numpy allocates may come from memory that was used before, which has to be written over as a whole.
+    """
+    return np.frombuffer(mmap.mmap(-1, max(rows * columns, 1)), np.int8, rows * columns).reshape(rows, columns)
+
+
+def map_around_start(floor: FloorTables, resolution: float) -> Map:
+    """Return a map in the start's own frame that holds the whole floor, however it is turned."""
+    rows, columns = floor.laser.solid.shape
+    # A square around the start, in steps of 32 m: its size and place tell nothing of the floor's shape.
+    diagonal = math.hypot(rows, columns) * floor.laser.resolution
+    half = math.ceil(math.ceil(diagonal / 32.0) * 32.0 / resolution / WORD) * WORD
+    return blank_map(2 * half, 2 * half), (-half * resolution, -half * resolution)
+
+
+def map_with_margin(floor: FloorTables, rows: int, columns: int, resolution: float) -> Map:
+    """Return a map on the floor's lattice of ``rows`` x ``columns`` cells that reaches beyond it, for poses that drift."""
+    margin = math.ceil(max(LEAST_MARGIN, 0.5 * math.hypot(rows, columns) * resolution) / resolution / WORD) * WORD
+    x, y = floor.laser.origin
+    return blank_map(rows + 2 * margin, columns + 2 * margin), (x - margin * resolution, y - margin * resolution)
+
+
+def wipe(log_odds: NDArray[np.int8], touched: NDArray[np.uint64], window: NDArray[np.int64]) -> None:
+    """Make a map blank again, and note in ``touched`` and in the ``window`` of changes (4,) where it was not."""
+    used = (log_odds.view(np.uint64) != 0).reshape(len(log_odds), -1, WORD // 8).any(axis=2)
+    lines, words = np.flatnonzero(used.any(axis=1)), np.flatnonzero(used.any(axis=0))
+    if not lines.size:
+        return
+    low, high = int(lines[0]), int(lines[-1]) + 1
+    log_odds[low:high] = 0
+    for word in words.tolist() if touched.size else []:
+        touched[low:high, word // WORD] |= np.uint64(1 << word % WORD)
+    window[0], window[1] = min(window[0], low), max(window[1], high)
+    window[2], window[3] = min(window[2], WORD * words[0]), max(window[3], WORD * (words[-1] + 1))
