@@ -60,6 +60,7 @@ def follow(
     """
     matching = replace(settings.matching, beam_interval_s=log.beam_interval_s or settings.matching.beam_interval_s)
     slam = Slam(replace(settings, matching=matching, uses_odometry=settings.uses_odometry and log.odometry is not None), log.geometry)
+    slam.reset(log.laser_pose, 0)
     scans = len(log.stamps)
     odometry = np.zeros((scans, 3)) if log.odometry is None else composed(log.odometry, log.laser_pose)
     numbers, places = np.zeros(scans, np.int64), np.zeros((scans, 3))

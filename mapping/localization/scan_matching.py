@@ -263,7 +263,13 @@ def _refine(
             damping *= 8.0
             if damping > 1e3:
                 break
-    hessian[:] = weight * hessian + information
+    # On the crest of a wall slopes vanish: how steep it is, is seen half a cell away.
+    hessian[:] = information
+    for k in range(4):
+        trial[:] = pose
+        trial[k >> 1] += 0.5 * side if k & 1 else -0.5 * side
+        _normal_equations(levels, first_column, first_row, side, points, trial, trial_hessian, trial_gradient)
+        hessian += 0.25 * weight * trial_hessian
     _judge(levels, first_column, first_row, side, points, pose, told)
 
 

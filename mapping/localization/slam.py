@@ -276,7 +276,7 @@ class Slam:
         is_wrong = (np.hypot(rest[:, 0], rest[:, 1]) > graph.correct_beyond_m).any() or (abs(rest[:, 2]) > graph.correct_beyond_angle).any()
         if not (is_wrong or self._waiting >= graph.waiting or time_s == np.inf):
             return
-        self._nodes, self._node_covariance = optimised(self._nodes, edges, graph.robust_scale, graph.iterations)
+        self._nodes, self._node_covariance = optimised(self._nodes, edges, graph.robust_scale, graph.iterations, len(acting))
         self.counts.corrections += 1
         self._waiting, self._mapped, self._is_corrected = 0, 0, True
 
