@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -102,10 +102,11 @@ def execute(command: Slam) -> Answer:
 
 def settings_of(command: Slam) -> "SlamSettings":
     """Return the settings that a command asks for."""
-    from lidarium.mapping.localization.settings import MatchingSettings, SlamSettings, SubmapSettings
+    from lidarium.mapping.localization.following import LOG_MATCHING
+    from lidarium.mapping.localization.settings import SlamSettings, SubmapSettings
 
-    matching = MatchingSettings(
-        distance_m=command.match_distance, angle=math.radians(command.match_angle), beam_interval_s=command.beam_interval
+    matching = replace(
+        LOG_MATCHING, distance_m=command.match_distance, angle=math.radians(command.match_angle), beam_interval_s=command.beam_interval
     )
     return SlamSettings(uses_odometry=command.odometry, matching=matching, submaps=SubmapSettings(resolution=command.resolution))
 
@@ -176,18 +177,10 @@ def _against_reference(
 
 
 def _against_relations(command: Slam, log: "LaserLog", poses: "NDArray[np.float64]", relations: "Relations") -> dict[str, float]:
-    from lidarium.evaluation.metrics.relations import relation_errors
-    from lidarium.mapping.trajectories import at_readings, interpolated, last_before
+    from lidarium.evaluation.metrics.relations import log_relation_errors
 
-    shift = command.clock_shift
-    if command.relation_poses == "between":
-        begin, end = (interpolated(log.stamps + shift, poses, times) for times in (relations.begin, relations.end))
-    elif len(log.reading_of_scan):
-        carried = at_readings(poses, log.reading_of_scan, log.readings)
-        begin, end = (last_before(log.readings_stamps + shift, carried, times) for times in (relations.begin, relations.end))
-    else:
-        begin, end = (last_before(log.stamps + shift, poses, times) for times in (relations.begin, relations.end))
-    return {name: round(value, 8) for name, value in relation_errors(begin, end, relations).as_dict().items()}
+    errors = log_relation_errors(log, poses, relations, command.clock_shift, command.relation_poses)
+    return {name: round(value, 8) for name, value in errors.as_dict().items()}
 
 
 def _write(command: Slam, out: Path, log: "LaserLog", followed: "Followed", result: dict[str, Any]) -> None:
@@ -213,5 +206,6 @@ def _summary(result: dict[str, Any], out: Path) -> str:
         rows.append(("ATE", f"{result['ate_m']:.3f} m"))
     if "relations" in result:
         errors = result["relations"]
-        rows.append(("relations", f"{errors['translation_m']:.4f} m, {math.degrees(errors['rotation_rad']):.3f} deg of {errors['relations']}"))
+        figures = f"{errors['translation_m']:.4f} m, {math.degrees(errors['rotation_rad']):.3f} deg"
+        rows.append(("relations", f"{figures} of {errors['relations']}"))
     return "\n".join([table(rows), "", f"written to {out}: map.yaml, map.pgm, trajectory.tum, slam.json"])

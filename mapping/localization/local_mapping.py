@@ -140,7 +140,7 @@ class LocalMapper:
         reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
         reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
         start = search(grid, points, predicted, reach_m, reach_angle)
-        return refine(grid, points, start, predicted, np.linalg.inv(covariance), self._weight)
+        return refine(grid, points, start, predicted, np.asarray(np.linalg.inv(covariance), np.float64), self._weight)
 
     def _match_far(self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]) -> Match | None:
         settings, oldest = self._matching, self._active[0].submap

@@ -125,9 +125,7 @@ def _cost(poses: NDArray[np.float64], edges: Edges, robust_scale: float) -> floa
     return float(np.where(edges.is_robust, scale * np.log1p(squares / scale), squares).sum())
 
 
-def _normal_equations(
-    poses: NDArray[np.float64], edges: Edges, robust_scale: float
-) -> tuple[scipy.sparse.csc_matrix, NDArray[np.float64]]:
+def _normal_equations(poses: NDArray[np.float64], edges: Edges, robust_scale: float) -> tuple[scipy.sparse.csc_matrix, NDArray[np.float64]]:
     """Return Hessian and gradient for all poses but the first."""
     rest = residuals(poses, edges)
     weights = np.where(edges.is_robust, 1.0 / (1.0 + _squares(rest, edges) / (robust_scale * robust_scale)), 1.0)
@@ -142,7 +140,7 @@ def _normal_equations(
     is_free = (rows >= 0) & (columns >= 0)
     hessian = scipy.sparse.csc_matrix((blocks[is_free], (rows[is_free], columns[is_free])), shape=(size, size))
     gradient = np.bincount((places + 3).ravel(), slopes.ravel(), size + 3)
-    return hessian, gradient[3:]
+    return hessian, np.asarray(gradient[3:], np.float64)
 
 
 def _jacobians(poses: NDArray[np.float64], edges: Edges) -> NDArray[np.float64]:

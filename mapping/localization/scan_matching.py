@@ -150,7 +150,8 @@ def refine(
     if count == 0:
         return Match(pose, 0.0, 0.0, 0.0, _inverse(information))
     _refine(grid.levels, grid.column, grid.row, grid.resolution, points, pose, prior, information, weight / count, hessian, told)
-    return Match(pose, *told.tolist(), _inverse(hessian))
+    score, overlap, contradiction = told.tolist()
+    return Match(pose, score, overlap, contradiction, _inverse(hessian))
 
 
 def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -167,7 +168,7 @@ def _spline_weights(t: float) -> tuple[float, float, float, float]:
 
 @kernel(inline=True)
 def _spline_slopes(t: float) -> tuple[float, float, float, float]:
-    """Derivatives of the weights."""
+    """Slopes of the weights."""
     u, square = 1.0 - t, t * t
     return -0.5 * u * u, 1.5 * square - 2.0 * t, -1.5 * square + t + 0.5, 0.5 * square
 

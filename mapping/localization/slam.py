@@ -18,7 +18,6 @@ from lidarium.mapping.localization.local_mapping import Finished, LocalMapper, w
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.odometry import compounded
 from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
-from lidarium.mapping.localization.scan_matching import Match
 from lidarium.mapping.localization.scan_points import at_last_beam, scan_points, thinned
 from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
@@ -123,6 +122,11 @@ class Slam:
     def nodes(self) -> NDArray[np.float64]:
         """Poses of all nodes as they are now believed, shape (nodes, 3) [m, rad]."""
         return self._nodes.copy()
+
+    @property
+    def pending(self) -> int:
+        """How many closures were found that have not acted yet."""
+        return len(self._due)
 
     @property
     def covariance(self) -> NDArray[np.float64]:
@@ -243,7 +247,7 @@ class Slam:
         """Set a node where the robot is, so far from the last one."""
         last = self._nodes[-1]
         self._node_covariance = compounded(last, self._node_covariance, since, covariance)
-        self._edges.append((len(self._nodes) - 1, len(self._nodes), since, np.linalg.inv(covariance), False))
+        self._edges.append((len(self._nodes) - 1, len(self._nodes), since, _inverse(covariance), False))
         self._nodes = np.vstack([self._nodes, composed(last, since)])
         self._at_node = self._local.copy()
         self._spread = np.zeros((3, 3))
@@ -267,7 +271,7 @@ class Slam:
             return
         self._due = [(due, closure) for due, closure in self._due if due > time_s]
         for closure in acting:
-            self._edges.append((closure.old, closure.new, closure.measured, np.linalg.inv(closure.covariance), True))
+            self._edges.append((closure.old, closure.new, closure.measured, _inverse(closure.covariance), True))
         self.counts.closures += len(acting)
         self._waiting += len(acting)
         graph = self._settings.graph
@@ -283,3 +287,7 @@ class Slam:
     def _edge_arrays(self) -> Edges:
         a, b, measured, information, is_robust = zip(*self._edges, strict=True)
         return Edges(np.array(a), np.array(b), np.stack(measured), np.stack(information), np.array(is_robust))
+
+
+def _inverse(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.inv(covariance), np.float64)

@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import numpy as np
@@ -26,7 +27,7 @@ def edges_of(pairs, measured, robust):
 
 def drifted(truth, wrong=(0.0, 0.0, 0.01)):
     """Motions that all turn a little too far, and the poses that they lead to."""
-    motions = [relative(a, b) + np.array(wrong) for a, b in zip(truth[:-1], truth[1:], strict=True)]
+    motions = [relative(a, b) + np.array(wrong) for a, b in itertools.pairwise(truth)]
     poses = [np.zeros(3)]
     for motion in motions:
         poses.append(composed(poses[-1], motion))
@@ -47,7 +48,7 @@ def test_a_closure_takes_out_most_of_the_drift():
 
 def test_a_false_closure_does_not_bend_what_others_hold():
     truth = square()
-    motions = [relative(a, b) for a, b in zip(truth[:-1], truth[1:], strict=True)]
+    motions = [relative(a, b) for a, b in itertools.pairwise(truth)]
     pairs = [(k, k + 1) for k in range(len(motions))]
     good = [(0, 40), (1, 39), (2, 38)]
     measured = [*motions, *(relative(truth[a], truth[b]) for a, b in good), np.array([3.0, 0.0, 0.0])]
@@ -58,8 +59,10 @@ def test_a_false_closure_does_not_bend_what_others_hold():
 
 def test_poses_that_agree_stay():
     truth = square()
-    motions = [relative(a, b) for a, b in zip(truth[:-1], truth[1:], strict=True)]
-    corrected, covariance = optimised(truth, edges_of([(k, k + 1) for k in range(len(motions))], motions, [False] * len(motions)), 2.0, 5, 0)
+    motions = [relative(a, b) for a, b in itertools.pairwise(truth)]
+    corrected, covariance = optimised(
+        truth, edges_of([(k, k + 1) for k in range(len(motions))], motions, [False] * len(motions)), 2.0, 5, 0
+    )
     assert np.allclose(relative(truth, corrected), 0.0, atol=1e-9)
     # Along a chain variances add up, and headings lever the rest.
     assert covariance[2, 2] == pytest.approx(len(motions) / 1e5, rel=1e-3)

@@ -87,7 +87,7 @@ def test_closures_act_a_second_after_they_are_found(ring_run):
 def test_two_rooms_that_look_alike_are_not_taken_for_one():
     run = driven(twins(), TWINS_VISITED, drift=(0.03, 0.02))
     slam = Slam(SlamSettings(), GEOMETRY)
-    told, places = follow(slam, run.sensings)
+    _, places = follow(slam, run.sensings)
     slam.finish()
     poses = final(slam, places)
     assert errors(poses, run.truth).max() < 0.5
@@ -96,7 +96,7 @@ def test_two_rooms_that_look_alike_are_not_taken_for_one():
 
 
 def test_the_same_run_gives_the_same_poses_to_the_bit(ring_run, ring_followed):
-    slam, told, _ = ring_followed
+    _, told, _ = ring_followed
     again = Slam(SlamSettings(), GEOMETRY)
     poses, _ = follow(again, ring_run.sensings[:300])
     assert (poses == told[:300]).all()
@@ -249,7 +249,12 @@ def test_names_without_localizer_are_refused():
 
 @pytest.mark.parametrize(
     ("kind", "name", "value"),
-    [(MatchingSettings, "distance_m", -1.0), (MatchingSettings, "points", 0), (ClosureSettings, "delay_s", math.nan), (OdometrySettings, "turn_share", 0.0)],
+    [
+        (MatchingSettings, "distance_m", -1.0),
+        (MatchingSettings, "points", 0),
+        (ClosureSettings, "delay_s", math.nan),
+        (OdometrySettings, "turn_share", 0.0),
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(kind, name, value):
     with pytest.raises(ValueError, match=name):
