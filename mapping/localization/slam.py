@@ -18,7 +18,7 @@ from lidarium.mapping.localization.local_mapping import Finished, LocalMapper, w
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.odometry import compounded
 from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
-from lidarium.mapping.localization.scan_points import at_last_beam, scan_points, thinned
+from lidarium.mapping.localization.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.rigid import composed, relative
@@ -102,9 +102,11 @@ class Slam:
         is_far = np.hypot(moved[0], moved[1]) >= matching.distance_m or abs(moved[2]) >= matching.angle
         if is_far or not self._has_begun or not self._settings.uses_odometry:
             ranges = at_last_beam(np.asarray(sensing.ranges, np.float32), self._geometry, motion, matching.beam_interval_s, period)
-            points = scan_points(ranges, self._unit_vectors, min(matching.range_m, self._geometry.range_max))
+            longest = min(matching.range_m, self._geometry.range_max)
+            increment = self._geometry.angle_increment
+            points = scan_points(ranges, self._unit_vectors, increment, longest, matching.spacing_m, matching.points)
             if len(points):
-                self._take(ranges, thinned(points, matching.spacing_m, matching.points), moved, sensing.time_s)
+                self._take(ranges, points, moved, sensing.time_s)
         return self.pose
 
     @property

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lidarium.mapping.localization.branch_and_bound import place, pyramid
 from lidarium.mapping.localization.scan_matching import refine, search
-from lidarium.mapping.localization.scan_points import at_last_beam, scan_points, thinned
+from lidarium.mapping.localization.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.submaps import FREE_LEVEL, UNSEEN, Submap
 from lidarium.mapping.rigid import composed, relative
 from lidarium.mapping.scans import ScanGeometry
@@ -17,7 +17,7 @@ ORIGIN = np.array([2.5, 1.5, 0.3])
 
 
 def points_of(ranges):
-    return thinned(scan_points(ranges, GEOMETRY.unit_vectors, 5.6), 0.08, 250)
+    return scan_points(ranges, GEOMETRY.unit_vectors, GEOMETRY.angle_increment, 5.6, 0.08, 250)
 
 
 @pytest.fixture(scope="module")
