@@ -38,8 +38,8 @@ class Slam(Command):
     """or after so much of a turn [degrees]"""
     beam_interval: float = 0.0
     """time from beam to beam where the log does not say [s]; 0 for scans taken at once"""
-    odometry: bool = True
-    """use the log's odometry; without it scans are matched around the last motion"""
+    ignore_odometry: bool = False
+    """do without the log's odometry: scans are matched around the last motion"""
     clear_without_return: bool = False
     """a beam without return says that its way is free, as in simulation; else it says nothing"""
     reference: Path | None = None
@@ -108,7 +108,7 @@ def settings_of(command: Slam) -> "SlamSettings":
     matching = replace(
         LOG_MATCHING, distance_m=command.match_distance, angle=math.radians(command.match_angle), beam_interval_s=command.beam_interval
     )
-    return SlamSettings(uses_odometry=command.odometry, matching=matching, submaps=SubmapSettings(resolution=command.resolution))
+    return SlamSettings(uses_odometry=not command.ignore_odometry, matching=matching, submaps=SubmapSettings(resolution=command.resolution))
 
 
 def _log(command: Slam) -> "LaserLog":
@@ -137,7 +137,7 @@ def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, A
         "log": command.log.name,
         "scans": len(log.stamps),
         "skipped": log.skipped,
-        "odometry": command.odometry and log.odometry is not None,
+        "odometry": not command.ignore_odometry and log.odometry is not None,
         "data_s": round(data_s, 3),
         "cpu_s": round(cpu_s, 3),
         "cpu_over_data": round(cpu_s / data_s, 6) if data_s > 0.0 else None,

@@ -14,7 +14,6 @@ from lidarium.mapping.localization.settings import MatchingSettings, SlamSetting
 from lidarium.mapping.localization.slam import Slam
 from lidarium.mapping.rigid import composed, relative
 
-
 LOG_MATCHING = MatchingSettings(distance_m=0.02, angle=math.radians(1.0))
 """Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and time is plenty."""
 

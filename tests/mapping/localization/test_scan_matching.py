@@ -186,7 +186,22 @@ def test_a_scan_taken_at_once_is_left_as_it_is():
 
 
 def test_few_points_stand_for_all():
-    points = points_of(np.full(GEOMETRY.beams, 1.0, np.float32))
+    near, far = np.full(GEOMETRY.beams, 1.0, np.float32), np.full(GEOMETRY.beams, 5.0, np.float32)
+    points = points_of(near)
     assert 40 < len(points) < 70
-    assert np.hypot(*np.diff(points, axis=0).T).min() >= 0.08 - 1e-6
-    assert len(thinned(np.random.default_rng(0).uniform(-9, 9, (900, 2)), 0.01, 100)) == 100
+    assert np.hypot(*np.diff(points, axis=0).T).min() > 0.07
+    assert len(points_of(far)) == GEOMETRY.beams
+    assert len(scan_points(far, GEOMETRY.unit_vectors, GEOMETRY.angle_increment, 20.0, 0.01, 100)) == 100
+    assert len(scan_points(far, GEOMETRY.unit_vectors, GEOMETRY.angle_increment, 4.0, 0.01, 100)) == 0
+
+
+def test_noise_does_not_turn_scans_against_the_map():
+    generator = np.random.default_rng(0)
+    turns = []
+    for _ in range(80):
+        pose = np.array([*generator.uniform(1.5, 3.5, 2), generator.uniform(-3.0, 3.0)])
+        scans = [cast(odd_room(), pose) + generator.normal(0.0, 0.03, GEOMETRY.beams).astype(np.float32) for _ in range(2)]
+        submap = Submap(0.05, 12.0)
+        submap.insert(np.zeros(3), scans[0], GEOMETRY, 20.0)
+        turns.append(refine(submap.grid, points_of(scans[1]), np.zeros(3), np.zeros(3), np.zeros((3, 3)), 500.0).pose[2])
+    assert abs(np.mean(turns)) < 3.0 * np.std(turns) / math.sqrt(len(turns))
