@@ -233,7 +233,7 @@ _NAMES: dict[str, dict[str, Any]] = {"robot": ROBOTS, "lidar": LIDARS, "odometry
 
 def localizations() -> tuple[str, ...]:
     """Return the names of all who can say where a robot is."""
-    return (*KERNEL_LOCALIZATIONS, *localizer_names())
+    return ("truth", *localizer_names())
 
 
 def _observed(names: Iterable[str]) -> tuple[str, ...]:

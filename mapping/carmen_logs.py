@@ -136,7 +136,10 @@ def _flaser(words: list[str]) -> _Scan:
 
 
 def _robotlaser(words: list[str]) -> _Scan:
-    """Read ``ROBOTLASER1 type start fov step max accuracy mode n ranges m remissions laser_pose robot_pose ... stamp host logger_stamp``."""
+    """Read type, start, field of view, step, longest range, accuracy, mode, n, ranges, m, remissions, laser, robot, and what follows.
+
+    These are five numbers on the drive, the stamp, the host and the logger's stamp.
+    """
     start, _, increment, max_range = _numbers(words[2:6], 4)
     beams = int(words[8])
     ranges = [float(word) for word in words[9 : 9 + beams]]

@@ -21,6 +21,7 @@ odometry_of_scan          (n,)       number of the last of these before each sca
 import io
 import math
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -183,10 +184,12 @@ def read_npz_log(path: Path) -> LaserLog:
     """
     path = Path(path)
     check_file(path)
+    if not zipfile.is_zipfile(path):
+        raise ValueError(f"{path} is not an npz file; want the archive of arrays that numpy writes")
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {key: np.asarray(archive[key]) for key in archive.files}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, AttributeError) as error:
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise ValueError(f"{path} is not an npz file that can be read: {error}") from error
     missing = [key for key in _NEEDED if key not in arrays]
     if missing:

@@ -167,6 +167,29 @@ def write_ros_map(folder: Path, name: str, levels: NDArray[np.uint8], origin: tu
     return folder / f"{name}.yaml"
 
 
+def cropped(
+    levels: NDArray[np.uint8], origin: tuple[float, float], resolution: float, margin: int = 4
+) -> tuple[NDArray[np.uint8], tuple[float, float]]:
+    """Return the part of a map that is known, with a margin [cells] where the map has one, and its lower left corner [m].
+
+    Parameters
+    ----------
+    levels : (rows, columns) uint8
+        0 occupied, 127 unknown, 255 free; row 0 at the lowest y.
+    origin : (x, y)
+        Lower left corner [m].
+    resolution : float
+        Side of a cell [m].
+    """
+    is_known = levels != UNKNOWN
+    if not is_known.any():
+        return levels, origin
+    rows, columns = np.flatnonzero(is_known.any(axis=1)), np.flatnonzero(is_known.any(axis=0))
+    row, column = max(int(rows[0]) - margin, 0), max(int(columns[0]) - margin, 0)
+    part = levels[row : int(rows[-1]) + 1 + margin, column : int(columns[-1]) + 1 + margin]
+    return np.ascontiguousarray(part), (origin[0] + column * resolution, origin[1] + row * resolution)
+
+
 def read_image(path: Path) -> NDArray[Any]:
     """Read an image file with all its channels.
 

@@ -4,6 +4,7 @@ The format is TUM's: a line of ``stamp x y z qx qy qz qw`` for each pose; ours l
 """
 
 import math
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,9 @@ def read_numbers(path: Path, columns: int, what: str) -> NDArray[np.float64]:
     path = Path(path)
     check_file(path)
     try:
-        table = np.loadtxt(path, np.float64, ndmin=2) if path.stat().st_size else np.zeros((0, columns))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a file without numbers, which is told below
+            table = np.loadtxt(path, np.float64, ndmin=2)
     except (ValueError, OSError, EOFError) as error:
         raise ValueError(f"{path} is not {what}: {error}") from error
     if table.shape[0] == 0 or table.shape[1] != columns or not np.isfinite(table).all():

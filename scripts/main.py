@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
-from lidarium.scripts import bench, evaluate, floors, merge, replay, report, reproduce, run, show
+from lidarium.scripts import bench, evaluate, floors, merge, replay, report, reproduce, run, show, slam
 from lidarium.scripts.bench import Bench
 from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
 from lidarium.scripts.evaluate import Evaluate
@@ -19,6 +19,7 @@ from lidarium.scripts.report import Report
 from lidarium.scripts.reproduce import Reproduce
 from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
+from lidarium.scripts.slam import Slam
 
 Choice = (
     Annotated[Run, subcommand("run")]
@@ -27,6 +28,7 @@ Choice = (
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Replay, subcommand("replay")]
     | Annotated[Merge, subcommand("merge")]
+    | Annotated[Slam, subcommand("slam")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -39,6 +41,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Reproduce: reproduce.execute,
     Replay: replay.execute,
     Merge: merge.execute,
+    Slam: slam.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,

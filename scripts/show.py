@@ -104,11 +104,7 @@ def _radios() -> tuple[dict[str, Any], str]:
 def _localizers() -> tuple[dict[str, Any], str]:
     from lidarium.mapping.localization.registry import LOCALIZERS
 
-    lines = {
-        "truth": "the true pose",
-        "odometry": "dead reckoning by the wheels",
-        **{name: entry.description for name, entry in LOCALIZERS.items()},
-    }
+    lines = {"truth": "the true pose", **{name: entry.description for name, entry in LOCALIZERS.items()}}
     return {"localizers": lines}, table(lines.items(), indent="")
 
 

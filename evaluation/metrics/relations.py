@@ -7,12 +7,16 @@ Kuemmerle et al., On measuring the accuracy of SLAM algorithms (Autonomous Robot
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.laser_logs import LaserLog
 from lidarium.mapping.rigid import relative
-from lidarium.mapping.trajectories import read_numbers
+from lidarium.mapping.trajectories import at_readings, interpolated, last_before, read_numbers
+
+Which = Literal["between", "before"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,3 +96,30 @@ def relation_errors(begin: NDArray[np.float64], end: NDArray[np.float64], relati
     values = [function(errors) for errors in (translation, rotation) for function in (np.mean, np.std)]
     squares = [function(errors**2) for errors in (translation, rotation) for function in (np.mean, np.std)]
     return RelationErrors(len(difference), *(float(value) for value in (*values, *squares)))
+
+
+def log_relation_errors(
+    log: LaserLog, poses: NDArray[np.float64], relations: Relations, clock_shift: float = 0.0, which: Which = "between"
+) -> RelationErrors:
+    """Return by how much the poses found for a log's scans miss relations.
+
+    Parameters
+    ----------
+    log : LaserLog
+        The log.
+    poses : (scans, 3) float64
+        The robot's poses at its scans [m, rad].
+    relations : Relations
+        The true motions.
+    clock_shift : float
+        What is added to the log's stamps to compare them with the relations' [s].
+    which : str
+        Pose at a relation's time: ``between`` those of the scans around it at constant speed, or ``before``, the last one before,
+        for logs whose scans carry the stamp of the odometry before them; the log's odometry then tells the way between scans.
+    """
+    stamps = log.stamps + clock_shift
+    if which == "between":
+        return relation_errors(interpolated(stamps, poses, relations.begin), interpolated(stamps, poses, relations.end), relations)
+    if len(log.reading_of_scan):
+        poses, stamps = at_readings(poses, log.reading_of_scan, log.readings), log.readings_stamps + clock_shift
+    return relation_errors(last_before(stamps, poses, relations.begin), last_before(stamps, poses, relations.end), relations)

@@ -124,18 +124,8 @@ def place(
         pose, distance, angle = apart
         avoided[:] = (pose[0] - around[0]) / side + steps, (pose[1] - around[1]) / side + steps, pose[2], distance / side, angle
     found = np.full(4, -1.0)
-    is_over = _place(
-        coarse.maxima,
-        coarse.shapes,
-        points / side,
-        headings,
-        corner,
-        2 * steps + 1,
-        255.0 * least_score * len(points),
-        evaluations,
-        avoided,
-        found,
-    )
+    least, width = 255.0 * least_score * len(points), 2 * steps + 1
+    is_over = _place(coarse.maxima, coarse.shapes, points / side, headings, corner, width, least, evaluations, avoided, found)
     if found[3] < 0.0:
         return None, is_over
     pose = np.array([around[0] + (found[0] - steps) * side, around[1] + (found[1] - steps) * side, headings[int(found[2])]])
@@ -162,7 +152,7 @@ def _is_avoided(avoided: Array, column: int, row: int, heading: float) -> bool:
     turn = heading - avoided[2]
     turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
     away = (column - avoided[0]) ** 2 + (row - avoided[1]) ** 2
-    return away < avoided[3] * avoided[3] and abs(turn) < avoided[4]
+    return bool(away < avoided[3] * avoided[3] and abs(turn) < avoided[4])
 
 
 @kernel

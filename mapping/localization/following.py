@@ -1,5 +1,6 @@
 """A recorded run followed by SLAM from its first scan to its last."""
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -9,9 +10,12 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.laser_logs import LaserLog
 from lidarium.mapping.localization.localizer import Sensing
-from lidarium.mapping.localization.settings import SlamSettings
+from lidarium.mapping.localization.settings import MatchingSettings, SlamSettings
 from lidarium.mapping.localization.slam import Slam
 from lidarium.mapping.rigid import composed, relative
+
+LOG_MATCHING = MatchingSettings(distance_m=0.02, angle=math.radians(1.0))
+"""Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and time is plenty."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +64,7 @@ def follow(
     """
     matching = replace(settings.matching, beam_interval_s=log.beam_interval_s or settings.matching.beam_interval_s)
     slam = Slam(replace(settings, matching=matching, uses_odometry=settings.uses_odometry and log.odometry is not None), log.geometry)
+    slam.reset(log.laser_pose, 0)
     scans = len(log.stamps)
     odometry = np.zeros((scans, 3)) if log.odometry is None else composed(log.odometry, log.laser_pose)
     numbers, places = np.zeros(scans, np.int64), np.zeros((scans, 3))

@@ -140,7 +140,8 @@ class LocalMapper:
         reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
         reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
         start = search(grid, points, predicted, reach_m, reach_angle)
-        return refine(grid, points, start, predicted, np.linalg.inv(covariance), self._weight)
+        information = np.asarray(np.linalg.inv(settings.prior_deviations**2 * covariance), np.float64)
+        return refine(grid, points, start, predicted, information, self._weight)
 
     def _match_far(self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]) -> Match | None:
         settings, oldest = self._matching, self._active[0].submap

@@ -32,9 +32,8 @@ class Odometry:
         odometry = np.array(sensing.odometry, np.float64)
         if self._odometry is not None and np.isfinite(odometry).all():
             motion = relative(self._odometry, odometry)
-            growth = (
-                self._settings.covariance(float(np.hypot(motion[0], motion[1])), float(motion[2])) if motion.any() else np.zeros((3, 3))
-            )
+            distance, turn = float(np.hypot(motion[0], motion[1])), float(motion[2])
+            growth = self._settings.covariance(distance, turn) if motion.any() else np.zeros((3, 3))
             self._covariance = compounded(self._pose, self._covariance, motion, growth)
             self._pose = composed(self._pose, motion)
         if np.isfinite(odometry).all():

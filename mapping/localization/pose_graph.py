@@ -43,7 +43,7 @@ class Edges:
 
 
 def optimised(
-    poses: NDArray[np.float64], edges: Edges, robust_scale: float, iterations: int
+    poses: NDArray[np.float64], edges: Edges, robust_scale: float, iterations: int, newest: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the poses that agree best with the edges, the first kept, and the covariance of the last.
 
@@ -56,7 +56,10 @@ def optimised(
     robust_scale : float
         Residual, in standard deviations, from which on an edge that may be wrong counts less.
     iterations : int
-        At most so many steps.
+        At most so many steps for each scale, at least 1.
+    newest : int
+        So many of the last edges have not had their say yet. Where they pull hard, they count fully at first, and what others
+        contradict is let go little by little.
 
     Returns
     -------
@@ -68,27 +71,41 @@ def optimised(
     if len(poses) < 2:
         return poses.copy(), np.zeros((3, 3))
     best = poses.copy()
-    cost = _cost(best, edges, robust_scale)
-    damping, hessian = 1e-9, None
+    squares = _squares(residuals(best, edges), edges)[len(edges.a) - newest :]
+    scale = max(robust_scale, math.sqrt(float(squares.max())) if len(squares) else 0.0)
+    while True:
+        best, factor = _settled(best, edges, scale, iterations)
+        if scale <= robust_scale:
+            break
+        scale = max(0.2 * scale, robust_scale)
+    best[:, 2] = math.pi - (math.pi - best[:, 2]) % (2.0 * math.pi)
+    return best, _last_covariance(factor)
+
+
+def _settled(
+    poses: NDArray[np.float64], edges: Edges, robust_scale: float, iterations: int
+) -> tuple[NDArray[np.float64], scipy.sparse.linalg.SuperLU]:
+    """Return the poses of least cost near given ones (Levenberg and Marquardt), and the factors of the last Hessian."""
+    best, cost = poses, _cost(poses, edges, robust_scale)
+    damping = 1e-9
     for _ in range(iterations):
         hessian, gradient = _normal_equations(best, edges, robust_scale)
-        diagonal = scipy.sparse.diags(hessian.diagonal() * damping + 1e-12)
-        step = scipy.sparse.linalg.splu((hessian + diagonal).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        move = step.solve(-gradient).reshape(-1, 3)
+        damped = (hessian + scipy.sparse.diags(hessian.diagonal() * damping)).tocsc()
+        factor = scipy.sparse.linalg.splu(damped, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        move = factor.solve(-gradient).reshape(-1, 3)
         trial = best.copy()
         trial[1:] += move
         trial_cost = _cost(trial, edges, robust_scale)
         if trial_cost <= cost:
             gain = cost - trial_cost
             best, cost, damping = trial, trial_cost, max(0.1 * damping, 1e-9)
-            if gain < 1e-4 * cost + 1e-9:
+            if gain < 3e-3 * cost + 1e-9:
                 break
         else:
             damping = max(100.0 * damping, 1e-4)
             if damping > 1e6:
                 break
-    best[:, 2] = math.pi - (math.pi - best[:, 2]) % (2.0 * math.pi)
-    return best, _last_covariance(best, edges, robust_scale)
+    return best, factor
 
 
 def residuals(poses: NDArray[np.float64], edges: Edges) -> NDArray[np.float64]:
@@ -99,7 +116,7 @@ def residuals(poses: NDArray[np.float64], edges: Edges) -> NDArray[np.float64]:
 
 
 def _squares(rest: NDArray[np.float64], edges: Edges) -> NDArray[np.float64]:
-    return np.asarray(np.einsum("ki,kij,kj->k", rest, edges.information, rest))
+    return np.asarray(((rest[:, None, :] @ edges.information)[:, 0] * rest).sum(axis=1))
 
 
 def _cost(poses: NDArray[np.float64], edges: Edges, robust_scale: float) -> float:
@@ -113,23 +130,21 @@ def _normal_equations(poses: NDArray[np.float64], edges: Edges, robust_scale: fl
     rest = residuals(poses, edges)
     weights = np.where(edges.is_robust, 1.0 / (1.0 + _squares(rest, edges) / (robust_scale * robust_scale)), 1.0)
     information = edges.information * weights[:, None, None]
-    before, after = _jacobians(poses, edges)
-    jacobians = np.stack([before, after], axis=1)
-    ends = np.stack([edges.a, edges.b], axis=1) - 1
-    blocks = np.einsum("kpia,kij,kqjb->kpqab", jacobians, information, jacobians)
-    slopes = np.einsum("kpia,kij,kj->kpa", jacobians, information, rest)
+    jacobians = _jacobians(poses, edges)
+    weighted = jacobians.swapaxes(1, 2) @ information
+    blocks = weighted @ jacobians
+    slopes = (weighted @ rest[:, :, None])[:, :, 0]
+    places = np.concatenate([3 * edges.a[:, None] + np.arange(-3, 0), 3 * edges.b[:, None] + np.arange(-3, 0)], axis=1)
     size = 3 * (len(poses) - 1)
-    rows = np.broadcast_to(3 * ends[:, :, None, None, None] + np.arange(3)[:, None], blocks.shape)
-    columns = np.broadcast_to(3 * ends[:, None, :, None, None] + np.arange(3), blocks.shape)
+    rows, columns = np.broadcast_to(places[:, :, None], blocks.shape), np.broadcast_to(places[:, None, :], blocks.shape)
     is_free = (rows >= 0) & (columns >= 0)
     hessian = scipy.sparse.csc_matrix((blocks[is_free], (rows[is_free], columns[is_free])), shape=(size, size))
-    gradient = np.zeros((len(poses), 3))
-    np.add.at(gradient, ends + 1, slopes)
-    return hessian, gradient[1:].ravel()
+    gradient = np.bincount((places + 3).ravel(), slopes.ravel(), size + 3)
+    return hessian, np.asarray(gradient[3:], np.float64)
 
 
-def _jacobians(poses: NDArray[np.float64], edges: Edges) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the derivatives (edges, 3, 3) of the residuals by the poses a and b."""
+def _jacobians(poses: NDArray[np.float64], edges: Edges) -> NDArray[np.float64]:
+    """Return the derivatives (edges, 3, 6) of the residuals by the poses a and then b."""
     a, b = poses[edges.a], poses[edges.b]
     cosine, sine = np.cos(a[:, 2]), np.sin(a[:, 2])
     x, y = (b - a)[:, 0], (b - a)[:, 1]
@@ -137,13 +152,12 @@ def _jacobians(poses: NDArray[np.float64], edges: Edges) -> tuple[NDArray[np.flo
     after[:, 0, 0], after[:, 0, 1], after[:, 1, 0], after[:, 1, 1], after[:, 2, 2] = cosine, sine, -sine, cosine, 1.0
     before = -after
     before[:, 0, 2], before[:, 1, 2] = cosine * y - sine * x, -cosine * x - sine * y
-    return before, after
+    return np.concatenate([before, after], axis=2)
 
 
-def _last_covariance(poses: NDArray[np.float64], edges: Edges, robust_scale: float) -> NDArray[np.float64]:
-    hessian, _ = _normal_equations(poses, edges, robust_scale)
-    ends = np.zeros((hessian.shape[0], 3))
+def _last_covariance(factor: scipy.sparse.linalg.SuperLU) -> NDArray[np.float64]:
+    """Return the covariance of the last pose, of the factors of the last Hessian."""
+    ends = np.zeros((factor.shape[0], 3))
     ends[-3:] = np.eye(3)
-    factor = scipy.sparse.linalg.splu(hessian, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
     covariance = factor.solve(ends)[-3:]
     return np.asarray(0.5 * (covariance + covariance.T))

@@ -23,6 +23,12 @@ class Entry:
     make: Callable[[ScanGeometry], Localizer]
 
 
+def _odometry(geometry: ScanGeometry) -> Localizer:
+    from lidarium.mapping.localization.odometry import Odometry
+
+    return Odometry()
+
+
 def _slam(geometry: ScanGeometry) -> Localizer:
     from lidarium.mapping.localization.settings import SlamSettings
     from lidarium.mapping.localization.slam import Slam
@@ -31,6 +37,7 @@ def _slam(geometry: ScanGeometry) -> Localizer:
 
 
 LOCALIZERS: dict[str, Entry] = {
+    "odometry": Entry("dead reckoning from the start by the wheels", _odometry),
     "slam": Entry("scans matched with local maps, places recognised, the past corrected", _slam),
 }
 """The localizers by name; the modules of each are imported when it is first made."""

@@ -150,7 +150,8 @@ def refine(
     if count == 0:
         return Match(pose, 0.0, 0.0, 0.0, _inverse(information))
     _refine(grid.levels, grid.column, grid.row, grid.resolution, points, pose, prior, information, weight / count, hessian, told)
-    return Match(pose, *told.tolist(), _inverse(hessian))
+    score, overlap, contradiction = told.tolist()
+    return Match(pose, score, overlap, contradiction, _inverse(hessian))
 
 
 def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -167,7 +168,7 @@ def _spline_weights(t: float) -> tuple[float, float, float, float]:
 
 @kernel(inline=True)
 def _spline_slopes(t: float) -> tuple[float, float, float, float]:
-    """Derivatives of the weights."""
+    """Slopes of the weights."""
     u, square = 1.0 - t, t * t
     return -0.5 * u * u, 1.5 * square - 2.0 * t, -1.5 * square + t + 0.5, 0.5 * square
 
@@ -263,7 +264,13 @@ def _refine(
             damping *= 8.0
             if damping > 1e3:
                 break
-    hessian[:] = weight * hessian + information
+    # On the crest of a wall slopes vanish: how steep it is, is seen half a cell away.
+    hessian[:] = information
+    for k in range(4):
+        trial[:] = pose
+        trial[k >> 1] += 0.5 * side if k & 1 else -0.5 * side
+        _normal_equations(levels, first_column, first_row, side, points, trial, trial_hessian, trial_gradient)
+        hessian += 0.25 * weight * trial_hessian
     _judge(levels, first_column, first_row, side, points, pose, told)
 
 

@@ -69,30 +69,45 @@ def _undo_motion(
                 seen[place] = distance
 
 
-def scan_points(ranges: NDArray[np.float32], unit_vectors: NDArray[np.float64], longest: float) -> NDArray[np.float64]:
-    """Return the points in which beams ended, no farther than ``longest`` [m], in the robot's frame, shape (points, 2) [m]."""
-    is_hit = np.isfinite(ranges) & (ranges <= longest) & (ranges > 0.0)
-    return np.ascontiguousarray((unit_vectors[:, is_hit] * ranges[is_hit]).T)
+def scan_points(
+    ranges: NDArray[np.float32], unit_vectors: NDArray[np.float64], increment: float, longest: float, spacing: float, limit: int
+) -> NDArray[np.float64]:
+    """Return points in which beams ended, in the robot's frame, shape (points, 2) [m]: few that stand for all.
 
-
-def thinned(points: NDArray[np.float64], spacing: float, limit: int) -> NDArray[np.float64]:
-    """Return points of a scan in order, those left out that are nearer than a spacing [m] to the one before; at most so many."""
-    places = np.empty(len(points), np.int64)
-    kept = points[places[: _thin(points, spacing, places)]]
+    Parameters
+    ----------
+    ranges : (beams,) float32
+        The scan [m]; inf for no return, nan for an invalid beam.
+    unit_vectors : (2, beams) float64
+        Which way the beams look.
+    increment : float
+        Angle between neighbouring beams [rad].
+    longest : float
+        Longest range that counts [m].
+    spacing : float
+        Of returns between which the beams are nearer to each other than this at their range, one is taken [m].
+    limit : int
+        At most so many points.
+    """
+    beams = np.empty(len(ranges), np.int64)
+    kept = beams[: _spaced(ranges, increment, longest, spacing, beams)]
     if len(kept) > limit:
         kept = kept[np.linspace(0, len(kept) - 1, limit).astype(np.int64)]
-    return np.ascontiguousarray(kept)
+    return np.ascontiguousarray((unit_vectors[:, kept] * ranges[kept]).T)
 
 
 @kernel
-def _thin(points: Array, spacing: float, places: Array) -> int:
-    """Note the places of the points that stay; return their number."""
-    count = 0
-    last_x, last_y = math.inf, math.inf
-    for k in range(points.shape[0]):
-        gap_x, gap_y = points[k, 0] - last_x, points[k, 1] - last_y
-        if not (gap_x * gap_x + gap_y * gap_y < spacing * spacing):
-            places[count] = k
+def _spaced(ranges: Array, increment: float, longest: float, spacing: float, kept: Array) -> int:
+    """Note the beams that stay; return their number.
+
+    What counts is the gap between beams, not between their ends: the first end that is far enough from the last one would be one that
+    noise has moved that way more often than not, and scans so thinned turn against the map.
+    """
+    count, last = 0, -ranges.shape[0] * 1000
+    for beam in range(ranges.shape[0]):
+        value = float(ranges[beam])
+        if 0.0 < value <= longest and (beam - last) * increment * value >= spacing:
+            kept[count] = beam
             count += 1
-            last_x, last_y = points[k, 0], points[k, 1]
+            last = beam
     return count

@@ -60,6 +60,9 @@ class MatchingSettings:
         What the search around odometry reaches beyond its standard deviation [m, rad].
     search_deviations : float
         How many standard deviations of odometry the search reaches.
+    prior_deviations : float
+        By so much odometry is trusted less than its standard deviation says where the map tells something too: its errors are the same
+        from scan to scan and would add up.
     blind_m, blind_angle : float
         What the search reaches where there is no odometry, or odometry leads nowhere [m, rad].
     evaluations : int
@@ -95,6 +98,7 @@ class MatchingSettings:
     search_m: float = 0.05
     search_angle: float = math.radians(1.0)
     search_deviations: float = 2.0
+    prior_deviations: float = 5.0
     blind_m: float = 1.2
     blind_angle: float = math.radians(50.0)
     evaluations: int = 100_000

@@ -18,8 +18,7 @@ from lidarium.mapping.localization.local_mapping import Finished, LocalMapper, w
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.odometry import compounded
 from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
-from lidarium.mapping.localization.scan_matching import Match
-from lidarium.mapping.localization.scan_points import at_last_beam, scan_points, thinned
+from lidarium.mapping.localization.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.rigid import composed, relative
@@ -103,9 +102,11 @@ class Slam:
         is_far = np.hypot(moved[0], moved[1]) >= matching.distance_m or abs(moved[2]) >= matching.angle
         if is_far or not self._has_begun or not self._settings.uses_odometry:
             ranges = at_last_beam(np.asarray(sensing.ranges, np.float32), self._geometry, motion, matching.beam_interval_s, period)
-            points = scan_points(ranges, self._unit_vectors, min(matching.range_m, self._geometry.range_max))
+            longest = min(matching.range_m, self._geometry.range_max)
+            increment = self._geometry.angle_increment
+            points = scan_points(ranges, self._unit_vectors, increment, longest, matching.spacing_m, matching.points)
             if len(points):
-                self._take(ranges, thinned(points, matching.spacing_m, matching.points), moved, sensing.time_s)
+                self._take(ranges, points, moved, sensing.time_s)
         return self.pose
 
     @property
@@ -123,6 +124,11 @@ class Slam:
     def nodes(self) -> NDArray[np.float64]:
         """Poses of all nodes as they are now believed, shape (nodes, 3) [m, rad]."""
         return self._nodes.copy()
+
+    @property
+    def pending(self) -> int:
+        """How many closures were found that have not acted yet."""
+        return len(self._due)
 
     @property
     def covariance(self) -> NDArray[np.float64]:
@@ -243,7 +249,7 @@ class Slam:
         """Set a node where the robot is, so far from the last one."""
         last = self._nodes[-1]
         self._node_covariance = compounded(last, self._node_covariance, since, covariance)
-        self._edges.append((len(self._nodes) - 1, len(self._nodes), since, np.linalg.inv(covariance), False))
+        self._edges.append((len(self._nodes) - 1, len(self._nodes), since, _inverse(covariance), False))
         self._nodes = np.vstack([self._nodes, composed(last, since)])
         self._at_node = self._local.copy()
         self._spread = np.zeros((3, 3))
@@ -267,7 +273,7 @@ class Slam:
             return
         self._due = [(due, closure) for due, closure in self._due if due > time_s]
         for closure in acting:
-            self._edges.append((closure.old, closure.new, closure.measured, np.linalg.inv(closure.covariance), True))
+            self._edges.append((closure.old, closure.new, closure.measured, _inverse(closure.covariance), True))
         self.counts.closures += len(acting)
         self._waiting += len(acting)
         graph = self._settings.graph
@@ -276,10 +282,14 @@ class Slam:
         is_wrong = (np.hypot(rest[:, 0], rest[:, 1]) > graph.correct_beyond_m).any() or (abs(rest[:, 2]) > graph.correct_beyond_angle).any()
         if not (is_wrong or self._waiting >= graph.waiting or time_s == np.inf):
             return
-        self._nodes, self._node_covariance = optimised(self._nodes, edges, graph.robust_scale, graph.iterations)
+        self._nodes, self._node_covariance = optimised(self._nodes, edges, graph.robust_scale, graph.iterations, len(acting))
         self.counts.corrections += 1
         self._waiting, self._mapped, self._is_corrected = 0, 0, True
 
     def _edge_arrays(self) -> Edges:
         a, b, measured, information, is_robust = zip(*self._edges, strict=True)
         return Edges(np.array(a), np.array(b), np.stack(measured), np.stack(information), np.array(is_robust))
+
+
+def _inverse(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.inv(covariance), np.float64)

@@ -1,0 +1,80 @@
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
+from lidarium.mapping.rigid import composed, relative
+
+SIDE = 10
+
+
+def square():
+    """True poses along a square, back to the start."""
+    poses = [np.zeros(3)]
+    for k in range(4 * SIDE):
+        turn = math.pi / 2 if k % SIDE == SIDE - 1 else 0.0
+        poses.append(composed(poses[-1], np.array([1.0, 0.0, turn])))
+    return np.array(poses)
+
+
+def edges_of(pairs, measured, robust):
+    information = np.array([np.diag([1e4, 1e4, 1e5]) for _ in pairs])
+    a, b = np.array(pairs).T
+    return Edges(a, b, np.array(measured), information, np.array(robust))
+
+
+def drifted(truth, wrong=(0.0, 0.0, 0.01)):
+    """Motions that all turn a little too far, and the poses that they lead to."""
+    motions = [relative(a, b) + np.array(wrong) for a, b in itertools.pairwise(truth)]
+    poses = [np.zeros(3)]
+    for motion in motions:
+        poses.append(composed(poses[-1], motion))
+    return motions, np.array(poses)
+
+
+def test_a_closure_takes_out_most_of_the_drift():
+    truth = square()
+    motions, poses = drifted(truth)
+    pairs = [(k, k + 1) for k in range(len(motions))]
+    edges = edges_of([*pairs, (0, len(motions))], [*motions, relative(truth[0], truth[-1])], [False] * len(motions) + [True])
+    corrected, covariance = optimised(poses, edges, 5.0, 20, 1)
+    assert np.abs(poses - truth)[:, :2].max() > 1.0
+    assert np.abs(corrected - truth)[:, :2].max() < 0.15
+    assert corrected[0].tolist() == [0.0, 0.0, 0.0]
+    assert (np.linalg.eigvalsh(covariance) > 0.0).all()
+
+
+def test_a_false_closure_does_not_bend_what_others_hold():
+    truth = square()
+    motions = [relative(a, b) for a, b in itertools.pairwise(truth)]
+    pairs = [(k, k + 1) for k in range(len(motions))]
+    good = [(0, 40), (1, 39), (2, 38)]
+    measured = [*motions, *(relative(truth[a], truth[b]) for a, b in good), np.array([3.0, 0.0, 0.0])]
+    edges = edges_of([*pairs, *good, (5, 25)], measured, [False] * len(motions) + [True] * 4)
+    corrected, _ = optimised(truth, edges, 2.0, 20, 4)
+    assert np.abs(corrected - truth)[:, :2].max() < 0.05
+
+
+def test_poses_that_agree_stay():
+    truth = square()
+    motions = [relative(a, b) for a, b in itertools.pairwise(truth)]
+    corrected, covariance = optimised(
+        truth, edges_of([(k, k + 1) for k in range(len(motions))], motions, [False] * len(motions)), 2.0, 5, 0
+    )
+    assert np.allclose(relative(truth, corrected), 0.0, atol=1e-9)
+    # Along a chain variances add up, and headings lever the rest.
+    assert covariance[2, 2] == pytest.approx(len(motions) / 1e5, rel=1e-3)
+
+
+def test_one_pose_is_known():
+    poses, covariance = optimised(np.ones((1, 3)), edges_of([(0, 0)], [np.zeros(3)], [False]), 1.0, 3, 0)
+    assert poses.tolist() == [[1.0, 1.0, 1.0]]
+    assert not covariance.any()
+
+
+def test_residuals_turn_the_short_way():
+    poses = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])
+    rest = residuals(poses, edges_of([(0, 1)], [np.array([0.0, 0.0, 2 * math.pi - 6.0 - 0.1])], [False]))
+    assert rest[0, 2] == pytest.approx(0.1)

@@ -1,0 +1,140 @@
+import gzip
+import json
+
+import numpy as np
+import pytest
+from driven_rooms import GEOMETRY, driven, odd_room
+
+from lidarium.mapping.laser_logs import LaserLog, write_npz_log
+from lidarium.mapping.map_files import read_ros_map
+from lidarium.mapping.rigid import composed, relative
+from lidarium.mapping.trajectories import read_tum, write_tum
+from lidarium.scripts.main import main
+
+FILES = ["map.pgm", "map.yaml", "slam.json", "trajectory.tum"]
+START_S = 1000.0
+
+
+@pytest.fixture(scope="module")
+def run():
+    return driven(odd_room(), [(1.0, 1.0), (4.5, 1.0), (4.5, 2.4)])
+
+
+@pytest.fixture(scope="module")
+def log(run, tmp_path_factory):
+    """A recording of the run, with its true trajectory and relations beside it."""
+    folder = tmp_path_factory.mktemp("recording")
+    stamps = START_S + np.array([sensing.time_s for sensing in run.sensings])
+    ranges = np.stack([sensing.ranges for sensing in run.sensings])
+    odometry = np.stack([sensing.odometry for sensing in run.sensings])
+    write_npz_log(folder / "run.npz", LaserLog(stamps, ranges, GEOMETRY, odometry))
+    write_tum(folder / "true.tum", stamps, run.truth)
+    motions = relative(run.truth[:-20], run.truth[20:])
+    rows = [f"{a} {b} {m[0]} {m[1]} 0 0 0 {m[2]}\n" for a, b, m in zip(stamps[:-20], stamps[20:], motions, strict=True)]
+    (folder / "true.relations").write_text("".join(rows))
+    return folder / "run.npz"
+
+
+def test_a_recording_becomes_map_trajectory_and_figures(run, log, tmp_path, capsys):
+    options = ["--reference", str(log.parent / "true.tum"), "--relations", str(log.parent / "true.relations")]
+    assert main(["slam", str(log), "--out", str(tmp_path / "out"), "--json", *options]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result == json.loads((tmp_path / "out" / "slam.json").read_text())
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
+    assert result["scans"] == len(run.sensings)
+    assert result["ate_m"] < 0.03
+    assert result["rpe_m"] < 0.05
+    assert result["relations"]["relations"] == len(run.sensings) - 20
+    assert result["relations"]["translation_m"] < 0.04
+    assert result["settings"]["submaps"]["resolution"] == 0.05
+    assert result["odometry"] is True
+    stamps, poses = read_tum(tmp_path / "out" / "trajectory.tum")
+    assert stamps[0] == START_S
+    assert np.hypot(*(poses - run.truth)[:, :2].T).max() < 0.1
+    levels = read_ros_map(tmp_path / "out" / "map.yaml").levels
+    assert 80 < levels.shape[0] < 140
+    assert (levels == 0).sum() > 200
+
+
+def test_the_robots_poses_are_told_wherever_its_laser_is(run, log, tmp_path, capsys):
+    with np.load(log) as archive:
+        arrays = dict(archive)
+    mounting = np.array([0.2, 0.0, 0.3])
+    robot = composed(arrays["pose_odom"], relative(mounting, np.zeros(3)))
+    np.savez(tmp_path / "turned.npz", **{**arrays, "pose_odom": robot, "laser_pose": mounting})
+    assert main(["slam", str(tmp_path / "turned.npz"), "--out", str(tmp_path / "out")]) == 0
+    _, poses = read_tum(tmp_path / "out" / "trajectory.tum")
+    true = composed(composed(mounting, run.truth), relative(mounting, np.zeros(3)))
+    assert np.hypot(*(poses - true)[:, :2].T).max() < 0.1
+
+
+def carmen(run, count=60):
+    lines = []
+    for sensing in run.sensings[:count]:
+        numbers = [*np.nan_to_num(sensing.ranges, posinf=80.0).round(3)[30:211], *[0.0] * 3, *sensing.odometry, sensing.time_s]
+        lines.append(f"FLASER 181 {' '.join(map(str, numbers))} host {sensing.time_s}\n")
+    return lines
+
+
+def test_a_carmen_log_with_damage_is_used_as_far_as_it_goes(run, tmp_path, capsys):
+    lines = carmen(run)
+    (tmp_path / "run.log.gz").write_bytes(
+        gzip.compress("".join([*lines[:30], "WIND 3\n", "FLASER 181 1\n", lines[3], *lines[30:]]).encode())
+    )
+    assert main(["slam", str(tmp_path / "run.log.gz"), "--out", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr()
+    assert "1 WIND lines" in told.err
+    assert "1 damaged FLASER lines" in told.err
+    assert "1 scans back in time" in told.err
+    assert json.loads((tmp_path / "out" / "slam.json").read_text())["scans"] == 60
+
+
+def test_a_log_without_odometry_is_matched_all_the_same(run, log, tmp_path, capsys):
+    with np.load(log) as archive:
+        arrays = dict(archive)
+    np.savez(tmp_path / "blind.npz", **{**arrays, "pose_odom": np.zeros_like(arrays["pose_odom"])})
+    arguments = ["--out", str(tmp_path / "out"), "--reference", str(log.parent / "true.tum")]
+    assert main(["slam", str(tmp_path / "blind.npz"), *arguments]) == 0
+    assert "no odometry" in capsys.readouterr().err
+    result = json.loads((tmp_path / "out" / "slam.json").read_text())
+    assert result["odometry"] is False
+    assert result["ate_m"] < 0.1
+
+
+def test_the_same_log_gives_the_same_trajectory_to_the_bit(log, tmp_path, capsys):
+    for name in "ab":
+        assert main(["slam", str(log), "--out", str(tmp_path / name), "--seed", "3"]) == 0
+    for name in ("trajectory.tum", "map.pgm"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [(b"", "no scans"), (b"ODOM 0 0 0 0 0 0 1 h 1\n", "no scans"), (b"FLASER 3 80 80 80 0 0 0 0 0 0 1 h 1\n", "no scan with a return")],
+)
+def test_logs_without_anything_to_map_are_refused(content, word, tmp_path, capsys):
+    (tmp_path / "run.log").write_bytes(content)
+    assert main(["slam", str(tmp_path / "run.log"), "--out", str(tmp_path / "out")]) == 2
+    assert word in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--resolution", "0"], "resolution is 0"),
+        (["--range", "nan"], "range is nan"),
+        (["--match-angle", "-1"], "match-angle"),
+        (["--clock-shift", "inf"], "clock-shift"),
+        (["--reference", "gone.tum"], "no file gone.tum"),
+        (["--relations", "gone.relations"], "no file gone.relations"),
+        (["--clock-shift", "1e6", "--reference", "TRUE"], "want times in common"),
+    ],
+)
+def test_bad_options_are_named(log, arguments, word, tmp_path, capsys):
+    arguments = [str(log.parent / "true.tum") if word_of == "TRUE" else word_of for word_of in arguments]
+    assert main(["slam", str(log), *arguments, "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr()
+    assert word in told.err
+    assert "Traceback" not in told.err
+    assert not (tmp_path / "out").exists()
