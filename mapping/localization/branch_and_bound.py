@@ -141,7 +141,7 @@ def _bound(maxima: Array, begin: int, rows: int, columns: int, level: int, cells
         j = ((cells[k, 0] + column) >> level) + shift
         i = ((cells[k, 1] + row) >> level) + shift
         if 0 <= j < columns and 0 <= i < rows:
-            total += maxima[begin + i * columns + j]
+            total += int(maxima[begin + i * columns + j])
     return total
 
 

@@ -87,8 +87,9 @@ def _settled(
 ) -> tuple[NDArray[np.float64], scipy.sparse.linalg.SuperLU]:
     """Return the poses of least cost near given ones (Levenberg and Marquardt), and the factors of the last Hessian."""
     best, cost = poses, _cost(poses, edges, robust_scale)
-    damping = 1e-9
-    for _ in range(iterations):
+    damping, step = 1e-9, 0
+    while True:
+        step += 1
         hessian, gradient = _normal_equations(best, edges, robust_scale)
         damped = (hessian + scipy.sparse.diags(hessian.diagonal() * damping)).tocsc()
         factor = scipy.sparse.linalg.splu(damped, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
@@ -99,13 +100,12 @@ def _settled(
         if trial_cost <= cost:
             gain = cost - trial_cost
             best, cost, damping = trial, trial_cost, max(0.1 * damping, 1e-9)
-            if gain < 3e-3 * cost + 1e-9:
-                break
+            is_over = gain < 3e-3 * cost + 1e-9
         else:
             damping = max(100.0 * damping, 1e-4)
-            if damping > 1e6:
-                break
-    return best, factor
+            is_over = damping > 1e6
+        if is_over or step >= iterations:
+            return best, factor
 
 
 def residuals(poses: NDArray[np.float64], edges: Edges) -> NDArray[np.float64]:

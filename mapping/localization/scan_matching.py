@@ -156,7 +156,7 @@ def refine(
 
 def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the covariance; a metre and a radian at most, for what nothing tells."""
-    return np.asarray(np.linalg.inv(information + np.eye(3)))
+    return np.asarray(np.linalg.inv(information + np.eye(3)), np.float64)
 
 
 @kernel(inline=True)
