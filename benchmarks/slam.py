@@ -26,7 +26,7 @@ from lidarium.evaluation.runner import run_episode
 from lidarium.evaluation.watching import WatchedExploration
 from lidarium.mapping.carmen_logs import read_carmen_log
 from lidarium.mapping.laser_logs import LaserLog, read_npz_log
-from lidarium.mapping.localization.following import LOG_MATCHING, Followed, follow
+from lidarium.mapping.localization.following import LOG_SETTINGS, Followed, follow
 from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.localization.slam import Slam
@@ -248,14 +248,13 @@ def robot_lines(robot: Robot, floor: str) -> list[str]:
 
 def page(data: Path, names: Sequence[str], floor: str, command: str) -> str:
     """Measure everything and return the page."""
-    settings = SlamSettings(matching=LOG_MATCHING)
     # Kernels are compiled before anything is measured.
     warm, _ = read(data, "aces")
-    follow(warm, settings)
+    follow(warm, LOG_SETTINGS)
     rows, relation_rows = [], []
     for name in names:
         log, shift = read(data, name)
-        followed = follow(log, settings)
+        followed = follow(log, LOG_SETTINGS)
         rows.append(log_row(name, log, followed))
         print(rows[-1], flush=True)
         if name in RELATIONS:

@@ -102,13 +102,16 @@ def execute(command: Slam) -> Answer:
 
 def settings_of(command: Slam) -> "SlamSettings":
     """Return the settings that a command asks for."""
-    from lidarium.mapping.localization.following import LOG_MATCHING
-    from lidarium.mapping.localization.settings import SlamSettings, SubmapSettings
+    from lidarium.mapping.localization.following import LOG_SETTINGS
 
     matching = replace(
-        LOG_MATCHING, distance_m=command.match_distance, angle=math.radians(command.match_angle), beam_interval_s=command.beam_interval
+        LOG_SETTINGS.matching,
+        distance_m=command.match_distance,
+        angle=math.radians(command.match_angle),
+        beam_interval_s=command.beam_interval,
     )
-    return SlamSettings(uses_odometry=not command.ignore_odometry, matching=matching, submaps=SubmapSettings(resolution=command.resolution))
+    submaps = replace(LOG_SETTINGS.submaps, resolution=command.resolution)
+    return replace(LOG_SETTINGS, uses_odometry=not command.ignore_odometry, matching=matching, submaps=submaps)
 
 
 def _log(command: Slam) -> "LaserLog":

@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.laser_logs import LaserLog
 from lidarium.mapping.localization.localizer import Sensing
-from lidarium.mapping.localization.settings import MatchingSettings, SlamSettings
+from lidarium.mapping.localization.settings import MatchingSettings, SlamSettings, SubmapSettings
 from lidarium.mapping.localization.slam import Slam
 from lidarium.mapping.rigid import composed, relative
 
-LOG_MATCHING = MatchingSettings(distance_m=0.02, angle=math.radians(1.0))
-"""Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and time is plenty."""
+LOG_SETTINGS = SlamSettings(
+    matching=MatchingSettings(distance_m=0.02, angle=math.radians(1.0), spacing_m=0.08, points=250), submaps=SubmapSettings(path_m=8.0)
+)
+"""Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and time is plenty. Lasers of
+logs reach far, so that a local map of a shorter way holds enough, and places are recognised by more of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.localization.submaps import AgreementGrid
 
-FULL_AGREEMENT = 0.5
-"""Smoothed agreement in the middle of a thin wall that lies between cells."""
+FULL_AGREEMENT = 2.0 / 3.0
+"""Smoothed agreement in the middle of a wall that lies along a row of cells: the most that there is.
+
+With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -93,8 +93,8 @@ class MatchingSettings:
     angle: float = math.radians(5.0)
     beam_interval_s: float = 0.0
     range_m: float = 20.0
-    spacing_m: float = 0.08
-    points: int = 250
+    spacing_m: float = 0.05
+    points: int = 350
     search_m: float = 0.05
     search_angle: float = math.radians(1.0)
     search_deviations: float = 2.0
@@ -134,7 +134,7 @@ class SubmapSettings:
     """
 
     resolution: float = 0.05
-    path_m: float = 8.0
+    path_m: float = 16.0
     least_scans: int = 10
 
     def __post_init__(self) -> None:
