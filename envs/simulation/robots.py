@@ -1,4 +1,12 @@
-"""The robots of the catalogue: bodies and drives."""
+"""The robots of the catalogue: bodies and drives.
+
+Worlds know a robot as a disc with limits of its speeds. What its two wheels are is kept apart, in `WHEELS`: a robot's own software
+turns speeds into wheel speeds with it, and odometry is made of what the encoders count.
+
+References
+----------
+Pioneer P3-DX: data sheet of Adept MobileRobots. Kobuki: user guide of Yujin Robot.
+"""
 
 from dataclasses import dataclass
 
@@ -46,6 +54,44 @@ class Robot:
         return np.array([self.radius, self.max_speed, self.max_turn_rate, self.max_acceleration, self.max_turn_acceleration, self.height])
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wheels:
+    """The two driven wheels of a robot and the outline of its body.
+
+    Attributes
+    ----------
+    radius : float
+        Radius of a wheel [m].
+    track : float
+        Distance between the wheels [m].
+    ticks_per_turn : float
+        What an encoder counts in a turn of its wheel.
+    length, width : float
+        Footprint of the body [m].
+    """
+
+    radius: float
+    track: float
+    ticks_per_turn: float
+    length: float
+    width: float
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "track", "ticks_per_turn", "length", "width"):
+            value = getattr(self, name)
+            if not (0.0 < value < float("inf")):
+                raise ValueError(f"{name} of the wheels is {value}; want a number above 0")
+
+    def speeds(self, left: float, right: float) -> tuple[float, float]:
+        """Return speed [m/s] and turn rate [rad/s] of the body for turn rates of the wheels [rad/s]."""
+        return self.radius * (right + left) / 2.0, self.radius * (right - left) / self.track
+
+    def wheel_rates(self, speed: float, turn_rate: float) -> tuple[float, float]:
+        """Return turn rates of the left and the right wheel [rad/s] for speed [m/s] and turn rate [rad/s] of the body."""
+        middle, half = speed / self.radius, turn_rate * self.track / (2.0 * self.radius)
+        return middle - half, middle + half
+
+
 ROBOTS: dict[str, Robot] = {
     "kobuki": Robot(),
     "pioneer": Robot(
@@ -58,3 +104,9 @@ ROBOTS: dict[str, Robot] = {
         radius=0.01, height=0.5, cruise_speed=1.0, max_speed=1.0, max_turn_rate=6.28, max_acceleration=100.0, max_turn_acceleration=600.0
     ),
 }
+
+WHEELS: dict[str, Wheels] = {
+    "kobuki": Wheels(radius=0.035, track=0.230, ticks_per_turn=2578.33, length=0.352, width=0.352),
+    "pioneer": Wheels(radius=0.0975, track=0.331, ticks_per_turn=500.0, length=0.455, width=0.381),
+}
+"""Wheels of the robots whose makers tell them, by the names of `ROBOTS`."""

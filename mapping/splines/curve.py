@@ -1,0 +1,109 @@
+"""A curve of the map: a spline, how much is known of each part of it, and what is derived of it once."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.splines.bspline import ORDER, Spline
+from lidarium.mapping.splines.fitting import fit_bspline
+from lidarium.mapping.splines.joining import Way
+from lidarium.mapping.splines.settings import FitSettings, MapSettings
+
+STRAIGHT = 0.02
+"""A curve that stays this close to its chord is a line [m]."""
+
+_END_WEIGHT = 4.0
+
+LEAST_LINE = 0.4
+"""Shorter lines tell no direction [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A wall as the map has it.
+
+    Attributes
+    ----------
+    spline : Spline
+        Its shape.
+    weights : (n,) float64
+        How much is known at each control point, as a number of observations with a standard deviation of 1 cm.
+    count : int
+        How many scans have seen it.
+    last_seen : int
+        The map's update that saw it last.
+    way : Way
+        Points along it, for comparisons.
+    box : (4,) float64
+        Least x, y and greatest x, y [m].
+    line : (4,) float64 or None
+        Middle x, y, direction [rad] and half length [m], where the curve is a line.
+    """
+
+    spline: Spline
+    weights: NDArray[np.float64]
+    count: int
+    last_seen: int
+    way: Way
+    box: NDArray[np.float64]
+    line: NDArray[np.float64] | None
+
+
+def make_curve(spline: Spline, weights: NDArray[np.float64], count: int, last_seen: int, spacing: float) -> Curve:
+    """Return a curve whose way has points ``spacing`` apart [m].
+
+    Raises
+    ------
+    ValueError
+        Where there are not as many weights as control points.
+    """
+    if np.shape(weights) != (len(spline.control_points),):
+        raise ValueError(f"weights have shape {np.shape(weights)}; the curve has {len(spline.control_points)} control points")
+    parameters = spline.sample_parameters(spacing)
+    points = spline.evaluate(parameters)
+    way = Way(points, np.interp(parameters, control_parameters(spline.knots), weights))
+    box = np.concatenate([points.min(axis=0), points.max(axis=0)])
+    return Curve(spline, np.asarray(weights, np.float64), count, last_seen, way, box, _line_of(points))
+
+
+def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: MapSettings) -> Curve:
+    """Fit a curve to a way."""
+    fitting = FitSettings(
+        spacing=fit.spacing,
+        finest_spacing=fit.finest_spacing,
+        rms=settings.rms,
+        explained=0.0,
+        is_sparse=fit.is_sparse,
+        stiffness=fit.stiffness,
+    )
+    weights = way.weights.copy()
+    # An end of little weight would be left to the rest of the curve, and run away fit by fit.
+    weights[[0, -1]] = _END_WEIGHT * weights.max()
+    spline = fit_bspline(way.points, fitting, 0.01 / np.sqrt(weights)).spline
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way.points, axis=0), axis=1))])
+    shares = control_parameters(spline.knots) / spline.domain[1]
+    weights = np.interp(shares * lengths[-1], lengths, way.weights)
+    return make_curve(spline, weights, count, last_seen, settings.sample_spacing)
+
+
+def control_parameters(knots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return at which parameter each control point acts most: the mean of its three inner knots (Greville), shape (n,) [m]."""
+    count = len(knots) - ORDER
+    return np.asarray((knots[1 : count + 1] + knots[2 : count + 2] + knots[3 : count + 3]) / 3.0)
+
+
+def _line_of(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return the line through a way, None where it is bent or short."""
+    chord = points[-1] - points[0]
+    length = math.hypot(*chord.tolist())
+    if length < LEAST_LINE:
+        return None
+    along = chord / length
+    offsets = points - points[0]
+    aside = along[0] * offsets[:, 1] - along[1] * offsets[:, 0]
+    if float(np.ptp(aside)) > STRAIGHT:
+        return None
+    middle = (points[0] + points[-1]) / 2.0 + float(aside.mean()) * np.array([-along[1], along[0]])
+    return np.array([middle[0], middle[1], math.atan2(along[1], along[0]), length / 2.0])
