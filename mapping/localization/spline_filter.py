@@ -22,6 +22,7 @@ from lidarium.mapping.splines.features import Observation
 
 _HIT_SHARE = 0.95
 _RECOVERY_STEPS = 10
+_ENTRIES_PER_METRE, _FARTHEST = 2000.0, 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,6 +100,7 @@ class SplineFilter(SplineTracker):
         self.particles = pose + spread * self._generator.standard_normal((settings.particles, 3))
         self.weights = np.full(settings.particles, 1.0 / settings.particles)
         self.resamplings, self._lost_steps = 0, 0
+        self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
 
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
         first, distance, second = steps_of(motion)
@@ -118,7 +120,7 @@ class SplineFilter(SplineTracker):
 
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
         tracking, lookup = self.tracking, self._lookup
-        numbers = np.array([tracking.feature_sigma, tracking.line_angle_sigma, tracking.curve_sigma, tracking.ray_share])
+        numbers = np.array([tracking.feature_sigma, tracking.line_angle_sigma, tracking.ray_share])
         logarithms, fits = np.empty(len(self.particles)), np.empty(len(self.particles))
         _weigh(
             self.particles,
@@ -132,6 +134,7 @@ class SplineFilter(SplineTracker):
             lookup.pieces,
             lookup.nearest,
             lookup.frame,
+            self._ray_table,
             numbers,
             logarithms,
             fits,
@@ -170,6 +173,14 @@ class SplineFilter(SplineTracker):
             self._lost_steps = 0
 
 
+def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:
+    """Return logarithm and value of the likelihood of a ray by the distance of its end from a curve, shape (entries, 2)."""
+    gaps = (np.arange(round(_FARTHEST * _ENTRIES_PER_METRE)) + 0.5) / _ENTRIES_PER_METRE
+    likelihoods = _HIT_SHARE * np.exp(-0.5 * (gaps / sigma) ** 2) + 1.0 - _HIT_SHARE
+    likelihoods[-1] = 1.0 - _HIT_SHARE
+    return np.stack([np.log(likelihoods), likelihoods], axis=1)
+
+
 @kernel
 def _weigh(
     particles: Array,
@@ -183,12 +194,14 @@ def _weigh(
     pieces: Array,
     nearest: Array,
     frame: Array,
+    ray_table: Array,
     numbers: Array,
     logarithms: Array,
     fits: Array,
 ) -> None:
     """Write the logarithm of each particle's likelihood, and how well rays fit in the mean, 0.05 to 1."""
-    feature_sigma, angle_sigma, curve_sigma, ray_share = numbers
+    feature_sigma, angle_sigma, ray_share = numbers
+    last_entry = ray_table.shape[0] - 1
     for i in range(particles.shape[0]):
         x, y, theta = particles[i]
         cosine, sine = math.cos(theta), math.sin(theta)
@@ -210,11 +223,10 @@ def _weigh(
         for k in range(rays.shape[0]):
             ray_x, ray_y = x + cosine * rays[k, 0] - sine * rays[k, 1], y + sine * rays[k, 0] + cosine * rays[k, 1]
             piece = piece_at(nearest, frame, ray_x, ray_y)
-            likelihood = 1.0 - _HIT_SHARE
+            entry = last_entry
             if piece >= 0:
-                gap = piece_distance(pieces, piece, ray_x, ray_y) / curve_sigma
-                likelihood += _HIT_SHARE * math.exp(-0.5 * gap * gap)
-            ray_total += math.log(likelihood)
-            fit += likelihood
+                entry = min(int(piece_distance(pieces, piece, ray_x, ray_y) * _ENTRIES_PER_METRE), last_entry)
+            ray_total += ray_table[entry, 0]
+            fit += ray_table[entry, 1]
         logarithms[i] = total + ray_share * ray_total
         fits[i] = fit / max(rays.shape[0], 1)

@@ -49,16 +49,16 @@ class TrackingSettings:
     """
 
     splines: SplineSettings = field(default_factory=SplineSettings)
-    turn_per_turn: float = 0.05
-    turn_per_metre: float = 0.02
-    slip_per_metre: float = 0.03
-    slip_per_turn: float = 0.01
-    feature_sigma: float = 0.03
+    turn_per_turn: float = 0.15
+    turn_per_metre: float = 0.06
+    slip_per_metre: float = 0.10
+    slip_per_turn: float = 0.03
+    feature_sigma: float = 0.02
     line_angle_sigma: float = math.radians(1.0)
-    curve_sigma: float = 0.05
+    curve_sigma: float = 0.03
     curve_distance: float = 0.3
     ray_stride: int = 8
-    ray_share: float = 0.25
+    ray_share: float = 0.5
     least_sightings: int = 3
     least_features: int = 2
     least_rays: int = 20

@@ -40,12 +40,10 @@ class Spline:
         control_points = np.ascontiguousarray(self.control_points, np.float64)
         if control_points.ndim != 2 or control_points.shape[1] != 2 or len(control_points) < ORDER:
             raise ValueError(f"control points have shape {control_points.shape}; want (n, 2) with n >= {ORDER}")
-        if knots.shape != (len(control_points) + ORDER,) or not (np.diff(knots) >= 0.0).all():
-            raise ValueError(f"knots have shape {knots.shape}; want {len(control_points) + ORDER} that do not decrease")
-        if not (np.isfinite(knots).all() and np.isfinite(control_points).all()):
-            raise ValueError("knots or control points are not finite")
-        if not knots[ORDER - 1] < knots[len(control_points)]:
-            raise ValueError(f"knots span nothing: from {knots[ORDER - 1]} to {knots[len(control_points)]}")
+        if knots.shape != (len(control_points) + ORDER,):
+            raise ValueError(f"knots have shape {knots.shape}; want {len(control_points) + ORDER}, {ORDER} more than control points")
+        if not _is_sound(knots, control_points):
+            raise ValueError("knots decrease or span nothing, or knots or control points are not finite")
         object.__setattr__(self, "knots", knots)
         object.__setattr__(self, "control_points", control_points)
 
@@ -77,7 +75,7 @@ class Spline:
 
     def length(self) -> float:
         """Return the length of the curve [m], by Gauss-Legendre quadrature of each span."""
-        return float(_length(self.knots, self.control_points, _GAUSS_PLACES, _GAUSS_WEIGHTS))
+        return float(curve_length(self.knots, self.control_points))
 
     def sample(self, spacing: float) -> NDArray[np.float64]:
         """Return points evenly spaced in the parameter, both ends included, at most about ``spacing`` apart, shape (m, 2) [m]."""
@@ -86,7 +84,8 @@ class Spline:
     def sample_parameters(self, spacing: float) -> NDArray[np.float64]:
         """Return the parameters of `sample`, shape (m,) [m]."""
         first, last = self.domain
-        return np.linspace(first, last, max(math.ceil((last - first) / spacing), 2) + 1)
+        gaps = max(math.ceil((last - first) / spacing), 2)
+        return np.asarray(first + np.arange(gaps + 1) * ((last - first) / gaps))
 
     def closest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return parameters (m,) of the nearest points of the curve to points (m, 2), and the distances (m,) [m]."""
@@ -132,6 +131,18 @@ def basis_matrix(knots: ArrayLike, parameters: ArrayLike) -> NDArray[np.float64]
 
 
 _GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+@kernel
+def _is_sound(knots: Array, control_points: Array) -> bool:
+    """Return whether all numbers are finite, and knots do not decrease and span something."""
+    for k in range(1, knots.shape[0]):
+        if not knots[k] >= knots[k - 1]:
+            return False
+    for k in range(control_points.shape[0]):
+        if not (math.isfinite(control_points[k, 0]) and math.isfinite(control_points[k, 1])):
+            return False
+    return bool(knots[ORDER - 1] < knots[control_points.shape[0]] and math.isfinite(knots[0]) and math.isfinite(knots[-1]))
 
 
 @kernel
@@ -211,16 +222,17 @@ def _fill_basis(knots: Array, parameters: Array, matrix: Array) -> None:
 
 
 @kernel
-def _length(knots: Array, control_points: Array, places: Array, weights: Array) -> float:
+def curve_length(knots: Array, control_points: Array) -> float:
+    """Return the length of a curve [m]."""
     values = np.empty(ORDER)
     total = 0.0
     for span in range(ORDER - 1, control_points.shape[0]):
         half = (knots[span + 1] - knots[span]) / (2.0 * _PIECES)
         if half > 0.0:
             for i in range(_PIECES):
-                for k in range(places.shape[0]):
-                    x, y = point_at(knots, control_points, knots[span] + half * (2 * i + 1 + places[k]), 1, values)
-                    total += half * weights[k] * math.sqrt(x * x + y * y)
+                for k in range(len(_GAUSS_PLACES)):
+                    x, y = point_at(knots, control_points, knots[span] + half * (2 * i + 1 + _GAUSS_PLACES[k]), 1, values)
+                    total += half * _GAUSS_WEIGHTS[k] * math.sqrt(x * x + y * y)
     return total
 
 

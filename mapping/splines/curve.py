@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.splines.bspline import ORDER, Spline
 from lidarium.mapping.splines.fitting import fit_bspline
-from lidarium.mapping.splines.joining import Way
+from lidarium.mapping.splines.joining import Way, lengths_along
 from lidarium.mapping.splines.settings import FitSettings, MapSettings
 
 STRAIGHT = 0.02
@@ -64,8 +65,9 @@ def make_curve(spline: Spline, weights: NDArray[np.float64], count: int, last_se
     parameters = spline.sample_parameters(spacing)
     points = spline.evaluate(parameters)
     way = Way(points, np.interp(parameters, control_parameters(spline.knots), weights))
-    box = np.concatenate([points.min(axis=0), points.max(axis=0)])
-    return Curve(spline, np.asarray(weights, np.float64), count, last_seen, way, box, _line_of(points))
+    box, line = np.empty(4), np.empty(4)
+    is_line = _describe(points, box, line)
+    return Curve(spline, np.asarray(weights, np.float64), count, last_seen, way, box, line if is_line else None)
 
 
 def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: MapSettings) -> Curve:
@@ -82,7 +84,7 @@ def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: 
     # An end of little weight would be left to the rest of the curve, and run away fit by fit.
     weights[[0, -1]] = _END_WEIGHT * weights.max()
     spline = fit_bspline(way.points, fitting, 0.01 / np.sqrt(weights)).spline
-    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way.points, axis=0), axis=1))])
+    lengths = lengths_along(way.points)
     shares = control_parameters(spline.knots) / spline.domain[1]
     weights = np.interp(shares * lengths[-1], lengths, way.weights)
     return make_curve(spline, weights, count, last_seen, settings.sample_spacing)
@@ -94,16 +96,23 @@ def control_parameters(knots: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray((knots[1 : count + 1] + knots[2 : count + 2] + knots[3 : count + 3]) / 3.0)
 
 
-def _line_of(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return the line through a way, None where it is bent or short."""
-    chord = points[-1] - points[0]
-    length = math.hypot(*chord.tolist())
-    if length < LEAST_LINE:
-        return None
-    along = chord / length
-    offsets = points - points[0]
-    aside = along[0] * offsets[:, 1] - along[1] * offsets[:, 0]
-    if float(np.ptp(aside)) > STRAIGHT:
-        return None
-    middle = (points[0] + points[-1]) / 2.0 + float(aside.mean()) * np.array([-along[1], along[0]])
-    return np.array([middle[0], middle[1], math.atan2(along[1], along[0]), length / 2.0])
+@kernel
+def _describe(points: Array, box: Array, line: Array) -> bool:
+    """Write the box around a way, and the line through it; return whether it is long and straight enough to be one."""
+    last = points.shape[0] - 1
+    box[0], box[1], box[2], box[3] = points[0, 0], points[0, 1], points[0, 0], points[0, 1]
+    x, y = points[last, 0] - points[0, 0], points[last, 1] - points[0, 1]
+    length = math.sqrt(x * x + y * y)
+    lowest, highest, total = 0.0, 0.0, 0.0
+    for k in range(last + 1):
+        box[0], box[1] = min(box[0], points[k, 0]), min(box[1], points[k, 1])
+        box[2], box[3] = max(box[2], points[k, 0]), max(box[3], points[k, 1])
+        aside = (x * (points[k, 1] - points[0, 1]) - y * (points[k, 0] - points[0, 0])) / length
+        lowest, highest, total = min(lowest, aside), max(highest, aside), total + aside
+    if not (length >= LEAST_LINE and highest - lowest <= STRAIGHT):
+        return False
+    mean = total / (last + 1)
+    line[0] = (points[0, 0] + points[last, 0]) / 2.0 - mean * y / length
+    line[1] = (points[0, 1] + points[last, 1]) / 2.0 + mean * x / length
+    line[2], line[3] = math.atan2(y, x), length / 2.0
+    return True

@@ -69,11 +69,15 @@ class CurveLookup:
         return pieces, gaps
 
 
-def _pieces_of(way: NDArray[np.float64]) -> NDArray[np.float64]:
-    steps = np.diff(way, axis=0)
-    lengths = np.maximum(np.linalg.norm(steps, axis=1), 1e-9)
-    middles = way[:-1] + steps / 2.0
-    return np.column_stack([middles, steps / lengths[:, None], lengths / 2.0])
+@kernel
+def _pieces_of(way: Array) -> Array:
+    pieces = np.empty((way.shape[0] - 1, 5))
+    for k in range(pieces.shape[0]):
+        x, y = way[k + 1, 0] - way[k, 0], way[k + 1, 1] - way[k, 1]
+        length = max(math.sqrt(x * x + y * y), 1e-9)
+        pieces[k, 0], pieces[k, 1] = way[k, 0] + x / 2.0, way[k, 1] + y / 2.0
+        pieces[k, 2], pieces[k, 3], pieces[k, 4] = x / length, y / length, length / 2.0
+    return pieces
 
 
 @kernel(inline=True)
@@ -90,7 +94,7 @@ def piece_distance(pieces: Array, piece: int, x: float, y: float) -> float:
 @kernel(inline=True)
 def piece_at(nearest: Array, frame: Array, x: float, y: float) -> int:
     """Return the nearest piece of a place, -1 where there is none."""
-    column, row = int((x - frame[0]) / CELL), int((y - frame[1]) / CELL)
+    column, row = int((x - frame[0]) * (1.0 / CELL)), int((y - frame[1]) * (1.0 / CELL))
     if x < frame[0] or y < frame[1] or row >= nearest.shape[0] or column >= nearest.shape[1]:
         return -1
     return int(nearest[row, column])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.splines.bspline import ORDER, Spline, basis_of_span, find_span, point_at
+from lidarium.mapping.splines.bspline import ORDER, Spline, basis_of_span, curve_length, find_span, point_at
 from lidarium.mapping.splines.settings import FitSettings
 
 _SHORTEST = 1e-9
@@ -81,17 +81,15 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
     if places.ndim != 2 or places.shape[1] != 2 or len(places) < ORDER:
         raise ValueError(f"points have shape {places.shape}; want (m, 2) with m >= {ORDER}")
     deviations = np.full(len(places), 0.01) if sigmas is None else np.ascontiguousarray(sigmas, np.float64)
-    if deviations.shape != (len(places),) or not (deviations > 0.0).all():
+    if deviations.shape != (len(places),) or not deviations.min() > 0.0:
         raise ValueError(f"sigmas have shape {deviations.shape} or are not positive; want ({len(places)},)")
-    if not np.isfinite(places).all():
-        raise ValueError("points are not finite")
     parameters = np.empty(len(places))
     noise = settings.explained * deviations if sigmas is not None else np.zeros(len(places))
     length = float(_chord_lengths(places, noise, parameters))
-    if length < _SHORTEST:
-        raise ValueError("all points are the same; want points along a curve")
+    if not _SHORTEST < length < math.inf:
+        raise ValueError("points are all the same, or not finite; want points along a curve")
     is_noisy = sigmas is not None and settings.explained > 0.0
-    wanted = max(settings.rms, settings.explained * math.sqrt(float((deviations**2).mean()))) if is_noisy else settings.rms
+    wanted = max(settings.rms, settings.explained * math.sqrt(float(deviations @ deviations) / len(places))) if is_noisy else settings.rms
     window = max(len(places) // _WINDOWS, _LEAST_WINDOW) if is_noisy else 1
     scales = np.hypot(deviations, _FINE * settings.rms) if is_noisy else np.full(len(places), settings.rms)
     control_points, knots, normal, rms = _fit(
@@ -107,10 +105,9 @@ def fit_bspline(points: ArrayLike, settings: FitSettings | None = None, sigmas: 
         settings.is_sparse,
         settings.stiffness,
     )
-    spline = Spline(knots, control_points)
-    # Noise makes the way through the points longer than the curve; another scale of the parameter leaves the curve as it is.
-    scaled = Spline(knots * (spline.length() / length), control_points) if spline.length() > _SHORTEST else spline
-    return Fit(scaled, float(rms), normal)
+    # The way through the points is longer than the curve; another scale of the parameter leaves the curve as it is.
+    curve = curve_length(knots, control_points)
+    return Fit(Spline(knots * (curve / length) if curve > _SHORTEST else knots, control_points), float(rms), normal)
 
 
 def averaged_knots(parameters: ArrayLike, count: int) -> NDArray[np.float64]:

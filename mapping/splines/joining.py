@@ -32,7 +32,7 @@ class Way:
     @property
     def length(self) -> float:
         """Length of the way [m]."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+        return float(lengths_along(self.points)[-1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +72,16 @@ def join(seen: Way, known: Way, places: Places, settings: MapSettings) -> tuple[
         weights,
     )
     return Way(points[:count].copy(), weights[:count].copy()), bool(extends)
+
+
+@kernel
+def lengths_along(points: Array) -> Array:
+    """Return how far along a way of points (n, 2) each lies, shape (n,) [m]."""
+    lengths = np.zeros(points.shape[0])
+    for k in range(1, points.shape[0]):
+        dx, dy = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
+        lengths[k] = lengths[k - 1] + math.sqrt(dx * dx + dy * dy)
+    return lengths
 
 
 @kernel

@@ -82,7 +82,7 @@ class SegmentationSettings:
     split_distance: float = 0.04
     split_sigmas: float = 4.0
     collinear_angle: float = math.radians(5.0)
-    corner_angle: float = math.radians(30.0)
+    corner_angle: float = math.radians(20.0)
     corner_rule: str = "angle"
     corner_reach: float = 0.25
     line_points: int = 8
@@ -160,7 +160,7 @@ class AssociationSettings:
     mean_distance: float = 0.10
     mean_turn: float = math.radians(20.0)
     least_overlap: float = 0.20
-    point_distance: float = 0.30
+    point_distance: float = 0.15
     line_distance: float = 0.10
     line_angle: float = math.radians(5.0)
     line_origin: str = "segment"
@@ -238,9 +238,9 @@ def spline_settings(mode: str = "default") -> SplineSettings:
     if mode == "default":
         return SplineSettings()
     return SplineSettings(
-        segmentation=SegmentationSettings(test="dietmayer", corner_rule="slope"),
+        segmentation=SegmentationSettings(test="dietmayer", corner_rule="slope", corner_angle=math.radians(30.0)),
         fit=FitSettings(is_sparse=False, finest_spacing=0.25),
-        association=AssociationSettings(line_origin="robot"),
+        association=AssociationSettings(point_distance=0.30, line_origin="robot"),
     )
 
 
