@@ -94,7 +94,7 @@ def seen_walls(edges: Edges, hits: Points, spacing: float = 0.02, reach: float =
     edges : (edges, 4) float64
         Walls.
     hits : (m, 2) float64
-        Ends of beams from true poses [m].
+        Ends of beams from true poses, before noise, as `hits_of_beams` gives them [m].
     spacing : float
         Distance of the points [m].
     reach : float
@@ -109,6 +109,25 @@ def seen_walls(edges: Edges, hits: Points, spacing: float = 0.02, reach: float =
         points.append(edge[:2] + shares[:, None] * (edge[2:] - edge[:2]))
     along = np.concatenate(points)
     return np.asarray(along[cKDTree(hits).query(along)[0] <= reach])
+
+
+def hits_of_beams(edges: Edges, poses: Points, angles: NDArray[np.float64], range_max: float) -> Points:
+    """Return where the beams of scans from true poses end, before noise, (n, 2) [m].
+
+    Parameters
+    ----------
+    edges : (edges, 4) float64
+        Walls.
+    poses : (scans, 3) float64
+        True poses of the laser x, y, theta [m, rad].
+    angles : (beams,) float64
+        Angles of the beams against the heading [rad].
+    range_max : float
+        Reach of the laser [m].
+    """
+    hits = np.empty((len(poses) * len(angles), 2))
+    count = _cast(np.ascontiguousarray(edges, np.float64), np.ascontiguousarray(poses, np.float64), angles, range_max, hits)
+    return hits[:count].copy()
 
 
 def end_point_bytes(points: int) -> int:
@@ -133,3 +152,24 @@ def _distances(points: Array, edges: Array, distances: Array) -> None:
             share = min(max((x * dx + y * dy) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
             nearest = min(nearest, (x - share * dx) ** 2 + (y - share * dy) ** 2)
         distances[k] = np.sqrt(nearest)
+
+
+@kernel
+def _cast(edges: Array, poses: Array, angles: Array, range_max: float, hits: Array) -> int:
+    count = 0
+    for p in range(poses.shape[0]):
+        for b in range(angles.shape[0]):
+            cosine, sine = np.cos(poses[p, 2] + angles[b]), np.sin(poses[p, 2] + angles[b])
+            nearest = np.inf
+            for e in range(edges.shape[0]):
+                dx, dy = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
+                x, y = edges[e, 0] - poses[p, 0], edges[e, 1] - poses[p, 1]
+                across = cosine * dy - sine * dx
+                if across != 0.0:
+                    distance, share = (x * dy - y * dx) / across, (x * sine - y * cosine) / across
+                    if 0.0 <= share <= 1.0 and 0.0 < distance < nearest:
+                        nearest = distance
+            if nearest <= range_max:
+                hits[count, 0], hits[count, 1] = poses[p, 0] + nearest * cosine, poses[p, 1] + nearest * sine
+                count += 1
+    return count

@@ -115,11 +115,19 @@ def closest_place(way: Array, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
-def mark_near(points: Array, way: Array, distance: float, is_near: Array) -> None:
-    """Mark the points (m, 2) that are within a distance of a way (n, 2) [m]; others keep their marks (m,)."""
+def mark_along(points: Array, way: Array, distance: float, is_along: Array) -> None:
+    """Mark the points of one way (m, 2) that run along another (n, 2) within a distance [m]; others keep their marks (m,).
+
+    The two faces of a thin wall run opposite ways.
+    """
+    last = points.shape[0] - 1
     for k in range(points.shape[0]):
-        if not is_near[k]:
-            is_near[k] = closest_place(way, points[k, 0], points[k, 1])[1] <= distance
+        place, gap = closest_place(way, points[k, 0], points[k, 1])
+        if gap <= distance:
+            x, y = points[min(k + 1, last), 0] - points[max(k - 1, 0), 0], points[min(k + 1, last), 1] - points[max(k - 1, 0), 1]
+            direction = direction_of(way, place)
+            if x * math.cos(direction) + y * math.sin(direction) >= 0.0:
+                is_along[k] = True
 
 
 @kernel

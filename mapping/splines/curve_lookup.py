@@ -54,9 +54,7 @@ class CurveLookup:
         self._centre = np.array(place, np.float64)
         self.frame[:2] = self._centre - side / 2.0
         low, high = self.frame[:2], self.frame[:2] + side
-        ways = [
-            curve.spline.sample(PIECE) for curve in curves if (curve.box[:2] <= high).all() and (curve.box[2:] >= low).all()
-        ]
+        ways = [curve.spline.sample(PIECE) for curve in curves if (curve.box[:2] <= high).all() and (curve.box[2:] >= low).all()]
         self.pieces = np.concatenate([np.empty((0, 5)), *(_pieces_of(way) for way in ways)])
         self.nearest.fill(-1)
         self._gaps.fill(np.inf)

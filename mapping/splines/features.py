@@ -55,9 +55,7 @@ class Features:
         lines = self.lines.copy()
         lines[:, :2] = pose.apply(self.lines[:, :2])
         lines[:, 2] += pose.theta
-        return Features(
-            pose.apply(self.corners), pose.apply(self.peaks), lines, self.corner_sigmas, self.peak_sigmas, self.line_sigmas
-        )
+        return Features(pose.apply(self.corners), pose.apply(self.peaks), lines, self.corner_sigmas, self.peak_sigmas, self.line_sigmas)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -234,9 +234,7 @@ def _fit_straight(points: Array, sigmas: Array) -> Array:
 
 
 @kernel
-def _accumulate(
-    points: Array, sigmas: Array, parameters: Array, knots: Array, stiffness: float, normal: Array, right: Array
-) -> None:
+def _accumulate(points: Array, sigmas: Array, parameters: Array, knots: Array, stiffness: float, normal: Array, right: Array) -> None:
     """Add up the lower band of the normal matrix, (n, 4): row i holds columns i .. i - 3, and the right side, (n, 2)."""
     count = normal.shape[0]
     values = np.empty(ORDER)
@@ -298,9 +296,7 @@ def _solve(factor: Array, right: Array) -> None:
 
 
 @kernel
-def _misfit(
-    points: Array, parameters: Array, knots: Array, control_points: Array, scales: Array, window: int
-) -> tuple[float, float]:
+def _misfit(points: Array, parameters: Array, knots: Array, control_points: Array, scales: Array, window: int) -> tuple[float, float]:
     """Return how far points lie beside the curve at their parameters; along it, parameters are but estimates.
 
     Returns

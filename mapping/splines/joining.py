@@ -138,6 +138,10 @@ def _join(
             if 0.0 < place < last_seen or k == known_from or k == known_to:
                 x, y = point_of(seen, place)
                 weight = _weight_at(seen_weights, place)
+                if known_from > 0.0:
+                    weight *= _ramp(_length_between(known, known_from, float(k)), blend)
+                if known_to < last_known:
+                    weight *= _ramp(_length_between(known, float(k), known_to), blend)
                 shift_x, shift_y = _shift(x, y, weight, known[k, 0], known[k, 1], known_weights[k])
                 points[count, 0] += shift_x
                 points[count, 1] += shift_y
@@ -153,6 +157,12 @@ def _join(
             weights[count] = seen_weights[k]
             count += 1
     return count, head or tail
+
+
+@kernel
+def _ramp(length: float, blend: float) -> float:
+    """Return by what share a seen way counts so far from its end: where the known one goes on alone, there shall be no step."""
+    return min((length + 1e-3) / blend, 1.0)
 
 
 @kernel

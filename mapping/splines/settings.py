@@ -193,6 +193,8 @@ class MapSettings:
         Nor do curves shorter than so many standard deviations of their noise.
     explained_distance : float
         Nor do curves most of which lies nearer than this to curves of the map [m], or nearer than three standard deviations.
+    trusted_count, trusted_length, trial_updates : int, float, int
+        Corners, peaks and shorter curves that fewer scans have seen are forgotten after so many updates without seeing them [m].
     """
 
     sample_spacing: float = 0.05
@@ -203,10 +205,15 @@ class MapSettings:
     least_length: float = 0.1
     least_sigmas: float = 6.0
     explained_distance: float = 0.1
+    trusted_count: int = 3
+    trusted_length: float = 0.3
+    trial_updates: int = 20
 
     def __post_init__(self) -> None:
         _check_positive(self, "the map", ("sample_spacing", "rms", "most_weight", "blend_length"))
-        _check_from_zero(self, "the map", ("least_extension", "least_length", "least_sigmas", "explained_distance"))
+        _check_from_zero(self, "the map", ("least_extension", "least_length", "least_sigmas", "explained_distance", "trusted_length"))
+        if self.trusted_count < 1 or self.trial_updates < 1:
+            raise ValueError(f"trusted_count is {self.trusted_count} and trial_updates is {self.trial_updates}; want at least 1 each")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

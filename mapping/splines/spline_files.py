@@ -83,7 +83,7 @@ def compact_arrays(spline_map: SplineMap) -> dict[str, NDArray[Any]]:
     weights = np.concatenate(
         [np.empty(0), *(curve.weights for curve in spline_map.curves), spline_map.corners.weights, spline_map.peaks.weights]
     )
-    counts = [[min(curve.count, _STEPS), curve.last_seen & _STEPS] for curve in spline_map.curves]
+    counts = [[min(curve.count, _STEPS), min(curve.last_seen, _STEPS)] for curve in spline_map.curves]
     marks = np.concatenate([spline_map.corners.counts, spline_map.peaks.counts])
     return {
         "frame": np.array([VERSION, low[0], low[1], unit, len(spline_map.corners), spline_map.updates]),
@@ -127,9 +127,11 @@ def from_compact_arrays(arrays: dict[str, NDArray[Any]], settings: SplineSetting
     if not len(marks) == len(mark_weights) == len(counts):
         raise ValueError("its arrays do not fit together")
     split = int(corner_count)
-    spline_map.corners = Landmarks(marks[:split], mark_weights[:split], counts[:split])
-    spline_map.peaks = Landmarks(marks[split:], mark_weights[split:], counts[split:])
     spline_map.updates = int(updates)
+    # When landmarks were last seen is not kept: those on trial begin anew.
+    now = np.full(len(marks), spline_map.updates, np.int64)
+    spline_map.corners = Landmarks(marks[:split], mark_weights[:split], counts[:split], now[:split])
+    spline_map.peaks = Landmarks(marks[split:], mark_weights[split:], counts[split:], now[split:])
     return spline_map
 
 
@@ -172,7 +174,12 @@ def _as_json(spline_map: SplineMap) -> dict[str, Any]:
             for curve in spline_map.curves
         ],
         **{
-            name: {"points": marks.points.tolist(), "weights": marks.weights.tolist(), "counts": marks.counts.tolist()}
+            name: {
+                "points": marks.points.tolist(),
+                "weights": marks.weights.tolist(),
+                "counts": marks.counts.tolist(),
+                "last_seen": marks.last_seen.tolist(),
+            }
             for name, marks in (("corners", spline_map.corners), ("peaks", spline_map.peaks))
         },
     }
@@ -190,10 +197,10 @@ def _from_json(content: dict[str, Any], settings: SplineSettings | None) -> Spli
     for name in ("corners", "peaks"):
         marks = content[name]
         points, weights = np.array(marks["points"], np.float64).reshape(-1, 2), np.array(marks["weights"], np.float64)
-        counts = np.array(marks["counts"], np.int64)
-        if not len(points) == len(weights) == len(counts):
-            raise ValueError(f"its {name} have not as many points as weights and counts")
-        setattr(spline_map, name, Landmarks(points, weights, counts))
+        counts, last_seen = np.array(marks["counts"], np.int64), np.array(marks["last_seen"], np.int64)
+        if not len(points) == len(weights) == len(counts) == len(last_seen):
+            raise ValueError(f"its {name} have not as many points as weights, counts and times")
+        setattr(spline_map, name, Landmarks(points, weights, counts, last_seen))
     spline_map.updates = int(content["updates"])
     if not all(math.isfinite(value) for curve in spline_map.curves for value in curve.weights.tolist()):
         raise ValueError("weights are not finite")

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.rigid import Transform
-from lidarium.mapping.splines.association import are_near, mark_near
+from lidarium.mapping.splines.association import are_near, mark_along
 from lidarium.mapping.splines.bspline import ORDER, Spline
 from lidarium.mapping.splines.curve import Curve, fit_curve
 from lidarium.mapping.splines.features import Observation, curves_of, match_points
 from lidarium.mapping.splines.joining import Places, Way, common_places, join
 from lidarium.mapping.splines.segmentation import split_merge
-from lidarium.mapping.splines.settings import SplineSettings
+from lidarium.mapping.splines.settings import MapSettings, SplineSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,38 +28,47 @@ class Landmarks:
         How much is known of each, as a number of observations with a standard deviation of 1 cm.
     counts : (n,) int64
         How many scans have seen each.
+    last_seen : (n,) int64
+        The map's update that saw each last.
     """
 
     points: NDArray[np.float64]
     weights: NDArray[np.float64]
     counts: NDArray[np.int64]
+    last_seen: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def updated(self, seen: NDArray[np.float64], sigmas: NDArray[np.float64], most_distance: float, most_weight: float) -> "Landmarks":
-        """Return the landmarks with seen points (m, 2) of standard deviations (m,) taken in [m]."""
+    def updated(
+        self, seen: NDArray[np.float64], sigmas: NDArray[np.float64], update: int, most_distance: float, settings: MapSettings
+    ) -> "Landmarks":
+        """Return the landmarks with seen points (m, 2) of standard deviations (m,) taken in, and without those that were but noise [m]."""
         weights = (0.01 / sigmas) ** 2
         which, known = match_points(seen, self.points, most_distance)
-        points, all_weights, counts = self.points.copy(), self.weights.copy(), self.counts.copy()
+        points, all_weights, counts, last_seen = self.points.copy(), self.weights.copy(), self.counts.copy(), self.last_seen.copy()
         share = (weights[which] / (weights[which] + all_weights[known]))[:, None]
         points[known] += share * (seen[which] - points[known])
-        all_weights[known] = np.minimum(all_weights[known] + weights[which], most_weight)
+        all_weights[known] = np.minimum(all_weights[known] + weights[which], settings.most_weight)
         counts[known] += 1
+        last_seen[known] = update
         # What is near a known one, but not the nearest, is none of its own.
         is_new = np.ones(len(seen), np.bool_)
         if len(self.points) and len(seen):
             is_new = np.linalg.norm(seen[:, None] - self.points[None], axis=2).min(axis=1) >= most_distance
+        is_kept = (counts >= settings.trusted_count) | (last_seen > update - settings.trial_updates)
+        added = int(is_new.sum())
         return Landmarks(
-            np.concatenate([points, seen[is_new]]),
-            np.concatenate([all_weights, weights[is_new]]),
-            np.concatenate([counts, np.ones(int(is_new.sum()), np.int64)]),
+            np.concatenate([points[is_kept], seen[is_new]]),
+            np.concatenate([all_weights[is_kept], weights[is_new]]),
+            np.concatenate([counts[is_kept], np.ones(added, np.int64)]),
+            np.concatenate([last_seen[is_kept], np.full(added, update, np.int64)]),
         )
 
 
 def no_landmarks() -> Landmarks:
     """Return landmarks of a blank map."""
-    return Landmarks(np.empty((0, 2)), np.empty(0), np.empty(0, np.int64))
+    return Landmarks(np.empty((0, 2)), np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class SplineMap:
@@ -99,7 +108,8 @@ class SplineMap:
         self.updates += 1
         for spline, sigmas in curves_of(observation, self.settings):
             self._take_in(Spline(spline.knots, pose.apply(spline.control_points)), sigmas)
-        limits = self.settings.association.point_distance, self.settings.map.most_weight
+        self._forget()
+        limits = self.updates, self.settings.association.point_distance, self.settings.map
         seen = observation.features.moved(pose)
         self.corners = self.corners.updated(seen.corners, seen.corner_sigmas, *limits)
         self.peaks = self.peaks.updated(seen.peaks, seen.peak_sigmas, *limits)
@@ -123,6 +133,16 @@ class SplineMap:
         """Return the range that a laser at a point (2,) would measure along a direction [rad], inf where no curve is met [m]."""
         return min((curve.spline.ray(origin, direction) for curve in self.curves), default=math.inf)
 
+    def _forget(self) -> None:
+        """Drop short curves that have not been seen again."""
+        settings = self.settings.map
+        since = self.updates - settings.trial_updates
+        self.curves = [
+            curve
+            for curve in self.curves
+            if curve.count >= settings.trusted_count or curve.last_seen > since or curve.way.length >= settings.trusted_length
+        ]
+
     def _take_in(self, spline: Spline, sigmas: NDArray[np.float64]) -> None:
         """Join a seen curve with the map's curves along which it runs, or add it as a new one."""
         settings = self.settings.map
@@ -137,8 +157,11 @@ class SplineMap:
             count += known.count
             pieces = self._cut_at_corners(way) if extends else [way]
             if len(pieces) > 1:
+                longest = max(pieces, key=lambda piece: piece.length)
+                self._add(longest, count)
                 for piece in pieces:
-                    self._add(piece, count)
+                    if piece is not longest and self._is_new(piece):
+                        self._add(piece, count)
                 return
             fitted = fit_curve(way, count, self.updates, self.settings.fit, settings)
             way, control_points = fitted.way, fitted.spline.control_points
@@ -158,7 +181,7 @@ class SplineMap:
         distance = max(settings.explained_distance, 3.0 * sigma)
         is_known = np.zeros(len(way.points), np.bool_)
         for index in self._near(way, distance):
-            mark_near(way.points, self.curves[index].way.points, distance, is_known)
+            mark_along(way.points, self.curves[index].way.points, distance, is_known)
         return 2 * int(is_known.sum()) < len(is_known)
 
     def _near(self, way: Way, distance: float) -> list[int]:

@@ -69,7 +69,8 @@ def test_joined_curves_are_their_weighted_mean_where_both_run():
     seen, known = way(1.0, 3.0, 0.04, weight=1.0), way(0.0, 4.0, 0.0, weight=3.0)
     joined, extends = join(seen, known, common_places(seen, known, AssociationSettings()), MapSettings())
     assert not extends
-    middle = (joined.points[:, 0] > 1.1) & (joined.points[:, 0] < 2.9)
+    # Towards the ends of the seen curve its share fades, so that there is no step where the known one goes on alone.
+    middle = (joined.points[:, 0] > 1.5) & (joined.points[:, 0] < 2.5)
     np.testing.assert_allclose(joined.points[middle, 1], 0.01, atol=1e-9)
     np.testing.assert_allclose(joined.weights[middle], 4.0)
     np.testing.assert_allclose(joined.points[[0, -1], 0], (0.0, 4.0))

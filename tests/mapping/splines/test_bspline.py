@@ -75,7 +75,8 @@ def test_no_sample_is_nearer_than_the_closest_point(spline, point):
 
 def test_length_and_curvature_of_an_arc():
     quarter = Spline(
-        np.array([0, 0, 0, 0, 1, 1, 1, 1.0]), np.array([(1, 0), (1, 4 / 3 * math.tan(math.pi / 8)), (4 / 3 * math.tan(math.pi / 8), 1), (0, 1)])
+        np.array([0, 0, 0, 0, 1, 1, 1, 1.0]),
+        np.array([(1, 0), (1, 4 / 3 * math.tan(math.pi / 8)), (4 / 3 * math.tan(math.pi / 8), 1), (0, 1)]),
     )
     assert quarter.length() == pytest.approx(math.pi / 2.0, abs=1e-3)
     np.testing.assert_allclose(quarter.curvature(np.linspace(0.05, 0.95, 9)), 1.0, atol=0.02)
