@@ -1,5 +1,6 @@
 """Scans of rooms given by their walls, for tests of what works on scans alone."""
 
+import itertools
 import math
 
 import numpy as np
@@ -35,7 +36,7 @@ def biased_odometry(poses, bias, seed=0, slip=0.0):
     """Return odometry (n, 3) along poses (n, 3) whose ways and turns are too long by a share, and slip."""
     generator = np.random.default_rng(seed)
     place, told = Transform(), [np.zeros(3)]
-    for before, after in zip(poses[:-1], poses[1:], strict=True):
+    for before, after in itertools.pairwise(poses):
         motion = Transform(*map(float, before)).inverse() @ Transform(*map(float, after))
         way, draws = math.hypot(motion.x, motion.y), slip * generator.standard_normal(3)
         place = place @ Transform(

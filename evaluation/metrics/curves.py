@@ -64,7 +64,7 @@ def curve_precision(curve_points: Points, edges: Edges, tolerance: float = TOLER
     tolerance : float
         [m]
     """
-    return float((distances_to_walls(curve_points, edges) <= tolerance).mean()) if len(curve_points) else 1.0
+    return float(np.mean(distances_to_walls(curve_points, edges) <= tolerance)) if len(curve_points) else 1.0
 
 
 def wall_recall(wall_points: Points, curve_points: Points, tolerance: float = TOLERANCE) -> float:
@@ -83,7 +83,7 @@ def wall_recall(wall_points: Points, curve_points: Points, tolerance: float = TO
         return 1.0
     if len(curve_points) == 0:
         return 0.0
-    return float((cKDTree(curve_points).query(wall_points)[0] <= tolerance).mean())
+    return float(np.mean(cKDTree(curve_points).query(wall_points)[0] <= tolerance))
 
 
 def seen_walls(edges: Edges, hits: Points, spacing: float = 0.02, reach: float = 0.05) -> Points:

@@ -65,13 +65,13 @@ class Spline:
     def tangents(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return unit vectors along the curve at parameters (m,), shape (m, 2)."""
         along = self.derivative(parameters)
-        return np.asarray(along / np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None])
+        return np.asarray(along / np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None], np.float64)
 
     def curvature(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return the signed curvature at parameters (m,), positive where the curve turns left [1/m]."""
         first, second = self.derivative(parameters), self.derivative(parameters, 2)
         speed = np.maximum(np.linalg.norm(first, axis=1), 1e-12)
-        return np.asarray((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3)
+        return np.asarray((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3, np.float64)
 
     def length(self) -> float:
         """Return the length of the curve [m], by Gauss-Legendre quadrature of each span."""
@@ -85,7 +85,7 @@ class Spline:
         """Return the parameters of `sample`, shape (m,) [m]."""
         first, last = self.domain
         gaps = max(math.ceil((last - first) / spacing), 2)
-        return np.asarray(first + np.arange(gaps + 1) * ((last - first) / gaps))
+        return np.asarray(first + np.arange(gaps + 1) * ((last - first) / gaps), np.float64)
 
     def closest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return parameters (m,) of the nearest points of the curve to points (m, 2), and the distances (m,) [m]."""
@@ -123,7 +123,7 @@ def basis_matrix(knots: ArrayLike, parameters: ArrayLike) -> NDArray[np.float64]
     """
     all_knots, wanted = np.asarray(knots, np.float64), np.atleast_1d(np.asarray(parameters, np.float64))
     count = len(all_knots) - ORDER
-    if count < ORDER or wanted.size and not (all_knots[ORDER - 1] <= wanted.min() and wanted.max() <= all_knots[count]):
+    if count < ORDER or (wanted.size and not (all_knots[ORDER - 1] <= wanted.min() and wanted.max() <= all_knots[count])):
         raise ValueError(f"{len(all_knots)} knots, or parameters outside of the domain; want 8 knots or more and parameters within")
     matrix = np.zeros((len(wanted), count))
     _fill_basis(all_knots, wanted, matrix)
@@ -348,4 +348,4 @@ def _crossing(
         slope = cosine * dy - sine * dx
         moved = parameter - aside / slope if slope != 0.0 else low
         parameter = moved if low < moved < high else (low + high) / 2.0
-    return cosine * (px - x) + sine * (py - y)
+    return float(cosine * (px - x) + sine * (py - y))

@@ -85,7 +85,7 @@ def piece_distance(pieces: Array, piece: int, x: float, y: float) -> float:
     along = abs(dx * pieces[piece, 2] + dy * pieces[piece, 3]) - pieces[piece, 4]
     aside = dy * pieces[piece, 2] - dx * pieces[piece, 3]
     if along <= 0.0:
-        return abs(aside)
+        return float(abs(aside))
     return math.sqrt(aside * aside + along * along)
 
 

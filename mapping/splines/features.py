@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.rigid import Transform
-from lidarium.mapping.splines.bspline import Spline
 from lidarium.mapping.splines.breakpoints import clusters
+from lidarium.mapping.splines.bspline import Spline
 from lidarium.mapping.splines.fitting import fit_bspline
 from lidarium.mapping.splines.scan_points import ScanPoints
 from lidarium.mapping.splines.segmentation import Cut, split_merge

@@ -100,7 +100,7 @@ def _length_between(way: Array, low: float, high: float) -> float:
 def _weight_at(weights: Array, place: float) -> float:
     k = min(max(int(place), 0), weights.shape[0] - 2)
     share = place - k
-    return weights[k] + share * (weights[k + 1] - weights[k])
+    return float(weights[k] + share * (weights[k + 1] - weights[k]))
 
 
 @kernel
@@ -135,7 +135,7 @@ def _join(
         if known_from <= k <= known_to:
             place, _ = closest_place(seen, known[k, 0], known[k, 1])
             # What lies beside an end of the seen way is not what it saw.
-            if 0.0 < place < last_seen or k == known_from or k == known_to:
+            if 0.0 < place < last_seen or k in (known_from, known_to):
                 x, y = point_of(seen, place)
                 weight = _weight_at(seen_weights, place)
                 if known_from > 0.0:

@@ -251,4 +251,4 @@ def _cut(
             x, y = before[0] + along * np.cos(before[2]), before[1] + along * np.sin(before[2])
             if (x - points[at, 0]) ** 2 + (y - points[at, 1]) ** 2 < _NEAR_CORNER**2:
                 corners[k, 0], corners[k, 1] = x, y
-    return count
+    return int(count)

@@ -39,7 +39,7 @@ def write_spline_map(path: Path, spline_map: SplineMap) -> None:
         write_whole(path, (json.dumps(_as_json(spline_map), indent=1) + "\n").encode())
     elif path.suffix == ".npz":
         content = io.BytesIO()
-        np.savez(content, **compact_arrays(spline_map))
+        np.savez(content, allow_pickle=False, **compact_arrays(spline_map))
         write_whole(path, content.getvalue())
     else:
         raise ValueError(f"{path} is no name for a spline map; want one that ends in .json or .npz")
