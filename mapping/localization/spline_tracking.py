@@ -1,6 +1,7 @@
 """What both localizers on spline maps share: odometry, the map that they make as they go, and what of a scan they match to it."""
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -79,7 +80,7 @@ class TrackingSettings:
                 raise ValueError(f"{name} of tracking is {getattr(self, name)}; want at least 1")
 
 
-class SplineTracker:
+class SplineTracker(ABC):
     """A localizer that makes a map of curves and keeps itself on it; how a pose is predicted and corrected, heirs say.
 
     Parameters
@@ -147,21 +148,26 @@ class SplineTracker:
             self._take_in(observation)
         return self.pose.copy()
 
+    @property
+    @abstractmethod
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2]."""
+
     def take_correction(self) -> KeyScans | None:
         """Return None: the past is never corrected."""
         return None
 
+    @abstractmethod
     def _begin(self, pose: NDArray[np.float64], seed: int) -> None:
         """Begin at a pose."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
         """Move as odometry says, ``before_from_now``; return the pose."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
         """Weigh what was matched; return the pose."""
-        raise NotImplementedError
 
     def _match(self, observation: Observation) -> Matches:
         """Match a scan to the map from the pose as it is believed now."""

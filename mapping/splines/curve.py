@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.splines.bspline import ORDER, Spline
+from lidarium.mapping.splines.basis import ORDER
+from lidarium.mapping.splines.bspline import Spline
 from lidarium.mapping.splines.fitting import fit_bspline
 from lidarium.mapping.splines.joining import Way, lengths_along
 from lidarium.mapping.splines.settings import FitSettings, MapSettings

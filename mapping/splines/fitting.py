@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.splines.bspline import ORDER, Spline, basis_of_span, curve_length, find_span, point_at
+from lidarium.mapping.splines.banded import factorize, solve
+from lidarium.mapping.splines.basis import ORDER, basis_of_span, find_span, point_at
+from lidarium.mapping.splines.bspline import Spline, curve_length
 from lidarium.mapping.splines.settings import FitSettings
 
 _SHORTEST = 1e-9
@@ -41,12 +43,12 @@ class Fit:
         count = len(self.normal)
         inverse = np.empty((count, count))
         factor = self.normal.copy()
-        if not _factorize(factor):
+        if not factorize(factor):
             raise ValueError("the points do not determine the control points")
         for k in range(count):
             column = np.zeros((count, 1))
             column[k] = 1.0
-            _solve(factor, column)
+            solve(factor, column)
             inverse[:, k] = column[:, 0]
         return inverse
 
@@ -194,9 +196,9 @@ def _fit(
                 return line, knots, normal, rms
         factor = normal.copy()
         # With the stiffness there always is a solution; without, more control points than the points determine have none.
-        is_solved = _factorize(factor)
-        if is_solved:
-            _solve(factor, control_points)
+        issolved = factorize(factor)
+        if issolved:
+            solve(factor, control_points)
             rms, bias = _misfit(points, parameters, knots, control_points, scales, window)
             if (rms <= wanted and bias <= _MOST_BIAS) or count >= most:
                 return control_points, knots, normal, rms
@@ -258,41 +260,6 @@ def _accumulate(points: Array, sigmas: Array, parameters: Array, knots: Array, s
         normal[i, 1] -= 2.0 * scale
         normal[i + 1, 1] -= 2.0 * scale
         normal[i + 1, 2] += scale
-
-
-@kernel
-def _factorize(band: Array) -> bool:
-    """Replace a banded matrix by its Cholesky factor, band for band; return False where it is not positive definite."""
-    for i in range(band.shape[0]):
-        for back in range(min(i, ORDER - 1), -1, -1):
-            j = i - back
-            value = band[i, back]
-            for k in range(max(i - ORDER + 1, j - ORDER + 1, 0), j):
-                value -= band[i, i - k] * band[j, j - k]
-            if back > 0:
-                band[i, back] = value / band[j, 0]
-            elif value <= 1e-14 * band[i, 0] or value <= 0.0:
-                return False
-            else:
-                band[i, 0] = math.sqrt(value)
-    return True
-
-
-@kernel
-def _solve(factor: Array, right: Array) -> None:
-    """Solve for all columns of the right side, in place."""
-    count = factor.shape[0]
-    for column in range(right.shape[1]):
-        for i in range(count):
-            value = right[i, column]
-            for back in range(1, min(i, ORDER - 1) + 1):
-                value -= factor[i, back] * right[i - back, column]
-            right[i, column] = value / factor[i, 0]
-        for i in range(count - 1, -1, -1):
-            value = right[i, column]
-            for ahead in range(1, min(count - 1 - i, ORDER - 1) + 1):
-                value -= factor[i + ahead, ahead] * right[i + ahead, column]
-            right[i, column] = value / factor[i, 0]
 
 
 @kernel

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.files import write_whole
-from lidarium.mapping.splines.bspline import ORDER, Spline
+from lidarium.mapping.splines.basis import ORDER
+from lidarium.mapping.splines.bspline import Spline
 from lidarium.mapping.splines.curve import make_curve
 from lidarium.mapping.splines.settings import SplineSettings
 from lidarium.mapping.splines.spline_map import Landmarks, SplineMap

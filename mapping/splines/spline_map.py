@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.rigid import Transform
 from lidarium.mapping.splines.association import are_near, mark_along
-from lidarium.mapping.splines.bspline import ORDER, Spline
+from lidarium.mapping.splines.basis import ORDER
+from lidarium.mapping.splines.bspline import Spline
 from lidarium.mapping.splines.curve import Curve, fit_curve
 from lidarium.mapping.splines.features import Observation, curves_of, match_points
 from lidarium.mapping.splines.joining import Places, Way, common_places, join

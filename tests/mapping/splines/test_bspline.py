@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from lidarium.mapping.splines.bspline import ORDER, Spline, basis_matrix
+from lidarium.mapping.splines.basis import ORDER, basis_matrix
+from lidarium.mapping.splines.bspline import Spline
 
 
 @st.composite

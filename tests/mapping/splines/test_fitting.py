@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import make_lsq_spline
 
-from lidarium.mapping.splines.bspline import basis_matrix
+from lidarium.mapping.splines.basis import basis_matrix
 from lidarium.mapping.splines.fitting import averaged_knots, fit_bspline
 from lidarium.mapping.splines.settings import FitSettings
 
