@@ -49,7 +49,10 @@ from lidarium.mapping.localization.spline_filter import SplineFilter
 from lidarium.mapping.rigid import Transform
 from lidarium.mapping.splines.spline_files import compact_bytes
 
-FLOORS = ("srt_corridor", "srt_l_room", "srt_lab", "srt_t_junction", "srt_cluttered", "srt_cluttered_reachable")
+TUNED_ON = ("srt_corridor", "srt_l_room", "srt_lab", "srt_t_junction", "srt_cluttered", "srt_cluttered_reachable")
+FLOORS = (*TUNED_ON, "apartment")
+"""Floors that come with a start; settings were chosen on the first six, with other seeds."""
+
 LOCALIZERS = {"splines": SplineFilter, "splines_ekf": SplineEkf}
 POLICY, RASTER, RESOLUTION, TIME_STEP = "nearest_frontier", 0.01, 0.05, 0.1
 _SPACING = 0.01
@@ -99,7 +102,7 @@ def drive(floor: Floor, seed: int, noise: str) -> Drive:
     settings = make_settings(robots=1, robot="pioneer", noise=noise, resolution=RESOLUTION, raster_resolution=RASTER)
     watcher = Drive([], [])
     env = WatchedExploration(floor, settings, watchers=[watcher])
-    run_episode(make_policy(POLICY), env, seed, {"starts": floor.starts})
+    run_episode(make_policy(POLICY), env, seed, {"starts": floor.starts[:1]})
     return watcher
 
 
@@ -189,10 +192,12 @@ every few steps the map takes in a scan, which makes the 95 %. On a machine that
 
 def report(rows: list[str], arguments: argparse.Namespace) -> str:
     """Return the document."""
+    seeds = f"{arguments.seeds} seeds from {arguments.first_seed} on"
     how = f"""A Pioneer P3-DX with the URG-04LX (`noise={arguments.noise}`) explores the worlds with a goal by `{POLICY}`. True poses drive;
 the localizer follows on what was measured and on odometry whose ways and turns are {100 * arguments.bias:.0f} % too long, with slip of
-2 % of either. The world's raster is 1 cm. A line holds the worst of {arguments.seeds} seeds, of times the median of the seeds' figures."""
-    made = f"""Made with `python benchmarks/splines.py --seeds {arguments.seeds}` on {date.today()}, lidarium {lidarium.__version__},
+2 % of either. The world's raster is 1 cm. A line holds the worst of {seeds}, of times the median of the seeds' figures.
+The filters' settings were chosen on the six worlds with a goal with seeds 0 to 2; `apartment` had no part in it."""
+    made = f"""Made with `python benchmarks/splines.py --seeds {arguments.seeds} --first-seed {arguments.first_seed}` on {date.today()}, lidarium {lidarium.__version__},
 Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, {platform.machine()}."""
     table = "\n".join([HEADER, *rows])
     return "\n\n".join(["# Spline maps and localization on them", how, table, TO_REACH, MEANING, made]) + "\n"
@@ -204,19 +209,21 @@ def main() -> None:
     parser.add_argument("--floors", nargs="+", default=list(FLOORS), help="floors that come with a start")
     parser.add_argument("--localizers", nargs="+", choices=list(LOCALIZERS), default=list(LOCALIZERS))
     parser.add_argument("--seeds", type=int, default=3, help="runs of each line")
+    parser.add_argument("--first-seed", type=int, default=100, help="seed of the first run; settings were chosen with seeds 0 to 2")
     parser.add_argument("--bias", type=float, default=0.05, help="share by which odometry tells too much")
     parser.add_argument("--noise", choices=("datasheet", "thesis"), default="datasheet", help="noise of the laser")
     parser.add_argument("--out", type=Path, default=Path("docs/results/splines.md"))
     parser.add_argument("--pictures", type=Path, default=None, help="folder for a picture of each first run")
     arguments = parser.parse_args()
     rows = []
+    seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
     for name in arguments.floors:
         floor = load_floor(name)
-        walks = [drive(floor, seed, arguments.noise) for seed in range(arguments.seeds)]
+        walks = [drive(floor, seed, arguments.noise) for seed in seeds]
         for localizer in arguments.localizers:
             runs = []
-            for seed, walk in enumerate(walks):
-                folder = arguments.pictures if seed == 0 else None
+            for seed, walk in zip(seeds, walks, strict=True):
+                folder = arguments.pictures if seed == seeds[0] else None
                 picture = None if folder is None else folder / f"{name}_{localizer}.png"
                 runs.append(measure(localizer, floor, walk, seed, arguments.bias, picture))
             rows.append(row(name, localizer, runs))
