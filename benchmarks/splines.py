@@ -197,8 +197,9 @@ def report(rows: list[str], arguments: argparse.Namespace) -> str:
 the localizer follows on what was measured and on odometry whose ways and turns are {100 * arguments.bias:.0f} % too long, with slip of
 2 % of either. The world's raster is 1 cm. A line holds the worst of {seeds}, of times the median of the seeds' figures.
 The filters' settings were chosen on the six worlds with a goal with seeds 0 to 2; `apartment` had no part in it."""
-    made = f"""Made with `python benchmarks/splines.py --seeds {arguments.seeds} --first-seed {arguments.first_seed}` on {date.today()},
-lidarium {lidarium.__version__}, Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, {platform.machine()}."""
+    made = f"""Made with `python benchmarks/splines.py --seeds {arguments.seeds} --first-seed {arguments.first_seed}`
+on {date.today()}, lidarium {lidarium.__version__}, Python {platform.python_version()},
+numpy {np.__version__}, scipy {scipy.__version__}, {platform.machine()}."""
     table = "\n".join([HEADER, *rows])
     return "\n\n".join(["# Spline maps and localization on them", how, table, TO_REACH, MEANING, made]) + "\n"
 
