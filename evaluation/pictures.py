@@ -35,6 +35,7 @@ from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.grid_planning import centres_of
 
 FRONTIER_COLOUR, GIVEN_UP_COLOUR, UNSEEN_COLOUR, UNCOUNTED_COLOUR = "#e11d48", "#7c3aed", "#ffd9a0", "#dfe3ea"
+GOAL_COLOUR = "#d97706"
 _START_COLOUR = "#2563eb"
 
 
@@ -69,7 +70,7 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
 
 
 def save_floor_picture(path: Path, floor: Floor, height: float, resolution: float = 0.025) -> None:
-    """Draw a floor: what the laser sees at a height [m], and where its starts are.
+    """Draw a floor: what the laser sees at a height [m], where its starts are, and its goal.
 
     Parameters
     ----------
@@ -90,6 +91,8 @@ def save_floor_picture(path: Path, floor: Floor, height: float, resolution: floa
         draw_start(axes, k, float(x), float(y), _START_COLOUR)
         ahead = (x + 0.6 * math.cos(theta), y + 0.6 * math.sin(theta))
         axes.annotate("", ahead, (x, y), arrowprops={"arrowstyle": "->", "color": _START_COLOUR})
+    if floor.goal is not None:
+        axes.plot(*([value] for value in floor.goal), marker="*", markersize=15, color=GOAL_COLOUR, markeredgecolor="white", zorder=8)
     x_min, y_min, x_max, y_max = floor.bounds
     save_page(path, figure, floor.name, f"{x_max - x_min:.1f} x {y_max - y_min:.1f} m, seen at a height of {height:g} m")
 

@@ -50,6 +50,11 @@ def wrapped(angle: float) -> float:
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
 
 
+def yaw_of_quaternion(z: float, w: float) -> float:
+    """Return the angle in (-pi, pi] of a rotation about the vertical, of the quaternion (0, 0, z, w), of whatever length and sign."""
+    return wrapped(2.0 * math.atan2(z, w))
+
+
 def halfway(first: Transform, second: Transform, at: ArrayLike) -> Transform:
     """Return the motion half way between two, which takes a point half way between its images."""
     turn = Transform(0.0, 0.0, wrapped(first.theta + 0.5 * wrapped(second.theta - first.theta)))

@@ -10,6 +10,9 @@ A file holds, all in metres and degrees::
       "walls": [[0, 4, 8, 4], [8, 4, 8, 0, 0.2]],    middle line x, y, x, y, and the thickness where it is not 0.1
       "blocks": [[3, 3, 5, 4]],                      solid rectangles x, y, x, y
       "doors": [[2, 4], [6, 4, 1.2]],                middle of the gap and its width where it is not 0.9
+      "rooms": [[[0, 0], [3, 0], [3, 9], [0, 9]]],   outlines of free space, apart from each other: all else is solid, no outer walls
+      "obstacles": [{"corners": [[1, 1], ...], "height": 1.2}],   a solid of any outline; one without a height reaches the ceiling
+      "wall_height": 2.5,                            of walls, blocks and what surrounds rooms; to the ceiling where left out
       "furniture": [["bed", 2, 7, 90, 1.6, 2.0]],    kind, middle, direction of its back, and width and depth if wanted
       "starts": [[1, 1, 0]],                         x, y, heading
       "goal": [7, 7]
@@ -20,6 +23,7 @@ A door cuts every wall that passes through its middle.
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,10 +71,18 @@ def load_drawn(path: Path) -> Floor:
         bounds = tuple(float(value) for value in plan["bounds"])
         if len(bounds) != 4:
             raise ValueError(f"bounds are {plan['bounds']}; want x, y, x, y")
-        solids = [*_outer_walls(bounds, float(plan.get("outer_wall", 0.2)))]
+        height = float(plan.get("wall_height", math.inf))
+        rooms = tuple(np.array(room, dtype=np.float64) for room in plan.get("rooms", []))
+        if rooms:
+            solids = [replace(_rectangle(*bounds), holes=rooms)]
+        else:
+            solids = [*_outer_walls(bounds, float(plan.get("outer_wall", 0.2)))]
         for wall in plan.get("walls", []):
             solids += _wall(wall, plan.get("doors", []))
         solids += [_rectangle(*block) for block in plan.get("blocks", [])]
+        solids = [replace(solid, z_high=height) for solid in solids]
+        for obstacle in plan.get("obstacles", []):
+            solids.append(Solid(np.array(obstacle["corners"], dtype=np.float64), z_high=float(obstacle.get("height", math.inf))))
         for kind, x, y, degrees, *size in plan.get("furniture", []):
             solids += place(kind, x, y, math.radians(degrees), *size)
         starts = [(x, y, math.radians(degrees)) for x, y, degrees in plan.get("starts", [])]

@@ -1,4 +1,9 @@
-"""The robots of the catalogue: bodies and drives."""
+"""The robots of the catalogue: bodies and drives.
+
+References
+----------
+Pioneer P3-DX: data sheet of Adept MobileRobots. Kobuki: user guide of Yujin Robot.
+"""
 
 import math
 from dataclasses import dataclass, fields
@@ -30,6 +35,8 @@ class Robot:
         Distance between the driven wheels [m].
     ticks_per_metre : float
         Ticks that the encoder of a wheel counts on a metre [1/m].
+    length, width : float
+        Outline of the body [m].
     """
 
     radius: float = 0.18
@@ -41,6 +48,8 @@ class Robot:
     max_turn_acceleration: float = 6.0
     wheel_base: float = 0.23
     ticks_per_metre: float = 11724.0
+    length: float = 0.352
+    width: float = 0.352
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -49,6 +58,15 @@ class Robot:
                 raise ValueError(f"{field.name} of the robot is {value}; want a number above 0")
         if self.cruise_speed > self.max_speed:
             raise ValueError(f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s")
+
+    def wheel_speeds(self, speed: float, turn_rate: float) -> tuple[float, float]:
+        """Return the speeds of the left and the right wheel [m/s] for a speed [m/s] and turn rate [rad/s] of the body."""
+        side = 0.5 * turn_rate * self.wheel_base
+        return speed - side, speed + side
+
+    def body_motion(self, left: float, right: float) -> tuple[float, float]:
+        """Return speed [m/s] and turn rate [rad/s] of the body for the speeds of its wheels [m/s]."""
+        return 0.5 * (left + right), (right - left) / self.wheel_base
 
     @property
     def numbers(self) -> NDArray[np.float64]:
@@ -71,6 +89,8 @@ ROBOTS: dict[str, Robot] = {
         max_turn_acceleration=3.0,
         wheel_base=0.331,
         ticks_per_metre=500 / (2 * math.pi * 0.0975),
+        length=0.455,
+        width=0.381,
     ),
     "service": Robot(
         radius=0.30,
@@ -82,6 +102,8 @@ ROBOTS: dict[str, Robot] = {
         max_turn_acceleration=2.0,
         wheel_base=0.45,
         ticks_per_metre=4000.0,
+        length=0.6,
+        width=0.6,
     ),
     "point": Robot(
         radius=0.01,
@@ -93,5 +115,7 @@ ROBOTS: dict[str, Robot] = {
         max_turn_acceleration=600.0,
         wheel_base=0.02,
         ticks_per_metre=100000.0,
+        length=0.02,
+        width=0.02,
     ),
 }

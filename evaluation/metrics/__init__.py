@@ -8,6 +8,17 @@ from lidarium.evaluation.metrics.communication import (
     sharing_lag,
 )
 from lidarium.evaluation.metrics.coverage import free_coverage, known_coverage, own_coverage, valid_coverage
+from lidarium.evaluation.metrics.curves import (
+    WallError,
+    curve_precision,
+    distances_to_walls,
+    end_point_bytes,
+    grid_bytes,
+    hits_of_beams,
+    seen_walls,
+    wall_error,
+    wall_recall,
+)
 from lidarium.evaluation.metrics.effort import decision_percentiles, peak_megabytes
 from lidarium.evaluation.metrics.evenness import balance, jain_index, path_balance
 from lidarium.evaluation.metrics.maps import free_error_rate, occupied_f1, occupied_iou, surface, widened
@@ -27,6 +38,7 @@ from lidarium.evaluation.metrics.progress import (
 from lidarium.evaluation.metrics.safety import collisions_per_episode, collisions_per_km
 
 __all__ = [
+    "WallError",
     "absolute_error",
     "area_under_curve",
     "balance",
@@ -35,13 +47,18 @@ __all__ = [
     "collisions_per_episode",
     "collisions_per_km",
     "connected_share",
+    "curve_precision",
     "decision_percentiles",
     "decisions_to",
     "distance_sum_to",
     "distance_to",
+    "distances_to_walls",
+    "end_point_bytes",
     "first_reached",
     "free_coverage",
     "free_error_rate",
+    "grid_bytes",
+    "hits_of_beams",
     "instant_overlap",
     "is_success",
     "jain_index",
@@ -59,9 +76,12 @@ __all__ = [
     "peak_megabytes",
     "relative_error",
     "restricted_time",
+    "seen_walls",
     "sharing_lag",
     "surface",
     "time_to",
     "valid_coverage",
+    "wall_error",
+    "wall_recall",
     "widened",
 ]

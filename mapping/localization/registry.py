@@ -36,9 +36,23 @@ def _slam(geometry: ScanGeometry) -> Localizer:
     return Slam(SlamSettings(), geometry)
 
 
+def _splines(geometry: ScanGeometry) -> Localizer:
+    from lidarium.mapping.localization.spline_filter import SplineFilter
+
+    return SplineFilter(geometry=geometry)
+
+
+def _splines_ekf(geometry: ScanGeometry) -> Localizer:
+    from lidarium.mapping.localization.spline_ekf import SplineEkf
+
+    return SplineEkf(geometry=geometry)
+
+
 LOCALIZERS: dict[str, Entry] = {
     "odometry": Entry("dead reckoning from the start by the wheels", _odometry),
     "slam": Entry("scans matched with local maps, places recognised, the past corrected", _slam),
+    "splines": Entry("a particle filter on walls kept as B-splines and their features", _splines),
+    "splines_ekf": Entry("an extended Kalman filter on the features of walls kept as B-splines", _splines_ekf),
 }
 """The localizers by name; the modules of each are imported when it is first made."""
 

@@ -1,5 +1,7 @@
 """The catalogue finds floors by name, seed and path, and its sets stay what they are."""
 
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -17,17 +19,21 @@ from lidarium.envs.floors.catalogue import (
 )
 from lidarium.envs.floors.measures import measure_building
 from lidarium.envs.floors.starts import check_starts, configuration_space
+from lidarium.envs.simulation.robots import ROBOTS
 
 SCENES = ("scene_loop", "scene_corridor", "scene_corner", "scene_room", "scene_loop_corridor", "scene_room_corner")
 
+TREE_WORLDS = ("srt_corridor", "srt_l_room", "srt_lab", "srt_t_junction", "srt_cluttered", "srt_cluttered_reachable")
+TEAM_FLOORS = ("apartment", "clinic", *SCENES)
 
-def test_the_catalogue_holds_the_apartment_the_clinic_and_six_scenes():
-    assert set(floor_names()) == {"apartment", "clinic", *SCENES}
+
+def test_the_catalogue_holds_the_apartment_the_clinic_six_scenes_and_six_worlds_with_goals():
+    assert set(floor_names()) == {*TEAM_FLOORS, *TREE_WORLDS}
     assert all(about_floor(name).endswith(".") for name in floor_names())
 
 
-@pytest.mark.parametrize("name", floor_names())
-def test_every_drawn_floor_is_one_piece_for_the_largest_robot_with_three_starts(name):
+@pytest.mark.parametrize("name", TEAM_FLOORS)
+def test_every_drawn_floor_for_teams_is_one_piece_for_the_largest_robot_with_three_starts(name):
     floor = load_floor(name)
     assert floor.name == name
     assert floor.starts.shape == (3, 3)
@@ -39,6 +45,30 @@ def test_every_drawn_floor_is_one_piece_for_the_largest_robot_with_three_starts(
             assert cv2.connectedComponents(space.astype(np.uint8), connectivity=4)[0] - 1 == 1
             for start in floor.starts:
                 check_starts(raster, 0.5, start[None])
+
+
+@pytest.mark.parametrize("name", TREE_WORLDS)
+def test_the_way_to_the_goal_is_free_for_a_pioneer_unless_the_goal_is_enclosed(name):
+    floor = load_floor(name)
+    radius = ROBOTS["pioneer"].radius
+    assert floor.starts.shape == (1, 3)
+    assert floor.starts[0, :2].tolist() == [0.0, 0.0]
+    assert all(math.isfinite(solid.z_high) for solid in floor.solids)
+    raster = floor.raster(0.01, 0.0, 0.3)
+    check_starts(raster, radius, floor.starts)
+    labels = cv2.connectedComponents(configuration_space(raster, radius).astype(np.uint8), connectivity=4)[1]
+    cells = ((np.array([floor.starts[0, :2], floor.goal]) - raster.origin) / raster.resolution).astype(int)
+    at_start, at_goal = labels[cells[:, 1], cells[:, 0]]
+    assert at_start != 0
+    assert at_goal != 0
+    assert (at_start == at_goal) == (name != "srt_cluttered")
+
+
+def test_the_two_cluttered_worlds_differ_by_the_lid_over_the_goal():
+    closed, opened = load_floor("srt_cluttered"), load_floor("srt_cluttered_reachable")
+    more = closed.raster(0.01, 0.3, 0.3).solid - opened.raster(0.01, 0.3, 0.3).solid
+    assert set(np.unique(more)) == {0, 1}
+    assert int(more.sum()) == 120 * 15
 
 
 def test_the_indoor_floors_are_as_large_as_they_say():

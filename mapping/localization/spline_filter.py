@@ -1,0 +1,232 @@
+"""The particle filter on a map of curves: each particle is a pose, weighed by how well features and rays fit the map from there.
+
+References
+----------
+Motion by turn, way and turn, and resampling by one comb: Thrun, Burgard, Fox, "Probabilistic robotics", 2005, chapters 4 and 5. Printed
+forms that divide the prior by the proposal leave the likelihood out; here it is the weight.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.localization.spline_matches import Matches
+from lidarium.mapping.localization.spline_tracking import SplineTracker, TrackingSettings, steps_of
+from lidarium.mapping.rigid import Transform
+from lidarium.mapping.scans import ScanGeometry
+from lidarium.mapping.splines.curve_lookup import piece_at, piece_distance
+from lidarium.mapping.splines.features import Observation
+
+_HIT_SHARE = 0.95
+_RECOVERY_STEPS = 10
+_ENTRIES_PER_METRE, _FARTHEST = 2000.0, 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplineFilterSettings:
+    """Settings of the particle filter.
+
+    Attributes
+    ----------
+    tracking : TrackingSettings
+        What is matched, and how the map is made.
+    particles : int
+        Number of particles.
+    start_distance, start_turn : float
+        Standard deviations of the particles around the first pose [m, rad].
+    lost_likelihood : float
+        Where rays fit worse than this in the mean for ten corrections, some particles are drawn anew; 0 for never.
+    recovered_share, recovery_distance, recovery_turn : float
+        What share of particles, and half of the box around the pose from which they are drawn [m, rad].
+    """
+
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    particles: int = 200
+    start_distance: float = 0.0
+    start_turn: float = 0.0
+    lost_likelihood: float = 0.3
+    recovered_share: float = 0.1
+    recovery_distance: float = 0.25
+    recovery_turn: float = math.radians(10.0)
+
+    def __post_init__(self) -> None:
+        if self.particles < 1:
+            raise ValueError(f"particles is {self.particles}; want at least 1")
+        for name in ("start_distance", "start_turn", "lost_likelihood", "recovered_share", "recovery_distance", "recovery_turn"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise ValueError(f"{name} of the filter is {getattr(self, name)}; want zero or more")
+        if self.recovered_share > 1.0:
+            raise ValueError(f"recovered_share of the filter is {self.recovered_share}; want a share from 0 to 1")
+
+
+class SplineFilter(SplineTracker):
+    """Localizes by particles on the map of curves that it makes.
+
+    Parameters
+    ----------
+    settings : SplineFilterSettings or None
+        The defaults where None.
+    geometry : ScanGeometry or None
+        The laser; the URG-04LX of the theses where None.
+
+    Attributes
+    ----------
+    particles : (n, 3) float64
+        Poses x, y, theta [m, rad].
+    weights : (n,) float64
+        Their weights, which sum to one.
+    resamplings : int
+        How often particles were drawn anew by their weights.
+    """
+
+    def __init__(self, settings: SplineFilterSettings | None = None, geometry: ScanGeometry | None = None) -> None:
+        self.settings = settings or SplineFilterSettings()
+        super().__init__(self.settings.tracking, geometry or ScanGeometry())
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the particles, shape (3, 3) [m^2, m rad, rad^2]."""
+        offsets = self.particles - self.pose
+        offsets[:, 2] = np.arctan2(np.sin(offsets[:, 2]), np.cos(offsets[:, 2]))
+        return np.asarray((offsets * self.weights[:, None]).T @ offsets)
+
+    def _begin(self, pose: NDArray[np.float64], seed: int) -> None:
+        settings = self.settings
+        self._generator = np.random.default_rng(seed)
+        spread = np.array([settings.start_distance, settings.start_distance, settings.start_turn])
+        self.particles = pose + spread * self._generator.standard_normal((settings.particles, 3))
+        self.weights = np.full(settings.particles, 1.0 / settings.particles)
+        self.resamplings, self._lost_steps = 0, 0
+        self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
+
+    def _predict(self, motion: Transform) -> NDArray[np.float64]:
+        first, distance, second = steps_of(motion)
+        noise, tracking = self._generator.standard_normal((3, len(self.particles))), self.tracking
+        if first == 0.0 and distance == 0.0 and second == 0.0:
+            return self.pose
+        turns = abs(first), abs(second)
+        sway = tracking.turn_per_metre * abs(distance)
+        firsts = first + noise[0] * (tracking.turn_per_turn * turns[0] + sway)
+        ways = distance + noise[1] * (tracking.slip_per_metre * abs(distance) + tracking.slip_per_turn * sum(turns))
+        seconds = second + noise[2] * (tracking.turn_per_turn * turns[1] + sway)
+        headings = self.particles[:, 2] + firsts
+        self.particles[:, 0] += ways * np.cos(headings)
+        self.particles[:, 1] += ways * np.sin(headings)
+        self.particles[:, 2] = headings + seconds
+        return self._mean()
+
+    def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
+        tracking, lookup = self.tracking, self._lookup
+        numbers = np.array([tracking.feature_sigma, tracking.line_angle_sigma, tracking.ray_share])
+        logarithms, fits = np.empty(len(self.particles)), np.empty(len(self.particles))
+        _weigh(
+            self.particles,
+            matches.points,
+            matches.known_points,
+            matches.point_sigmas,
+            matches.lines,
+            matches.known_lines,
+            matches.line_sigmas,
+            matches.rays,
+            lookup.pieces,
+            lookup.nearest,
+            lookup.frame,
+            self._ray_table,
+            numbers,
+            logarithms,
+            fits,
+        )
+        weights = self.weights * np.exp(logarithms - logarithms.max())
+        self.weights = weights / weights.sum()
+        pose = self._mean()
+        likelihood = float(self.weights @ fits)
+        if float((self.weights**2).sum()) * len(self.particles) > 2.0:
+            self._resample()
+        self._recover(likelihood if len(matches.rays) else 1.0, pose)
+        return pose
+
+    def _mean(self) -> NDArray[np.float64]:
+        x, y = self.weights @ self.particles[:, :2]
+        headings = self.particles[:, 2]
+        return np.array([x, y, math.atan2(float(self.weights @ np.sin(headings)), float(self.weights @ np.cos(headings)))])
+
+    def _resample(self) -> None:
+        """Draw particles by their weights with one comb of evenly spaced teeth."""
+        count = len(self.particles)
+        teeth = (self._generator.random() + np.arange(count)) / count
+        chosen = np.searchsorted(np.cumsum(self.weights), teeth).clip(max=count - 1)
+        self.particles, self.weights = self.particles[chosen], np.full(count, 1.0 / count)
+        self.resamplings += 1
+
+    def _recover(self, likelihood: float, pose: NDArray[np.float64]) -> None:
+        """Draw some particles around the pose where rays have not fitted for a while."""
+        settings = self.settings
+        self._lost_steps = self._lost_steps + 1 if likelihood < settings.lost_likelihood else 0
+        drawn = round(settings.recovered_share * len(self.particles))
+        if self._lost_steps >= _RECOVERY_STEPS and drawn > 0:
+            box = np.array([settings.recovery_distance, settings.recovery_distance, settings.recovery_turn])
+            which = self._generator.permutation(len(self.particles))[:drawn]
+            self.particles[which] = pose + box * self._generator.uniform(-1.0, 1.0, (drawn, 3))
+            self._lost_steps = 0
+
+
+def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:
+    """Return logarithm and value of the likelihood of a ray by the distance of its end from a curve, shape (entries, 2)."""
+    gaps = (np.arange(round(_FARTHEST * _ENTRIES_PER_METRE)) + 0.5) / _ENTRIES_PER_METRE
+    likelihoods = _HIT_SHARE * np.exp(-0.5 * (gaps / sigma) ** 2) + 1.0 - _HIT_SHARE
+    likelihoods[-1] = 1.0 - _HIT_SHARE
+    return np.stack([np.log(likelihoods), likelihoods], axis=1)
+
+
+@kernel
+def _weigh(
+    particles: Array,
+    points: Array,
+    known_points: Array,
+    point_sigmas: Array,
+    lines: Array,
+    known_lines: Array,
+    line_sigmas: Array,
+    rays: Array,
+    pieces: Array,
+    nearest: Array,
+    frame: Array,
+    ray_table: Array,
+    numbers: Array,
+    logarithms: Array,
+    fits: Array,
+) -> None:
+    """Write the logarithm of each particle's likelihood, and how well rays fit in the mean, 0.05 to 1."""
+    feature_sigma, angle_sigma, ray_share = numbers
+    last_entry = ray_table.shape[0] - 1
+    for i in range(particles.shape[0]):
+        x, y, theta = particles[i]
+        cosine, sine = math.cos(theta), math.sin(theta)
+        total = 0.0
+        for k in range(points.shape[0]):
+            dx = x + cosine * points[k, 0] - sine * points[k, 1] - known_points[k, 0]
+            dy = y + sine * points[k, 0] + cosine * points[k, 1] - known_points[k, 1]
+            sigma = max(feature_sigma, point_sigmas[k])
+            total -= 0.5 * (dx * dx + dy * dy) / (sigma * sigma)
+        for k in range(lines.shape[0]):
+            dx = x + cosine * lines[k, 0] - sine * lines[k, 1] - known_lines[k, 0]
+            dy = y + sine * lines[k, 0] + cosine * lines[k, 1] - known_lines[k, 1]
+            aside = dy * math.cos(known_lines[k, 2]) - dx * math.sin(known_lines[k, 2])
+            turn = theta + lines[k, 2] - known_lines[k, 2]
+            turn = math.atan2(math.sin(turn), math.cos(turn))
+            sigma = max(feature_sigma, line_sigmas[k])
+            total -= 0.5 * ((aside / sigma) ** 2 + (turn / angle_sigma) ** 2)
+        ray_total, fit = 0.0, 0.0
+        for k in range(rays.shape[0]):
+            ray_x, ray_y = x + cosine * rays[k, 0] - sine * rays[k, 1], y + sine * rays[k, 0] + cosine * rays[k, 1]
+            piece = piece_at(nearest, frame, ray_x, ray_y)
+            entry = last_entry
+            if piece >= 0:
+                entry = min(int(piece_distance(pieces, piece, ray_x, ray_y) * _ENTRIES_PER_METRE), last_entry)
+            ray_total += ray_table[entry, 0]
+            fit += ray_table[entry, 1]
+        logarithms[i] = total + ray_share * ray_total
+        fits[i] = fit / max(rays.shape[0], 1)

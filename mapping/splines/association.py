@@ -1,0 +1,189 @@
+"""Which curves are of one wall, and along which part of both.
+
+Rough step: curves some of whose control points are near each other are candidates. Fine step: from an end of the seen curve the nearest
+point of the known curve is looked up. Where that is an end of the known curve, the known curve ends first, and the overlap begins at the
+seen curve's point nearest to it; else it begins at the seen curve's own end. The same at the other end: four cases.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.splines.bspline import Spline
+from lidarium.mapping.splines.settings import AssociationSettings
+
+SAMPLE_SPACING = 0.05
+"""Curves are compared by points so far apart [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Overlap:
+    """The common part of a seen and a known curve, which run the same way.
+
+    Attributes
+    ----------
+    seen, known : (float, float)
+        Parameters at which it begins and ends, of either curve [m].
+    begins_at_known, ends_at_known : bool
+        Whether the known curve's end, not the seen one's, bounds it.
+    length : float
+        Its length along the seen curve [m].
+    distance : float
+        Mean distance of the curves [m].
+    turn : float
+        Mean angle between them [rad].
+    """
+
+    seen: tuple[float, float]
+    known: tuple[float, float]
+    begins_at_known: bool
+    ends_at_known: bool
+    length: float
+    distance: float
+    turn: float
+
+
+def are_near(seen: NDArray[np.float64], known: NDArray[np.float64], distance: float) -> bool:
+    """Return whether any of the control points (n, 2) of one curve is within a distance of one of another (m, 2) [m]."""
+    return bool(_are_near(seen, known, distance))
+
+
+def overlap_of(seen: Spline, known: Spline, settings: AssociationSettings | None = None) -> Overlap | None:
+    """Find the common part of two curves.
+
+    Parameters
+    ----------
+    seen, known : Spline
+        Curves in one frame.
+    settings : AssociationSettings or None
+        How alike they have to be.
+
+    Returns
+    -------
+    Overlap or None
+        None where they have no common part of the least length, lie too far apart, or run different ways.
+    """
+    settings = settings or AssociationSettings()
+    seen_at, known_at = seen.sample_parameters(SAMPLE_SPACING), known.sample_parameters(SAMPLE_SPACING)
+    found = find_overlap(seen.evaluate(seen_at), known.evaluate(known_at))
+    seen_from, seen_to, known_from, known_to, length, distance, turn, cases = found
+    if length < settings.least_overlap or distance > settings.mean_distance or turn > settings.mean_turn:
+        return None
+    return Overlap(
+        (_parameter(seen_at, seen_from), _parameter(seen_at, seen_to)),
+        (_parameter(known_at, known_from), _parameter(known_at, known_to)),
+        bool(cases & 1),
+        bool(cases & 2),
+        length,
+        distance,
+        turn,
+    )
+
+
+def _parameter(parameters: NDArray[np.float64], place: float) -> float:
+    """Return the parameter at a place of a way through samples, counted in samples."""
+    return float(np.interp(place, np.arange(len(parameters)), parameters))
+
+
+@kernel
+def _are_near(seen: Array, known: Array, distance: float) -> bool:
+    for i in range(seen.shape[0]):
+        for j in range(known.shape[0]):
+            x, y = seen[i, 0] - known[j, 0], seen[i, 1] - known[j, 1]
+            if x * x + y * y <= distance * distance:
+                return True
+    return False
+
+
+@kernel
+def closest_place(way: Array, x: float, y: float) -> tuple[float, float]:
+    """Return the place of a way of points (n, 2), n >= 2, that is nearest to a point, counted in its points, and the distance [m]."""
+    place, nearest = 0.0, math.inf
+    for k in range(way.shape[0] - 1):
+        ax, ay = way[k, 0], way[k, 1]
+        dx, dy = way[k + 1, 0] - ax, way[k + 1, 1] - ay
+        squared = dx * dx + dy * dy
+        share = ((x - ax) * dx + (y - ay) * dy) / squared if squared > 0.0 else 0.0
+        share = min(max(share, 0.0), 1.0)
+        gap = (ax + share * dx - x) ** 2 + (ay + share * dy - y) ** 2
+        if gap < nearest:
+            place, nearest = k + share, gap
+    return place, math.sqrt(nearest)
+
+
+@kernel
+def mark_along(points: Array, way: Array, distance: float, is_along: Array) -> None:
+    """Mark the points of one way (m, 2) that run along another (n, 2) within a distance [m]; others keep their marks (m,).
+
+    The two faces of a thin wall run opposite ways.
+    """
+    last = points.shape[0] - 1
+    for k in range(points.shape[0]):
+        place, gap = closest_place(way, points[k, 0], points[k, 1])
+        if gap <= distance:
+            x, y = points[min(k + 1, last), 0] - points[max(k - 1, 0), 0], points[min(k + 1, last), 1] - points[max(k - 1, 0), 1]
+            direction = direction_of(way, place)
+            if x * math.cos(direction) + y * math.sin(direction) >= 0.0:
+                is_along[k] = True
+
+
+@kernel
+def point_of(way: Array, place: float) -> tuple[float, float]:
+    """Return the point at a place of a way."""
+    k = min(max(int(place), 0), way.shape[0] - 2)
+    share = place - k
+    return way[k, 0] + share * (way[k + 1, 0] - way[k, 0]), way[k, 1] + share * (way[k + 1, 1] - way[k, 1])
+
+
+@kernel
+def direction_of(way: Array, place: float) -> float:
+    """Return the direction of a way at a place [rad]."""
+    k = min(max(int(place), 0), way.shape[0] - 2)
+    return math.atan2(way[k + 1, 1] - way[k, 1], way[k + 1, 0] - way[k, 0])
+
+
+@kernel
+def find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float, float, float, float, int]:
+    """Find the common part of two ways of points (n, 2), (m, 2).
+
+    Returns
+    -------
+    tuple
+        Places where it begins and ends on the seen way and on the known one, counted in points; its length along the seen way [m]; mean
+        distance [m] and mean angle [rad]; 1 where the known way's end begins it, plus 2 where one ends it. A length of 0 for none.
+    """
+    ends = np.empty(4)
+    cases = 0
+    for side in range(2):
+        a = 0 if side == 0 else seen.shape[0] - 1
+        b, _ = closest_place(known, seen[a, 0], seen[a, 1])
+        is_end = b <= 0.0 or b >= known.shape[0] - 1.0
+        if is_end:
+            x, y = point_of(known, b)
+            ends[side], _ = closest_place(seen, x, y)
+            cases += 1 << side
+        else:
+            ends[side] = float(a)
+        ends[2 + side] = b
+    if not (ends[0] < ends[1] and ends[2] < ends[3]):
+        return ends[0], ends[1], ends[2], ends[3], 0.0, math.inf, math.inf, cases
+    length, distance, turn, weight = 0.0, 0.0, 0.0, 0.0
+    for k in range(int(ends[0]), min(int(ends[1]) + 1, seen.shape[0] - 1)):
+        low, high = max(ends[0], float(k)), min(ends[1], k + 1.0)
+        if high <= low:
+            continue
+        dx, dy = seen[k + 1, 0] - seen[k, 0], seen[k + 1, 1] - seen[k, 1]
+        step = (high - low) * math.sqrt(dx * dx + dy * dy)
+        x, y = point_of(seen, (low + high) / 2.0)
+        place, gap = closest_place(known, x, y)
+        angle = math.atan2(dy, dx) - direction_of(known, place)
+        length += step
+        distance += step * gap
+        turn += step * abs(math.atan2(math.sin(angle), math.cos(angle)))
+        weight += step
+    if weight == 0.0:
+        return ends[0], ends[1], ends[2], ends[3], 0.0, math.inf, math.inf, cases
+    return ends[0], ends[1], ends[2], ends[3], length, distance / weight, turn / weight, cases

@@ -1,0 +1,119 @@
+"""A curve of the map: a spline, how much is known of each part of it, and what is derived of it once."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.splines.basis import ORDER
+from lidarium.mapping.splines.bspline import Spline
+from lidarium.mapping.splines.fitting import fit_bspline
+from lidarium.mapping.splines.joining import Way, lengths_along
+from lidarium.mapping.splines.settings import FitSettings, MapSettings
+
+STRAIGHT = 0.02
+"""A curve that stays this close to its chord is a line [m]."""
+
+_END_WEIGHT = 4.0
+
+LEAST_LINE = 0.4
+"""Shorter lines tell no direction [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A wall as the map has it.
+
+    Attributes
+    ----------
+    spline : Spline
+        Its shape.
+    weights : (n,) float64
+        How much is known at each control point, as a number of observations with a standard deviation of 1 cm.
+    count : int
+        How many scans have seen it.
+    last_seen : int
+        The map's update that saw it last.
+    way : Way
+        Points along it, for comparisons.
+    box : (4,) float64
+        Least x, y and greatest x, y [m].
+    line : (4,) float64 or None
+        Middle x, y, direction [rad] and half length [m], where the curve is a line.
+    """
+
+    spline: Spline
+    weights: NDArray[np.float64]
+    count: int
+    last_seen: int
+    way: Way
+    box: NDArray[np.float64]
+    line: NDArray[np.float64] | None
+
+
+def make_curve(spline: Spline, weights: NDArray[np.float64], count: int, last_seen: int, spacing: float) -> Curve:
+    """Return a curve whose way has points ``spacing`` apart [m].
+
+    Raises
+    ------
+    ValueError
+        Where there are not as many weights as control points.
+    """
+    if np.shape(weights) != (len(spline.control_points),):
+        raise ValueError(f"weights have shape {np.shape(weights)}; the curve has {len(spline.control_points)} control points")
+    parameters = spline.sample_parameters(spacing)
+    points = spline.evaluate(parameters)
+    way = Way(points, np.interp(parameters, control_parameters(spline.knots), weights))
+    box, line = np.empty(4), np.empty(4)
+    is_line = _describe(points, box, line)
+    return Curve(spline, np.asarray(weights, np.float64), count, last_seen, way, box, line if is_line else None)
+
+
+def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: MapSettings) -> Curve:
+    """Fit a curve to a way."""
+    fitting = FitSettings(
+        spacing=fit.spacing,
+        finest_spacing=fit.finest_spacing,
+        rms=settings.rms,
+        explained=0.0,
+        is_sparse=fit.is_sparse,
+        stiffness=fit.stiffness,
+    )
+    weights = way.weights.copy()
+    # An end of little weight would be left to the rest of the curve, and run away fit by fit.
+    weights[[0, -1]] = _END_WEIGHT * weights.max()
+    spline = fit_bspline(way.points, fitting, 0.01 / np.sqrt(weights)).spline
+    lengths = lengths_along(way.points)
+    shares = control_parameters(spline.knots) / spline.domain[1]
+    weights = np.interp(shares * lengths[-1], lengths, way.weights)
+    return make_curve(spline, weights, count, last_seen, settings.sample_spacing)
+
+
+def control_parameters(knots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return at which parameter each control point acts most: the mean of its three inner knots (Greville), shape (n,) [m]."""
+    count = len(knots) - ORDER
+    return np.asarray((knots[1 : count + 1] + knots[2 : count + 2] + knots[3 : count + 3]) / 3.0)
+
+
+@kernel
+def _describe(points: Array, box: Array, line: Array) -> bool:
+    """Write the box around a way, and the line through it; return whether it is long and straight enough to be one."""
+    last = points.shape[0] - 1
+    box[0], box[1], box[2], box[3] = points[0, 0], points[0, 1], points[0, 0], points[0, 1]
+    x, y = points[last, 0] - points[0, 0], points[last, 1] - points[0, 1]
+    length = math.sqrt(x * x + y * y)
+    lowest, highest, total = 0.0, 0.0, 0.0
+    for k in range(last + 1):
+        box[0], box[1] = min(box[0], points[k, 0]), min(box[1], points[k, 1])
+        box[2], box[3] = max(box[2], points[k, 0]), max(box[3], points[k, 1])
+        aside = (x * (points[k, 1] - points[0, 1]) - y * (points[k, 0] - points[0, 0])) / length
+        lowest, highest, total = min(lowest, aside), max(highest, aside), total + aside
+    if not (length >= LEAST_LINE and highest - lowest <= STRAIGHT):
+        return False
+    mean = total / (last + 1)
+    line[0] = (points[0, 0] + points[last, 0]) / 2.0 - mean * y / length
+    line[1] = (points[0, 1] + points[last, 1]) / 2.0 + mean * x / length
+    line[2], line[3] = math.atan2(y, x), length / 2.0
+    return True

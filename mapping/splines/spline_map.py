@@ -1,0 +1,219 @@
+"""The map of curves, corners and peaks, and how scans from known poses improve it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.rigid import Transform
+from lidarium.mapping.splines.association import are_near, mark_along
+from lidarium.mapping.splines.basis import ORDER
+from lidarium.mapping.splines.bspline import Spline
+from lidarium.mapping.splines.curve import Curve, fit_curve
+from lidarium.mapping.splines.features import Observation, curves_of, match_points
+from lidarium.mapping.splines.joining import Places, Way, common_places, join
+from lidarium.mapping.splines.segmentation import split_merge
+from lidarium.mapping.splines.settings import MapSettings, SplineSettings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Landmarks:
+    """Points of the map: corners or peaks.
+
+    Attributes
+    ----------
+    points : (n, 2) float64
+        Where they are [m].
+    weights : (n,) float64
+        How much is known of each, as a number of observations with a standard deviation of 1 cm.
+    counts : (n,) int64
+        How many scans have seen each.
+    last_seen : (n,) int64
+        The map's update that saw each last.
+    """
+
+    points: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    last_seen: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def updated(
+        self, seen: NDArray[np.float64], sigmas: NDArray[np.float64], update: int, most_distance: float, settings: MapSettings
+    ) -> "Landmarks":
+        """Return the landmarks with seen points (m, 2) of standard deviations (m,) taken in, and without those that were but noise [m]."""
+        weights = (0.01 / sigmas) ** 2
+        which, known = match_points(seen, self.points, most_distance)
+        points, all_weights, counts, last_seen = self.points.copy(), self.weights.copy(), self.counts.copy(), self.last_seen.copy()
+        share = (weights[which] / (weights[which] + all_weights[known]))[:, None]
+        points[known] += share * (seen[which] - points[known])
+        all_weights[known] = np.minimum(all_weights[known] + weights[which], settings.most_weight)
+        counts[known] += 1
+        last_seen[known] = update
+        # What is near a known one, but not the nearest, is none of its own.
+        is_new = np.ones(len(seen), np.bool_)
+        if len(self.points) and len(seen):
+            is_new = np.linalg.norm(seen[:, None] - self.points[None], axis=2).min(axis=1) >= most_distance
+        is_kept = (counts >= settings.trusted_count) | (last_seen > update - settings.trial_updates)
+        added = int(is_new.sum())
+        return Landmarks(
+            np.concatenate([points[is_kept], seen[is_new]]),
+            np.concatenate([all_weights[is_kept], weights[is_new]]),
+            np.concatenate([counts[is_kept], np.ones(added, np.int64)]),
+            np.concatenate([last_seen[is_kept], np.full(added, update, np.int64)]),
+        )
+
+
+def no_landmarks() -> Landmarks:
+    """Return landmarks of a blank map."""
+    return Landmarks(np.empty((0, 2)), np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+class SplineMap:
+    """A map of walls as curves.
+
+    Parameters
+    ----------
+    settings : SplineSettings or None
+        How scans become curves, and curves one map.
+
+    Attributes
+    ----------
+    curves : list of Curve
+        The walls; their free side is the one from which they were seen.
+    corners, peaks : Landmarks
+        Where walls meet and where they end.
+    updates : int
+        How many scans were taken in.
+    """
+
+    def __init__(self, settings: SplineSettings | None = None) -> None:
+        self.settings = settings or SplineSettings()
+        self.curves: list[Curve] = []
+        self.corners, self.peaks = no_landmarks(), no_landmarks()
+        self.updates = 0
+
+    def update(self, observation: Observation, pose: Transform) -> None:
+        """Take in a scan that was seen from a pose of the robot.
+
+        Parameters
+        ----------
+        observation : Observation
+            The scan, in the frame of the robot.
+        pose : Transform
+            Where the robot is, ``map_from_robot``.
+        """
+        self.updates += 1
+        for spline, sigmas in curves_of(observation, self.settings):
+            self._take_in(Spline(spline.knots, pose.apply(spline.control_points)), sigmas)
+        self._forget()
+        limits = self.updates, self.settings.association.point_distance, self.settings.map
+        seen = observation.features.moved(pose)
+        self.corners = self.corners.updated(seen.corners, seen.corner_sigmas, *limits)
+        self.peaks = self.peaks.updated(seen.peaks, seen.peak_sigmas, *limits)
+
+    @property
+    def lines(self) -> NDArray[np.float64]:
+        """Middle x, y, direction and half length of the curves that are lines, shape (n, 4) [m, m, rad, m]."""
+        lines = [curve.line for curve in self.curves if curve.line is not None]
+        return np.array(lines).reshape(-1, 4)
+
+    @property
+    def length(self) -> float:
+        """Length of all curves [m]."""
+        return math.fsum(curve.spline.length() for curve in self.curves)
+
+    def sample(self, spacing: float = 0.02) -> NDArray[np.float64]:
+        """Return points of all curves, at most about ``spacing`` apart, shape (n, 2) [m]."""
+        return np.concatenate([np.empty((0, 2)), *(curve.spline.sample(spacing) for curve in self.curves)])
+
+    def ray(self, origin: NDArray[np.float64], direction: float) -> float:
+        """Return the range that a laser at a point (2,) would measure along a direction [rad], inf where no curve is met [m]."""
+        return min((curve.spline.ray(origin, direction) for curve in self.curves), default=math.inf)
+
+    def _forget(self) -> None:
+        """Drop short curves that have not been seen again."""
+        settings = self.settings.map
+        since = self.updates - settings.trial_updates
+        self.curves = [
+            curve
+            for curve in self.curves
+            if curve.count >= settings.trusted_count or curve.last_seen > since or curve.way.length >= settings.trusted_length
+        ]
+
+    def _take_in(self, spline: Spline, sigmas: NDArray[np.float64]) -> None:
+        """Join a seen curve with the map's curves along which it runs, or add it as a new one."""
+        settings = self.settings.map
+        parameters = spline.sample_parameters(settings.sample_spacing)
+        places = np.linspace(0.0, 1.0, len(sigmas))
+        noise = np.interp((parameters - parameters[0]) / (parameters[-1] - parameters[0]), places, sigmas)
+        way, count = Way(spline.evaluate(parameters), (0.01 / noise) ** 2), 1
+        control_points = spline.control_points
+        while (best := self._best_match(way, control_points)) is not None:
+            known = self.curves.pop(best[0])
+            way, extends = join(way, known.way, best[1], settings)
+            count += known.count
+            pieces = self._cut_at_corners(way) if extends else [way]
+            if len(pieces) > 1:
+                longest = max(pieces, key=lambda piece: piece.length)
+                self._add(longest, count)
+                for piece in pieces:
+                    if piece is not longest and self._is_new(piece):
+                        self._add(piece, count)
+                return
+            fitted = fit_curve(way, count, self.updates, self.settings.fit, settings)
+            way, control_points = fitted.way, fitted.spline.control_points
+        if count > 1 or self._is_new(way):
+            self._add(way, count)
+
+    def _add(self, way: Way, count: int) -> None:
+        if len(way.points) >= ORDER and way.length >= self.settings.map.least_length:
+            self.curves.append(fit_curve(way, count, self.updates, self.settings.fit, self.settings.map))
+
+    def _is_new(self, way: Way) -> bool:
+        """Return whether a way is long against its noise, and not one more view of what the map holds."""
+        settings = self.settings.map
+        sigma = 0.01 / math.sqrt(float(way.weights.min()))
+        if way.length < settings.least_sigmas * sigma:
+            return False
+        distance = max(settings.explained_distance, 3.0 * sigma)
+        is_known = np.zeros(len(way.points), np.bool_)
+        for index in self._near(way, distance):
+            mark_along(way.points, self.curves[index].way.points, distance, is_known)
+        return 2 * int(is_known.sum()) < len(is_known)
+
+    def _near(self, way: Way, distance: float) -> list[int]:
+        """Return the curves whose boxes come within a distance of that of a way [m]."""
+        if not self.curves:
+            return []
+        low, high = way.points.min(axis=0) - distance, way.points.max(axis=0) + distance
+        boxes = np.array([curve.box for curve in self.curves])
+        is_near = (boxes[:, 0] <= high[0]) & (boxes[:, 1] <= high[1]) & (boxes[:, 2] >= low[0]) & (boxes[:, 3] >= low[1])
+        return [int(index) for index in np.flatnonzero(is_near)]
+
+    def _best_match(self, way: Way, control_points: NDArray[np.float64]) -> tuple[int, Places] | None:
+        """Return which curve runs along a way the longest, and where."""
+        settings = self.settings.association
+        best: tuple[int, Places] | None = None
+        for index in self._near(way, settings.control_distance):
+            curve = self.curves[index]
+            # Long curves have few control points: their ways stand in for them.
+            if not (
+                are_near(control_points, curve.spline.control_points, settings.control_distance)
+                or are_near(way.points, curve.way.points, settings.control_distance)
+            ):
+                continue
+            places = common_places(way, curve.way, settings)
+            if places is not None and (best is None or places.length > best[1].length):
+                best = (index, places)
+        return best
+
+    def _cut_at_corners(self, way: Way) -> list[Way]:
+        """Cut a way where it turns sharply."""
+        cut = split_merge(way.points, 0.01 / np.sqrt(way.weights), self.settings.segmentation)
+        if len(cut.pieces) == 1:
+            return [way]
+        return [Way(way.points[first : last + 1], way.weights[first : last + 1]) for first, last in cut.pieces.tolist()]

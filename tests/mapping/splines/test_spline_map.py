@@ -1,0 +1,162 @@
+import copy
+import json
+import math
+import pickle
+
+import numpy as np
+import pytest
+from polygon_scans import distances_to, ring, scan
+
+from lidarium.mapping.rigid import Transform, yaw_of_quaternion
+from lidarium.mapping.scans import ScanGeometry
+from lidarium.mapping.splines.curve_lookup import CurveLookup
+from lidarium.mapping.splines.features import observe
+from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.settings import SplineSettings, spline_settings
+from lidarium.mapping.splines.spline_files import compact_bytes, read_spline_map, write_spline_map
+from lidarium.mapping.splines.spline_map import SplineMap
+
+LASER = ScanGeometry()
+ROOM = np.vstack([ring((-2, -1.5), (3, -1.5), (3, 2), (-2, 2)), ring((0.5, 0.5), (1.1, 0.5), (1.1, 1.0), (0.5, 1.0))])
+ROUND = [(0.3 * k, -0.8 + 0.1 * math.sin(0.7 * k), 0.6 * k) for k in range(8)]
+
+
+def taken(walls=ROOM, poses=ROUND, noise=0.01, settings=None):
+    spline_map = SplineMap(settings)
+    for k, pose in enumerate(poses):
+        points = scan_points(scan(walls, pose, LASER, noise, seed=k), LASER)
+        spline_map.update(observe(points, settings), Transform(*pose))
+    return spline_map
+
+
+@pytest.fixture(scope="module")
+def room_map():
+    return taken()
+
+
+def test_a_room_becomes_a_few_curves_on_its_walls(room_map):
+    errors = distances_to(ROOM, room_map.sample())
+    assert errors.mean() < 0.01
+    assert np.quantile(errors, 0.95) < 0.03
+    assert 4 <= len(room_map.curves) <= 12
+
+
+def test_corners_of_the_room_are_found_where_they_are(room_map):
+    known = room_map.corners.points[room_map.corners.counts >= 3]
+    for corner in ((-2, -1.5), (3, -1.5), (3, 2), (-2, 2)):
+        assert np.linalg.norm(known - corner, axis=1).min() < 0.03
+
+
+def test_seeing_the_same_again_does_not_make_the_map_grow():
+    once, often = taken(poses=ROUND), taken(poses=ROUND * 4)
+    assert len(often.curves) <= len(once.curves) + 1
+    assert compact_bytes(often) < 1.3 * compact_bytes(once)
+
+
+def test_a_wall_seen_from_both_sides_is_two_curves():
+    spline_map = taken(np.array([(1.0, -1.0, 1.0, 1.0), (1.05, -1.0, 1.05, 1.0)]), [(0, 0, 0), (2, 0, math.pi)], noise=0.0)
+    assert len(spline_map.curves) == 2
+    first, second = (curve.spline.tangents([0.5])[0] for curve in spline_map.curves)
+    assert float(first @ second) < -0.99
+
+
+def test_two_views_of_one_wall_grow_together_when_a_third_joins_them():
+    wall = np.array([(-4.0, 1.5, 4.0, 1.5)])
+    block = np.array([(-0.6, 0.8, 0.6, 0.8)])
+    apart = taken(np.vstack([wall, block]), [(0, 0, math.pi / 2)], noise=0.0)
+    assert len(apart.curves) == 3
+    joined = SplineMap()
+    for walls in (np.vstack([wall, block]), wall):
+        joined.update(observe(scan_points(scan(walls, (0, 0, math.pi / 2), LASER), LASER)), Transform(0.0, 0.0, math.pi / 2))
+    assert len(joined.curves) == 2
+    assert max(curve.spline.length() for curve in joined.curves) > 6.0
+
+
+def test_the_map_predicts_ranges(room_map):
+    assert room_map.ray(np.array([0.0, 0.0]), 0.0) == pytest.approx(3.0, abs=0.02)
+    assert SplineMap().ray(np.array([0.0, 0.0]), 0.0) == math.inf
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 0.005])
+def test_a_scan_that_shows_nothing_changes_nothing(value):
+    spline_map = taken()
+    before = spline_map.sample()
+    spline_map.update(observe(scan_points(np.full(LASER.beams, value, np.float32), LASER)), Transform())
+    np.testing.assert_array_equal(spline_map.sample(), before)
+
+
+def test_the_rules_of_the_thesis_make_a_map_too():
+    settings = spline_settings("thesis")
+    errors = distances_to(ROOM, taken(settings=settings).sample())
+    assert np.median(errors) < 0.02
+    with pytest.raises(ValueError, match="mode of spline maps"):
+        spline_settings("other")
+
+
+def test_the_same_scans_make_the_same_map_to_the_bit(room_map):
+    again = taken()
+    np.testing.assert_array_equal(again.sample(), room_map.sample())
+    for copied in (copy.deepcopy(again), pickle.loads(pickle.dumps(again))):
+        np.testing.assert_array_equal(copied.sample(), room_map.sample())
+
+
+def test_json_keeps_the_map_to_the_bit(room_map, tmp_path):
+    write_spline_map(tmp_path / "room.json", room_map)
+    read = read_spline_map(tmp_path / "room.json")
+    np.testing.assert_array_equal(read.sample(), room_map.sample())
+    np.testing.assert_array_equal(read.corners.points, room_map.corners.points)
+    assert [curve.count for curve in read.curves] == [curve.count for curve in room_map.curves]
+
+
+def test_the_compact_form_keeps_the_map_to_a_millimetre_and_can_go_on(room_map, tmp_path):
+    write_spline_map(tmp_path / "room.npz", room_map)
+    read = read_spline_map(tmp_path / "room.npz")
+    for mine, theirs in zip(read.curves, room_map.curves, strict=True):
+        assert theirs.spline.closest(mine.spline.sample(0.05))[1].max() < 0.0015
+    np.testing.assert_allclose(read.peaks.points, room_map.peaks.points, atol=0.001)
+    assert read.updates == room_map.updates
+    before = len(read.curves)
+    read.update(observe(scan_points(scan(ROOM, ROUND[0], LASER), LASER)), Transform(*ROUND[0]))
+    assert len(read.curves) <= before + 1
+
+
+def test_the_compact_form_is_small(room_map):
+    assert compact_bytes(room_map) < 0.1 * 100 * 70
+
+
+def test_a_blank_map_is_kept_too(tmp_path):
+    for name in ("blank.json", "blank.npz"):
+        write_spline_map(tmp_path / name, SplineMap())
+        assert read_spline_map(tmp_path / name, SplineSettings()).curves == []
+
+
+def test_files_that_are_no_maps_are_refused(room_map, tmp_path):
+    with pytest.raises(ValueError, match=r"\.json or \.npz"):
+        write_spline_map(tmp_path / "room.txt", room_map)
+    with pytest.raises(FileNotFoundError, match="no spline map"):
+        read_spline_map(tmp_path / "none.json")
+    (tmp_path / "other.json").write_text(json.dumps({"version": 1}))
+    (tmp_path / "broken.npz").write_bytes(b"PK not really")
+    np.savez(tmp_path / "arrays.npz", frame=np.zeros(6))
+    for name in ("other.json", "broken.npz", "arrays.npz"):
+        with pytest.raises(ValueError, match="is not a spline map"):
+            read_spline_map(tmp_path / name)
+
+
+def test_the_lookup_finds_the_nearest_curve_and_how_far_it_is(room_map):
+    lookup = CurveLookup(reach=5.6, distance=0.3)
+    lookup.renew(room_map.curves, np.zeros(2))
+    points = np.array([(2.9, 0.0), (0.0, -1.45), (0.0, 0.0)])
+    pieces, distances = lookup.look_up(points)
+    assert (pieces >= 0).tolist() == [True, True, False]
+    expected = [min(curve.spline.closest([point])[1][0] for curve in room_map.curves) for point in points[:2]]
+    np.testing.assert_allclose(distances[:2], expected, atol=0.002)
+    assert distances[2] == math.inf
+    assert lookup.covers(np.array([0.9, 0.0]))
+    assert not lookup.covers(np.array([1.1, 0.0]))
+
+
+@pytest.mark.parametrize("theta", np.linspace(-3.1, 3.1, 9))
+@pytest.mark.parametrize("scale", [1.0, -1.0, 3.0])
+def test_the_yaw_of_a_quaternion_is_right_in_all_quadrants_and_for_both_signs(theta, scale):
+    assert yaw_of_quaternion(scale * math.sin(theta / 2), scale * math.cos(theta / 2)) == pytest.approx(theta)
