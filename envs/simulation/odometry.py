@@ -22,6 +22,9 @@ DISTANCE_SCALE, TURN_SCALE, DRIFT, LEFT_TRAVEL, RIGHT_TRAVEL, LEFT_TICKS, RIGHT_
 
 WHEEL_NUMBERS = 7
 
+WHEEL_BASE, TICKS_PER_METRE = 6, 7
+"""Places in ``Robot.numbers``."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySettings:

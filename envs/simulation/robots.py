@@ -11,9 +11,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-WHEEL_BASE, TICKS_PER_METRE = 6, 7
-"""Places in the numbers of a robot that kernels know."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:

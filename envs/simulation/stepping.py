@@ -14,8 +14,7 @@ from lidarium.envs.simulation.arrays import DEAD_RECKONING, ENDED, KNOWN_MATES, 
 from lidarium.envs.simulation.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
 from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import stream_key
-from lidarium.envs.simulation.odometry import disturb_commands, read_encoders
-from lidarium.envs.simulation.robots import TICKS_PER_METRE, WHEEL_BASE
+from lidarium.envs.simulation.odometry import TICKS_PER_METRE, WHEEL_BASE, disturb_commands, read_encoders
 from lidarium.envs.simulation.stages import TIME_STEP, invalidate_mates, perceive_robot, sense_and_perceive
 from lidarium.mapping.kernels import Array, kernel, word_grid_at
 
