@@ -21,10 +21,10 @@ RESOLUTION = 0.025
 """Side of the maps' cells [m]."""
 
 STARTS, RUNS = 3, 2
-SNAPSHOTS = (0.25, 0.55, 0.95)
+SNAPSHOTS = (1.0 / 3.0, 2.0 / 3.0, 0.95)
 """Shares of the floor that a robot has seen when its map is kept; what it has not reached by the end is kept then."""
 
-HORIZON_S = 200.0
+HORIZON_S = 300.0
 _MARGIN = 3
 
 

@@ -21,7 +21,12 @@ LASER_HEIGHT = 0.3
 _APARTMENTS, _OFFICES, _CORRIDORS, _LIKE_ROOMS, _REAL, _COPIED = 5, 4, 2, 4, 4, 9
 _DRAWN = {"tuning": "clinic", "test": "apartment"}
 _FIRST_SEED = {"tuning": 5000, "test": 6000}
-_LEAST_REAL_M2 = 45.0
+_LEAST_REAL_M2 = 55.0
+_AREAS = {
+    "apartment": dict(enumerate((60.0, 80.0, 100.0, 120.0, 140.0))),
+    "office": dict(enumerate((120.0, 140.0, 160.0, 180.0, 200.0))),
+}
+"""Floor areas of generated buildings by kind and seed modulo five [m2]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +73,7 @@ class BankFloor:
             return load_floor(self.name)
         if self.kind == "like_rooms":
             return like_rooms(self.seed)
-        # Offices of the catalogue are too large to be explored three times over by two robots each.
-        area = 60.0 + 20.0 * (self.seed % 5) if self.kind == "office" else None
+        area = _AREAS.get(self.kind, {}).get(self.seed % 5)
         return generate_building(self.seed, BuildingSettings(kind=self.kind, area_m2=area))
 
 

@@ -39,6 +39,9 @@ ALIKE_M, ALIKE_SHARE = 6.0, 0.7
 AS_WELL = 0.9
 """A positive is symmetric where another transform lets this share of its walls agree and less than `DIFFERENT_M` differs."""
 
+_SLIDES = [Transform(0.3 * x, 0.3 * y, 0.0) for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+"""Along a corridor of which both maps know no end, every shift explains them as well."""
+
 _QUARTERS = np.arange(4) * (math.pi / 2.0)
 _TRUTH = ValidationSettings(hit_distance_m=0.05, miss_distance_m=0.1)
 _SEARCH = CorrelationSettings(cell_m=0.1, peaks=8)
@@ -187,9 +190,10 @@ def _judged_negative(pair: Pair, a: _Known, b: _Known) -> Pair:
 def _is_symmetric(a: _Known, b: _Known) -> bool:
     """Return whether another transform explains what is true of two maps of one floor as well as the true one."""
     truth = compare(a.truth, b.truth, Transform(), _TRUTH)
-    for transform, agreement in _alignments(a, b):
+    slides = [(slide, compare(a.truth, b.truth, slide, _TRUTH)) for slide in _SLIDES]
+    for transform, agreement in [*slides, *_alignments(a, b)]:
         distance, angle = transform.difference(Transform(), truth.centre)
-        is_other = distance > 0.5 or angle > math.radians(5.0)
+        is_other = distance > 0.25 or angle > math.radians(5.0)
         if is_other and agreement.contradicting_m < DIFFERENT_M and agreement.agreeing_m >= AS_WELL * truth.agreeing_m:
             return True
     return False

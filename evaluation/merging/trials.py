@@ -20,6 +20,7 @@ from lidarium.evaluation.workers import shared_out
 from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MODES, MergeSettings, merge_settings
+from lidarium.mapping.merging.validation import Agreement
 from lidarium.mapping.occupancy import UNKNOWN
 from lidarium.mapping.rigid import Transform
 
@@ -52,6 +53,8 @@ class Outcome:
         Processor time, detection and description of both maps included [ms].
     is_standard : bool
         Whether both maps have `SIDE` x `SIDE` cells.
+    overlap_m2, agreeing_m, wall_m, across_m, contradicting_m : float
+        As of `Agreement`, of our own methods.
     """
 
     is_accepted: bool
@@ -62,6 +65,11 @@ class Outcome:
     confidence: float
     time_ms: float
     is_standard: bool
+    overlap_m2: float = 0.0
+    agreeing_m: float = 0.0
+    wall_m: float = 0.0
+    across_m: float = 0.0
+    contradicting_m: float = 0.0
 
     @property
     def is_exact(self) -> bool:
@@ -144,18 +152,20 @@ def _tried(pair: Pair, a: BankMap, b: BankMap, method: str, settings: MergeSetti
     first, second = padded(a.levels), padded(b.levels)
     is_standard = max(*first.shape, *second.shape) == SIDE
     began = time.process_time()
+    agreement = Agreement()
     if method in MODES:
         chosen = settings or merge_settings(method, RESOLUTION)
         described_maps = _both(first, second, chosen)
         result = merge_pair(*described_maps, chosen)
         found, is_accepted, reason, by = result.a_from_b, result.is_accepted, result.reason, result.found_by
-        confidence = result.score
+        confidence, agreement = result.score, result.agreement
     else:
         peer = match_peers(features_of(first, method), features_of(second, method), RESOLUTION)
         found, is_accepted, reason, by, confidence = peer.a_from_b, peer.confidence > 0.0, "", method, peer.confidence
     time_ms = 1e3 * (time.process_time() - began)
     distance, angle = (None, None) if found is None or pair.a_from_b is None else found.difference(pair.a_from_b, pair.at)
-    return Outcome(is_accepted, reason, distance, angle, by, confidence, round(time_ms, 3), is_standard)
+    walls = (agreement.overlap_m2, agreement.agreeing_m, agreement.wall_m, agreement.across_m, agreement.contradicting_m)
+    return Outcome(is_accepted, reason, distance, angle, by, confidence, round(time_ms, 3), is_standard, *(round(one, 4) for one in walls))
 
 
 def _both(a: NDArray[np.uint8], b: NDArray[np.uint8], settings: MergeSettings) -> tuple[DescribedMap, DescribedMap]:
