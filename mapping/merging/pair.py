@@ -266,7 +266,7 @@ def _ambiguity(a: DescribedMap, b: DescribedMap, best: _Judged, judged: list[_Ju
         distance, angle = transform.difference(other.candidate.a_from_b, best.agreement.centre)
         if distance <= validation.rival_distance_m and angle <= validation.rival_angle:
             continue
-        if other.agreement.evidence_m > best.agreement.evidence_m + validation.rival_lead_m:
+        if other.agreement.evidence_m > validation.rival_lead * best.agreement.evidence_m:
             return (
                 f"contradiction: moved by {distance:.1f} m and turned by {math.degrees(angle):.0f} deg, "
                 f"{other.agreement.evidence_m:.1f} m of walls speak for it instead of {best.agreement.evidence_m:.1f} m, but {other.refusal}"

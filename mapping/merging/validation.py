@@ -59,8 +59,8 @@ class ValidationSettings:
     rival_share : float
         A rival that nothing contradicts makes the best transform ambiguous where the walls that agree under it are longer than this
         share of those under the best.
-    rival_lead_m : float
-        A rival that is refused still speaks against the best transform where by so much more wall speaks for it [m].
+    rival_lead : float
+        A rival that is refused still speaks against the best transform where so many times more wall speaks for it.
     disc_radius_cells : int
         Radius of the discs [cells].
     disc_agreement : float
@@ -70,19 +70,19 @@ class ValidationSettings:
     test: str = "walls"
     hit_distance_m: float = 0.075
     miss_distance_m: float = 0.175
-    least_overlap_m2: float = 3.0
-    least_wall_m: float = 3.0
-    least_evidence_m: float = 3.0
-    least_across_m: float = 0.6
+    least_overlap_m2: float = 2.5
+    least_wall_m: float = 2.5
+    least_evidence_m: float = 2.2
+    least_across_m: float = 0.4
     hit_rate: float = 0.7
     score: float = 0.9
-    most_contradiction_m: float = 0.5
+    most_contradiction_m: float = 0.3
     plenty_of_wall_m: float = 200.0
     contradiction_share: float = 0.1
     rival_distance_m: float = 0.5
     rival_angle: float = math.radians(5.0)
-    rival_share: float = 0.5
-    rival_lead_m: float = 1.0
+    rival_share: float = 0.6
+    rival_lead: float = 1.5
     disc_radius_cells: int = 25
     disc_agreement: float = 0.90
 
@@ -93,7 +93,7 @@ class ValidationSettings:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
         least = ("least_overlap_m2", "least_wall_m", "least_evidence_m", "least_across_m")
-        lengths = ("hit_distance_m", "miss_distance_m", "most_contradiction_m", "plenty_of_wall_m", "rival_distance_m", "rival_lead_m")
+        lengths = ("hit_distance_m", "miss_distance_m", "most_contradiction_m", "plenty_of_wall_m", "rival_distance_m", "rival_lead")
         for name in (*least, *lengths):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want zero or more")
