@@ -153,7 +153,9 @@ class TeamMapping:
 
 def crop_around(fused: FusedMap, x: float, y: float, cells: int) -> NDArray[np.uint8]:
     """Return the cells of a map around a place [m], (cells, cells); unknown outside of the map."""
-    column, row = (int(np.floor((value - low) / fused.resolution + 1e-9)) - cells // 2 for value, low in zip((x, y), fused.origin, strict=True))
+    column, row = (
+        int(np.floor((value - low) / fused.resolution + 1e-9)) - cells // 2 for value, low in zip((x, y), fused.origin, strict=True)
+    )
     crop = np.full((cells, cells), UNKNOWN, np.uint8)
     rows, columns = fused.levels.shape
     top, left = max(row, 0), max(column, 0)

@@ -154,7 +154,8 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         return self._with_team(observations), infos
 
     def step(
-        self, actions: Any  # noqa: ANN401
+        self,
+        actions: Any,  # noqa: ANN401
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Take a step or a decision, and exchange maps where the period is over."""
         observations, rewards, terminations, truncations, infos = self.env.step(actions)
@@ -206,7 +207,10 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         """Return how the map frames of all robots truly lie."""
         base = self._base
         if base.settings.known_starts:
-            frames = [Transform(*base.perception.offset(row).tolist(), 0.0) for row in range(base.settings.robots)]
+            frames = [
+                Transform(float(base.perception.offset(row)[0]), float(base.perception.offset(row)[1]))
+                for row in range(base.settings.robots)
+            ]
         else:
             frames = [Transform(*start) for start in base.world.starts.tolist()]
         agents = self.possible_agents

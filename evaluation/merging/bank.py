@@ -8,12 +8,13 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.evaluation.merging.drives import RUNS, STARTS, bank_starts, drive
+from lidarium.evaluation.merging.drives import RUNS, SNAPSHOTS, STARTS, bank_starts, drive
 from lidarium.evaluation.merging.floors import BankFloor
 from lidarium.evaluation.output import whole_file, write_json
 from lidarium.evaluation.workers import shared_out
@@ -159,10 +160,10 @@ def _drive_into(folder: Path, drive_: Drive) -> None:
     # Original and copy have starts of their own, as the furniture may stand on a start otherwise.
     seed = drive_.floor.seed
     start = bank_starts(floor, seed)[drive_.start] + (0.0, 0.0, 2.0 * drive_.run)
-    shares = {"shares": LIKE_ROOMS_SHARES} if drive_.floor.kind == "like_rooms" else {}
+    shares = LIKE_ROOMS_SHARES if drive_.floor.kind == "like_rooms" else SNAPSHOTS
     noise = [*drive_.name.encode(), seed]
-    snapshots = drive(floor, start, int(np.random.SeedSequence(noise).generate_state(1)[0]), **shares)
-    arrays = {f"levels_{stage}": snapshot.levels for stage, snapshot in enumerate(snapshots)}
+    snapshots = drive(floor, start, int(np.random.SeedSequence(noise).generate_state(1)[0]), shares=shares)
+    arrays: dict[str, Any] = {f"levels_{stage}": snapshot.levels for stage, snapshot in enumerate(snapshots)}
     poses = [(one.floor_from_map.x, one.floor_from_map.y, one.floor_from_map.theta) for one in snapshots]
     with whole_file(_file_of(folder, drive_)) as beside:
         np.savez_compressed(

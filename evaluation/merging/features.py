@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import cv2
@@ -11,17 +12,21 @@ from numpy.typing import NDArray
 
 from lidarium.evaluation.merging.bank import BankMap, Pair
 from lidarium.evaluation.merging.drives import RESOLUTION
+from lidarium.evaluation.merging.pairs import PLENTY
+from lidarium.evaluation.merging.peers import finders
 from lidarium.evaluation.merging.trials import padded
-from lidarium.mapping.merging.alignment import find_inliers
-from lidarium.mapping.merging.corners import CornerSettings, detect_corners
+from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers
+from lidarium.mapping.merging.corners import Corners, CornerSettings, detect_corners
 from lidarium.mapping.merging.correspondence import METHODS, CorrespondenceSettings, match_corners
+from lidarium.mapping.merging.described_map import DescribedMap
 from lidarium.mapping.merging.descriptors import VARIANTS, DescriptorSettings, describe_corners
 from lidarium.mapping.merging.pair import described
 from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.rigid import Transform
 
 REPEATS = 20
-RIGHT_M = 0.15
-"""Distance within which a match is right [m]."""
+RIGHT_M, VOTED_M = 0.15, 0.5
+"""Distances within which a match, and a transform that matches vote for, is right [m]."""
 
 
 def images(maps: dict[str, BankMap]) -> dict[str, NDArray[np.uint8]]:
@@ -39,14 +44,14 @@ def compare_detectors(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
     """Return points and least time of each detector on each image [us]; one thread, the runs of all detectors in turn."""
     cv2.setNumThreads(1)
     raw = CornerSettings(separation_m=0.0, limit=0)
-    orb, sift, fast = cv2.ORB.create(), cv2.SIFT.create(), cv2.FastFeatureDetector.create()
+    peers = finders()
     detectors: dict[str, Callable[[NDArray[np.uint8]], int]] = {
         "ours": lambda image: len(detect_corners(image, RESOLUTION, raw)),
         "goodFeaturesToTrack": lambda image: len(cv2.goodFeaturesToTrack(image, 500, 0.01, 3)),
         "Harris": lambda image: int(np.count_nonzero(cv2.cornerHarris(image, 3, 3, 0.04) > 0.01)),
-        "FAST": lambda image: len(fast.detect(image)),
-        "ORB": lambda image: len(orb.detect(image)),
-        "SIFT": lambda image: len(sift.detect(image)),
+        "FAST": lambda image: len(peers["fast"].detect(image)),
+        "ORB": lambda image: len(peers["orb"].detect(image)),
+        "SIFT": lambda image: len(peers["sift"].detect(image)),
     }
     return [_timed(name, image, detectors) for name, image in images(maps).items()]
 
@@ -54,54 +59,68 @@ def compare_detectors(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
 def compare_descriptors(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
     """Return the least time of each descriptor on each image [us], for the points of its own detector."""
     cv2.setNumThreads(1)
-    rows = []
-    for name, image in images(maps).items():
-        corners = detect_corners(image, RESOLUTION)
-        ours = {
-            variant: (lambda levels, chosen=DescriptorSettings(variant=variant), at=corners: len(describe_corners(levels, RESOLUTION, at, chosen).values))
-            for variant in VARIANTS
-        }
-        peers = {}
-        for peer, finder in (("ORB", cv2.ORB.create()), ("SIFT", cv2.SIFT.create()), ("AKAZE", cv2.AKAZE.create())):
-            points = finder.detect(image)
-            peers[peer] = lambda levels, by=finder, at=points: len(by.compute(levels, at)[0])
-        rows.append(_timed(name, image, {**ours, **peers}))
-    return rows
+    return [_timed(name, image, _describers(image)) for name, image in images(maps).items()]
+
+
+def _describers(image: NDArray[np.uint8]) -> dict[str, Callable[[NDArray[np.uint8]], int]]:
+    """Return what describes the points of an image, each those of its own detector."""
+    corners = detect_corners(image, RESOLUTION)
+    found: dict[str, Callable[[NDArray[np.uint8]], int]] = {}
+    for variant in VARIANTS:
+        chosen = DescriptorSettings(variant=variant)
+        found[variant] = partial(_count_described, corners, chosen)
+    for name in ("orb", "sift", "akaze"):
+        finder = finders()[name]
+        found[name] = partial(_count_computed, finder, finder.detect(image))
+    return found
+
+
+def _count_described(corners: Corners, chosen: DescriptorSettings, image: NDArray[np.uint8]) -> int:
+    return len(describe_corners(image, RESOLUTION, corners, chosen).values)
+
+
+def _count_computed(finder: Any, points: Any, image: NDArray[np.uint8]) -> int:  # noqa: ANN401
+    return len(finder.compute(image, points)[0])
 
 
 def compare_methods(maps: dict[str, BankMap], pairs: list[Pair]) -> list[dict[str, Any]]:
     """Return for each method of matching what it finds on positives: matches, right ones, pairs with two right ones or more, time [ms]."""
     settings = MergeSettings()
+    chosen = [pair for pair in pairs if pair.category == "positive" and pair.overlap >= PLENTY][:60]
+    features = {key: described(maps[key].levels, RESOLUTION, settings) for pair in chosen for key in (pair.a, pair.b)}
     rows = []
-    chosen = [pair for pair in pairs if pair.category == "positive" and pair.overlap >= 0.3][:60]
-    both = [(pair, *(described(maps[key].levels, RESOLUTION, settings) for key in (pair.a, pair.b))) for pair in chosen]
     for method in METHODS:
-        counts, right, spent, voted = [], [], [], 0
-        for pair, a, b in both:
-            began = time.process_time()
-            matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, CorrespondenceSettings(method=method))
-            spent.append(1e3 * (time.process_time() - began))
-            assert pair.a_from_b is not None
-            apart = np.linalg.norm(pair.a_from_b.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1)
-            counts.append(len(matches))
-            right.append(int(np.count_nonzero(apart <= RIGHT_M)))
-            proposals, is_inlier = find_inliers(a.corners, b.corners, matches, RESOLUTION, settings.alignment)
-            if len(proposals):
-                best = proposals[int(is_inlier.sum(axis=1).argmax())]
-                image = np.array([math.cos(best[2]) * pair.at[0] - math.sin(best[2]) * pair.at[1] + best[0], math.sin(best[2]) * pair.at[0] + math.cos(best[2]) * pair.at[1] + best[1]])
-                voted += bool(np.linalg.norm(image - pair.a_from_b.apply(pair.at)) <= 0.5)
+        correspondence = CorrespondenceSettings(method=method)
+        found = [_matched(pair, features[pair.a], features[pair.b], correspondence, settings.alignment) for pair in chosen]
+        matches, right, votes, spent = np.array(found, np.float64).reshape(-1, 4).T
         rows.append(
             {
                 "method": method,
-                "pairs": len(both),
-                "matches": float(np.median(counts)),
+                "pairs": len(chosen),
+                "matches": float(np.median(matches)),
                 "right": float(np.median(right)),
-                "two_right": float(np.mean(np.array(right) >= 2)),
-                "voted": voted / max(len(both), 1),
+                "two_right": float((right >= 2).mean()),
+                "voted": float(votes.mean()),
                 "time_ms": float(np.median(spent)),
             }
         )
     return rows
+
+
+def _matched(
+    pair: Pair, a: DescribedMap, b: DescribedMap, correspondence: CorrespondenceSettings, alignment: AlignmentSettings
+) -> tuple[int, int, bool, float]:
+    """Return the number of matches, of right ones, whether the transform with most inliers is about right, and the time [ms]."""
+    true = pair.a_from_b
+    assert true is not None
+    began = time.process_time()
+    matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, correspondence)
+    spent = 1e3 * (time.process_time() - began)
+    apart = np.linalg.norm(true.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1)
+    proposals, is_inlier = find_inliers(a.corners, b.corners, matches, RESOLUTION, alignment)
+    best = None if len(proposals) == 0 else Transform(*proposals[int(is_inlier.sum(axis=1).argmax())].tolist())
+    is_voted = best is not None and best.difference(true, pair.at)[0] <= VOTED_M
+    return len(matches), int(np.count_nonzero(apart <= RIGHT_M)), is_voted, spent
 
 
 def _timed(name: str, image: NDArray[np.uint8], work: dict[str, Callable[[NDArray[np.uint8]], int]]) -> dict[str, Any]:
@@ -119,4 +138,8 @@ def _timed(name: str, image: NDArray[np.uint8], work: dict[str, Callable[[NDArra
 def _shown(maps: dict[str, BankMap]) -> list[str]:
     """Return the last maps of some floors of the test half that fit into a standard map."""
     keys = [key for key, one in maps.items() if one.floor.half == "test" and one.stage == 2 and max(one.levels.shape) <= 512]
-    return [next(key for key in keys if key.startswith(kind)) for kind in ("apartment-", "real-", "like_rooms-") if any(key.startswith(kind) for key in keys)]
+    return [
+        next(key for key in keys if key.startswith(kind))
+        for kind in ("apartment-", "real-", "like_rooms-")
+        if any(key.startswith(kind) for key in keys)
+    ]

@@ -87,7 +87,9 @@ def safe_threshold(tried: Tried) -> float:
 
 def errors(tried: Tried) -> tuple[float, float, float]:
     """Return the median and the 95th percentile of the distance [m] and the median angle [rad] of positives that were accepted."""
-    found = [(one.distance_m, one.angle) for pair, one in tried if pair.category == "positive" and one.is_accepted and one.distance_m is not None]
+    found = [
+        (one.distance_m, one.angle) for pair, one in tried if pair.category == "positive" and one.is_accepted and one.distance_m is not None
+    ]
     if not found:
         return math.nan, math.nan, math.nan
     distances, angles = np.array(found, np.float64).T

@@ -94,7 +94,7 @@ def bank_floors(data: Path | None, every: int = 1) -> list[BankFloor]:
         for kind, count in (("apartment", _APARTMENTS), ("office", _OFFICES), ("corridors", _CORRIDORS), ("like_rooms", _LIKE_ROOMS)):
             floors += [BankFloor(f"{kind}-{seed}", half, kind, seed) for seed in range(first, first + count, every)]
         floors.append(BankFloor(_DRAWN[half], half, "drawn"))
-        chosen = real[HALVES.index(half) :: len(HALVES)][: _REAL : every]
+        chosen = real[HALVES.index(half) :: len(HALVES)][:_REAL:every]
         floors += [BankFloor(f"real-{path.stem[:20]}", half, "real", path=path) for path in chosen]
         originals = [floor for floor in floors if floor.half == half and floor.kind in ("apartment", "office")]
         copied = originals[:_COPIED]

@@ -41,7 +41,14 @@ def merge_teams(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
                 distances.append(distance)
                 angles.append(angle)
         rows.append(
-            {"floor": floor, "robots": len(team), "joined": len(group), "distance_m": max(distances), "angle": max(angles), "time_s": seconds}
+            {
+                "floor": floor,
+                "robots": len(team),
+                "joined": len(group),
+                "distance_m": max(distances),
+                "angle": max(angles),
+                "time_s": seconds,
+            }
         )
     return rows
 
@@ -63,11 +70,14 @@ def _merge_real(folder: Path, truth: dict[str, Any]) -> dict[str, Any]:
     resolution, settings = float(truth["resolution"]), merge_settings()
     levels = [read_grey_map(folder / truth[key], resolution).levels for key in "AB"]
     began = time.process_time()
-    result = merge_pair(*(described(one, resolution, settings) for one in levels), settings)
+    a, b = (described(one, resolution, settings) for one in levels)
+    result = merge_pair(a, b, settings)
     spent = 1e3 * (time.process_time() - began)
     error = (math.nan, math.nan)
     if result.a_from_b is not None:
-        error = result.a_from_b.difference(transform_of_pixels(truth["pixel"], resolution, *(len(one) for one in levels)), result.agreement.centre)
+        error = result.a_from_b.difference(
+            transform_of_pixels(truth["pixel"], resolution, *(len(one) for one in levels)), result.agreement.centre
+        )
     return {
         "is_accepted": result.is_accepted,
         "reason": result.reason,

@@ -34,7 +34,7 @@ def like_rooms(seed: int) -> Floor:
     choices = generator.integers(0, SLOTS, 2 * rooms)
     boxes = _walls(rooms, width, depth, corridor)
     for index, slot in enumerate(choices.tolist()):
-        pieces = furniture[:-SLOTS] + [furniture[len(furniture) - SLOTS + slot]]
+        pieces = [*furniture[:-SLOTS], furniture[len(furniture) - SLOTS + slot]]
         boxes += [_placed(piece, index, rooms, width, depth, corridor) for piece in pieces if piece[2] > piece[0]]
     bounds = (0.0, 0.0, rooms * width + 2 * WALL, 2 * depth + corridor + 2 * WALL)
     solids = tuple(Solid(np.array([(a, b), (c, b), (c, d), (a, d)], np.float64)) for a, b, c, d in boxes)

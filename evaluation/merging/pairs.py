@@ -19,8 +19,8 @@ from lidarium.evaluation.merging.bank import BankMap, Pair
 from lidarium.evaluation.merging.drives import RESOLUTION
 from lidarium.evaluation.merging.floors import HALVES, LASER_HEIGHT, BankFloor
 from lidarium.mapping.merging.alignment import distinct
-from lidarium.mapping.merging.correlation import CorrelationSettings, best_translations
 from lidarium.mapping.merging.corners import CornerSettings
+from lidarium.mapping.merging.correlation import CorrelationSettings, best_translations
 from lidarium.mapping.merging.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.validation import Agreement, ValidationSettings, compare
 from lidarium.mapping.merging.wall_alignment import refine_on_walls

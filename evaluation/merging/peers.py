@@ -19,6 +19,9 @@ from lidarium.mapping.rigid import Transform
 
 FEATURES = ("orb", "akaze")
 
+_CV: Any = cv2
+"""OpenCV, of which the type stubs lack a part."""
+
 
 @dataclass(frozen=True, slots=True)
 class PeerResult:
@@ -41,7 +44,7 @@ class PeerResult:
 
 def features_of(levels: NDArray[np.uint8], kind: str) -> Any:  # noqa: ANN401 (OpenCV's own type)
     """Return what OpenCV computes of a map, for `match_peers`."""
-    return cv2.detail.computeImageFeatures2(_finder(kind), levels)
+    return _CV.detail.computeImageFeatures2(_finder(kind), levels)
 
 
 def match_peers(a: Any, b: Any, resolution: float) -> PeerResult:  # noqa: ANN401
@@ -62,10 +65,14 @@ def match_peers(a: Any, b: Any, resolution: float) -> PeerResult:  # noqa: ANN40
 
 @lru_cache
 def _finder(kind: str) -> Any:  # noqa: ANN401
-    makers = {"orb": lambda: cv2.ORB.create(), "akaze": lambda: cv2.AKAZE.create()}
-    return makers[kind]()
+    return finders()[kind]
 
 
 @lru_cache
 def _matcher() -> Any:  # noqa: ANN401
-    return cv2.detail.AffineBestOf2NearestMatcher(False, False, 0.3)
+    return _CV.detail.AffineBestOf2NearestMatcher(False, False, 0.3)
+
+
+def finders() -> dict[str, Any]:
+    """Return OpenCV's features by name, with its own settings."""
+    return {"orb": _CV.ORB.create(), "akaze": _CV.AKAZE.create(), "sift": _CV.SIFT.create(), "fast": _CV.FastFeatureDetector.create()}

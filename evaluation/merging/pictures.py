@@ -1,5 +1,6 @@
 """Pictures of pairs of the bank, laid over each other."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ def draw_pairs(path: Path, maps: dict[str, BankMap], pairs: list[Pair], outcomes
 
 def _chosen(pairs: list[Pair], outcomes: list[Outcome]) -> list[tuple[str, Pair]]:
     both = list(zip(pairs, outcomes, strict=True))
-    wanted = (
+    wanted: tuple[tuple[str, Callable[[Pair, Outcome], bool]], ...] = (
         ("joined by corners", lambda pair, one: pair.category == "positive" and one.is_accepted and one.found_by == "corners"),
         ("joined by correlation, little overlap", lambda pair, one: pair.category == "positive" and one.is_accepted and pair.overlap < 0.3),
         ("missed: little overlap", lambda pair, one: pair.category == "positive" and not one.is_accepted and pair.overlap < 0.3),

@@ -9,6 +9,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,6 +71,11 @@ class Outcome:
     wall_m: float = 0.0
     across_m: float = 0.0
     contradicting_m: float = 0.0
+
+    @property
+    def needed_fallback(self) -> bool:
+        """Whether all rotations and translations were tried: corners gave nothing that passes on its own."""
+        return not (self.found_by == "corners" and (self.is_accepted or ": moved by" in self.reason))
 
     @property
     def is_exact(self) -> bool:
@@ -139,9 +145,7 @@ def _file_of(folder: Path, method: str, number: int) -> Path:
     return Path(folder) / f"{method}_{number:03d}.json"
 
 
-def _try_chunk(
-    folder: Path, method: str, settings: MergeSettings | None, task: tuple[int, list[tuple[Pair, BankMap, BankMap]]]
-) -> None:
+def _try_chunk(folder: Path, method: str, settings: MergeSettings | None, task: tuple[int, list[tuple[Pair, BankMap, BankMap]]]) -> None:
     number, tasks = task
     _warm_up(method, settings)
     outcomes = [_tried(pair, a, b, method, settings) for pair, a, b in tasks]
@@ -174,9 +178,10 @@ def _both(a: NDArray[np.uint8], b: NDArray[np.uint8], settings: MergeSettings) -
 
 @lru_cache
 def _warm_up(method: str, settings: MergeSettings | None) -> None:
-    """Let kernels be compiled before anything is timed."""
+    """Let kernels be compiled before anything is timed, and everything run on one thread."""
     from lidarium.evaluation.merging.floors import BankFloor
 
+    cv2.setNumThreads(1)
     levels = np.full((200, 200), UNKNOWN, np.uint8)
     levels[20:180, 20:160] = 0
     levels[22:178, 22:158] = 255

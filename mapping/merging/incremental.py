@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.merger import Merged, joined_tree, placed
 from lidarium.mapping.merging.pair import PairResult, described, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.occupancy import UNKNOWN
 from lidarium.mapping.rigid import Transform
 

@@ -269,7 +269,8 @@ def _ambiguity(a: DescribedMap, b: DescribedMap, best: _Judged, judged: list[_Ju
         if other.agreement.evidence_m > validation.rival_lead * best.agreement.evidence_m:
             return (
                 f"contradiction: moved by {distance:.1f} m and turned by {math.degrees(angle):.0f} deg, "
-                f"{other.agreement.evidence_m:.1f} m of walls speak for it instead of {best.agreement.evidence_m:.1f} m, but {other.refusal}"
+                f"{other.agreement.evidence_m:.1f} m of walls speak for it instead of {best.agreement.evidence_m:.1f} m, "
+                f"but {other.refusal}"
             )
         if is_rival(other.agreement, best.agreement, validation):
             return (
