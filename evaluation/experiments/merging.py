@@ -11,9 +11,10 @@ from typing import Any
 import lidarium
 from lidarium.evaluation.merging import tables
 from lidarium.evaluation.merging.bank import drives_of, fill, read_maps, read_pairs, write_pairs
+from lidarium.evaluation.merging.features import compare_descriptors, compare_detectors, compare_methods
 from lidarium.evaluation.merging.figures import Tried
 from lidarium.evaluation.merging.floors import BankFloor, bank_floors
-from lidarium.evaluation.merging.groups import merge_real_pairs
+from lidarium.evaluation.merging.groups import merge_real_pairs, merge_teams
 from lidarium.evaluation.merging.pairs import choose_pairs
 from lidarium.evaluation.merging.pictures import draw_pairs
 from lidarium.evaluation.merging.trials import METHODS, read_outcomes, try_pairs

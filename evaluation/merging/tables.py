@@ -1,15 +1,12 @@
 """The tables of the page on map merging, each beside what the thesis printed."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from lidarium.evaluation.merging import figures
+from lidarium.evaluation.merging import figures, thesis
 from lidarium.evaluation.merging.bank import Pair
 from lidarium.evaluation.merging.trials import METHODS
-
-THESIS_DETECTORS = {"ours": (384, 228, 2349), "goodFeaturesToTrack": (1095, 632, 9106), "SIFT": (11321, 6510, 75746)}
-"""Times of the thesis on its three maps [us]; its Shi-Tomasi is OpenCV's goodFeaturesToTrack."""
 
 
 def bank_table(tried: dict[str, figures.Tried]) -> str:
@@ -55,7 +52,8 @@ def reading(tried: dict[str, figures.Tried]) -> str:
     return (
         f"- Without the fallback a pair of 512 x 512 cells takes {without.median:.0f} ms (median, both maps described). The fallback ran "
         f"on {100 * (1 - without.count / max(every.count, 1)):.0f} % of these pairs, most of which are negatives: who is refused has been "
-        f"searched for everywhere. Of all pairs 95 % are done in {every.p95:.0f} ms; of those that are joined, half in {joined.median:.0f} ms.\n"
+        f"searched for everywhere. Of all pairs 95 % are done in {every.p95:.0f} ms; of those that are joined, half in "
+        f"{joined.median:.0f} ms.\n"
         f"- {negatives.hits} of {negatives.total} negatives are accepted, so the rate is below {100 * negatives.high:.2f} % (95 %).\n"
         f"- Of the {len(missed)} pairs with 15 to 30 % of overlap that are missed, {poor} have less than 2.5 m of wall in common under the "
         "best transform: what both know is open floor, on which any two rooms agree. Whoever accepts on less accepts strangers too.\n"
@@ -84,22 +82,26 @@ def by_stage(tried: figures.Tried) -> str:
 
 def beside_thesis(tried: dict[str, figures.Tried]) -> str:
     """Return the thesis's bank beside both modes on this one."""
+    joined, spent = sum(pair.is_accepted for pair in thesis.PAIRS), [thesis.pair_ms(pair) for pair in thesis.PAIRS]
+    strangers = figures.Share(0, len(thesis.PAIRS) - thesis.OVERLAPPING)
     lines = [
         "| | pairs that overlap | joined | negatives accepted | time a pair |",
         "|---|---:|---|---|---|",
-        "| thesis, an apartment of 65 m2 (errors never measured) | 10 | 40 % (4 of 10) | 0 of 2 (the rate may be up to 78 %) | "
-        "157 ms mean, 302 ms worst |",
+        f"| thesis, an apartment of 65 m2 (errors never measured) | {thesis.OVERLAPPING} | {100 * joined / thesis.OVERLAPPING:.0f} % ({joined} of "
+        f"{thesis.OVERLAPPING}) | 0 of {strangers.total} (the rate may be up to {100 * strangers.high:.0f} %) | {sum(spent) / len(spent):.0f} ms "
+        f"mean, {max(spent):.0f} ms worst |",
     ]
     for method, name in (("thesis", "thesis mode"), ("default", "default mode")):
         positives = figures.recall(tried[method], lambda pair: pair.category == "positive")
-        spent = figures.times(tried[method])
+        times = figures.times(tried[method])
         negatives = figures.accepted(tried[method], figures.NEGATIVE)
         lines.append(
-            f"| {name}, this bank | {positives.total} | {positives} | {negatives} | {spent.median:.0f} ms median, {spent.p95:.0f} ms 95 % |"
+            f"| {name}, this bank | {positives.total} | {positives} | {negatives} | {times.median:.0f} ms median, {times.p95:.0f} ms 95 % |"
         )
     return (
-        "\n".join(lines) + "\n\nThe 280 ms that it claims are the longest times of its stages, added up once; with both maps described its "
-        "worst pair takes 302 ms."
+        "\n".join(lines)
+        + f"\n\nThe 280 ms that it claims are the longest times of its stages, added up once: {thesis.claimed_ms():.0f} ms. "
+        f"With both maps described its worst pair takes {max(spent):.0f} ms."
     )
 
 
@@ -111,10 +113,9 @@ def detectors(rows: list[dict[str, Any]]) -> str:
         cells = [f"{row['time_us'][name]:.0f} ({row['points'][name]})" for name in names]
         ratio = row["time_us"]["goodFeaturesToTrack"] / row["time_us"]["ours"]
         lines.append(f"| {row['image']} {row['shape'][1]} x {row['shape'][0]} | {' | '.join(cells)} | {ratio:.1f} x |")
-    theirs = ", ".join(f"{name} {'/'.join(str(one) for one in times)}" for name, times in THESIS_DETECTORS.items())
     return (
         "Least time of 20 runs in turn [us], one thread, and points found.\n\n" + "\n".join(lines) + "\n\n"
-        f"The thesis, C++ on 2.2 GHz, on maps of 146 x 144, 113 x 113 and 398 x 402 cells [us]: {theirs}; 2.8 to 3.9 times faster than "
+        f"The thesis, C++ on 2.2 GHz, on maps of 146 x 144, 113 x 113 and 398 x 402 cells [us]: {_printed(thesis.DETECTORS_US)}; 2.8 to 3.9 times faster than "
         "Shi-Tomasi. Its rows of Harris and Shi-Tomasi are the same in six of eight columns; one was copied."
     )
 
@@ -128,7 +129,7 @@ def descriptors(rows: list[dict[str, Any]]) -> str:
         lines.append(f"| {row['image']} | {' | '.join(cells)} |")
     return (
         "Least time of 20 runs [us] and number of descriptors; each for the points of its own detector.\n\n" + "\n".join(lines) + "\n\n"
-        "The thesis on its three maps [us]: polar 904/425/1808, log-polar 829/605/1050, SIFT 9176/5407/61673, ORB 1164/315/8704."
+        f"The thesis on its three maps [us]: {_printed(thesis.DESCRIPTORS_US)}."
     )
 
 
@@ -172,3 +173,7 @@ def real_maps(rows: list[dict[str, Any]]) -> str:
         f"Parts of logs of real robots, rendered with one trajectory's estimate: {joined} of {len(rows)} are joined. The error is that of "
         "the best transform, also where it is refused.\n\n" + "\n".join(lines)
     )
+
+
+def _printed(rows: Mapping[str, tuple[int, ...]]) -> str:
+    return ", ".join(f"{name} {'/'.join(str(one) for one in times)}" for name, times in rows.items())
