@@ -13,6 +13,7 @@ from pettingzoo import ParallelEnv
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.observations import FARTHEST
 from lidarium.envs.onboard.team_mapping import Frames, TeamMapping, crop_around
+from lidarium.envs.wrappers.decisions import boxes_of
 from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 from lidarium.mapping.merging.settings import MergeSettings
@@ -125,7 +126,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         self._steps = max(round(self.merging.period_s / base.settings.time_step), 1)
         self._due = 0
         self._observation_spaces: dict[str, spaces.Space[Any]] = {
-            agent: spaces.Dict({**_boxes(env.observation_space(agent)), **team_boxes(robots, base.settings.map_cells)})
+            agent: spaces.Dict({**boxes_of(env.observation_space(agent)), **team_boxes(robots, base.settings.map_cells)})
             for agent in self.possible_agents
         }
 
@@ -262,8 +263,3 @@ def _check_links(links: NDArray[Any], robots: int) -> NDArray[np.bool_]:
         raise ValueError(f"can_talk has shape {links.shape}; want ({robots}, {robots}): which robots reach each other")
     found = np.asarray(links, np.bool_)
     return found | found.T
-
-
-def _boxes(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
-    assert isinstance(space, spaces.Dict)
-    return dict(space.spaces)

@@ -91,4 +91,4 @@ def _starts(rooms: int, width: float, depth: float, corridor: float, generator: 
     places = [
         (WALL + (room % rooms + 0.5) * width, WALL + 0.5 * depth + (depth + corridor if room >= rooms else 0.0)) for room in chosen.tolist()
     ]
-    return np.round(np.column_stack([places, generator.uniform(-np.pi, np.pi, 3)]), 4)
+    return np.asarray(np.round(np.column_stack([places, generator.uniform(-np.pi, np.pi, 3)]), 4), np.float64)

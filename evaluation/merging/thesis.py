@@ -38,7 +38,7 @@ DESCRIPTION_US = {"A1": 11171, "A2": 24335, "B1": 15320, "B2": 17891, "C1": 3004
 """Times of each map [us]."""
 
 DETECTORS_US = {"own": (384, 228, 2349), "Shi-Tomasi": (1095, 632, 9106), "SIFT": (11321, 6510, 75746)}
-"""Times on three maps of 146 x 144, 113 x 113 and 398 x 402 cells [us]; the rows of Harris and Shi-Tomasi are the same in six of eight columns."""
+"""Times on three maps of 146 x 144, 113 x 113 and 398 x 402 cells [us]; the row of Shi-Tomasi may be that of Harris, copied."""
 
 DESCRIPTORS_US = {"polar": (904, 425, 1808), "log-polar": (829, 605, 1050), "SIFT": (9176, 5407, 61673), "ORB": (1164, 315, 8704)}
 """The same of descriptors [us]."""

@@ -76,7 +76,7 @@ class ValidationSettings:
     least_across_m: float = 0.4
     hit_rate: float = 0.7
     score: float = 0.9
-    most_contradiction_m: float = 0.3
+    most_contradiction_m: float = 0.15
     plenty_of_wall_m: float = 200.0
     contradiction_share: float = 0.1
     rival_distance_m: float = 0.5
