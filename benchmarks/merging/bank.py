@@ -8,7 +8,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from lidarium.evaluation.merging.bank import drives_of, fill, read_maps, read_pairs, write_pairs
+from lidarium.evaluation.merging.bank import drives_of, fill, missing_drives, read_maps, read_pairs, write_pairs
 from lidarium.evaluation.merging.floors import bank_floors
 from lidarium.evaluation.merging.pairs import choose_pairs
 
@@ -23,7 +23,8 @@ def main() -> None:
     arguments = parser.parse_args()
     floors = bank_floors(arguments.data, arguments.every)
     total = len(drives_of(floors))
-    for done, (drive, error) in enumerate(fill(arguments.out, floors, arguments.workers), 1):
+    first = total - len(missing_drives(arguments.out, floors)) + 1
+    for done, (drive, error) in enumerate(fill(arguments.out, floors, arguments.workers), first):
         print(f"{done} of {total} {drive.name}{'' if error is None else f': {error}'}", file=sys.stderr)
     pairs = read_pairs(arguments.out)
     if pairs is None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import lidarium
 from lidarium.evaluation.merging import tables
-from lidarium.evaluation.merging.bank import drives_of, fill, read_maps, read_pairs, write_pairs
+from lidarium.evaluation.merging.bank import drives_of, fill, missing_drives, read_maps, read_pairs, write_pairs
 from lidarium.evaluation.merging.features import compare_descriptors, compare_detectors, compare_methods
 from lidarium.evaluation.merging.figures import Tried
 from lidarium.evaluation.merging.floors import BankFloor, bank_floors
@@ -30,8 +30,8 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     floors = bank_floors(data, every)
     _check_same(folder / DATA_FILE, floors)
     total = len(drives_of(floors))
-    failures = []
-    for done, (drive, error) in enumerate(fill(folder, floors, workers), 1):
+    first, failures = total - len(missing_drives(folder, floors)) + 1, []
+    for done, (drive, error) in enumerate(fill(folder, floors, workers), first):
         if error is not None:
             failures.append(f"{drive.name}: {error}")
         yield "drives", done, total

@@ -109,10 +109,14 @@ def drives_of(floors: list[BankFloor]) -> list[Drive]:
     return [Drive(floor, start, run) for floor in floors for start in range(STARTS) for run in range(1 if floor.is_copy else RUNS)]
 
 
+def missing_drives(folder: Path, floors: list[BankFloor]) -> list[Drive]:
+    """Return the drives of a bank whose maps are not there yet."""
+    return [drive for drive in drives_of(floors) if not _file_of(folder, drive).exists()]
+
+
 def fill(folder: Path, floors: list[BankFloor], workers: int) -> Iterator[tuple[Drive, Exception | None]]:
     """Drive what the bank has not yet, and yield each drive when its maps are on the disk, or the error that it ended with."""
-    missing = [drive for drive in drives_of(floors) if not _file_of(folder, drive).exists()]
-    for done, result in shared_out(partial(_drive_into, folder), missing, workers):
+    for done, result in shared_out(partial(_drive_into, folder), missing_drives(folder, floors), workers):
         yield done, result if isinstance(result, Exception) else None
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lidarium.evaluation.merging.bank import BankMap, Pair
 from lidarium.evaluation.merging.drives import RESOLUTION
 from lidarium.evaluation.merging.pairs import PLENTY
-from lidarium.evaluation.merging.peers import finders
+from lidarium.evaluation.merging.peers import FEATURES, finders
 from lidarium.evaluation.merging.trials import padded
 from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers
 from lidarium.mapping.merging.corners import Corners, CornerSettings, detect_corners
@@ -69,7 +69,7 @@ def _describers(image: NDArray[np.uint8]) -> dict[str, Callable[[NDArray[np.uint
     for variant in VARIANTS:
         chosen = DescriptorSettings(variant=variant)
         found[variant] = partial(_count_described, corners, chosen)
-    for name in ("orb", "sift", "akaze"):
+    for name in FEATURES:
         finder = finders()[name]
         found[name] = partial(_count_computed, finder, finder.detect(image))
     return found
@@ -87,6 +87,8 @@ def compare_methods(maps: dict[str, BankMap], pairs: list[Pair]) -> list[dict[st
     """Return for each method of matching what it finds on positives: matches, right ones, pairs with two right ones or more, time [ms]."""
     settings = MergeSettings()
     chosen = [pair for pair in pairs if pair.category == "positive" and pair.overlap >= PLENTY][:60]
+    if not chosen:
+        return []
     features = {key: described(maps[key].levels, RESOLUTION, settings) for pair in chosen for key in (pair.a, pair.b)}
     rows = []
     for method in METHODS:

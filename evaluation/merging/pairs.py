@@ -168,7 +168,9 @@ def _copies(known: list[_Known], half: str, wanted: Wanted, generator: np.random
 
 
 def _across_floors(known: list[_Known], half: str, wanted: Wanted, generator: np.random.Generator) -> Iterator[Pair]:
-    """Yield pairs of maps of different floors."""
+    """Yield pairs of maps of different floors, where there are any."""
+    if len({one.map.floor for one in known}) < 2:
+        return
     for _ in range(wanted.negative):
         while True:
             a, b = (known[int(index)] for index in generator.integers(0, len(known), 2))

@@ -2,8 +2,9 @@
 
 References
 ----------
-Horner, "Map-merging for multi-robot system", 2016, and its package m-explore `map_merge` (BSD): ORB or AKAZE, `AffineBestOf2NearestMatcher`
-without shear, confidence of a pair as inliers / (8 + 0.3 matches).
+Horner, "Map-merging for multi-robot system", 2016, and its package m-explore `map_merge` (BSD): ORB, AKAZE or SURF features,
+`AffineBestOf2NearestMatcher` without shear, confidence of a pair as inliers / (8 + 0.3 matches). OpenCV 5 has neither AKAZE nor SURF any
+more; SIFT, the most distinctive of what it has, stands in their place.
 """
 
 import math
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.rigid import Transform
 
-FEATURES = ("orb", "akaze")
+FEATURES = ("orb", "sift")
 
 _CV: Any = cv2
 """OpenCV, of which the type stubs lack a part."""
@@ -75,4 +76,4 @@ def _matcher() -> Any:  # noqa: ANN401
 
 def finders() -> dict[str, Any]:
     """Return OpenCV's features by name, with its own settings."""
-    return {"orb": _CV.ORB.create(), "akaze": _CV.AKAZE.create(), "sift": _CV.SIFT.create(), "fast": _CV.FastFeatureDetector.create()}
+    return {"orb": _CV.ORB.create(), "sift": _CV.SIFT.create(), "fast": _CV.FastFeatureDetector.create()}

@@ -40,7 +40,7 @@ def _chosen(pairs: list[Pair], outcomes: list[Outcome]) -> list[tuple[str, Pair]
         ("symmetric, refused", lambda pair, one: pair.category == "symmetric" and not one.is_accepted),
     )
     found = [(title, next((pair for pair, one in both if is_wanted(pair, one)), None)) for title, is_wanted in wanted]
-    return [(title, pair) for title, pair in found if pair is not None]
+    return [(title, pair) for title, pair in found if pair is not None] or [(pair.category, pair) for pair in pairs[:1]]
 
 
 def _draw(axes: Axes, title: str, a: BankMap, b: BankMap) -> None:

@@ -6,15 +6,16 @@ from typing import Any
 
 from lidarium.evaluation.merging import figures, thesis
 from lidarium.evaluation.merging.bank import Pair
+from lidarium.evaluation.merging.peers import FEATURES
 from lidarium.evaluation.merging.trials import METHODS
 
 
 def bank_table(tried: dict[str, figures.Tried]) -> str:
     """Return the figures of all methods on the bank."""
-    names = {"default": "default", "thesis": "thesis mode", "orb": "ORB, as ROS map_merge", "akaze": "AKAZE, as ROS map_merge"}
+    names = {"default": "default", "thesis": "thesis mode", "orb": "ORB, as ROS map_merge", "sift": "SIFT in its place"}
     lines = [f"| | {' | '.join(names[method] for method in METHODS)} |", "|---|" + "---|" * len(METHODS)]
     # The peers say how sure they are; the thresholds are the least that let no negative through.
-    least = {method: figures.safe_threshold(tried[method]) if method in ("orb", "akaze") else -math.inf for method in METHODS}
+    least = {method: figures.safe_threshold(tried[method]) if method in FEATURES else -math.inf for method in METHODS}
     is_ours = {method: math.isinf(least[method]) for method in METHODS}
     rows: list[tuple[str, Callable[[str], object]]] = [
         ("recall, overlap 30 % and more", lambda one: figures.recall(tried[one], figures.is_plenty, least[one])),
@@ -137,6 +138,8 @@ def descriptors(rows: list[dict[str, Any]]) -> str:
 
 def methods(rows: list[dict[str, Any]]) -> str:
     """Return what each method of matching finds."""
+    if not rows:
+        return "There are no positives with 30 % of overlap and more in this bank."
     lines = [
         "| method | matches | right ones | pairs with two right ones | best vote right | time [ms] |",
         "|---|---:|---:|---:|---:|---:|",

@@ -81,7 +81,7 @@ def test_the_bank_goes_on_where_it_stopped(tmp_path):
     assert list(fill(tmp_path, floors, 1)) == []
     maps = read_maps(tmp_path, floors)
     assert len(maps) == 3 * len(drives_of(floors))
-    pairs = list(choose_pairs(maps, wanted=Wanted(plenty=4, little=2, negative=0)))
+    pairs = list(choose_pairs(maps, wanted=Wanted(plenty=4, little=2)))
     assert {pair.half for pair in pairs} == {"tuning"}
     for pair in pairs:
         assert pair.category in ("positive", "symmetric", "look_alike", "indistinct")
