@@ -77,7 +77,7 @@ class Pair:
     half : str
         ``tuning`` or ``test``.
     category : str
-        ``positive``; ``negative``; ``look_alike``, a negative that differs by 1 m of wall or more where it looks most alike;
+        ``positive``; ``negative``; ``look_alike``, a negative that differs by 1 m of wall or more wherever it looks alike;
         ``symmetric``, a positive that another transform explains as well; ``indistinct``, a negative that differs by less.
     overlap : float
         Share of the smaller known area that both know, of maps of one floor.
@@ -86,7 +86,7 @@ class Pair:
     at : (x, y)
         Centroid of the overlap in map b [m].
     differing_m : float
-        Length of walls that differ under the transform under which a negative looks most alike [m].
+        Least length of walls that differ where a negative looks alike [m].
     """
 
     a: str

@@ -19,9 +19,9 @@ LASER_HEIGHT = 0.3
 """At which furniture has to stand to be seen [m]."""
 
 _APARTMENTS, _OFFICES, _CORRIDORS, _LIKE_ROOMS, _REAL, _COPIED = 5, 4, 2, 4, 4, 9
-_DRAWN = {"tuning": "clinic", "test": "scene_loop"}
-_FIRST_SEED = {"tuning": 5000, "test": 7000}
-_FIRST_REAL = {"tuning": 0, "test": 9}
+_DRAWN = {"tuning": "clinic", "test": "scene_loop_corridor"}
+_FIRST_SEED = {"tuning": 5000, "test": 8000}
+_FIRST_REAL = {"tuning": 0, "test": 8}
 _LEAST_REAL_M2 = 55.0
 _AREAS = {
     "apartment": dict(enumerate((60.0, 80.0, 100.0, 120.0, 140.0))),

@@ -33,7 +33,7 @@ OVERLAPPING, PLENTY, APART = 0.15, 0.30, 0.02
 DIFFERENT_M = 1.0
 """Length of walls by which look-alikes differ at least [m]."""
 
-ALIKE_M, ALIKE_SHARE = 6.0, 0.7
+ALIKE_M, ALIKE_SHARE = 5.0, 0.7
 """What looks alike: so much wall that agrees in truth [m], and such a share of the walls in the overlap."""
 
 AS_WELL = 0.9
@@ -44,7 +44,7 @@ _SLIDES = [Transform(0.3 * x, 0.3 * y, 0.0) for x, y in ((1, 0), (-1, 0), (0, 1)
 
 _QUARTERS = np.arange(4) * (math.pi / 2.0)
 _TRUTH = ValidationSettings(hit_distance_m=0.05, miss_distance_m=0.1)
-_SEARCH = CorrelationSettings(cell_m=0.1, peaks=8)
+_SEARCH = CorrelationSettings(cell_m=0.1, peaks=12)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,13 +180,12 @@ def _across_floors(known: list[_Known], half: str, wanted: Wanted, generator: np
 
 
 def _judged_negative(pair: Pair, a: _Known, b: _Known) -> Pair:
-    """Return a pair of two places as what it looks like where it looks most alike."""
+    """Return a pair of two places as what it looks like: it can be decided where every overlay that looks alike differs somewhere."""
     looks = [one for _, one in _alignments(a, b) if one.agreeing_m >= ALIKE_M and one.hit_rate >= ALIKE_SHARE]
     if not looks:
         return replace(pair, category="negative")
-    most = max(looks, key=lambda one: one.agreeing_m - one.contradicting_m)
-    category = "look_alike" if most.contradicting_m >= DIFFERENT_M else "indistinct"
-    return replace(pair, category=category, differing_m=round(most.contradicting_m, 3))
+    least = min(one.contradicting_m for one in looks)
+    return replace(pair, category="look_alike" if least >= DIFFERENT_M else "indistinct", differing_m=round(least, 3))
 
 
 def _is_symmetric(a: _Known, b: _Known) -> bool:
@@ -206,7 +205,7 @@ def _alignments(a: _Known, b: _Known) -> list[tuple[Transform, Agreement]]:
     transforms, values = best_translations(a.truth, b.truth, _QUARTERS, _SEARCH)
     order = np.argsort(-values, kind="stable")
     middle: NDArray[np.float64] = b.truth.walls.mean(axis=0) if len(b.truth.walls) else np.zeros(2)
-    chosen = distinct(transforms, order, middle, 12, (0.5, math.radians(5.0)))
+    chosen = distinct(transforms, order, middle, 24, (0.5, math.radians(5.0)))
     refined = [refine_on_walls(a.truth, b.truth, Transform(*transforms[k].tolist()), 0.2, 400) for k in chosen]
     return [(transform, compare(a.truth, b.truth, transform, _TRUTH)) for transform in refined]
 

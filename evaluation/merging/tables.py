@@ -9,6 +9,9 @@ from lidarium.evaluation.merging.bank import Pair
 from lidarium.evaluation.merging.peers import FEATURES
 from lidarium.evaluation.merging.trials import METHODS
 
+POOR_M = 3.5
+"""Walls in common that are too few to tell one room from another [m]."""
+
 
 def bank_table(tried: dict[str, figures.Tried]) -> str:
     """Return the figures of all methods on the bank."""
@@ -48,7 +51,7 @@ def reading(tried: dict[str, figures.Tried]) -> str:
     joined = figures.times(default, lambda one: one.is_accepted)
     little = [(pair, one) for pair, one in default if figures.is_little(pair)]
     missed = [one for _, one in little if not (one.is_accepted and one.is_exact)]
-    poor = sum(one.agreeing_m < 2.5 for one in missed)
+    poor = sum(one.agreeing_m < POOR_M for one in missed)
     negatives = figures.accepted(default, figures.NEGATIVE)
     return (
         f"- Without the fallback a pair of 512 x 512 cells takes {without.median:.0f} ms (median, both maps described). The fallback ran "
@@ -56,7 +59,7 @@ def reading(tried: dict[str, figures.Tried]) -> str:
         f"searched for everywhere. Of all pairs 95 % are done in {every.p95:.0f} ms; of those that are joined, half in "
         f"{joined.median:.0f} ms.\n"
         f"- {negatives.hits} of {negatives.total} negatives are accepted, so the rate is below {100 * negatives.high:.2f} % (95 %).\n"
-        f"- Of the {len(missed)} pairs with 15 to 30 % of overlap that are missed, {poor} have less than 2.5 m of wall in common under the "
+        f"- Of the {len(missed)} pairs with 15 to 30 % of overlap that are missed, {poor} have less than {POOR_M:g} m of wall in common under the "
         "best transform: what both know is open floor, on which any two rooms agree. Whoever accepts on less accepts strangers too.\n"
         "- Indistinct negatives are maps of a floor and its copy whose difference neither robot has seen, or less than 1 m of it: they are "
         "the same as maps of one floor, so whoever joins those joins them. To refuse them all is to refuse every pair. Symmetric positives "

@@ -70,9 +70,9 @@ class ValidationSettings:
     test: str = "walls"
     hit_distance_m: float = 0.075
     miss_distance_m: float = 0.175
-    least_overlap_m2: float = 2.5
-    least_wall_m: float = 2.5
-    least_evidence_m: float = 2.2
+    least_overlap_m2: float = 5.0
+    least_wall_m: float = 3.0
+    least_evidence_m: float = 3.5
     least_across_m: float = 0.4
     hit_rate: float = 0.7
     score: float = 0.9
