@@ -115,8 +115,8 @@ def _about_bank(folder: Path, tested: int) -> str:
         f"- Undecidable: {counts['symmetric']} symmetric positives, which another transform explains as well in truth (along a corridor "
         f"every shift does), and {counts['indistinct']} indistinct negatives, which differ by less than 1 m. A refusal is right; they are "
         "in no rate.\n\n"
-        f"Half of the floors was for tuning. All figures are of the other half, {tested} pairs. It was drawn anew after two former ones had "
-        "been looked at: of the 554 and 572 negatives there 1 and 6 were accepted, the bounds were tightened, and like rooms of which "
+        f"Half of the floors was for tuning. All figures are of the other half, {tested} pairs. It was drawn anew after two former ones "
+        "had been looked at: of the 554 and 572 negatives there 1 and 6 were accepted, the bounds were tightened, and like rooms of which "
         "some overlay shows no difference were counted as indistinct. A positive is recalled where it is joined within 0.10 m and 1 degree "
         "at the overlap's centroid. Intervals are Clopper and Pearson's, 95 %."
     )

@@ -21,8 +21,10 @@ LASER_HEIGHT = 0.3
 _APARTMENTS, _OFFICES, _CORRIDORS, _LIKE_ROOMS, _REAL, _COPIED = 5, 4, 2, 4, 4, 9
 _DRAWN = {"tuning": "clinic", "test": "scene_loop_corridor"}
 _FIRST_SEED = {"tuning": 5000, "test": 8000}
-_FIRST_REAL = {"tuning": 0, "test": 8}
-_LEAST_REAL_M2 = 55.0
+_REAL_M2 = {"tuning": (55.0, 200.0), "test": (45.0, 55.0)}
+"""Free area of real apartments of each half [m2]."""
+
+_CONNECTED = 0.98
 _AREAS = {
     "apartment": dict(enumerate((60.0, 80.0, 100.0, 120.0, 140.0))),
     "office": dict(enumerate((120.0, 140.0, 160.0, 180.0, 200.0))),
@@ -89,13 +91,12 @@ def bank_floors(data: Path | None, every: int = 1) -> list[BankFloor]:
         Of each kind every so many-th is taken.
     """
     floors: list[BankFloor] = []
-    real = [] if data is None else _real_floors(Path(data))
     for half in HALVES:
         first = _FIRST_SEED[half]
         for kind, count in (("apartment", _APARTMENTS), ("office", _OFFICES), ("corridors", _CORRIDORS), ("like_rooms", _LIKE_ROOMS)):
             floors += [BankFloor(f"{kind}-{seed}", half, kind, seed) for seed in range(first, first + count, every)]
         floors.append(BankFloor(_DRAWN[half], half, "drawn"))
-        chosen = real[HALVES.index(half) :: len(HALVES)][:_REAL:every]
+        chosen = [] if data is None else _real_floors(Path(data), *_REAL_M2[half])[:_REAL:every]
         floors += [BankFloor(f"real-{path.stem[:20]}", half, "real", path=path) for path in chosen]
         originals = [floor for floor in floors if floor.half == half and floor.kind in ("apartment", "office")]
         copied = originals[:_COPIED]
@@ -119,8 +120,8 @@ def without_some_furniture(floor: Floor, seed: int) -> Floor:
     return Floor(f"{floor.name}-copy", floor.bounds, solids, starts=floor.starts)
 
 
-def _real_floors(data: Path) -> list[Path]:
-    """Return the files of LIFULL apartments that are connected and not tiny.
+def _real_floors(data: Path, least_m2: float, most_m2: float) -> list[Path]:
+    """Return the files of LIFULL apartments that are connected and of some free area [m2].
 
     Raises
     ------
@@ -133,5 +134,6 @@ def _real_floors(data: Path) -> list[Path]:
     if not (folder / "meta.json").is_file():
         raise FileNotFoundError(f"no floors of LIFULL below {data}; want {folder.relative_to(data)} there")
     meta = json.loads((folder / "meta.json").read_text())
-    wanted = [name for name, one in meta.items() if one["conn"] >= 0.98 and one["free_px"] * one["resolution"] ** 2 >= _LEAST_REAL_M2]
+    areas = {name: one["free_px"] * one["resolution"] ** 2 for name, one in meta.items() if one["conn"] >= _CONNECTED}
+    wanted = [name for name, area in areas.items() if least_m2 <= area < most_m2]
     return [folder / "txt" / f"{name}.txt" for name in sorted(wanted) if (folder / "txt" / f"{name}.txt").is_file()]

@@ -176,10 +176,10 @@ def test_walls_at_the_rim_of_what_a_map_knows_do_not_contradict():
 
 def test_what_speaks_against_a_transform_weighs_more_than_what_speaks_for_it():
     settings = ValidationSettings()
-    weak = Agreement(overlap_m2=6.0, agreeing_m=4.2, wall_m=5.9, across_m=1.3, contradicting_m=0.1, score=0.98)
-    assert weak.evidence_m == pytest.approx(4.2 - 1.7 - 0.3)
+    weak = Agreement(overlap_m2=6.0, agreeing_m=5.2, wall_m=6.0, across_m=1.3, contradicting_m=0.1, score=0.98)
+    assert weak.evidence_m == pytest.approx(5.2 - 0.8 - 0.3)
     assert why_refused(weak, settings) is None
-    assert "small overlap" in str(why_refused(replace(weak, wall_m=6.0), settings))
+    assert "small overlap" in str(why_refused(replace(weak, wall_m=6.8), settings))
     assert "contradiction" in str(why_refused(replace(weak, contradicting_m=0.2), settings))
 
 
