@@ -17,10 +17,14 @@ from lidarium.envs.wrappers.decisions import boxes_of
 from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.merging.validation import ValidationSettings
 from lidarium.mapping.rigid import Transform
 
 CanTalk = Callable[[float, NDArray[np.float64]], NDArray[np.bool_]]
 """Takes the time [s] and the true poses (robots, 3); returns which robots reach each other, (robots, robots)."""
+
+TEAM_VALIDATION = ValidationSettings(most_contradiction_m=1.0, plenty_of_wall_m=10.0, contradiction_share=0.1)
+"""Robots that do not know where the others are map their bodies as walls, so more may contradict than in maps of robots alone."""
 
 OLDEST_S = 3600.0
 """Bound of the age of news in observations [s]."""
@@ -37,12 +41,12 @@ class MergingSettings:
     known_starts : bool
         Whether the robots are told how their frames lie, for comparison; nothing is searched for then.
     merge : MergeSettings
-        How maps are merged.
+        How maps are merged; by default with `TEAM_VALIDATION`.
     """
 
     period_s: float = 1.0
     known_starts: bool = False
-    merge: MergeSettings = field(default_factory=MergeSettings)
+    merge: MergeSettings = field(default_factory=lambda: MergeSettings(validation=TEAM_VALIDATION))
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.period_s) and self.period_s > 0.0):

@@ -118,7 +118,7 @@ def test_every_level_of_decision_can_be_wrapped_and_repeats_itself(level):
 
 
 def test_robots_that_start_in_one_room_find_each_other():
-    env = team(horizon_s=16.0, noise="datasheet", resolution=0.025, map_cells=256, observe=["pose"])
+    env = team(horizon_s=8.0, noise="datasheet", resolution=0.025, map_cells=256, observe=["pose"])
     starts = {"starts": STARTS}
     episode = run_episode(lidarium.policy("nearest_frontier"), env, 2, starts, merging=MergingSettings())
     figures = result_of(episode)["merges"]
