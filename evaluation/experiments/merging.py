@@ -3,8 +3,9 @@
 import json
 import platform
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,12 @@ from lidarium.evaluation.merging.pairs import choose_pairs
 from lidarium.evaluation.merging.pictures import draw_pairs
 from lidarium.evaluation.merging.trials import METHODS, read_outcomes, try_pairs
 from lidarium.evaluation.output import write_json
+from lidarium.evaluation.workers import shared_out
 
 Progress = Iterator[tuple[str, int, int]]
 
 DATA_FILE, EXTRA_FILE = "floors.json", "extra.json"
+EXTRA = ("detectors", "descriptors", "methods", "teams", "real")
 
 
 def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
@@ -50,18 +53,27 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
         for done in try_pairs(folder / "outcomes", maps, tested, method, workers):
             yield f"pairs, {method}", done, len(tested)
     if not (folder / EXTRA_FILE).exists():
-        parts: dict[str, Callable[[], Any]] = {
-            "detectors": lambda: compare_detectors(maps),
-            "descriptors": lambda: compare_descriptors(maps),
-            "methods": lambda: compare_methods(maps, tested),
-            "teams": lambda: merge_teams(maps),
-            "real": lambda: [] if data is None else merge_real_pairs(data),
-        }
-        extra = {}
-        for done, (name, measure) in enumerate(parts.items(), 1):
-            extra[name] = measure()
-            yield "other experiments", done, len(parts)
+        extra: dict[str, Any] = {}
+        for name, rows in shared_out(partial(_measured, folder, data), EXTRA, 1, is_apart=True):
+            if isinstance(rows, Exception):
+                raise rows
+            extra[name] = rows
+            yield "other experiments", len(extra), len(EXTRA)
         write_json(folder / EXTRA_FILE, extra)
+
+
+def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]]:
+    """Do one of the other experiments, on the maps of the test half."""
+    maps = read_maps(folder, [floor for floor in _kept_floors(folder / DATA_FILE) if floor.half == "test"])
+    if name == "detectors":
+        return compare_detectors(maps)
+    if name == "descriptors":
+        return compare_descriptors(maps)
+    if name == "methods":
+        return compare_methods(maps, [pair for pair in read_pairs(folder) or [] if pair.half == "test"])
+    if name == "teams":
+        return merge_teams(maps)
+    return [] if data is None else merge_real_pairs(data)
 
 
 def page(folder: Path, command: str) -> str:
@@ -79,6 +91,7 @@ def page(folder: Path, command: str) -> str:
         _about_bank(folder, len(pairs)),
         "## The bank\n\n" + tables.bank_table(tried),
         tables.reading(tried),
+        tables.peers(tried),
         "![Pairs of the bank: joined, refused, and a look-alike](merging_pairs.png)",
         "## By overlap and stage\n\n" + tables.by_stage(tried["default"]),
         "## Beside the thesis's bank\n\n" + tables.beside_thesis(tried),

@@ -62,10 +62,10 @@ def recall(tried: Tried, of: Callable[[Pair], bool], above: float = -math.inf) -
     return Share(sum(one.is_accepted and one.is_exact and one.confidence > above for one in chosen), len(chosen))
 
 
-def accepted(tried: Tried, categories: Sequence[str]) -> Share:
-    """Return the share of the pairs of some categories that are accepted."""
+def accepted(tried: Tried, categories: Sequence[str], above: float = -math.inf) -> Share:
+    """Return the share of the pairs of some categories that are accepted by a confidence above a threshold."""
     chosen = [outcome for pair, outcome in tried if pair.category in categories]
-    return Share(sum(one.is_accepted for one in chosen), len(chosen))
+    return Share(sum(one.is_accepted and one.confidence > above for one in chosen), len(chosen))
 
 
 def refused(tried: Tried, categories: Sequence[str]) -> Share:
@@ -80,9 +80,9 @@ def wrong_positives(tried: Tried) -> Share:
     return Share(sum(one.is_accepted and not _is_near(one) for one in chosen), len(chosen))
 
 
-def safe_threshold(tried: Tried) -> float:
-    """Return the least confidence above which no negative is accepted."""
-    return max((outcome.confidence for pair, outcome in tried if pair.category in NEGATIVE and outcome.is_accepted), default=-math.inf)
+def safe_threshold(tried: Tried, categories: Sequence[str] = NEGATIVE) -> float:
+    """Return the least confidence above which no pair of some categories is accepted."""
+    return max((one.confidence for pair, one in tried if pair.category in categories and one.is_accepted), default=0.0)
 
 
 def errors(tried: Tried) -> tuple[float, float, float]:

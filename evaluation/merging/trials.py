@@ -118,7 +118,7 @@ def try_pairs(
     ]
     done = len(pairs) - sum(len(tasks) for _, tasks in missing)
     yield done
-    for (_, tasks), result in shared_out(partial(_try_chunk, folder, method, settings), missing, workers):
+    for (_, tasks), result in shared_out(partial(_try_chunk, folder, method, settings), missing, workers, is_apart=True):
         if isinstance(result, Exception):
             raise result
         done += len(tasks)

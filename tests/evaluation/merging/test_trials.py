@@ -84,6 +84,8 @@ def test_figures_count_what_they_say():
     assert figures.recall(tried, figures.is_plenty).hits == 1
     assert figures.recall(tried, figures.is_plenty).total == 3
     assert figures.safe_threshold(tried) == 0.95
+    assert figures.safe_threshold(tried, ("look_alike",)) == 0.0
+    assert figures.accepted(tried, ("negative",), above=0.95).hits == 0
     assert figures.recall(tried, figures.is_plenty, above=0.95).hits == 0
     assert figures.recall(tried, figures.is_little).value == 0.0
     assert str(figures.accepted(tried, figures.NEGATIVE)).startswith("50.0 % (1 of 2")
