@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from lidarium.evaluation.merging import bank, drives
 from lidarium.evaluation.merging.bank import BankMap, Pair, drives_of, fill, read_maps, read_pairs, write_pairs
 from lidarium.evaluation.merging.drives import PoseError, _Waves, bank_starts, drive
 from lidarium.evaluation.merging.floors import HALVES, BankFloor, bank_floors, without_some_furniture
@@ -71,7 +72,9 @@ def test_drives_keep_growing_maps_that_lie_where_the_truth_says():
     np.testing.assert_array_equal(last.levels, again[-1].levels)
 
 
-def test_the_bank_goes_on_where_it_stopped(tmp_path):
+def test_the_bank_goes_on_where_it_stopped(tmp_path, monkeypatch):
+    monkeypatch.setattr(bank, "RUNS", 1)
+    monkeypatch.setattr(drives, "HORIZON_S", 30.0)
     floors = [SCENE]
     with pytest.raises(FileNotFoundError, match="fill it first"):
         read_maps(tmp_path, floors)

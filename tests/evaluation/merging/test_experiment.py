@@ -3,9 +3,10 @@ from functools import partial
 import pytest
 
 from lidarium.evaluation.experiments import EXPERIMENTS, merging
-from lidarium.evaluation.merging import bank, drives, features
+from lidarium.evaluation.merging import bank, drives, features, trials
 from lidarium.evaluation.merging.floors import BankFloor
 from lidarium.evaluation.merging.pairs import Wanted, choose_pairs
+from lidarium.evaluation.workers import shared_out
 
 FLOORS = [
     BankFloor("scene_room", "tuning", "drawn"),
@@ -19,6 +20,9 @@ def small_bank(monkeypatch):
     few = Wanted(plenty=3, little=1, negative=2, like_places=1, copies=1, indistinct=1)
     monkeypatch.setattr(merging, "bank_floors", lambda data, every: FLOORS)
     monkeypatch.setattr(features, "REPEATS", 1)
+    for module in (merging, trials):
+        # What is patched here holds in this process alone.
+        monkeypatch.setattr(module, "shared_out", lambda work, tasks, workers, is_apart: shared_out(work, tasks, 1))
     monkeypatch.setattr(bank, "RUNS", 1)
     monkeypatch.setattr(drives, "HORIZON_S", 30.0)
     monkeypatch.setattr(merging, "choose_pairs", partial(choose_pairs, wanted=few))
