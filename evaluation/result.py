@@ -17,6 +17,7 @@ from lidarium.envs.settings import REALISM, ExplorationSettings, make_settings
 from lidarium.evaluation import metrics
 from lidarium.evaluation.beliefs import free_as_held, maps_on_floor
 from lidarium.evaluation.history import WHOLE, History
+from lidarium.evaluation.metrics.merges import merge_figures
 from lidarium.evaluation.runner import Episode
 from lidarium.evaluation.truth import truth_of
 
@@ -76,7 +77,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         "given_up": [_entry(env, given_up) for given_up in episode.given_up],
         **_pose_errors(env, history),
         **map_figures(env),
-        "merges": {"accepted": 0, "correct": 0, "false": 0, "first_correct_s": None},
+        "merges": merge_figures(episode.merges, settings.occupancy.resolution),
         "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
         "peak_mb": _rounded(metrics.peak_megabytes(), 1),
         "steps_per_s": round(steps / episode.wall_seconds, 3) if episode.wall_seconds > 0.0 else None,

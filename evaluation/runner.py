@@ -14,6 +14,7 @@ from lidarium.envs.onboard.perception import Belief
 from lidarium.envs.onboard.state import DriveState
 from lidarium.envs.solo import at_level
 from lidarium.envs.wrappers.frontiers import FrontierExploration
+from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 from lidarium.evaluation.watching import WatchedExploration
 
@@ -40,6 +41,8 @@ class Episode:
         What the policy left unexplored, and why.
     is_interrupted : bool
         Whether the user broke it off.
+    merges : list of MergeEvent
+        Which robots were joined, where maps are merged.
     """
 
     env: ExplorationEnv
@@ -49,6 +52,7 @@ class Episode:
     wall_seconds: float = 0.0
     given_up: list[GivenUp] = field(default_factory=list)
     is_interrupted: bool = False
+    merges: list[MergeEvent] = field(default_factory=list)
 
 
 class RunningTeam:
@@ -83,6 +87,7 @@ def run_episode(
     options: Mapping[str, Any] | None = None,
     on_decision: Progress | None = None,
     raise_interrupt: bool = True,
+    merging: MergingSettings | None = None,
 ) -> Episode:
     """Run a policy from reset until every robot has ended.
 
@@ -100,14 +105,17 @@ def run_episode(
         Called with the environment after the reset and after every decision, for progress, pictures and records.
     raise_interrupt : bool
         Whether ``KeyboardInterrupt`` is passed on; otherwise the episode so far is returned.
+    merging : MergingSettings or None
+        How the robots merge their maps (`MergedMaps`); they do not where None.
 
     Returns
     -------
     Episode
         What it left.
     """
-    world = at_level(env, policy.level, policy.shares_map)
-    driver = world.waypoints if isinstance(world, FrontierExploration) else world
+    level = at_level(env, policy.level, policy.shares_map)
+    driver = level.waypoints if isinstance(level, FrontierExploration) else level
+    world = level if merging is None else MergedMaps(level, merging)
     episode = Episode(env, policy, seed)
     began = time.perf_counter()
     try:
@@ -132,11 +140,12 @@ def run_episode(
         episode.is_interrupted = True
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(getattr(policy, "given_up", []))
+    episode.merges = world.events if isinstance(world, MergedMaps) else []
     return episode
 
 
 def decide(
-    policy: Policy, world: ExplorationEnv | WaypointExploration | FrontierExploration, observations: Mapping[str, Observation]
+    policy: Policy, world: ExplorationEnv | WaypointExploration | FrontierExploration | MergedMaps, observations: Mapping[str, Observation]
 ) -> dict[str, NDArray[np.float32] | Any]:
     """Ask a policy, and turn each ``Stop`` into an order to the environment."""
     actions: dict[str, Any] = {}

@@ -17,7 +17,9 @@ WAITING_PER_WORKER = 2
 """Tasks that are handed over before a worker is free, so that it never waits."""
 
 
-def shared_out(work: Callable[[Task], Result], tasks: Iterable[Task], workers: int) -> Iterator[tuple[Task, Result | Exception]]:
+def shared_out(
+    work: Callable[[Task], Result], tasks: Iterable[Task], workers: int, *, is_apart: bool = False
+) -> Iterator[tuple[Task, Result | Exception]]:
     """Do tasks in this process (one worker) or in several of their own, and yield each with its result as it is ready.
 
     Parameters
@@ -28,6 +30,8 @@ def shared_out(work: Callable[[Task], Result], tasks: Iterable[Task], workers: i
         Tasks and results go between processes, so they can be pickled.
     workers : int
         How many processes.
+    is_apart : bool
+        Whether one worker, too, is a process of its own, in which libraries keep to one thread: for what is timed.
 
     Yields
     ------
@@ -35,14 +39,14 @@ def shared_out(work: Callable[[Task], Result], tasks: Iterable[Task], workers: i
         An exception that the task has raised is its result. A task whose process died has a ``RuntimeError``; those that
         were under way beside it are done again.
     """
-    if workers <= 1:
+    if workers <= 1 and not is_apart:
         for task in tasks:
             yield task, _attempted(work, task)
         return
     pending = iter(tasks)
     suspects: list[Task] = []
     while True:
-        lost = yield from _in_pool(work, pending, workers)
+        lost = yield from _in_pool(work, pending, max(workers, 1))
         for suspect in lost:
             # Who brought the others down does it again, alone.
             suspects = yield from _in_pool(work, iter([suspect]), 1)
@@ -59,6 +63,9 @@ def _in_pool(
     context = multiprocessing.get_context("spawn")
     lost: list[Task] = []
     running: dict[Future[Result], Task] = {}
+    # Linear algebra reads its number of threads when it is loaded.
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
     is_whole = False
     try:

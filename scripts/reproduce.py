@@ -1,6 +1,8 @@
 """`lidarium reproduce`: published results, made anew by one command."""
 
 import os
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -13,13 +15,14 @@ if TYPE_CHECKING:
     from lidarium.evaluation.campaign import Campaign
 
 DEFAULT_FOLDER = Path("docs/results")
+SECONDS_BETWEEN_NEWS = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce(Command):
     """Run what a page of docs/results shows, and write the page to --out; what has been run before is not run again."""
 
-    name: Positional[Literal["leaderboard"]]
+    name: Positional[Literal["leaderboard", "merging"]]
     """which page"""
     data: Path | None = None
     """folder of real floors; without it generated floors alone"""
@@ -59,6 +62,10 @@ def execute(command: Reproduce) -> Answer:
     for name, campaign in campaigns.items():
         if not _ran(campaign, name, command.json):
             return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
+    if experiment.work is not None and not _worked(experiment.work(folder, command.data, command.every, workers), command.json):
+        return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
+    if experiment.pictures is not None:
+        experiment.pictures(folder, out)
     page = out / f"{command.name}.md"
     write_text(page, experiment.page(folder, _command_line(command)))
     failures = [(trial, error) for campaign in campaigns.values() for trial, error in campaign.failures]
@@ -78,6 +85,19 @@ def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
         return False
     finally:
         runs.close()
+    return True
+
+
+def _worked(work: Iterator[tuple[str, int, int]], is_quiet: bool) -> bool:
+    """Do an experiment's own work, and tell of it now and then; False where the user broke it off."""
+    before, told_at = "", 0.0
+    try:
+        for what, done, total in work:
+            if not is_quiet and (what != before or time.monotonic() - told_at > SECONDS_BETWEEN_NEWS):
+                tell(f"{what}: {done} of {total}" if total > done else f"{what}: {done}")
+                before, told_at = what, time.monotonic()
+    except KeyboardInterrupt:
+        return False
     return True
 
 

@@ -223,6 +223,14 @@ class Perception:
             self._own[row] = navigation
         return navigation
 
+    def known_window(self, row: int) -> tuple[int, int, int, int]:
+        """Return the first and last rows and columns, exclusive, that hold all that a robot's own map knows."""
+        self.own_map(row)
+        low_row, high_row, low_column, high_column = (int(value) for value in self._known[row])
+        rows, columns = self.world.log_odds[row].shape
+        low_row, low_column = max(low_row, 0), max(low_column, 0)
+        return low_row, max(min(high_row, rows), low_row), low_column, max(min(high_column, columns), low_column)
+
     def shared_map(self, row: int = 0) -> NavigationMap | None:
         """Return the team's map as it reached a robot, up to date; a lone robot's is its own, with unknown starts there is none."""
         if not self.settings.known_starts:

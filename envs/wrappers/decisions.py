@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
@@ -48,3 +49,9 @@ class DecisionWrapper(ParallelEnv[str, Observation, Any]):
     def close(self) -> None:
         """Close the window, if there is one."""
         self.env.close()
+
+
+def boxes_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
+    """Return the parts of a space of observations, by key."""
+    assert isinstance(space, spaces.Dict)
+    return dict(space.spaces)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.onboard.frontier_offers import CANDIDATES, FARTHEST, REASONS, FrontierOffers
-from lidarium.envs.wrappers.decisions import DecisionWrapper
+from lidarium.envs.wrappers.decisions import DecisionWrapper, boxes_of
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 
 
@@ -36,7 +36,7 @@ class FrontierExploration(DecisionWrapper):
         self.waypoints = WaypointExploration(env, shares_map)
         self._offers = FrontierOffers(env.perception, env.settings, self.waypoints.driver)
         self._observation_spaces = {
-            agent: spaces.Dict({**_boxes(env.observation_space(agent)), **frontier_boxes()}) for agent in self.possible_agents
+            agent: spaces.Dict({**boxes_of(env.observation_space(agent)), **frontier_boxes()}) for agent in self.possible_agents
         }
         self._action_spaces = {agent: spaces.Discrete(CANDIDATES + 1) for agent in self.possible_agents}
 
@@ -104,8 +104,3 @@ def frontier_boxes() -> dict[str, spaces.Space[Any]]:
     high = np.full((CANDIDATES, 4), FARTHEST, np.float32)
     low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (CANDIDATES, 1))
     return {"frontiers": spaces.Box(low, high, dtype=np.float32), "action_mask": spaces.Box(0, 1, (CANDIDATES + 1,), np.int8)}
-
-
-def _boxes(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
-    assert isinstance(space, spaces.Dict)
-    return dict(space.spaces)

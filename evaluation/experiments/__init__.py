@@ -1,11 +1,16 @@
-"""Published results that one command makes anew: suites and tables on top of the campaign and the report, nothing else."""
+"""Published results that one command makes anew: suites of episodes, or work of their own, and the page that tells of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from lidarium.evaluation.experiments import leaderboard
+from lidarium.evaluation.experiments import leaderboard, merging
 from lidarium.evaluation.suite import Suite
+
+
+def no_suites(_data: Path | None, _every: int) -> dict[str, Suite]:
+    """Return no suites: the experiment has work of its own."""
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,20 +21,33 @@ class Experiment:
     ----------
     about : str
         One line for people.
-    suites : callable
-        Takes the folder of real data (or None) and the share of the floors that is run, every how many-th; returns suites by name.
     page : callable
         Takes the folder that the suites have run into, a folder for each by its name, and returns the page for ``docs/results``.
+    suites : callable
+        Takes the folder of real data (or None) and the share of the floors that is run, every how many-th; returns suites by name.
+    work : callable or None
+        What is done beside suites: takes the folder, that of real data (or None), every how many-th floor and the number of processes,
+        and yields what is being done, how much of it is, and of how much. What the folder has is not done again.
+    pictures : callable or None
+        Takes the folder and that of the page, and draws the page's pictures.
     """
 
     about: str
-    suites: Callable[[Path | None, int], dict[str, Suite]]
     page: Callable[[Path, str], str]
+    suites: Callable[[Path | None, int], dict[str, Suite]] = no_suites
+    work: Callable[[Path, Path | None, int, int], Iterator[tuple[str, int, int]]] | None = None
+    pictures: Callable[[Path, Path], None] | None = None
 
 
 EXPERIMENTS: dict[str, Experiment] = {
     "leaderboard": Experiment(
-        "all policies on generated and real floors, 1 to 3 robots, known starts", leaderboard.suites, leaderboard.page
-    )
+        "all policies on generated and real floors, 1 to 3 robots, known starts", leaderboard.page, leaderboard.suites
+    ),
+    "merging": Experiment(
+        "map merging on a bank of maps that robots made, beside the thesis and ROS map_merge",
+        merging.page,
+        work=merging.work,
+        pictures=merging.pictures,
+    ),
 }
 """By name; the page of one is ``docs/results/NAME.md``."""

@@ -7,9 +7,12 @@ What is correct: the tolerances of m-explore's own test of its map merging (Hör
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from lidarium.envs.wrappers.merged_maps import MergeEvent
 
 ROTATION_TOLERANCE = 1e-2
 """Largest error of the rotation of a correct merge [rad]."""
@@ -54,6 +57,33 @@ def is_correct(translation_error: float, rotation_error: float, resolution: floa
     """
     # A millionth of a cell, so that an error of exactly two cells is not lost to rounding.
     return rotation_error <= ROTATION_TOLERANCE and translation_error <= (TRANSLATION_TOLERANCE + 1e-6) * resolution
+
+
+def merge_figures(events: Sequence[MergeEvent], resolution: float) -> dict[str, Any]:
+    """Return the entry ``merges`` of ``result.json``.
+
+    Parameters
+    ----------
+    events : sequence of MergeEvent
+        All of an episode.
+    resolution : float
+        Side of a cell of the maps [m].
+
+    Returns
+    -------
+    dict
+        ``accepted``, ``correct`` and ``false`` are numbers of events, ``first_correct_s`` is a time or None.
+    """
+    accepted = np.ones(len(events), np.bool_)
+    correct = np.array([is_correct(*transform_error(one.found, one.true, one.at), resolution) for one in events], np.bool_)
+    right = int(np.count_nonzero(correct))
+    times = [one.time_s for one in events]
+    return {
+        "accepted": len(events),
+        "correct": right,
+        "false": len(events) - right,
+        "first_correct_s": first_correct_time(times, accepted, correct),
+    }
 
 
 def precision(accepted: NDArray[np.bool_], correct: NDArray[np.bool_]) -> float | None:

@@ -16,6 +16,9 @@ MAX_SIDE = 20_000
 _FACING_REACH = 3
 _FAR = 1e6
 
+OPEN_DISTANCE_M = 0.1
+"""How far from all that is not free a cell lies in the open [m]: a wall that two maps of 4 cm error lay at the rim of free space is not."""
+
 FACING_DISTANCE_M = 0.075
 """How far before and behind a wall is looked to tell its side [m]; half of what thin walls measure."""
 
@@ -40,6 +43,8 @@ class DescribedMap:
         Which way each of them faces: unit vectors towards the free space around it, zero where that has no side.
     distance : (rows, columns) float32
         Distance to the nearest of these walls [m]; large where there is none.
+    is_open : (rows, columns) uint8
+        1 where all around a cell is free, so that no wall that is seen elsewhere can belong there.
     """
 
     levels: NDArray[np.uint8]
@@ -49,6 +54,7 @@ class DescribedMap:
     walls: NDArray[np.float64]
     normals: NDArray[np.float64]
     distance: NDArray[np.float32]
+    is_open: NDArray[np.uint8]
 
 
 def describe_map(
@@ -85,9 +91,8 @@ def describe_map(
     descriptors = describe_corners(three, resolution, corners, descriptor_settings)
     cells, normals = _walls(three)
     distance = _distance(three.shape, cells, resolution)
-    return DescribedMap(
-        three, float(resolution), corners, descriptors, np.asarray((cells + 0.5) * resolution, np.float64), normals, distance
-    )
+    walls = np.asarray((cells + 0.5) * resolution, np.float64)
+    return DescribedMap(three, float(resolution), corners, descriptors, walls, normals, distance, _open(three, resolution))
 
 
 def three_levels_of(levels: ArrayLike, settings: CornerSettings) -> NDArray[np.uint8]:
@@ -147,6 +152,13 @@ def _walls(levels: NDArray[np.uint8]) -> tuple[NDArray[np.int32], NDArray[np.flo
     normals = np.zeros((count, 2))
     _face(levels, cells, _FACING_REACH, normals)
     return cells[:count], normals
+
+
+def _open(levels: NDArray[np.uint8], resolution: float) -> NDArray[np.uint8]:
+    """Return 1 where a cell and all within `OPEN_DISTANCE_M` along the axes, a cell at least, are free."""
+    reach = max(round(OPEN_DISTANCE_M / resolution), 1)
+    is_free = np.asarray(levels == FREE, np.uint8)
+    return np.asarray(cv2.erode(is_free, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8), borderValue=0.0), np.uint8)
 
 
 def _distance(shape: tuple[int, ...], cells: NDArray[np.int32], resolution: float) -> NDArray[np.float32]:

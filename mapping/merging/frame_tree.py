@@ -5,8 +5,9 @@ group that was there first, and stays where it is while others join.
 """
 
 import math
-from collections.abc import Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Generic, TypeVar
 
 from lidarium.mapping.rigid import Transform
@@ -52,6 +53,7 @@ class FrameTree(Generic[Name]):
     _names: list[Name] = field(default_factory=list)
     _edges: dict[frozenset[Name], Edge[Name]] = field(default_factory=dict)
     _roots: list[Name] = field(default_factory=list)
+    _seniors: list[Name] = field(default_factory=list)
     _tree: dict[Name, dict[Name, Transform]] = field(default_factory=dict)
     _dropped: list[Edge[Name]] = field(default_factory=list)
 
@@ -84,6 +86,46 @@ class FrameTree(Generic[Name]):
         ValueError
             Where it joins a map with itself, or is not finite.
         """
+        pair = self._admitted(edge)
+        if pair not in self._edges or edge.weight > self._edges[pair].weight:
+            self._edges[pair] = edge
+            self._rebuild()
+
+    def set_edges(self, edges: Iterable[Edge[Name]], contradicts: Callable[[Name, Name, Transform], bool] | None = None) -> None:
+        """Put transforms in the place of all that there were; the world stays where it is for as long as its root is joined with any map.
+
+        Parameters
+        ----------
+        edges : iterable of Edge
+            At most one between two maps.
+        contradicts : callable or None
+            Asked of maps that are joined through others alone, with the transform of the second into the first that this implies: whether
+            the maps cannot lie over each other so. The weakest transform between them is dropped then.
+
+        Raises
+        ------
+        ValueError
+            As `add_edge`.
+        """
+        self._edges = {self._admitted(edge): edge for edge in edges}
+        self._rebuild(contradicts)
+
+    def remove_edge(self, a: Name, b: Name) -> None:
+        """Take the transform between two maps away, if there is one."""
+        if self._edges.pop(frozenset((a, b)), None) is not None:
+            self._rebuild()
+
+    def remove_map(self, name: Name) -> None:
+        """Take a map and all of its transforms away, if there is one."""
+        if name in self._tree:
+            self._names.remove(name)
+            del self._tree[name]
+            self._edges = {pair: edge for pair, edge in self._edges.items() if name not in pair}
+            self._seniors = [senior for senior in self._seniors if senior != name]
+            self._rebuild()
+
+    def _admitted(self, edge: Edge[Name]) -> frozenset[Name]:
+        """Check an edge, add its maps, and return them."""
         if edge.a == edge.b:
             raise ValueError(f"an edge joins map {edge.a!r} with itself; want two maps")
         pose = edge.a_from_b
@@ -91,15 +133,7 @@ class FrameTree(Generic[Name]):
             raise ValueError(f"the edge between {edge.a!r} and {edge.b!r} is {edge}; want finite numbers")
         self.add_map(edge.a)
         self.add_map(edge.b)
-        pair = frozenset((edge.a, edge.b))
-        if pair not in self._edges or edge.weight > self._edges[pair].weight:
-            self._edges[pair] = edge
-            self._rebuild()
-
-    def remove_edge(self, a: Name, b: Name) -> None:
-        """Take the transform between two maps away, if there is one."""
-        if self._edges.pop(frozenset((a, b)), None) is not None:
-            self._rebuild()
+        return frozenset((edge.a, edge.b))
 
     def groups(self) -> list[list[Name]]:
         """Return the maps that are joined with one another, each group with its root first; the world's first."""
@@ -140,21 +174,43 @@ class FrameTree(Generic[Name]):
                     waiting.append(other)
         return reached
 
-    def _rebuild(self) -> None:
-        """Build the forest of most weight; drop the weakest edge of a cycle that does not close, until all close."""
+    def _rebuild(self, contradicts: Callable[[Name, Name, Transform], bool] | None = None) -> None:
+        """Build the forest of most weight; drop the weakest edge of what cannot be true, until nothing is left of that kind."""
         self._dropped = []
         while True:
             usable = [edge for edge in self._edges.values() if edge not in self._dropped]
             # Equal weights keep the order in which edges came.
             usable.sort(key=lambda edge: -edge.weight)
             left_over = self._grow(usable)
-            broken = [(self._misses(edge), edge) for edge in left_over]
-            worst = max(broken, key=lambda one: one[0], default=None)
-            if worst is None or worst[0] <= 1.0:
+            worst = max(((self._misses(edge), edge) for edge in left_over), key=lambda one: one[0], default=None)
+            if worst is not None and worst[0] > 1.0:
+                # The forest has the most weight, so the edge outside of it is the weakest of its cycle.
+                self._dropped.append(worst[1])
+                continue
+            culprit = None if contradicts is None else self._culprit(contradicts)
+            if culprit is None:
                 break
-            # The forest has the most weight, so the edge outside of it is the weakest of its cycle.
-            self._dropped.append(worst[1])
+            self._dropped.append(culprit)
         self._settle_roots()
+
+    def _culprit(self, contradicts: Callable[[Name, Name, Transform], bool]) -> Edge[Name] | None:
+        """Return the weakest edge on the way between two maps that the forest lays over each other and that contradict each other so."""
+        for a, b in combinations(self._names, 2):
+            way = self._way(a, b)
+            if len(way) > 1 and frozenset((a, b)) not in self._edges and contradicts(a, b, self._reached_from(a)[b]):
+                return min(way, key=lambda edge: edge.weight)
+        return None
+
+    def _way(self, a: Name, b: Name) -> list[Edge[Name]]:
+        """Return the edges of the forest between two maps, none where they are not joined."""
+        ways: dict[Name, list[Edge[Name]]] = {a: []}
+        waiting = [a]
+        for name in waiting:
+            for other in self._tree[name]:
+                if other not in ways:
+                    ways[other] = [*ways[name], self._edges[frozenset((name, other))]]
+                    waiting.append(other)
+        return ways.get(b, [])
 
     def _grow(self, edges: Iterable[Edge[Name]]) -> list[Edge[Name]]:
         """Join maps by edges in turn; return the edges between maps that were joined already."""
@@ -179,11 +235,12 @@ class FrameTree(Generic[Name]):
         return max(distance / self.cycle_distance_m, angle / self.cycle_angle)
 
     def _settle_roots(self) -> None:
-        """Keep the roots that there were, the older one where groups have become one; new groups get their first map."""
+        """Keep the roots that there were, the oldest one where groups have become one; new groups get their first map."""
         roots: list[Name] = []
         taken: set[Name] = set()
-        for name in [*self._roots, *(name for name in self._names if self._tree[name])]:
+        for name in [*self._seniors, *(name for name in self._names if self._tree[name])]:
             if name not in taken and self._tree[name]:
                 roots.append(name)
                 taken |= set(self._reached_from(name))
+        self._seniors += [name for name in roots if name not in self._seniors]
         self._roots = roots

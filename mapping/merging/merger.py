@@ -2,15 +2,15 @@
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.merging.described_map import check_resolution, resampled, three_levels_of
+from lidarium.mapping.merging.described_map import DescribedMap, check_resolution, resampled, three_levels_of
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.pair import PairResult, described, merge_pair
+from lidarium.mapping.merging.pair import PairResult, described, is_contradicted, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.rigid import Transform
 
@@ -29,12 +29,15 @@ class Merged:
         Every pair, in the order in which the maps were given.
     tree : FrameTree
         The maps' frames. What is accepted as a pair and contradicts stronger pairs is among ``tree.dropped``.
+    origins : dict of str to (x, y)
+        Lower left corner of cell (0, 0) of each map in its frame [m]; (0, 0) where a map is not named.
     """
 
     levels: dict[str, NDArray[np.uint8]]
     resolution: float
     pairs: dict[tuple[str, str], PairResult]
     tree: FrameTree[str]
+    origins: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def groups(self) -> list[list[str]]:
         """Return the names of the maps that are joined, the root of each group first; a map that joins none is a group of its own."""
@@ -51,10 +54,11 @@ class Merged:
         return fuse([self.levels[name] for name in group], [self._into(group[0], name) for name in group], self.resolution)
 
     def _into(self, root: str, name: str) -> Transform:
+        """Return the transform from a map's lower left corner into the frame of another map."""
         transform = self.tree.lookup(root, name)
         if transform is None:
             raise ValueError(f"map {name!r} is not joined with {root!r}; want maps of one group")
-        return transform
+        return transform @ placed(self.origins.get(name, (0.0, 0.0)))
 
 
 def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSettings | None = None) -> Merged:
@@ -83,18 +87,64 @@ def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSetti
         raise ValueError("there are no maps to merge; want at least one")
     levels, resolution = _alike(maps, settings)
     features = {name: described(grid, resolution, settings) for name, grid in levels.items()}
-    tree: FrameTree[str] = FrameTree(settings.cycle_distance_m, settings.cycle_angle)
-    for name in maps:
-        tree.add_map(name)
     pairs = {(a, b): merge_pair(features[a], features[b], settings) for a, b in itertools.combinations(maps, 2)}
+    return Merged(levels, resolution, pairs, joined_tree(features, pairs, settings))
+
+
+def joined_tree(
+    features: Mapping[str, DescribedMap],
+    pairs: Mapping[tuple[str, str], PairResult],
+    settings: MergeSettings,
+    origins: Mapping[str, tuple[float, float]] | None = None,
+    tree: FrameTree[str] | None = None,
+) -> FrameTree[str]:
+    """Join maps by what was accepted of their pairs.
+
+    Maps that are joined through others alone must not contradict each other either: else the weakest pair between them is dropped.
+
+    Parameters
+    ----------
+    features : mapping of str to DescribedMap
+        The maps.
+    pairs : mapping of (str, str) to PairResult
+        What came of each two, from lower left corner to lower left corner.
+    settings : MergeSettings
+        What contradicts.
+    origins : mapping of str to (x, y) or None
+        Lower left corner of each map in its frame [m]; (0, 0) for all where None.
+    tree : FrameTree or None
+        Of an earlier call, whose world shall stay where it is; it is changed. A new one where None.
+
+    Returns
+    -------
+    FrameTree
+        The maps' frames.
+    """
+    tree = tree or FrameTree(settings.cycle_distance_m, settings.cycle_angle)
+    for name in tree.names:
+        if name not in features:
+            tree.remove_map(name)
+    for name in features:
+        tree.add_map(name)
+    frames = {name: placed((origins or {}).get(name, (0.0, 0.0))) for name in features}
+    edges = []
     for (a, b), result in pairs.items():
         if result.is_accepted and result.a_from_b is not None:
-            tree.add_edge(Edge(a, b, result.a_from_b, _weight(result), result.agreement.centre))
-    return Merged(levels, resolution, pairs, tree)
+            centre = frames[b].apply(result.agreement.centre)
+            a_from_b = frames[a] @ result.a_from_b @ frames[b].inverse()
+            edges.append(Edge(a, b, a_from_b, result.agreement.evidence_m, (float(centre[0]), float(centre[1]))))
+
+    def contradicts(a: str, b: str, a_from_b: Transform) -> bool:
+        implied = frames[a].inverse() @ a_from_b @ frames[b]
+        return is_contradicted(features[a], features[b], implied, settings)
+
+    tree.set_edges(edges, contradicts)
+    return tree
 
 
-def _weight(result: PairResult) -> float:
-    return result.agreement.evidence_m
+def placed(origin: tuple[float, float]) -> Transform:
+    """Return the transform from a map's lower left corner into its frame."""
+    return Transform(float(origin[0]), float(origin[1]), 0.0)
 
 
 def _alike(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSettings) -> tuple[dict[str, NDArray[np.uint8]], float]:

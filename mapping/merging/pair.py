@@ -12,7 +12,7 @@ from lidarium.mapping.merging.correlation import best_translations
 from lidarium.mapping.merging.correspondence import Matches, match_corners
 from lidarium.mapping.merging.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import Agreement, compare, disc_agreement, is_rival, why_refused
+from lidarium.mapping.merging.validation import Agreement, compare, disc_agreement, has_contradiction, is_rival, why_refused
 from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_walls
 from lidarium.mapping.rigid import Transform, halfway
 
@@ -40,7 +40,7 @@ class PairResult:
     agreement : Agreement
         What the score is made of.
     found_by : str
-        ``corners`` or ``correlation``.
+        ``corners``, ``correlation``, or ``verification`` of what was found before.
     time_ms : float
         Processor time, descriptions of the maps not included [ms].
     joined : ((n, 2), (n, 2)) float64
@@ -100,6 +100,45 @@ def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None 
     matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, settings.correspondence)
     merge = _merge_by_discs if settings.validation.test == "discs" else _merge_by_walls
     return replace(merge(a, b, matches, settings), matches=len(matches), time_ms=1e3 * (time.process_time() - began))
+
+
+def verify_pair(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings | None = None) -> PairResult:
+    """Verify a transform that was found before, when the maps knew less: it is refined and judged, nothing is searched for.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        Maps of one resolution.
+    a_from_b : Transform
+        What was found.
+    settings : MergeSettings or None
+        How it is judged.
+
+    Returns
+    -------
+    PairResult
+        The refined transform, or the reason why it is believed no more.
+    """
+    settings = settings or MergeSettings()
+    began = time.process_time()
+    start = Candidate(a_from_b, _NONE)
+    judged = _polished(a, b, _judged(a, b, start, settings), settings)
+    return PairResult(
+        is_accepted=judged.refusal is None,
+        reason=judged.refusal or "accepted",
+        a_from_b=judged.candidate.a_from_b,
+        score=judged.agreement.score,
+        agreement=judged.agreement,
+        found_by="verification",
+        time_ms=1e3 * (time.process_time() - began),
+    )
+
+
+def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings) -> bool:
+    """Return whether maps contradict each other where a transform that other maps imply lays them, having settled on their walls."""
+    settled = refine_on_walls(a, b, a_from_b, settings.cycle_distance_m, settings.alignment.wall_samples)
+    agreement = compare(a, b, settled, settings.validation)
+    return agreement.overlap_m2 >= settings.validation.least_overlap_m2 and has_contradiction(agreement, settings.validation)
 
 
 def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> PairResult:
@@ -227,6 +266,12 @@ def _ambiguity(a: DescribedMap, b: DescribedMap, best: _Judged, judged: list[_Ju
         distance, angle = transform.difference(other.candidate.a_from_b, best.agreement.centre)
         if distance <= validation.rival_distance_m and angle <= validation.rival_angle:
             continue
+        if other.agreement.evidence_m > validation.rival_lead * best.agreement.evidence_m:
+            return (
+                f"contradiction: moved by {distance:.1f} m and turned by {math.degrees(angle):.0f} deg, "
+                f"{other.agreement.evidence_m:.1f} m of walls speak for it instead of {best.agreement.evidence_m:.1f} m, "
+                f"but {other.refusal}"
+            )
         if is_rival(other.agreement, best.agreement, validation):
             return (
                 f"ambiguous: moved by {distance:.1f} m and turned by {math.degrees(angle):.0f} deg, "

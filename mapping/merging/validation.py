@@ -36,11 +36,13 @@ class ValidationSettings:
     hit_distance_m : float
         A wall agrees where the other map has one within this distance [m], or within a cell and a half.
     miss_distance_m : float
-        A wall contradicts where it stands in the other map's free space farther than this from any wall [m].
+        A wall contradicts where it stands in the open of the other map, farther than this from any wall [m].
     least_overlap_m2 : float
         Least area that both know [m2].
     least_wall_m : float
         Least length of walls that agree [m].
+    least_evidence_m : float
+        Least length of walls that agree, less that of walls that do not and three times that of walls that contradict [m].
     least_across_m : float
         Least length of walls that hold the maps in the direction in which they are held least [m]: two straight corridors agree
         wherever they are laid over each other.
@@ -57,6 +59,8 @@ class ValidationSettings:
     rival_share : float
         A rival that nothing contradicts makes the best transform ambiguous where the walls that agree under it are longer than this
         share of those under the best.
+    rival_lead : float
+        A rival that is refused still speaks against the best transform where so many times more wall speaks for it.
     disc_radius_cells : int
         Radius of the discs [cells].
     disc_agreement : float
@@ -66,17 +70,19 @@ class ValidationSettings:
     test: str = "walls"
     hit_distance_m: float = 0.075
     miss_distance_m: float = 0.175
-    least_overlap_m2: float = 4.0
-    least_wall_m: float = 4.0
-    least_across_m: float = 1.0
+    least_overlap_m2: float = 5.0
+    least_wall_m: float = 3.0
+    least_evidence_m: float = 3.5
+    least_across_m: float = 0.4
     hit_rate: float = 0.7
     score: float = 0.9
-    most_contradiction_m: float = 0.5
-    plenty_of_wall_m: float = 80.0
+    most_contradiction_m: float = 0.15
+    plenty_of_wall_m: float = 200.0
     contradiction_share: float = 0.1
     rival_distance_m: float = 0.5
     rival_angle: float = math.radians(5.0)
-    rival_share: float = 0.5
+    rival_share: float = 0.6
+    rival_lead: float = 1.5
     disc_radius_cells: int = 25
     disc_agreement: float = 0.90
 
@@ -86,8 +92,9 @@ class ValidationSettings:
         for name in ("hit_rate", "score", "contradiction_share", "rival_share", "disc_agreement"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
-        lengths = ("hit_distance_m", "miss_distance_m", "least_wall_m", "least_across_m", "most_contradiction_m", "plenty_of_wall_m")
-        for name in ("least_overlap_m2", "rival_distance_m", *lengths):
+        least = ("least_overlap_m2", "least_wall_m", "least_evidence_m", "least_across_m")
+        lengths = ("hit_distance_m", "miss_distance_m", "most_contradiction_m", "plenty_of_wall_m", "rival_distance_m", "rival_lead")
+        for name in (*least, *lengths):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want zero or more")
         if self.disc_radius_cells < 1:
@@ -131,8 +138,8 @@ class Agreement:
 
     @property
     def evidence_m(self) -> float:
-        """Walls that agree less those that do not, which weigh more [m]."""
-        return self.agreeing_m - 3.0 * self.contradicting_m
+        """Walls that agree less those that do not, and less those that contradict, which weigh more [m]."""
+        return 2.0 * self.agreeing_m - self.wall_m - 3.0 * self.contradicting_m
 
 
 def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: ValidationSettings) -> Agreement:
@@ -156,8 +163,8 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
     hit, miss = max(settings.hit_distance_m, 1.5 * side), max(settings.miss_distance_m, 2.5 * side)
     b_from_a = a_from_b.inverse()
     walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
-    _count_walls(a.levels, a.distance, 1.0 / side, b.walls, b.normals, _pose(a_from_b), hit, miss, walls[0], facing[0])
-    _count_walls(b.levels, b.distance, 1.0 / side, a.walls, a.normals, _pose(b_from_a), hit, miss, walls[1], facing[1])
+    _count_walls(a.levels, a.distance, a.is_open, 1.0 / side, b.walls, b.normals, _pose(a_from_b), hit, miss, walls[0], facing[0])
+    _count_walls(b.levels, b.distance, b.is_open, 1.0 / side, a.walls, a.normals, _pose(b_from_a), hit, miss, walls[1], facing[1])
     area = np.zeros(3)
     _count_overlap(a.levels, b.levels, side, _pose(a_from_b), area)
     both = float(area[0])
@@ -171,19 +178,26 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
 
 def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | None:
     """Return why a transform is refused, rivals aside, or None where nothing speaks against it."""
-    allowed = _excused(agreement, settings)
     if agreement.overlap_m2 < settings.least_overlap_m2:
         return f"small overlap: {agreement.overlap_m2:.1f} m2 known in both, want {settings.least_overlap_m2:g}"
-    if agreement.contradicting_m > allowed or agreement.score < settings.score:
+    if has_contradiction(agreement, settings):
+        allowed = _excused(agreement, settings)
         return f"contradiction: {agreement.contradicting_m:.1f} m of walls stand where the other map is free, at most {allowed:.1f} m may"
     if agreement.hit_rate < settings.hit_rate:
         share, wanted = 100.0 * agreement.hit_rate, 100.0 * settings.hit_rate
         return f"contradiction: {share:.0f} % of the walls in the overlap agree, want {wanted:.0f} %"
     if agreement.agreeing_m < settings.least_wall_m:
         return f"small overlap: {agreement.agreeing_m:.1f} m of walls agree, want {settings.least_wall_m:g}"
+    if agreement.evidence_m < settings.least_evidence_m:
+        return f"small overlap: {agreement.evidence_m:.1f} m of walls speak for it, want {settings.least_evidence_m:g}"
     if agreement.across_m < settings.least_across_m:
         return f"ambiguous: {agreement.across_m:.1f} m of walls hold the maps in one direction, want {settings.least_across_m:g}"
     return None
+
+
+def has_contradiction(agreement: Agreement, settings: ValidationSettings) -> bool:
+    """Return whether more contradicts than is excused."""
+    return agreement.contradicting_m > _excused(agreement, settings) or agreement.score < settings.score
 
 
 def is_rival(agreement: Agreement, best: Agreement, settings: ValidationSettings) -> bool:
@@ -222,6 +236,7 @@ def _pose(transform: Transform) -> tuple[float, float, float]:
 def _count_walls(
     levels: Array,
     distance: Array,
+    is_open: Array,
     scale: float,
     walls: Array,
     normals: Array,
@@ -251,7 +266,7 @@ def _count_walls(
                 facing[1] += normals[i, 0] * normals[i, 1]
                 facing[2] += normals[i, 1] * normals[i, 1]
             elif levels[y, x] == FREE:
-                counts[1 if distance[y, x] <= miss else 2] += 1
+                counts[2 if is_open[y, x] != 0 and distance[y, x] > miss else 1] += 1
 
 
 @kernel

@@ -1,5 +1,7 @@
 """Tasks are shared out; a task that fails or whose process dies concerns nobody else."""
 
+import os
+
 import pytest
 
 from lidarium.evaluation.workers import shared_out
@@ -25,3 +27,10 @@ def test_who_stops_listening_ends_the_work():
     running = shared_out(eval, iter(str(number) for number in range(10**9)), 2)
     next(running)
     running.close()
+
+
+def test_one_worker_can_be_a_process_of_its_own_with_one_thread():
+    tasks = ["__import__('os').getpid()", "__import__('os').environ['OPENBLAS_NUM_THREADS']"]
+    results = dict(shared_out(eval, tasks, 1, is_apart=True))
+    assert results[tasks[0]] != os.getpid()
+    assert int(results[tasks[1]]) >= 1

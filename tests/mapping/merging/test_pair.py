@@ -11,7 +11,7 @@ from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.described_map import describe_map, resampled
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings
-from lidarium.mapping.merging.validation import ValidationSettings, compare, disc_agreement, why_refused
+from lidarium.mapping.merging.validation import Agreement, ValidationSettings, compare, disc_agreement, why_refused
 from lidarium.mapping.rigid import Transform
 
 
@@ -162,6 +162,45 @@ def test_the_score_of_a_map_with_itself_is_one():
     shifted = compare(a, a, Transform(0.5, 0.0, 0.0), ValidationSettings())
     assert shifted.score < 0.9
     assert "contradiction" in str(why_refused(shifted, ValidationSettings()))
+
+
+def test_walls_at_the_rim_of_what_a_map_knows_do_not_contradict():
+    unseen = apartment()
+    unseen[8:10, 30:60] = 127
+    a, b = describe_map(apartment(), RESOLUTION), describe_map(unseen, RESOLUTION)
+    found = compare(a, b, Transform(0.0, -0.05, 0.0), ValidationSettings())
+    assert found.contradicting_m == 0.0
+    in_the_open = compare(a, b, Transform(0.0, -0.3, 0.0), ValidationSettings())
+    assert in_the_open.contradicting_m > 1.0
+
+
+def test_what_speaks_against_a_transform_weighs_more_than_what_speaks_for_it():
+    settings = ValidationSettings()
+    weak = Agreement(overlap_m2=6.0, agreeing_m=5.2, wall_m=6.0, across_m=1.3, contradicting_m=0.1, score=0.98)
+    assert weak.evidence_m == pytest.approx(5.2 - 0.8 - 0.3)
+    assert why_refused(weak, settings) is None
+    assert "small overlap" in str(why_refused(replace(weak, wall_m=6.8), settings))
+    assert "contradiction" in str(why_refused(replace(weak, contradicting_m=0.2), settings))
+
+
+def test_rooms_that_look_alike_are_refused_where_the_building_has_changed():
+    """Moved by a room, one room lies on another and nothing contradicts; but much more speaks for the place that is contradicted."""
+
+    def building():
+        levels = blank(140, 300)
+        for first in (10, 82, 154, 226):
+            room(levels, 10, first, 90, 66)
+            levels[10:22, first : first + 14] = OCCUPIED
+            levels[70:82, first + 50 : first + 66] = OCCUPIED
+        levels[40:56, 76:226] = np.where(levels[40:56, 76:226] == OCCUPIED, FREE, levels[40:56, 76:226])
+        return levels
+
+    changed = building()
+    for first in (10, 82, 154):
+        changed[50:62, first + 20 : first + 36] = OCCUPIED
+    result = merged(building(), changed)
+    assert not result.is_accepted
+    assert "contradiction" in result.reason or "ambiguous" in result.reason
 
 
 def test_the_overlap_and_its_middle_are_measured():

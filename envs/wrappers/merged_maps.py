@@ -1,0 +1,269 @@
+"""Merged maps: robots exchange their maps at a period, and each sees the team's map and its teammates in its own frame."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.observations import FARTHEST
+from lidarium.envs.onboard.team_mapping import Frames, TeamMapping, crop_around
+from lidarium.envs.wrappers.decisions import boxes_of
+from lidarium.envs.wrappers.frontiers import FrontierExploration
+from lidarium.envs.wrappers.waypoints import WaypointExploration
+from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.merging.validation import ValidationSettings
+from lidarium.mapping.rigid import Transform
+
+CanTalk = Callable[[float, NDArray[np.float64]], NDArray[np.bool_]]
+"""Takes the time [s] and the true poses (robots, 3); returns which robots reach each other, (robots, robots)."""
+
+TEAM_VALIDATION = ValidationSettings(most_contradiction_m=1.0, plenty_of_wall_m=10.0, contradiction_share=0.1)
+"""Robots that do not know where the others are map their bodies as walls, so more may contradict than in maps of robots alone."""
+
+OLDEST_S = 3600.0
+"""Bound of the age of news in observations [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MergingSettings:
+    """How a team merges its maps.
+
+    Attributes
+    ----------
+    period_s : float
+        Simulated time between two exchanges [s].
+    known_starts : bool
+        Whether the robots are told how their frames lie, for comparison; nothing is searched for then.
+    merge : MergeSettings
+        How maps are merged; by default with `TEAM_VALIDATION`.
+    """
+
+    period_s: float = 1.0
+    known_starts: bool = False
+    merge: MergeSettings = field(default_factory=lambda: MergeSettings(validation=TEAM_VALIDATION))
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.period_s) and self.period_s > 0.0):
+            raise ValueError(f"period_s of merging is {self.period_s}; want a positive time in seconds")
+
+
+@dataclass(frozen=True, slots=True)
+class MergeEvent:
+    """Two robots have been joined: how their frames lie as they found, and truly.
+
+    Attributes
+    ----------
+    time_s : float
+        When [s].
+    a, b : str
+        The robots.
+    found, true : (x, y, theta)
+        Of b's map frame in that of a [m, rad].
+    at : (x, y)
+        Where errors are taken, the middle of what both maps know, in b's frame [m].
+    """
+
+    time_s: float
+    a: str
+    b: str
+    found: tuple[float, float, float]
+    true: tuple[float, float, float]
+    at: tuple[float, float]
+
+
+class MergedMaps(ParallelEnv[str, Observation, Any]):
+    """Gives each robot the map that it and all it is joined with have made, and where those are.
+
+    The observation has, beside that of the environment below, ``team_map`` uint8 (1, M, M) like ``map``, as of the last exchange, and
+    ``teammates`` float32 (robots - 1, 5), one row for each of the others in their order: x, y [m], theta [rad] in the robot's own map
+    frame, the age of that news [s] and whether there is any; zeros where there is none. ``infos[agent]["merges"]`` lists with whom it
+    was joined in this step, ``infos[agent]["truth"]["merges"]`` the `MergeEvent` of each.
+
+    Parameters
+    ----------
+    env : ExplorationEnv, WaypointExploration or FrontierExploration
+        The environment, at any level of decision, with two robots or more.
+    settings : MergingSettings or None
+        How; the defaults where None.
+    can_talk : (robots, robots) bool, callable or None
+        Which robots reach each other, at all times or as a function (see `CanTalk`); all where None. News are passed on.
+
+    Attributes
+    ----------
+    events : list of MergeEvent
+        All of this episode, in their order.
+
+    Raises
+    ------
+    ValueError
+        Where there is but one robot, or ``can_talk`` is of another shape.
+    """
+
+    def __init__(
+        self,
+        env: ExplorationEnv | WaypointExploration | FrontierExploration,
+        settings: MergingSettings | None = None,
+        can_talk: NDArray[np.bool_] | CanTalk | None = None,
+    ) -> None:
+        base = env.unwrapped
+        assert isinstance(base, ExplorationEnv)
+        robots = base.settings.robots
+        if robots < 2:
+            raise ValueError(f"robots is {robots}; merging maps wants two or more")
+        if can_talk is not None and not callable(can_talk):
+            _check_links(np.asarray(can_talk), robots)
+        self.env, self._base = env, base
+        self.merging = settings or MergingSettings()
+        self._can_talk = can_talk
+        self.metadata = {**env.metadata, "name": f"{str(env.metadata['name']).removesuffix('_v0')}_merged_v0"}
+        self.possible_agents, self.agents = env.possible_agents, env.agents
+        self.render_mode, self.settings = env.render_mode, base.settings
+        self.team = TeamMapping(base.perception, self.merging.merge)
+        self.events: list[MergeEvent] = []
+        self._joined: set[tuple[str, str]] = set()
+        self._steps = max(round(self.merging.period_s / base.settings.time_step), 1)
+        self._due = 0
+        self._observation_spaces: dict[str, spaces.Space[Any]] = {
+            agent: spaces.Dict({**boxes_of(env.observation_space(agent)), **team_boxes(robots, base.settings.map_cells)})
+            for agent in self.possible_agents
+        }
+
+    @property
+    def unwrapped(self) -> ExplorationEnv:
+        """The environment that keeps the episode."""
+        return self._base
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's observations, the same object at each call."""
+        return self._observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's actions, that of the environment below."""
+        return self.env.action_space(agent)
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Start an episode; see ``ExplorationEnv.reset``."""
+        observations, infos = self.env.reset(seed, options)
+        self.agents = self.env.agents
+        self.team.start()
+        self.events, self._joined, self._due = [], set(), 0
+        self._exchange(infos)
+        return self._with_team(observations), infos
+
+    def step(
+        self,
+        actions: Any,  # noqa: ANN401
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Take a step or a decision, and exchange maps where the period is over."""
+        observations, rewards, terminations, truncations, infos = self.env.step(actions)
+        self.agents = self.env.agents
+        self._exchange(infos)
+        return self._with_team(observations), rewards, terminations, truncations, infos
+
+    def stop(self, agent: str, reason: str) -> None:
+        """End an agent at its next step, with a reason."""
+        self.env.stop(agent, reason)
+
+    def state(self) -> NDArray[np.float64]:
+        """Return the true state of the team."""
+        return self.env.state()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draw the environment."""
+        return self.env.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self.env.close()
+
+    def _exchange(self, infos: dict[str, dict[str, Any]]) -> None:
+        """Let the robots exchange maps if it is time, and tell who has come to know whom."""
+        for info in infos.values():
+            info["merges"] = []
+            info["truth"]["merges"] = []
+        steps = int(self._base.world.steps[0])
+        if steps < self._due or not infos:
+            return
+        self._due = steps - steps % self._steps + self._steps
+        time_s = self._base.scorer.time
+        truth = self._true_frames()
+        joined = self.team.exchange(self._clusters(time_s), time_s, truth if self.merging.known_starts else None)
+        for (a, b), (found, at) in joined.items():
+            if (a, b) in self._joined:
+                continue
+            true = truth[a, b]
+            event = MergeEvent(time_s, a, b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), at)
+            self.events.append(event)
+            for agent, other in ((a, b), (b, a)):
+                if agent in infos:
+                    infos[agent]["merges"].append(other)
+                    infos[agent]["truth"]["merges"].append(event)
+        self._joined = set(joined)
+
+    def _true_frames(self) -> Frames:
+        """Return how the map frames of all robots truly lie."""
+        base = self._base
+        if base.settings.known_starts:
+            frames = [
+                Transform(float(base.perception.offset(row)[0]), float(base.perception.offset(row)[1]))
+                for row in range(base.settings.robots)
+            ]
+        else:
+            frames = [Transform(*start) for start in base.world.starts.tolist()]
+        agents = self.possible_agents
+        return {(a, b): frames[i].inverse() @ frames[j] for i, a in enumerate(agents) for j, b in enumerate(agents) if i != j}
+
+    def _clusters(self, time_s: float) -> list[list[str]]:
+        """Return the robots that reach each other, some through others."""
+        robots = len(self.possible_agents)
+        if self._can_talk is None:
+            return [list(self.possible_agents)]
+        links = self._can_talk(time_s, self._base.world.poses.copy()) if callable(self._can_talk) else self._can_talk
+        reached = _check_links(np.asarray(links), robots).astype(np.int64) + np.eye(robots, dtype=np.int64)
+        for _ in range(robots.bit_length()):
+            reached = ((reached @ reached) > 0).astype(np.int64)
+        rows = {tuple(row) for row in (reached > 0).tolist()}
+        return [[agent for agent, is_in in zip(self.possible_agents, row, strict=True) if is_in] for row in sorted(rows, reverse=True)]
+
+    def _with_team(self, observations: dict[str, Observation]) -> dict[str, Observation]:
+        time_s, perception = self._base.scorer.time, self._base.perception
+        for agent, observation in observations.items():
+            row = self.possible_agents.index(agent)
+            x, y, _ = perception.pose_in_frame(row, row).tolist()
+            observation["team_map"] = crop_around(self.team.fused[agent], x, y, self.settings.map_cells)[None]
+            observation["teammates"] = self._teammates(agent, time_s)
+        return observations
+
+    def _teammates(self, agent: str, time_s: float) -> NDArray[np.float32]:
+        others = [other for other in self.possible_agents if other != agent]
+        table = np.zeros((len(others), 5), np.float32)
+        for row, other in enumerate(others):
+            news = self.team.news.get((agent, other))
+            if news is not None:
+                pose = news.own_from_other @ news.pose
+                age = min(time_s - news.time_s, OLDEST_S)
+                table[row] = (np.clip(pose.x, -FARTHEST, FARTHEST), np.clip(pose.y, -FARTHEST, FARTHEST), pose.theta, age, 1.0)
+        return table
+
+
+def team_boxes(robots: int, cells: int) -> dict[str, spaces.Space[Any]]:
+    """Return the spaces of what merging adds to an observation."""
+    turn = float(np.nextafter(np.float32(math.pi), np.float32(4.0)))
+    high = np.tile(np.array([FARTHEST, FARTHEST, turn, OLDEST_S, 1.0], np.float32), (robots - 1, 1))
+    low = np.tile(np.array([-FARTHEST, -FARTHEST, -turn, 0.0, 0.0], np.float32), (robots - 1, 1))
+    return {"team_map": spaces.Box(0, 255, (1, cells, cells), np.uint8), "teammates": spaces.Box(low, high, dtype=np.float32)}
+
+
+def _check_links(links: NDArray[Any], robots: int) -> NDArray[np.bool_]:
+    if links.shape != (robots, robots):
+        raise ValueError(f"can_talk has shape {links.shape}; want ({robots}, {robots}): which robots reach each other")
+    found = np.asarray(links, np.bool_)
+    return found | found.T

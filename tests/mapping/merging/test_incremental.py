@@ -1,0 +1,128 @@
+import math
+
+import numpy as np
+import pytest
+from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
+
+from lidarium.mapping.merging.frame_tree import Edge, FrameTree
+from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
+from lidarium.mapping.merging.pair import described, is_contradicted, verify_pair
+from lidarium.mapping.merging.settings import merge_settings
+from lidarium.mapping.rigid import Transform
+
+FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
+
+
+def part(columns, pose, seed=0):
+    return noisy(moved(kept(apartment(), slice(0, 180), columns), pose), seed)
+
+
+def grown(levels, rows, columns, origin=(0.0, 0.0)):
+    """The same map in a larger array, whose corner lies further out."""
+    padded = np.pad(levels, ((rows, 0), (columns, 0)), constant_values=127)
+    return GrowingMap(padded, (origin[0] - columns * RESOLUTION, origin[1] - rows * RESOLUTION))
+
+
+def is_true(found, distance=0.1):
+    apart, angle = found.difference(FIRST @ SECOND.inverse(), (8.0, 8.0))
+    return apart < distance and angle < math.radians(1.0)
+
+
+def test_maps_that_have_not_changed_are_neither_described_nor_compared_again():
+    merger = IncrementalMerger(RESOLUTION)
+    maps = {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    first = merger.update(maps)
+    assert (merger.searched, merger.verified) == (1, 0)
+    again = merger.update({name: GrowingMap(one.levels.copy()) for name, one in maps.items()})
+    assert (merger.searched, merger.verified) == (0, 0)
+    assert again.pairs["a", "b"] is first.pairs["a", "b"]
+    assert is_true(again.tree.lookup("a", "b"))
+
+
+def test_a_verified_transform_is_not_searched_for_when_maps_grow_and_frames_stay():
+    merger = IncrementalMerger(RESOLUTION)
+    before = merger.update({"b": GrowingMap(part(slice(60, 220), SECOND, 1)), "a": GrowingMap(part(slice(0, 150), FIRST))})
+    larger = grown(part(slice(0, 190), FIRST), 30, 41)
+    after = merger.update({"b": GrowingMap(part(slice(60, 220), SECOND, 1)), "a": larger})
+    assert (merger.searched, merger.verified) == (0, 1)
+    assert after.pairs["b", "a"].found_by == "verification"
+    assert after.groups() == [["b", "a"]]
+    for merged in (before, after):
+        assert is_true(merged.tree.lookup("a", "b"))
+    fused = after.fused(["b", "a"])
+    assert np.count_nonzero(fused.levels == 255) == pytest.approx(np.count_nonzero(apartment() == 255), rel=0.05)
+
+
+def test_a_transform_that_grown_maps_contradict_is_given_up():
+    merger = IncrementalMerger(RESOLUTION)
+    maps = {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    merger.update(maps)
+    other = merger.update({**maps, "b": GrowingMap(room(blank(320, 320), 20, 20, 90, 130))})
+    assert merger.searched == 1
+    assert other.groups() == [["a"], ["b"]]
+
+
+def test_a_refused_pair_is_searched_for_again_only_when_the_maps_know_more():
+    merger = IncrementalMerger(RESOLUTION, search_growth_m2=5.0)
+    maps = {"a": GrowingMap(part(slice(0, 50), FIRST)), "b": GrowingMap(part(slice(150, 220), SECOND, 1))}
+    assert merger.update(maps).groups() == [["a"], ["b"]]
+    merger.update({**maps, "a": GrowingMap(part(slice(0, 52), FIRST))})
+    assert merger.searched == 0
+    joined = merger.update({**maps, "a": GrowingMap(part(slice(0, 220), FIRST))})
+    assert merger.searched == 1
+    assert joined.groups() == [["a", "b"]]
+
+
+def test_maps_that_are_missing_are_forgotten_and_pairs_that_may_not_be_tried_are_left_alone():
+    merger = IncrementalMerger(RESOLUTION)
+    maps = {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    assert merger.update(maps, frozenset()).pairs == {}
+    assert merger.searched == 0
+    assert merger.update(maps).groups() == [["a", "b"]]
+    assert merger.update({"a": maps["a"]}).groups() == [["a"]]
+    with pytest.raises(ValueError, match="no maps"):
+        merger.update({})
+
+
+def test_verification_refines_a_transform_or_says_why_not():
+    settings = merge_settings()
+    a, b = (described(levels, RESOLUTION, settings) for levels in (part(slice(0, 150), FIRST), part(slice(60, 220), SECOND, 1)))
+    true = FIRST @ SECOND.inverse()
+    near = Transform(true.x + 0.05, true.y - 0.05, true.theta)
+    result = verify_pair(a, b, near, settings)
+    assert result.is_accepted
+    assert is_true(result.a_from_b, 0.05)
+    assert not verify_pair(a, b, Transform(true.x + 1.0, true.y, true.theta), settings).is_accepted
+
+
+def test_maps_joined_through_a_third_must_not_contradict_each_other():
+    settings = merge_settings()
+    features = {
+        "west": described(part(slice(0, 150), FIRST), RESOLUTION, settings),
+        "east": described(part(slice(60, 220), SECOND, 1), RESOLUTION, settings),
+    }
+    true = FIRST @ SECOND.inverse()
+
+    def contradicts(a, b, a_from_b):
+        return is_contradicted(features[a], features[b], a_from_b, settings)
+
+    for shift, weakest in ((0.0, None), (1.5, "b")):
+        tree = FrameTree()
+        # Through a map in between, whose overlap with both is not in question here.
+        edges = [Edge("west", "between", Transform(), 9.0), Edge("between", "east", Transform(true.x + shift, true.y, true.theta), 3.0)]
+        tree.set_edges(edges, contradicts)
+        assert [edge.weight for edge in tree.dropped] == ([] if weakest is None else [3.0])
+        assert (tree.lookup("west", "east") is None) == (weakest is not None)
+
+
+def test_edges_can_be_replaced_while_the_world_stays():
+    tree = FrameTree()
+    for name in "abc":
+        tree.add_map(name)
+    tree.set_edges([Edge("c", "b", Transform(1.0, 0.0, 0.0), 2.0)])
+    root = tree.groups()[0][0]
+    tree.set_edges([])
+    tree.set_edges([Edge("a", "b", Transform(), 9.0), Edge("b", "c", Transform(), 1.0)])
+    assert tree.groups()[0][0] == root
+    tree.remove_map(root)
+    assert all(root not in group for group in tree.groups())
