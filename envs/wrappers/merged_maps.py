@@ -92,7 +92,8 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
     settings : MergingSettings or None
         How; the defaults where None.
     can_talk : (robots, robots) bool, callable or None
-        Which robots reach each other, at all times or as a function (see `CanTalk`); all where None. News are passed on.
+        Which robots reach each other, at all times or as a function (see `CanTalk`); where None, those that the environment's radio
+        joins. News are passed on.
 
     Attributes
     ----------
@@ -224,9 +225,13 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
     def _clusters(self, time_s: float) -> list[list[str]]:
         """Return the robots that reach each other, some through others."""
         robots = len(self.possible_agents)
-        if self._can_talk is None:
+        exchanges = self._base.perception.exchanges
+        if self._can_talk is None and not exchanges:
             return [list(self.possible_agents)]
-        links = self._can_talk(time_s, self._base.world.poses.copy()) if callable(self._can_talk) else self._can_talk
+        if self._can_talk is None:
+            links = exchanges[0].links | exchanges[0].links.T
+        else:
+            links = self._can_talk(time_s, self._base.world.poses.copy()) if callable(self._can_talk) else self._can_talk
         reached = _check_links(np.asarray(links), robots).astype(np.int64) + np.eye(robots, dtype=np.int64)
         for _ in range(robots.bit_length()):
             reached = ((reached @ reached) > 0).astype(np.int64)

@@ -23,6 +23,9 @@ FULL_AGREEMENT = 2.0 / 3.0
 With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
 """
 
+SURFACE_GAP = 0.3
+"""Neighbouring points lie on one surface where they are nearer to each other than this share of their distance, or so many metres."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
@@ -133,14 +136,16 @@ def refine(
 ) -> Match:
     """Return the pose near a start at which the points agree best with the map.
 
-    Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a prior one.
+    Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a prior one. Points move
+    across the surfaces that they lie on, not along: where a wall goes on beyond what the map has observed of it, the points there would
+    draw the scan back to where the map ends, and a robot in a corridor with them.
 
     Parameters
     ----------
     grid : AgreementGrid
         The map.
     points : (n, 2) float64
-        Points in the robot's frame [m].
+        Points in the robot's frame, in the order of the beams [m].
     start, prior : (3,) float64
         Where to begin, and where odometry says the robot is: x, y, theta in the map's frame [m, rad].
     information : (3, 3) float64
@@ -152,7 +157,9 @@ def refine(
     count = len(points)
     if count == 0:
         return Match(pose, 0.0, 0.0, 0.0, _inverse(information))
-    _refine(grid.levels, grid.column, grid.row, grid.resolution, points, pose, prior, information, weight / count, hessian, told)
+    normals = np.zeros((count, 2))
+    _find_normals(points, normals)
+    _refine(grid.levels, grid.column, grid.row, grid.resolution, points, normals, pose, prior, information, weight / count, hessian, told)
     score, overlap, contradiction = told.tolist()
     return Match(pose, score, overlap, contradiction, _inverse(hessian))
 
@@ -199,8 +206,33 @@ def _agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
 
 
 @kernel
+def _find_normals(points: Array, normals: Array) -> None:
+    """Fill ``normals`` (n, 2) with unit vectors across the surface on which each point and its neighbours lie; zero for a point alone."""
+    count = points.shape[0]
+    for k in range(count):
+        before, after = k, k
+        gap = SURFACE_GAP * max(math.hypot(points[k, 0], points[k, 1]), 1.0)
+        if k > 0 and math.hypot(points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]) <= gap:
+            before = k - 1
+        if k + 1 < count and math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]) <= gap:
+            after = k + 1
+        along_x, along_y = points[after, 0] - points[before, 0], points[after, 1] - points[before, 1]
+        length = math.hypot(along_x, along_y)
+        if length > 0.0:
+            normals[k, 0], normals[k, 1] = -along_y / length, along_x / length
+
+
+@kernel
 def _normal_equations(
-    levels: Array, first_column: int, first_row: int, side: float, points: Array, pose: Array, hessian: Array, gradient: Array
+    levels: Array,
+    first_column: int,
+    first_row: int,
+    side: float,
+    points: Array,
+    normals: Array,
+    pose: Array,
+    hessian: Array,
+    gradient: Array,
 ) -> float:
     """Fill the normal equations of the points' disagreement at a pose; return the sum of its squares."""
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
@@ -213,6 +245,11 @@ def _normal_equations(
         cost += rest * rest
         scale = 1.0 / (side * FULL_AGREEMENT)
         a, b = slope_x * scale, slope_y * scale
+        if normals[k, 0] != 0.0 or normals[k, 1] != 0.0:
+            across_x = cosine * normals[k, 0] - sine * normals[k, 1]
+            across_y = sine * normals[k, 0] + cosine * normals[k, 1]
+            slope = a * across_x + b * across_y
+            a, b = slope * across_x, slope * across_y
         c = b * x - a * y
         gradient[0] += a * rest
         gradient[1] += b * rest
@@ -234,6 +271,7 @@ def _refine(
     first_row: int,
     side: float,
     points: Array,
+    normals: Array,
     pose: Array,
     prior: Array,
     information: Array,
@@ -245,7 +283,10 @@ def _refine(
     gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
     trial = np.empty(3)
     away = pose - prior
-    cost = weight * _normal_equations(levels, first_column, first_row, side, points, pose, hessian, gradient) + away @ information @ away
+    cost = (
+        weight * _normal_equations(levels, first_column, first_row, side, points, normals, pose, hessian, gradient)
+        + away @ information @ away
+    )
     damping = 1e-3
     for _ in range(30):
         whole = weight * hessian + information
@@ -254,7 +295,9 @@ def _refine(
         move = np.linalg.solve(whole, weight * gradient - information @ away)
         trial[:] = pose + move
         trial_away = trial - prior
-        trial_cost = weight * _normal_equations(levels, first_column, first_row, side, points, trial, trial_hessian, trial_gradient)
+        trial_cost = weight * _normal_equations(
+            levels, first_column, first_row, side, points, normals, trial, trial_hessian, trial_gradient
+        )
         trial_cost += trial_away @ information @ trial_away
         if trial_cost < cost:
             pose[:], away[:] = trial, trial_away
@@ -272,7 +315,7 @@ def _refine(
     for k in range(4):
         trial[:] = pose
         trial[k >> 1] += 0.5 * side if k & 1 else -0.5 * side
-        _normal_equations(levels, first_column, first_row, side, points, trial, trial_hessian, trial_gradient)
+        _normal_equations(levels, first_column, first_row, side, points, normals, trial, trial_hessian, trial_gradient)
         hessian += 0.25 * weight * trial_hessian
     _judge(levels, first_column, first_row, side, points, pose, told)
 

@@ -104,7 +104,7 @@ class MatchingSettings:
     evaluations: int = 100_000
     independent_points: float = 50.0
     deviation: float = 0.3
-    least_score: float = 0.2
+    least_score: float = 0.15
     least_share: float = 0.5
     least_overlap: float = 0.2
     most_contradiction: float = 0.25
@@ -193,7 +193,7 @@ class ClosureSettings:
     most_angle: float = math.radians(20.0)
     deviations: float = 2.5
     evaluations: int = 60_000
-    least_score: float = 0.4
+    least_score: float = 0.3
     least_share: float = 0.85
     least_overlap: float = 0.6
     most_contradiction: float = 0.12

@@ -76,7 +76,7 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
         "--robots",
         "1",
         "--seeds",
-        "12",
+        "30",
         "--horizon-s",
         "400",
         "--out",
@@ -94,7 +94,7 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
     kept = read_episodes(tmp_path / "episodes.jsonl")
     assert kept
     assert evaluate(*arguments) == 0
-    assert "12 of 12 episodes finished" in capsys.readouterr().out
+    assert "30 of 30 episodes finished" in capsys.readouterr().out
     assert read_episodes(tmp_path / "episodes.jsonl")[: len(kept)] == kept
 
 
