@@ -22,12 +22,12 @@ FIRST, SECOND, BOTH = (np.array(colour, np.float64) for colour in ((37, 99, 235)
 def draw_pairs(path: Path, maps: dict[str, BankMap], pairs: list[Pair], outcomes: list[Outcome]) -> None:
     """Draw five pairs laid over each other as they truly lie: two that are joined, one missed, a look-alike and a symmetric one."""
     chosen = _chosen(pairs, outcomes)
-    figure = Figure(figsize=(3.4 * len(chosen), 3.9), dpi=110, layout="constrained")
+    figure = Figure(figsize=(3.4 * len(chosen), 4.4), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
     for axes, (title, pair) in zip(figure.subplots(1, len(chosen), squeeze=False)[0], chosen, strict=True):
         _draw(axes, title, maps[pair.a], maps[pair.b])
     with whole_file(path) as beside:
-        figure.savefig(beside)
+        figure.savefig(beside, bbox_inches="tight", pad_inches=0.15)
 
 
 def _chosen(pairs: list[Pair], outcomes: list[Outcome]) -> list[tuple[str, Pair]]:
@@ -47,7 +47,7 @@ def _draw(axes: Axes, title: str, a: BankMap, b: BankMap) -> None:
     fused = fuse([a.levels, b.levels], [a.floor_from_map, b.floor_from_map], RESOLUTION)
     axes.imshow(_coloured(fused), origin="lower", interpolation="nearest")
     axes.set_title(title, fontsize=10)
-    axes.set_xlabel(f"{a.key}\n{b.key}", fontsize=6)
+    axes.set_xlabel(f"{a.key}\n{b.key}", fontsize=8)
     axes.set_xticks([])
     axes.set_yticks([])
 
