@@ -105,6 +105,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.scorer = Scorer(self.world, self.settings)
         self.perception = Perception(self.world, self.settings, self._offsets)
         self._software = Software(self.perception, self.settings)
+        # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a tenth of a step.
+        self._step = self._software.step if self._software.is_staged else self.world.step
+        self._may_fail = self.settings.may_fail
         self._stopping: dict[str, str] = {}
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -143,7 +146,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.agents = self.possible_agents[:]
         self.perception.start(self.goal)
         self._software.start(0, beginning.seed)
-        self._software.step(self._commands, moves_bodies=False)
+        self._step(self._commands, moves_bodies=False)
         self.scorer.start()
         infos = self._infos(self.agents)
         if self.render_mode == "human":
@@ -191,7 +194,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
         """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s], without building observations."""
-        self._software.step(commands)
+        self._step(commands)
         self.scorer.advance()
 
     @property
@@ -234,7 +237,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Whether the next outcome ends some agent for what happened to it (the goal reached, a collision)."""
         settings = self.settings
         is_at_goal = self.goal is not None and any(self._is_at_goal(self._rows[agent]) for agent in self.agents)
-        has_failed = any(self.world.failed[self._rows[agent]] for agent in self.agents)
+        has_failed = self._may_fail and any(self.world.failed[self._rows[agent]] for agent in self.agents)
         return is_at_goal or has_failed or (settings.stop_on_contact and bool(self.scorer.touched.any()))
 
     def _is_at_goal(self, row: int) -> bool:
@@ -260,7 +263,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     endings[agent] = "reached"
         if settings.stop_on_contact and self.scorer.touched.any():
             endings |= {agent: "collision" for agent in live if self.scorer.touched[self._rows[agent]]}
-        if self.world.failed.any():
+        if self._may_fail and self.world.failed.any():
             endings |= {agent: "failed" for agent in live if self.world.failed[self._rows[agent]]}
         return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
 

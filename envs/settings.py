@@ -206,6 +206,11 @@ class ExplorationSettings:
         return is_plain and not self.lidar.is_noisy and self.faults == NO_FAULTS
 
     @property
+    def may_fail(self) -> bool:
+        """Whether a robot can die, or take itself to be beyond its map."""
+        return self.localization != "truth" or self.faults != NO_FAULTS
+
+    @property
     def agents(self) -> list[str]:
         """Names of the robots."""
         return [f"robot_{robot}" for robot in range(self.robots)]

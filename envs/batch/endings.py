@@ -44,7 +44,8 @@ def endings(
         reasons[live & is_there] = REACHED
     if settings.stop_on_contact:
         reasons[live & (world.contacts != 0)] = COLLISION
-    reasons[live & (world.failed != 0)] = FAILED
+    if settings.may_fail:
+        reasons[live & (world.failed != 0)] = FAILED
     horizon = settings.horizon_steps
     if horizon is not None:
         is_late = world.steps >= horizon
