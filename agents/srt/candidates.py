@@ -1,0 +1,141 @@
+"""Where to go next from a node: through one of its openings, or, in the base algorithm, anywhere."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.frontier_arcs import Opening, least_opening
+from lidarium.agents.srt.memory import Memory
+from lidarium.agents.srt.safe_region import DIRECTIONS, UNIT
+from lidarium.agents.srt.settings import SrtSettings
+from lidarium.agents.srt.tree import Node
+
+TRIED_NEAR = 0.3
+"""A place this near to one from which an opening near by was looked at is not gone to for it again [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A place to go to from a node.
+
+    Attributes
+    ----------
+    node : int
+        The node from which a straight way leads there.
+    place : (2,) float64
+        Where [m].
+    opening : Opening or None
+        What for; None in the base algorithm and for the goal.
+    focus : (2,) float64
+        What there is to look at [m].
+    """
+
+    node: int
+    place: NDArray[np.float64]
+    opening: Opening | None
+    focus: NDArray[np.float64]
+
+
+class CandidateSource:
+    """Draws candidates, as the settings want them.
+
+    Parameters
+    ----------
+    settings : SrtSettings
+        Which.
+    body : float
+        Radius of the robot with its margin [m].
+    generator : numpy.random.Generator
+        Where all draws come from.
+    """
+
+    def __init__(self, settings: SrtSettings, body: float, generator: np.random.Generator) -> None:
+        self._settings, self._least, self._generator = settings, least_opening(body), generator
+        self._tried: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+
+    def note_tried(self, candidate: Candidate) -> None:
+        """Remember that a robot was at a candidate: what it went for is not gone to from there again."""
+        self._tried.append((candidate.place, candidate.focus))
+        if candidate.opening is not None:
+            candidate.opening.is_closed = True
+
+    def of_node(self, node: Node, memory: Memory, others: Iterable[Node]) -> list[Candidate]:
+        """Return the valid candidates of a node: one for each opening, or the first valid one that is drawn."""
+        if self._settings.algorithm == "base":
+            return self._anywhere(node, list(others))
+        found = [(opening, self._open(node, opening, memory)) for opening in node.openings]
+        found = [(opening, points) for opening, points in found if len(points)]
+        if not found:
+            return []
+        if self._settings.candidates == "random":
+            return self._drawn(node, found, list(others))
+        rivals = list(others) if self._settings.memory == "regions" else []
+        candidates = [self._through(node, opening, points, rivals) for opening, points in found]
+        return [candidate for candidate in candidates if candidate is not None]
+
+    def has_openings(self, node: Node, memory: Memory) -> bool:
+        """Whether any opening of a node is open."""
+        return any(len(self._open(node, opening, memory)) for opening in node.openings)
+
+    def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
+        """Whether what a candidate is for is still open."""
+        return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
+
+    def _open(self, node: Node, opening: Opening, memory: Memory) -> NDArray[np.int64]:
+        return opening.open_points(lambda points: memory.is_seen(points, node), self._least)
+
+    def _through(self, node: Node, opening: Opening, points: NDArray[np.int64], others: list[Node]) -> Candidate | None:
+        """Return the first valid candidate of an opening, from its middle or its longest ray outwards."""
+        settings = self._settings
+        share = 1.0 if settings.candidates == "farthest" else settings.step_share
+        safe = node.safe.radii[opening.directions[points]]
+        if settings.candidates == "farthest":
+            order = np.argsort(-safe, kind="stable")
+        else:
+            order = np.argsort(np.abs(points - np.median(points)), kind="stable")
+        spread = order[np.unique(np.linspace(0, len(order) - 1, min(settings.tries, len(order))).astype(np.int64))]
+        for index in spread:
+            candidate = self._at(node, opening, int(points[index]), share)
+            if self.is_valid(candidate, node, others):
+                return candidate
+        return None
+
+    def _drawn(self, node: Node, found: list[tuple[Opening, NDArray[np.int64]]], others: list[Node]) -> list[Candidate]:
+        """Draw an opening by its width and a point of it, until one is valid."""
+        widths = np.array([opening.width for opening, _ in found]) + 1e-9
+        rivals = others if self._settings.memory == "regions" else []
+        for _ in range(self._settings.tries):
+            opening, points = found[int(self._generator.choice(len(found), p=widths / widths.sum()))]
+            candidate = self._at(node, opening, int(self._generator.choice(points)), self._settings.step_share)
+            if self.is_valid(candidate, node, rivals):
+                return [candidate]
+        return []
+
+    def _at(self, node: Node, opening: Opening, point: int, share: float) -> Candidate:
+        direction = int(opening.directions[point])
+        distance = min(share * float(node.safe.radii[direction]), float(opening.reaches[point]))
+        return Candidate(node.number, node.place + distance * UNIT[direction], opening, opening.points[point])
+
+    def _anywhere(self, node: Node, others: list[Node]) -> list[Candidate]:
+        """Draw directions of the full circle until a candidate is valid, as the base algorithm does."""
+        for _ in range(self._settings.tries):
+            direction = int(self._generator.integers(DIRECTIONS))
+            place = node.place + self._settings.step_share * node.safe.radii[direction] * UNIT[direction]
+            candidate = Candidate(node.number, place, None, place)
+            if self.is_valid(candidate, node, others):
+                return [candidate]
+        return []
+
+    def is_valid(self, candidate: Candidate, node: Node, others: Iterable[Node]) -> bool:
+        """Whether a candidate is far enough from its node, within its safe region, outside of the others', and was not tried."""
+        if math.dist(candidate.place, node.place) <= self._settings.least_step or not node.safe.contains(candidate.place):
+            return False
+        if any(bool(other.safe.contains(candidate.place)) for other in others if not np.array_equal(other.place, node.place)):
+            return False
+        return not any(
+            math.dist(place, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
+            for place, focus in self._tried
+        )
