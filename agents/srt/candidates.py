@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,10 @@ from lidarium.agents.srt.tree import Node
 
 TRIED_NEAR = 0.3
 """A place this near to one from which an opening near by was looked at is not gone to for it again [m]."""
+
+
+NEARLY = 0.95
+"""A robot that gets so far beside an edge, as a share of where it wants to be, need not try to pass it wider."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +35,15 @@ class Candidate:
         What for; None in the base algorithm and for the goal.
     focus : (2,) float64
         What there is to look at [m].
+    is_unseen : bool
+        Whether something there was not seen yet; otherwise it is a place in seen space to which no way is known.
     """
 
     node: int
     place: NDArray[np.float64]
     opening: Opening | None
     focus: NDArray[np.float64]
+    is_unseen: bool = True
 
 
 class CandidateSource:
@@ -60,7 +67,7 @@ class CandidateSource:
         """Remember that a robot was at a candidate: what it went for is not gone to from there again."""
         self._tried.append((candidate.place, candidate.focus))
         if candidate.opening is not None:
-            candidate.opening.is_closed = True
+            candidate.opening.is_tried = True
 
     def of_node(self, node: Node, memory: Memory, others: Iterable[Node]) -> list[Candidate]:
         """Return the valid candidates of a node: one for each opening, or the first valid one that is drawn."""
@@ -76,13 +83,19 @@ class CandidateSource:
         candidates = [self._through(node, opening, points, rivals) for opening, points in found]
         return [candidate for candidate in candidates if candidate is not None]
 
+    def into_seen(self, node: Node, others: Iterable[Node]) -> list[Candidate]:
+        """Return candidates through openings, open or not, that lie in no other node's safe region: where the tree has not grown."""
+        found = [(opening, np.arange(len(opening.points))) for opening in node.openings if not opening.is_tried]
+        candidates = [self._through(node, opening, points, list(others)) for opening, points in found]
+        return [replace(candidate, is_unseen=False) for candidate in candidates if candidate is not None]
+
     def has_openings(self, node: Node, memory: Memory) -> bool:
         """Whether any opening of a node is open."""
         return any(len(self._open(node, opening, memory)) for opening in node.openings)
 
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
         """Whether what a candidate is for is still open."""
-        return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
+        return candidate.opening is None or not candidate.is_unseen or bool(len(self._open(node, candidate.opening, memory)))
 
     def _open(self, node: Node, opening: Opening, memory: Memory) -> NDArray[np.int64]:
         return opening.open_points(lambda points: memory.is_seen(points, node), self._least)
@@ -91,17 +104,26 @@ class CandidateSource:
         """Return the first valid candidate of an opening, from its middle or its longest ray outwards."""
         settings = self._settings
         share = 1.0 if settings.candidates == "farthest" else settings.step_share
-        safe = node.safe.radii[opening.directions[points]]
-        if settings.candidates == "farthest":
-            order = np.argsort(-safe, kind="stable")
+        best: Candidate | None = None
+        for index in self._order(node, opening, points):
+            candidate = self._at(node, opening, index, share)
+            if self.is_valid(candidate, node, others):
+                if not opening.is_gap or math.dist(candidate.place, node.place) >= NEARLY * opening.reaches[index]:
+                    return candidate
+                if best is None or math.dist(candidate.place, node.place) > math.dist(best.place, node.place):
+                    best = candidate
+        return best
+
+    def _order(self, node: Node, opening: Opening, points: NDArray[np.int64]) -> list[int]:
+        """Return the directions of an opening in the order in which they are tried."""
+        if opening.is_gap:
+            return list(range(len(opening.directions)))
+        if self._settings.candidates == "farthest":
+            order = np.argsort(-node.safe.radii[opening.directions[points]], kind="stable")
         else:
             order = np.argsort(np.abs(points - np.median(points)), kind="stable")
-        spread = order[np.unique(np.linspace(0, len(order) - 1, min(settings.tries, len(order))).astype(np.int64))]
-        for index in spread:
-            candidate = self._at(node, opening, int(points[index]), share)
-            if self.is_valid(candidate, node, others):
-                return candidate
-        return None
+        chosen = np.unique(np.linspace(0, len(order) - 1, min(self._settings.tries, len(order))).astype(np.int64))
+        return [int(points[index]) for index in order[chosen]]
 
     def _drawn(self, node: Node, found: list[tuple[Opening, NDArray[np.int64]]], others: list[Node]) -> list[Candidate]:
         """Draw an opening by its width and a point of it, until one is valid."""
@@ -109,15 +131,17 @@ class CandidateSource:
         rivals = others if self._settings.memory == "regions" else []
         for _ in range(self._settings.tries):
             opening, points = found[int(self._generator.choice(len(found), p=widths / widths.sum()))]
-            candidate = self._at(node, opening, int(self._generator.choice(points)), self._settings.step_share)
+            ways = len(opening.directions) if opening.is_gap else points
+            candidate = self._at(node, opening, int(self._generator.choice(ways)), self._settings.step_share)
             if self.is_valid(candidate, node, rivals):
                 return [candidate]
         return []
 
-    def _at(self, node: Node, opening: Opening, point: int, share: float) -> Candidate:
-        direction = int(opening.directions[point])
-        distance = min(share * float(node.safe.radii[direction]), float(opening.reaches[point]))
-        return Candidate(node.number, node.place + distance * UNIT[direction], opening, opening.points[point])
+    def _at(self, node: Node, opening: Opening, index: int, share: float) -> Candidate:
+        direction = int(opening.directions[index])
+        distance = min(share * float(node.safe.radii[direction]), float(opening.reaches[index]))
+        focus = opening.points[len(opening.points) // 2 if opening.is_gap else index]
+        return Candidate(node.number, node.place + distance * UNIT[direction], opening, focus)
 
     def _anywhere(self, node: Node, others: list[Node]) -> list[Candidate]:
         """Draw directions of the full circle until a candidate is valid, as the base algorithm does."""

@@ -78,6 +78,10 @@ def choose(
             if found:
                 best = found[int(generator.integers(len(found)))]
                 break
+    if best is None and senses.goal is not None and settings.memory == "map":
+        # All is seen, but a place that is seen need not be in a straight line of any node: the tree has to grow on.
+        found = [candidate for each in reached for candidate in source.into_seen(each, others)]
+        best = _cheapest(_left_by(targets, found), tree, lengths, before, settings, senses, limits)
     if best is None:
         return []
     return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]

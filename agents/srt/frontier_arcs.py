@@ -22,6 +22,9 @@ BEYOND = 0.1
 PAST_EDGE = 0.5
 """A robot that looks behind an edge goes at most this far beyond it [m]."""
 
+WIDER, WIDER_COUNT = math.radians(3.0), 20
+"""Angle between the directions in which a robot may pass an edge [rad], and their number."""
+
 IsSeen = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 
 
@@ -35,14 +38,18 @@ class Opening:
         Places along it, and just outside of them [m].
     lengths : (n,) float64
         How much of the border each point stands for [m].
-    directions : (n,) int64
-        Direction of a view in which a robot goes towards each point.
-    reaches : (n,) float64
+    directions : (m,) int64
+        Directions of a view in which a robot may go: to each point of a free arc; past the edge, ever wider of it, of a gap.
+    reaches : (m,) float64
         How far it goes at most [m].
+    is_gap : bool
+        Whether it is a gap beside an edge, and not an arc of free rays.
     width : float
         Angle that it takes up as seen from the node [rad].
     is_closed : bool
-        Whether it was seen through, or tried.
+        Whether it was seen through.
+    is_tried : bool
+        Whether a robot was where it looks through it, or could not get there.
     """
 
     points: NDArray[np.float64]
@@ -50,12 +57,14 @@ class Opening:
     lengths: NDArray[np.float64]
     directions: NDArray[np.int64]
     reaches: NDArray[np.float64]
+    is_gap: bool
     width: float
     is_closed: bool = False
+    is_tried: bool = False
 
     def open_points(self, is_seen: IsSeen, least: float) -> NDArray[np.int64]:
         """Return the numbers of the points that are open; none, for good, once less than ``least`` [m] of it is."""
-        if not self.is_closed:
+        if not (self.is_closed or self.is_tried):
             is_open = ~is_seen(self.beyond)
             if self.lengths[is_open].sum() >= least:
                 return np.flatnonzero(is_open)
@@ -115,7 +124,7 @@ def _runs(is_free: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
 def _free_arc(place: NDArray[np.float64], run: NDArray[np.int64], perception: float) -> Opening:
     lengths, reaches = np.full(len(run), perception * STEP), np.full(len(run), perception)
     return Opening(
-        place + perception * UNIT[run], place + (perception + BEYOND) * UNIT[run], lengths, run, reaches, len(run) * STEP
+        place + perception * UNIT[run], place + (perception + BEYOND) * UNIT[run], lengths, run, reaches, False, len(run) * STEP
     )  # fmt: skip
 
 
@@ -128,10 +137,11 @@ def _gap(place: NDArray[np.float64], ranges: NDArray[np.float64], direction: int
     count = max(round((far_range - near_range) / SPACING), 1)
     distances = near_range + (far_range - near_range) * (np.arange(count) + 0.5) / count
     hidden = -side * np.array([-UNIT[far, 1], UNIT[far, 0]])
-    # The body has to pass beside the edge, on the side of the longer ray.
-    aside = math.asin(min(body / max(near_range, body), 1.0)) if near_range > 0.0 else 0.0
-    towards = (far + side * math.ceil(aside / STEP + 1.0)) % DIRECTIONS
+    # The body has to pass beside the edge, on the side of the longer ray, and goes until it sees what lies behind.
+    aside = math.asin(min(body / near_range, 1.0)) if near_range > 0.0 else 0.0
+    offsets = aside + WIDER * np.arange(1, WIDER_COUNT + 1)
+    towards = np.round(far + side * offsets / STEP).astype(np.int64) % DIRECTIONS
     middle = min(0.5 * (near_range + far_range), near_range + PAST_EDGE)
     points = place + distances[:, None] * UNIT[far]
     lengths = np.full(count, (far_range - near_range) / count)
-    return Opening(points, points + BEYOND * hidden, lengths, np.full(count, towards), np.full(count, middle), aside)
+    return Opening(points, points + BEYOND * hidden, lengths, towards, np.full(WIDER_COUNT, middle), True, aside)
