@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,15 +35,12 @@ class Candidate:
         What for; None in the base algorithm and for the goal.
     focus : (2,) float64
         What there is to look at [m].
-    is_unseen : bool
-        Whether something there was not seen yet; otherwise it is a place in seen space to which no way is known.
     """
 
     node: int
     place: NDArray[np.float64]
     opening: Opening | None
     focus: NDArray[np.float64]
-    is_unseen: bool = True
 
 
 class CandidateSource:
@@ -83,19 +80,9 @@ class CandidateSource:
         candidates = [self._through(node, opening, points, rivals) for opening, points in found]
         return [candidate for candidate in candidates if candidate is not None]
 
-    def into_seen(self, node: Node, others: Iterable[Node]) -> list[Candidate]:
-        """Return candidates through openings, open or not, that lie in no other node's safe region: where the tree has not grown."""
-        found = [(opening, np.arange(len(opening.points))) for opening in node.openings if not opening.is_tried]
-        candidates = [self._through(node, opening, points, list(others)) for opening, points in found]
-        return [replace(candidate, is_unseen=False) for candidate in candidates if candidate is not None]
-
-    def has_openings(self, node: Node, memory: Memory) -> bool:
-        """Whether any opening of a node is open."""
-        return any(len(self._open(node, opening, memory)) for opening in node.openings)
-
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
         """Whether what a candidate is for is still open."""
-        return candidate.opening is None or not candidate.is_unseen or bool(len(self._open(node, candidate.opening, memory)))
+        return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
 
     def _open(self, node: Node, opening: Opening, memory: Memory) -> NDArray[np.int64]:
         return opening.open_points(lambda points: memory.is_seen(points, node), self._least)

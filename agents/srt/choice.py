@@ -63,10 +63,13 @@ def choose(
     lengths, before = tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
     reached = [tree.nodes[number] for number in lengths]
     if senses.goal is not None:
-        in_sight = [each for each in reached if each.safe.contains(senses.goal) or memory.is_clear(each.place, senses.goal)]
+        across = memory.way(senses.pose[:2], senses.goal)
+        if across is not None:
+            return [*(Choice(place, None) for place in across[:-1]), Choice(senses.goal, None, is_goal=True)]
+        in_sight = [each for each in reached if each.safe.contains(senses.goal)]
         if in_sight:
             nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, senses.goal))
-            return [*_legs(tree, way_to(nearest.number, before)), Choice(senses.goal, None, None, is_goal=True)]
+            return [*_legs(tree, way_to(nearest.number, before)), Choice(senses.goal, None, is_goal=True)]
     others = [tree.nodes[number] for number in sorted(known)]
     best: Candidate | None = None
     if settings.candidates == "goal" and generator.random() >= settings.random_share:
@@ -78,10 +81,6 @@ def choose(
             if found:
                 best = found[int(generator.integers(len(found)))]
                 break
-    if best is None and senses.goal is not None and settings.memory == "map":
-        # All is seen, but a place that is seen need not be in a straight line of any node: the tree has to grow on.
-        found = [candidate for each in reached for candidate in source.into_seen(each, others)]
-        best = _cheapest(_left_by(targets, found), tree, lengths, before, settings, senses, limits)
     if best is None:
         return []
     return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]

@@ -7,6 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.srt.safe_region import no_return
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.envs.simulation.robots import Robot
 from lidarium.mapping.rigid import wrapped
@@ -91,7 +92,7 @@ def free_way(scan: NDArray[np.float32], geometry: ScanGeometry, radius: float, h
         Length of the way [m]; the laser's greatest range where nothing is met.
     """
     ranges = np.asarray(scan, np.float64)
-    is_hit = (ranges >= geometry.range_min) & (ranges < geometry.range_max)
+    is_hit = (ranges >= geometry.range_min) & (ranges < no_return(geometry))
     angles = geometry.angles[is_hit] - heading
     along, across = ranges[is_hit] * np.cos(angles), ranges[is_hit] * np.sin(angles)
     half = radius + SIDE

@@ -191,7 +191,7 @@ class Explorer:
         if candidate is None or last.is_goal or self._settings.memory != "map":
             return
         is_direct = len(self._route) == 1
-        in_sight = senses.goal is not None and memory.is_clear(senses.pose[:2], senses.goal)
+        in_sight = senses.goal is not None and memory.way(senses.pose[:2], senses.goal) is not None
         if in_sight or not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory):
             self._pause(senses, memory)
         elif is_direct and senses.distance_to(self._tree.nodes[self._node].place) >= self._settings.passing_distance:

@@ -9,6 +9,12 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.envs.onboard.team_driver import footprint_of
+from lidarium.mapping.grid_planning import centres_of, plan
+
+
+CLEAR_MARGIN = 0.02
+"""Straight ways across the map keep the body this far from what is occupied [m]."""
 
 
 class Memory(Protocol):
@@ -22,6 +28,10 @@ class Memory(Protocol):
         """Whether the robot is known to get through on a straight way."""
         ...
 
+    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+        """Return the ends of the straight legs of a way across space that was seen, the last one ``end``; None where there is none."""
+        ...
+
 
 class MapMemory:
     """The map tells: space is seen where it is known, and a way is clear where all of it is free with room for the robot.
@@ -30,12 +40,12 @@ class MapMemory:
     ----------
     navigation : NavigationMap
         The map.
-    body : float
-        Room that the robot needs around its centre [m].
+    radius : float
+        Radius of the robot [m].
     """
 
-    def __init__(self, navigation: NavigationMap, body: float) -> None:
-        self._map, self._body = navigation, body
+    def __init__(self, navigation: NavigationMap, radius: float) -> None:
+        self._map, self._radius, self._body = navigation, radius, radius + CLEAR_MARGIN
 
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
         """Whether points (n, 2) lie in known cells; outside of the map all is seen, as nobody can go there."""
@@ -52,6 +62,23 @@ class MapMemory:
         is_near_start = np.arange(count + 1) * 0.5 * self._map.resolution < self._body
         is_free = (self._map.log_odds[rows, columns] < 0) & ((clearance >= self._body) | is_near_start)
         return bool((is_inside & is_free).all())
+
+    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+        """Return the way that the onboard planning finds across the map, its legs as long as they are clear."""
+        rows, columns, is_inside = self._cells(np.stack([start, end]))
+        if not is_inside.all() or self._map.log_odds[rows[1], columns[1]] >= 0:
+            return None
+        cells = [(int(row), int(column)) for row, column in zip(rows, columns, strict=True)]
+        found = plan(self._map.space, self._map.log_odds, self._map.clearance, cells[0], cells[1], footprint_of(self._radius))
+        if found is None:
+            return None
+        places = [*centres_of(found[1], (0.0, 0.0), self._map.resolution)[1:-1], end]
+        legs, at = [], start
+        while places:
+            clear = next((k for k in range(len(places) - 1, 0, -1) if self.is_clear(at, places[k])), 0)
+            at, places = places[clear], places[clear + 1 :]
+            legs.append(at)
+        return legs
 
     def _cells(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
         """Return rows and columns of points, and which of them lie on the map; the others get the nearest cell."""
@@ -85,3 +112,7 @@ class RegionMemory:
     def is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
         """Whether a way begins at a node and ends within its safe region."""
         return any(math.dist(node.place, start) <= 0.05 and bool(node.safe.contains(end)) for node in self._nodes)
+
+    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+        """Return None: regions know no way but the tree's."""
+        return None

@@ -35,6 +35,11 @@ REGIONS = 8
 """Laser regions of the full circle: right, right-front, front, left-front, left, and three of 40 degrees behind."""
 
 
+def no_return(geometry: ScanGeometry) -> float:
+    """Return the range from which on a beam has met nothing [m]: observations are float32, which may round the greatest range down."""
+    return geometry.range_max * (1.0 - 1e-6)
+
+
 def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -> NDArray[np.float64]:
     """Return what a scan tells of each direction.
 
@@ -55,7 +60,7 @@ def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -
     ranges = np.asarray(scan, np.float64)
     with np.errstate(invalid="ignore"):
         ranges = np.where(ranges >= geometry.range_min, ranges, np.nan)
-        ranges = np.where(ranges >= geometry.range_max, np.inf, ranges)
+        ranges = np.where(ranges >= no_return(geometry), np.inf, ranges)
     # A single beam sees its own direction alone.
     increment = geometry.angle_increment if geometry.beams > 1 else STEP
     offsets = (ANGLES - heading - geometry.angle_first + 0.5 * increment) % (2.0 * math.pi)

@@ -14,9 +14,6 @@ from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.perception import Belief
 from lidarium.mapping.scans import ScanGeometry
 
-CLEAR_MARGIN = 0.02
-"""Straight ways across the map keep the body this far from what is occupied [m]."""
-
 NEWS_S = 1.0
 """Robots whose news are at most this old are in contact [s]."""
 
@@ -78,4 +75,4 @@ def memory_of(belief: Belief, known: Iterable[Node], settings: SrtSettings) -> M
     if settings.memory == "regions":
         return RegionMemory(known)
     shared = belief.shared_map
-    return MapMemory(belief.map if shared is None else shared, belief.radius + CLEAR_MARGIN)
+    return MapMemory(belief.map if shared is None else shared, belief.radius)
