@@ -21,6 +21,10 @@ NEARLY = 0.95
 """A robot that gets so far beside an edge, as a share of where it wants to be, need not try to pass it wider."""
 
 
+STANDS = (1, 3, 5)
+"""Where a robot may stand before an opening that no straight way leads to, in tenths of a metre from it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """A place to go to from a node.
@@ -79,6 +83,18 @@ class CandidateSource:
         rivals = list(others) if self._settings.memory == "regions" else []
         candidates = [self._through(node, opening, points, rivals) for opening, points in found]
         return [candidate for candidate in candidates if candidate is not None]
+
+    def beside(self, node: Node, memory: Memory) -> list[Candidate]:
+        """Return places before each opening of a node, on the side from which it was seen, whether or not a straight way leads there."""
+        candidates = []
+        for opening in node.openings:
+            points = self._open(node, opening, memory)
+            if len(points):
+                middle = int(points[len(points) // 2])
+                inwards = opening.points[middle] - opening.beyond[middle]
+                places = [opening.points[middle] + steps * inwards for steps in STANDS]
+                candidates += [Candidate(node.number, place, opening, opening.points[middle]) for place in places]
+        return [candidate for candidate in candidates if not self._was_tried(candidate)]
 
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
         """Whether what a candidate is for is still open."""
@@ -146,7 +162,10 @@ class CandidateSource:
             return False
         if any(bool(other.safe.contains(candidate.place)) for other in others if not np.array_equal(other.place, node.place)):
             return False
-        return not any(
+        return not self._was_tried(candidate)
+
+    def _was_tried(self, candidate: Candidate) -> bool:
+        return any(
             math.dist(place, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
             for place, focus in self._tried
         )

@@ -82,8 +82,20 @@ def choose(
                 best = found[int(generator.integers(len(found)))]
                 break
     if best is None:
-        return []
+        return _across(reached, source, memory, senses, targets) if settings.candidates == "goal" else []
     return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
+
+
+def _across(
+    reached: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]
+) -> list[Choice]:
+    """Return the way across the map to the nearest opening that no straight way from its node leads to."""
+    found = [candidate for each in reached for candidate in source.beside(each, memory)]
+    for candidate in sorted(_left_by(targets, found), key=lambda each: senses.distance_to(each.place)):
+        way = memory.way(senses.pose[:2], candidate.place)
+        if way is not None:
+            return [*(Choice(place, None) for place in way[:-1]), Choice(candidate.place, None, candidate)]
+    return []
 
 
 def home_way(tree: Tree, start: int, root: int, known: set[int]) -> list[Choice]:
