@@ -82,15 +82,13 @@ def choose(
                 best = found[int(generator.integers(len(found)))]
                 break
     if best is None:
-        return _across(reached, source, memory, senses, targets) if settings.candidates == "goal" else []
+        return _across(others, source, memory, senses, targets) if settings.candidates == "goal" else []
     return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
 
 
-def _across(
-    reached: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]
-) -> list[Choice]:
+def _across(nodes: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
     """Return the way across the map to the nearest opening that no straight way from its node leads to."""
-    found = [candidate for each in reached for candidate in source.beside(each, memory)]
+    found = [candidate for each in nodes for candidate in source.beside(each, memory)]
     for candidate in sorted(_left_by(targets, found), key=lambda each: senses.distance_to(each.place)):
         way = memory.way(senses.pose[:2], candidate.place)
         if way is not None:
@@ -98,9 +96,13 @@ def _across(
     return []
 
 
-def home_way(tree: Tree, start: int, root: int, known: set[int]) -> list[Choice]:
-    """Return the legs of the shortest way to the first node; none where the robot is there, or no way is left."""
-    return _legs(tree, way_to(root, tree.ways(start, known)[1]))
+def home_way(tree: Tree, start: int, root: int, known: set[int], senses: Senses, memory: Memory) -> list[Choice]:
+    """Return the legs of the shortest way to the first node, along the tree or else across the map; none where there is no way."""
+    legs = _legs(tree, way_to(root, tree.ways(start, known)[1]))
+    if not legs and start != root:
+        across = memory.way(senses.pose[:2], tree.nodes[root].place)
+        legs = [*(Choice(place, None) for place in across[:-1]), *_legs(tree, [root])] if across else []
+    return legs
 
 
 def _legs(tree: Tree, way: list[int]) -> list[Choice]:
@@ -137,7 +139,9 @@ def _cheapest(
         first = tree.nodes[legs[0]].place if legs else candidate.place
         gap = first - senses.pose[:2]
         turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
-        way = lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place) + turn * limits.speed / limits.turn_rate
+        way = (
+            lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place) + turn * limits.speed / limits.turn_rate
+        )
         return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(candidate.place, senses.goal))
 
     return min(found, key=cost)

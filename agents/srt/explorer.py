@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
 from lidarium.agents.srt.choice import Choice, choose, home_way
 from lidarium.agents.srt.drive import Drive, Phase, driven, free_way, limits_of
-from lidarium.agents.srt.frontier_arcs import openings_of
+from lidarium.agents.srt.frontier_arcs import Opening, openings_of
 from lidarium.agents.srt.memory import Memory
-from lidarium.agents.srt.safe_region import joined_views, safe_region, seen_region, view_of
+from lidarium.agents.srt.safe_region import SafeRegion, joined_views, safe_region, seen_region, view_of
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node, Tree, sees_back_and_forth
@@ -40,7 +40,10 @@ ASIDES = 6
 REVIEW_S = 0.5
 """Time between looks at whether a target still stands [s]."""
 
-NEW_NODE = 0.2
+GOT_ON = 0.8
+"""A robot on its way along free rays goes on for this long before it asks whether they were seen through [m]."""
+
+NEW_NODE = 0.05
 """A robot nearer than this to its last node makes no new one [m]."""
 
 Command = tuple[float, float]
@@ -75,9 +78,7 @@ class Explorer:
         Whether it has ended its work and is back where it began, or as near as it gets.
     """
 
-    def __init__(
-        self, agent: str, tree: Tree, settings: SrtSettings, robot: Robot, lidar: Lidar, generator: np.random.Generator
-    ) -> None:
+    def __init__(self, agent: str, tree: Tree, settings: SrtSettings, robot: Robot, lidar: Lidar, generator: np.random.Generator) -> None:
         self.agent, self.known = agent, set[int]()
         self.ending: str | None = None
         self.is_home = False
@@ -156,7 +157,8 @@ class Explorer:
         self._node = node.number
         self._own_nodes += 1
 
-    def _regions(self, pose: NDArray[np.float64], view: NDArray[np.float64]):  # type: ignore[no-untyped-def]
+    def _regions(self, pose: NDArray[np.float64], view: NDArray[np.float64]) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
+        """Return where the robot is safe, what it has seen, and the openings, of a view."""
         settings, place = self._settings, np.array(pose[:2])
         safe = safe_region(place, view, float(pose[2]), settings.shape, self._body, self._perception, settings.turn_room)
         openings = openings_of(place, view, self._perception, self._body, with_blind=settings.memory == "map")
@@ -191,10 +193,13 @@ class Explorer:
         if candidate is None or last.is_goal or self._settings.memory != "map":
             return
         is_direct = len(self._route) == 1
+        departed = senses.distance_to(self._tree.nodes[self._node].place)
         in_sight = senses.goal is not None and memory.way(senses.pose[:2], senses.goal) is not None
-        if in_sight or not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory):
+        # Every step sees a little more beyond free rays: a target there stands until the robot has got on.
+        may_drop = departed >= self._settings.least_step if candidate.opening is None or candidate.opening.is_gap else departed >= GOT_ON
+        if in_sight or (may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)):
             self._pause(senses, memory)
-        elif is_direct and senses.distance_to(self._tree.nodes[self._node].place) >= self._settings.passing_distance:
+        elif is_direct and departed >= self._settings.passing_distance:
             self._add_node(senses, self._node, senses.pose, memory)
 
     def _pause(self, senses: Senses, memory: Memory) -> None:
@@ -206,8 +211,8 @@ class Explorer:
     def _decide(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
         """Choose where to go next, or to go home."""
         self._reviewed_at = senses.time_s
-        if self.ending == "budget" or self._is_spent(senses):
-            self._go_home("budget")
+        if self.ending in ("budget", "goal_missed") or self._is_spent(senses):
+            self._go_home(self.ending if self.ending == "goal_missed" else "budget", senses, memory)
             return
         node = self._tree.nodes[self._node]
         way = choose(node, self._tree, self.known, self._source, memory, self._settings, self._generator, senses, targets, self._limits)
@@ -220,9 +225,7 @@ class Explorer:
         elif self._settings.backtrack == "parent" and node.parent is not None:
             self._set_out([Choice(self._tree.nodes[node.parent].place, node.parent)], senses)
         else:
-            self._go_home("explored" if senses.goal is None else "unreachable")
-            if self._route:
-                self._stand(senses)
+            self._go_home("explored" if senses.goal is None else "unreachable", senses, memory)
 
     def _may_look(self, node: Node) -> bool:
         return self._settings.memory == "regions" and self._settings.looks_around and not node.has_looked and node.number != self._root
@@ -230,11 +233,12 @@ class Explorer:
     def _is_spent(self, senses: Senses) -> bool:
         return self._own_nodes >= self._settings.nodes or senses.time_s >= self._settings.time_s
 
-    def _go_home(self, ending: str) -> None:
+    def _go_home(self, ending: str, senses: Senses, memory: Memory) -> None:
         """Set out for the first node; there, or without a way, the robot is at its end."""
         self.ending = ending
-        self._route = home_way(self._tree, self._node, self._root, self.known)
+        self._route = home_way(self._tree, self._node, self._root, self.known, senses, memory)
         self._drive = None
+        self._stand(senses)
         self.is_home = not self._route
 
     def _set_out(self, way: list[Choice], senses: Senses) -> None:
@@ -275,7 +279,7 @@ class Explorer:
             self._return_to(leg.node, memory)
         elif leg.is_goal:
             # The environment ends a robot that truly is there; this one only takes itself to be.
-            self._go_home("goal_missed")
+            self._go_home("goal_missed", senses, memory)
         else:
             place = leg.place if self._settings.places_nodes_at_targets else senses.pose[:2]
             self._add_node(senses, self._node, np.array([*place, senses.pose[2]]), memory)

@@ -72,9 +72,7 @@ class Opening:
         return np.zeros(0, np.int64)
 
 
-def openings_of(
-    place: NDArray[np.float64], view: NDArray[np.float64], perception: float, body: float, with_blind: bool
-) -> list[Opening]:
+def openings_of(place: NDArray[np.float64], view: NDArray[np.float64], perception: float, body: float, with_blind: bool) -> list[Opening]:
     """Return the openings of what is seen from a place.
 
     Parameters

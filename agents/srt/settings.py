@@ -107,7 +107,17 @@ class SrtSettings:
         for name, words in CHOICES.items():
             if getattr(self, name) not in words:
                 raise ValueError(f"{name} of the tree is {getattr(self, name)!r}; want one of {', '.join(words)}")
-        for name in ("way_weight", "least_step", "time_s", "perception", "passing_distance", "speed", "turn_rate", "arrived", "turning_ends"):
+        for name in (
+            "way_weight",
+            "least_step",
+            "time_s",
+            "perception",
+            "passing_distance",
+            "speed",
+            "turn_rate",
+            "arrived",
+            "turning_ends",
+        ):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} of the tree is {getattr(self, name)}; want more than 0")
         for name in ("margin", "turn_room"):
