@@ -1,6 +1,7 @@
 """Where to go next from a node: through one of its openings, or, in the base algorithm, anywhere."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -23,6 +24,11 @@ NEARLY = 0.95
 
 STANDS = (1, 3, 5)
 """Where a robot may stand before an opening that no straight way leads to, in tenths of a metre from it."""
+
+
+ATTEMPTS, PATCH, ATTEMPT_REACH = 3, 0.3, 1.5
+"""How often robots look at a patch beyond openings before it counts as one that cannot be seen, its side [m], and how far from what
+they came for a look counts [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +69,16 @@ class CandidateSource:
     def __init__(self, settings: SrtSettings, body: float, generator: np.random.Generator) -> None:
         self._settings, self._least, self._generator = settings, least_opening(body), generator
         self._tried: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        self._attempts = Counter[tuple[int, int]]()
 
     def note_tried(self, candidate: Candidate) -> None:
         """Remember that a robot was at a candidate: what it went for is not gone to from there again."""
         self._tried.append((candidate.place, candidate.focus))
         if candidate.opening is not None:
             candidate.opening.is_tried = True
+            beyond = candidate.opening.beyond
+            near = beyond[np.hypot(*(beyond - candidate.focus).T) <= ATTEMPT_REACH]
+            self._attempts.update(set(_patches(near)))
 
     def of_node(self, node: Node, memory: Memory, others: Iterable[Node]) -> list[Candidate]:
         """Return the valid candidates of a node: one for each opening, or the first valid one that is drawn."""
@@ -101,7 +111,15 @@ class CandidateSource:
         return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
 
     def _open(self, node: Node, opening: Opening, memory: Memory) -> NDArray[np.int64]:
-        return opening.open_points(lambda points: memory.is_seen(points, node), self._least)
+        return opening.open_points(lambda points: self._is_done(points, node, memory), self._least)
+
+    def _is_done(self, points: NDArray[np.float64], node: Node, memory: Memory) -> NDArray[np.bool_]:
+        """Whether points were seen, or stayed unseen however often a robot came to look at them."""
+        is_done = memory.is_seen(points, node)
+        unseen = np.flatnonzero(~is_done)
+        if self._attempts and len(unseen):
+            is_done[unseen] = [self._attempts[patch] >= ATTEMPTS for patch in _patches(points[unseen])]
+        return is_done
 
     def _through(self, node: Node, opening: Opening, points: NDArray[np.int64], others: list[Node]) -> Candidate | None:
         """Return the first valid candidate of an opening, from its middle or its longest ray outwards."""
@@ -169,3 +187,8 @@ class CandidateSource:
             math.dist(place, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
             for place, focus in self._tried
         )
+
+
+def _patches(points: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Return the patch of each point (n, 2)."""
+    return [(int(x), int(y)) for x, y in np.floor(points / PATCH)]

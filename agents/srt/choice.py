@@ -62,14 +62,15 @@ def choose(
     """
     lengths, before = tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
     reached = [tree.nodes[number] for number in lengths]
-    if senses.goal is not None:
-        across = memory.way(senses.pose[:2], senses.goal)
+    goal = senses.goal
+    if goal is not None:
+        across = memory.way(senses.pose[:2], goal)
         if across is not None:
-            return [*(Choice(place, None) for place in across[:-1]), Choice(senses.goal, None, is_goal=True)]
-        in_sight = [each for each in reached if each.safe.contains(senses.goal)]
+            return [*(Choice(place, None) for place in across[:-1]), Choice(goal, None, is_goal=True)]
+        in_sight = [each for each in reached if each.safe.contains(goal)]
         if in_sight:
-            nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, senses.goal))
-            return [*_legs(tree, way_to(nearest.number, before)), Choice(senses.goal, None, is_goal=True)]
+            nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, goal))
+            return [*_legs(tree, way_to(nearest.number, before)), Choice(goal, None, is_goal=True)]
     others = [tree.nodes[number] for number in sorted(known)]
     best: Candidate | None = None
     if settings.candidates == "goal" and generator.random() >= settings.random_share:

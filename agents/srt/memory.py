@@ -12,7 +12,6 @@ from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.team_driver import footprint_of
 from lidarium.mapping.grid_planning import centres_of, plan
 
-
 CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
 

@@ -19,7 +19,7 @@ DIRECTIONS = 1080
 STEP = 2.0 * math.pi / DIRECTIONS
 """Angle between neighbouring directions [rad]."""
 
-ANGLES = STEP * np.arange(DIRECTIONS)
+ANGLES: NDArray[np.float64] = STEP * np.arange(DIRECTIONS)
 """Angles of the directions [rad]."""
 
 UNIT = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
@@ -150,7 +150,7 @@ def safe_region(
         raise ValueError(f"shape of the safe region is {shape!r}; want one of {', '.join(SHAPES)}")
     seen = ~np.isnan(view)
     ranges = np.minimum(np.where(seen, view, 0.0), perception)
-    regions = region_of(ANGLES - heading)
+    regions = region_of(np.asarray(ANGLES - heading, np.float64))
     radial = _radial(np.where(seen, ranges, np.nan), body)
     if shape == "radial":
         radii = radial
