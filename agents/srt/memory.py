@@ -16,6 +16,10 @@ CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
 
 
+WALL = 0.15
+"""What is unknown this near to something occupied may well be its inside [m]."""
+
+
 class Memory(Protocol):
     """What a robot remembers; places (..., 2) are in the frame of the map's first cell [m]."""
 
@@ -47,16 +51,16 @@ class MapMemory:
         self._map, self._radius, self._body = navigation, radius, radius + CLEAR_MARGIN
 
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
-        """Whether points (n, 2) lie in known cells; outside of the map all is seen, as nobody can go there."""
+        """Whether points (n, 2) lie in known cells, or so near to what is occupied that they may lie in it, or outside of the map."""
         rows, columns, is_inside = self._cells(points)
-        return np.asarray(~is_inside | (self._map.log_odds[rows, columns] != 0))
+        is_beside_wall = self._clearance(rows, columns) < WALL
+        return np.asarray(~is_inside | (self._map.log_odds[rows, columns] != 0) | is_beside_wall)
 
     def is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
         """Whether all cells on a way are free, with room for the robot."""
         count = max(math.ceil(math.dist(start, end) / (0.5 * self._map.resolution)), 1)
         rows, columns, is_inside = self._cells(start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None])
-        field = self._map.clearance
-        clearance = np.sqrt(field.limit - field.closeness[rows, columns].astype(np.float64)) * 0.5 * field.resolution
+        clearance = self._clearance(rows, columns)
         # Where the robot starts it may stand nearer to a wall than it would go.
         is_near_start = np.arange(count + 1) * 0.5 * self._map.resolution < self._body
         is_free = (self._map.log_odds[rows, columns] < 0) & ((clearance >= self._body) | is_near_start)
@@ -78,6 +82,11 @@ class MapMemory:
             at, places = places[clear], places[clear + 1 :]
             legs.append(at)
         return legs
+
+    def _clearance(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the distance of cells from what is occupied [m]."""
+        field = self._map.clearance
+        return np.sqrt(field.limit - field.closeness[rows, columns].astype(np.float64)) * 0.5 * field.resolution
 
     def _cells(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
         """Return rows and columns of points, and which of them lie on the map; the others get the nearest cell."""
