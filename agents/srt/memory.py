@@ -16,7 +16,7 @@ CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
 
 
-WALL = 0.15
+WALL = 0.08
 """What is unknown this near to something occupied may well be its inside [m]."""
 
 
