@@ -19,7 +19,7 @@ DIRECTIONS = 1080
 STEP = 2.0 * math.pi / DIRECTIONS
 """Angle between neighbouring directions [rad]."""
 
-ANGLES: NDArray[np.float64] = STEP * np.arange(DIRECTIONS)
+ANGLES = np.asarray(STEP * np.arange(DIRECTIONS), np.float64)
 """Angles of the directions [rad]."""
 
 UNIT = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
