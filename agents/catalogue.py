@@ -5,6 +5,7 @@ from functools import partial
 from lidarium.agents.frontier import ExploreLite, NearestFrontier, UtilityFrontier
 from lidarium.agents.policy import register_policy
 from lidarium.agents.random_walk import RandomWalk
+from lidarium.agents.srt.policy import SensorBasedRandomTree
 
 register_policy("random_walk", RandomWalk, "drives straight on and turns by a random angle where something is near")
 register_policy("nearest_frontier", NearestFrontier, "each robot drives to its nearest frontier of the team's map (Yamauchi)")
@@ -13,3 +14,4 @@ register_policy(
 )
 register_policy("utility_frontier", UtilityFrontier, "the team shares frontiers out by utility less cost (Burgard)")
 register_policy("explore_lite", ExploreLite, "least cost of distance less size of the frontier, both in metres (explore_lite)")
+register_policy("srt", SensorBasedRandomTree, "grows a tree of safe regions towards openings and the goal (sensor-based random tree)")

@@ -28,6 +28,8 @@ from lidarium.envs.onboard.navigation import (
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
 from lidarium.envs.simulation.kinematic import KinematicWorld
+from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.robots import Robot
 from lidarium.mapping.clearance import limit_of, stamp_of
 from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.localization.localizer import Localizer
@@ -91,6 +93,16 @@ class Belief:
     def radius(self) -> float:
         """Radius of the own body [m]."""
         return self._perception.settings.robot.radius
+
+    @property
+    def robot(self) -> Robot:
+        """The own body and drive."""
+        return self._perception.settings.robot
+
+    @property
+    def lidar(self) -> Lidar:
+        """The own laser."""
+        return self._perception.settings.lidar
 
     @property
     def map(self) -> NavigationMap:

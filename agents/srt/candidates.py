@@ -1,0 +1,194 @@
+"""Where to go next from a node: through one of its openings, or, in the base algorithm, anywhere."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.frontier_arcs import Opening, least_opening
+from lidarium.agents.srt.memory import Memory
+from lidarium.agents.srt.safe_region import DIRECTIONS, UNIT
+from lidarium.agents.srt.settings import SrtSettings
+from lidarium.agents.srt.tree import Node
+
+TRIED_NEAR = 0.3
+"""A place this near to one from which an opening near by was looked at is not gone to for it again [m]."""
+
+
+NEARLY = 0.95
+"""A robot that gets so far beside an edge, as a share of where it wants to be, need not try to pass it wider."""
+
+
+STANDS = (1, 3, 5)
+"""Where a robot may stand before an opening that no straight way leads to, in tenths of a metre from it."""
+
+
+ATTEMPTS, PATCH, ATTEMPT_REACH = 3, 0.3, 1.5
+"""How often robots look at a patch beyond openings before it counts as one that cannot be seen, its side [m], and how far from what
+they came for a look counts [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A place to go to from a node.
+
+    Attributes
+    ----------
+    node : int
+        The node from which a straight way leads there.
+    place : (2,) float64
+        Where [m].
+    opening : Opening or None
+        What for; None in the base algorithm and for the goal.
+    focus : (2,) float64
+        What there is to look at [m].
+    """
+
+    node: int
+    place: NDArray[np.float64]
+    opening: Opening | None
+    focus: NDArray[np.float64]
+
+
+class CandidateSource:
+    """Draws candidates, as the settings want them.
+
+    Parameters
+    ----------
+    settings : SrtSettings
+        Which.
+    body : float
+        Radius of the robot with its margin [m].
+    generator : numpy.random.Generator
+        Where all draws come from.
+    """
+
+    def __init__(self, settings: SrtSettings, body: float, generator: np.random.Generator) -> None:
+        self._settings, self._least, self._generator = settings, least_opening(body), generator
+        self._tried: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        self._attempts = Counter[tuple[int, int]]()
+
+    def note_tried(self, candidate: Candidate) -> None:
+        """Remember that a robot was at a candidate: what it went for is not gone to from there again."""
+        self._tried.append((candidate.place, candidate.focus))
+        if candidate.opening is not None:
+            candidate.opening.is_tried = True
+            beyond = candidate.opening.beyond
+            near = beyond[np.hypot(*(beyond - candidate.focus).T) <= ATTEMPT_REACH]
+            self._attempts.update(set(_patches(near)))
+
+    def of_node(self, node: Node, memory: Memory, others: Iterable[Node]) -> list[Candidate]:
+        """Return the valid candidates of a node: one for each opening, or the first valid one that is drawn."""
+        if self._settings.algorithm == "base":
+            return self._anywhere(node, list(others))
+        found = [(opening, self._open(node, opening, memory)) for opening in node.openings]
+        found = [(opening, points) for opening, points in found if len(points)]
+        if not found:
+            return []
+        if self._settings.candidates == "random":
+            return self._drawn(node, found, list(others))
+        rivals = list(others) if self._settings.memory == "regions" else []
+        candidates = [self._through(node, opening, points, rivals) for opening, points in found]
+        return [candidate for candidate in candidates if candidate is not None]
+
+    def beside(self, node: Node, memory: Memory) -> list[Candidate]:
+        """Return places before each opening of a node, on the side from which it was seen, whether or not a straight way leads there."""
+        candidates = []
+        for opening in node.openings:
+            points = self._open(node, opening, memory)
+            if len(points):
+                middle = int(points[len(points) // 2])
+                inwards = opening.points[middle] - opening.beyond[middle]
+                places = [opening.points[middle] + steps * inwards for steps in STANDS]
+                candidates += [Candidate(node.number, place, opening, opening.points[middle]) for place in places]
+        return [candidate for candidate in candidates if not self._was_tried(candidate)]
+
+    def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
+        """Whether what a candidate is for is still open."""
+        return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
+
+    def _open(self, node: Node, opening: Opening, memory: Memory) -> NDArray[np.int64]:
+        return opening.open_points(lambda points: self._is_done(points, node, memory), self._least)
+
+    def _is_done(self, points: NDArray[np.float64], node: Node, memory: Memory) -> NDArray[np.bool_]:
+        """Whether points were seen, or stayed unseen however often a robot came to look at them."""
+        is_done = memory.is_seen(points, node)
+        unseen = np.flatnonzero(~is_done)
+        if self._attempts and len(unseen):
+            is_done[unseen] = [self._attempts[patch] >= ATTEMPTS for patch in _patches(points[unseen])]
+        return is_done
+
+    def _through(self, node: Node, opening: Opening, points: NDArray[np.int64], others: list[Node]) -> Candidate | None:
+        """Return the first valid candidate of an opening, from its middle or its longest ray outwards."""
+        settings = self._settings
+        share = 1.0 if settings.candidates == "farthest" else settings.step_share
+        best: Candidate | None = None
+        for index in self._order(node, opening, points):
+            candidate = self._at(node, opening, index, share)
+            if self.is_valid(candidate, node, others):
+                if not opening.is_gap or math.dist(candidate.place, node.place) >= NEARLY * opening.reaches[index]:
+                    return candidate
+                if best is None or math.dist(candidate.place, node.place) > math.dist(best.place, node.place):
+                    best = candidate
+        return best
+
+    def _order(self, node: Node, opening: Opening, points: NDArray[np.int64]) -> list[int]:
+        """Return the directions of an opening in the order in which they are tried."""
+        if opening.is_gap:
+            return list(range(len(opening.directions)))
+        if self._settings.candidates == "farthest":
+            order = np.argsort(-node.safe.radii[opening.directions[points]], kind="stable")
+        else:
+            order = np.argsort(np.abs(points - np.median(points)), kind="stable")
+        chosen = np.unique(np.linspace(0, len(order) - 1, min(self._settings.tries, len(order))).astype(np.int64))
+        return [int(points[index]) for index in order[chosen]]
+
+    def _drawn(self, node: Node, found: list[tuple[Opening, NDArray[np.int64]]], others: list[Node]) -> list[Candidate]:
+        """Draw an opening by its width and a point of it, until one is valid."""
+        widths = np.array([opening.width for opening, _ in found]) + 1e-9
+        rivals = others if self._settings.memory == "regions" else []
+        for _ in range(self._settings.tries):
+            opening, points = found[int(self._generator.choice(len(found), p=widths / widths.sum()))]
+            ways = len(opening.directions) if opening.is_gap else points
+            candidate = self._at(node, opening, int(self._generator.choice(ways)), self._settings.step_share)
+            if self.is_valid(candidate, node, rivals):
+                return [candidate]
+        return []
+
+    def _at(self, node: Node, opening: Opening, index: int, share: float) -> Candidate:
+        direction = int(opening.directions[index])
+        distance = min(share * float(node.safe.radii[direction]), float(opening.reaches[index]))
+        focus = opening.points[len(opening.points) // 2 if opening.is_gap else index]
+        return Candidate(node.number, node.place + distance * UNIT[direction], opening, focus)
+
+    def _anywhere(self, node: Node, others: list[Node]) -> list[Candidate]:
+        """Draw directions of the full circle until a candidate is valid, as the base algorithm does."""
+        for _ in range(self._settings.tries):
+            direction = int(self._generator.integers(DIRECTIONS))
+            place = node.place + self._settings.step_share * node.safe.radii[direction] * UNIT[direction]
+            candidate = Candidate(node.number, place, None, place)
+            if self.is_valid(candidate, node, others):
+                return [candidate]
+        return []
+
+    def is_valid(self, candidate: Candidate, node: Node, others: Iterable[Node]) -> bool:
+        """Whether a candidate is far enough from its node, within its safe region, outside of the others', and was not tried."""
+        if math.dist(candidate.place, node.place) <= self._settings.least_step or not node.safe.contains(candidate.place):
+            return False
+        if any(bool(other.safe.contains(candidate.place)) for other in others if not np.array_equal(other.place, node.place)):
+            return False
+        return not self._was_tried(candidate)
+
+    def _was_tried(self, candidate: Candidate) -> bool:
+        return any(
+            math.dist(place, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
+            for place, focus in self._tried
+        )
+
+
+def _patches(points: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Return the patch of each point (n, 2)."""
+    return [(int(x), int(y)) for x, y in np.floor(points / PATCH)]

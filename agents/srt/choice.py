@@ -1,0 +1,148 @@
+"""Which way a robot takes: to the goal where it is in sight of a node, through the cheapest opening, or home."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.candidates import Candidate, CandidateSource
+from lidarium.agents.srt.drive import Limits
+from lidarium.agents.srt.memory import Memory
+from lidarium.agents.srt.senses import Senses
+from lidarium.agents.srt.settings import SrtSettings
+from lidarium.agents.srt.tree import Node, Tree, way_to
+from lidarium.mapping.rigid import wrapped
+
+MATE_SPREAD = 5.0
+"""Openings nearer than this to what a teammate goes for cost so much more as they are nearer [m]."""
+
+MATE_SAME = 1.0
+"""What lies this near to what a teammate goes for is the teammate's [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A leg of a way.
+
+    Attributes
+    ----------
+    place : (2,) float64
+        Where it ends [m].
+    node : int or None
+        The node there; None where there is none yet.
+    candidate : Candidate or None
+        What the robot goes for there.
+    is_goal : bool
+        Whether it is the goal.
+    """
+
+    place: NDArray[np.float64]
+    node: int | None
+    candidate: Candidate | None = None
+    is_goal: bool = False
+
+
+def choose(
+    node: Node,
+    tree: Tree,
+    known: set[int],
+    source: CandidateSource,
+    memory: Memory,
+    settings: SrtSettings,
+    generator: np.random.Generator,
+    senses: Senses,
+    targets: Sequence[Candidate],
+    limits: Limits,
+) -> list[Choice]:
+    """Return the legs of the way to take from a node, none where nothing is left to go for.
+
+    Nodes are looked at along the tree's ways, nearest first; with ``backtrack`` ``parent`` only the node itself is.
+    """
+    lengths, before = tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
+    reached = [tree.nodes[number] for number in lengths]
+    goal = senses.goal
+    if goal is not None:
+        across = memory.way(senses.pose[:2], goal)
+        if across is not None:
+            return [*(Choice(place, None) for place in across[:-1]), Choice(goal, None, is_goal=True)]
+        in_sight = [each for each in reached if each.safe.contains(goal)]
+        if in_sight:
+            nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, goal))
+            return [*_legs(tree, way_to(nearest.number, before)), Choice(goal, None, is_goal=True)]
+    others = [tree.nodes[number] for number in sorted(known)]
+    best: Candidate | None = None
+    if settings.candidates == "goal" and generator.random() >= settings.random_share:
+        found = [candidate for each in reached for candidate in source.of_node(each, memory, others)]
+        best = _cheapest(_left_by(targets, found), tree, lengths, before, settings, senses, limits)
+    else:
+        for each in sorted(reached, key=lambda each: lengths[each.number]):
+            found = _left_by(targets, source.of_node(each, memory, others))
+            if found:
+                best = found[int(generator.integers(len(found)))]
+                break
+    if best is None:
+        return _across(others, source, memory, senses, targets) if settings.candidates == "goal" else []
+    return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
+
+
+def _across(nodes: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
+    """Return the way across the map to the nearest opening that no straight way from its node leads to."""
+    found = [candidate for each in nodes for candidate in source.beside(each, memory)]
+    for candidate in sorted(_left_by(targets, found), key=lambda each: senses.distance_to(each.place)):
+        way = memory.way(senses.pose[:2], candidate.place)
+        if way is not None:
+            return [*(Choice(place, None) for place in way[:-1]), Choice(candidate.place, None, candidate)]
+    return []
+
+
+def home_way(tree: Tree, start: int, root: int, known: set[int], senses: Senses, memory: Memory) -> list[Choice]:
+    """Return the legs of the shortest way to the first node, along the tree or else across the map; none where there is no way."""
+    legs = _legs(tree, way_to(root, tree.ways(start, known)[1]))
+    if not legs and start != root:
+        across = memory.way(senses.pose[:2], tree.nodes[root].place)
+        legs = [*(Choice(place, None) for place in across[:-1]), *_legs(tree, [root])] if across else []
+    return legs
+
+
+def _legs(tree: Tree, way: list[int]) -> list[Choice]:
+    return [Choice(tree.nodes[number].place, number) for number in way]
+
+
+def _left_by(targets: Sequence[Candidate], found: list[Candidate]) -> list[Candidate]:
+    """Return the candidates that no teammate goes for."""
+    return [
+        each
+        for each in found
+        if not any(
+            (each.opening is not None and each.opening is target.opening) or math.dist(each.focus, target.focus) < MATE_SAME
+            for target in targets
+        )
+    ]
+
+
+def _cheapest(
+    found: list[Candidate],
+    tree: Tree,
+    lengths: dict[int, float],
+    before: dict[int, int],
+    settings: SrtSettings,
+    senses: Senses,
+    limits: Limits,
+) -> Candidate | None:
+    """Return the candidate of least way, with the turn that begins it, and of least distance to the goal where there is one."""
+    if not found:
+        return None
+
+    def cost(candidate: Candidate) -> float:
+        legs = way_to(candidate.node, before)
+        first = tree.nodes[legs[0]].place if legs else candidate.place
+        gap = first - senses.pose[:2]
+        turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
+        way = (
+            lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place) + turn * limits.speed / limits.turn_rate
+        )
+        return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(candidate.place, senses.goal))
+
+    return min(found, key=cost)

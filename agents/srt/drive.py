@@ -1,0 +1,170 @@
+"""Driving to a place in sight: turn, advance, done; or the best of a list of controls. Both stop before what the laser sees ahead."""
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.safe_region import no_return
+from lidarium.agents.srt.settings import SrtSettings
+from lidarium.envs.simulation.robots import Robot
+from lidarium.mapping.rigid import wrapped
+from lidarium.mapping.scans import ScanGeometry
+
+GAP = 0.03
+"""The robot stops this far before what it sees ahead [m]."""
+
+SIDE = 0.01
+"""What lies within the robot's radius and this beside its way is ahead [m]."""
+
+TURN_GAIN = 2.0
+"""Turn rate for each radian that the heading is off [1/s]."""
+
+CONTROL_SPEEDS, CONTROL_TURNS = (0.0, 1.0 / 3.0, 1.0), (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Shares of the greatest speed and turn rate of which the list of controls is made."""
+
+FORESIGHT_S = 0.2
+"""Time for which the pose after a control is predicted [s]."""
+
+HEADING_WEIGHT = 0.3
+"""What a radian off the heading to the target counts in the list of controls [m]."""
+
+
+class Phase(Enum):
+    """States of the drive."""
+
+    TURN = "turn"
+    ADVANCE = "advance"
+    DONE = "done"
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A drive to a target, and the state that it is in.
+
+    Attributes
+    ----------
+    target : (2,) float64
+        Where to [m].
+    phase : Phase
+        The state.
+    """
+
+    target: NDArray[np.float64]
+    phase: Phase = Phase.TURN
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a robot can do: greatest speed [m/s], turn rate [rad/s], deceleration [m/s2] and radius [m]."""
+
+    speed: float
+    turn_rate: float
+    deceleration: float
+    radius: float
+
+
+def limits_of(robot: Robot, settings: SrtSettings) -> Limits:
+    """Return what a robot is driven with under the settings."""
+    speed, turn_rate = min(settings.speed, robot.cruise_speed), min(settings.turn_rate, robot.max_turn_rate)
+    return Limits(speed, turn_rate, 0.5 * robot.max_acceleration, robot.radius)
+
+
+def free_way(scan: NDArray[np.float32], geometry: ScanGeometry, radius: float, heading: float = 0.0) -> float:
+    """Return how far the robot can go before it meets what the laser sees.
+
+    Parameters
+    ----------
+    scan : (beams,) float32
+        Ranges [m].
+    geometry : ScanGeometry
+        The laser.
+    radius : float
+        Radius of the body [m].
+    heading : float
+        Direction of the way against the robot's heading [rad].
+
+    Returns
+    -------
+    float
+        Length of the way [m]; the laser's greatest range where nothing is met.
+    """
+    ranges = np.asarray(scan, np.float64)
+    is_hit = (ranges >= geometry.range_min) & (ranges < no_return(geometry))
+    angles = geometry.angles[is_hit] - heading
+    along, across = ranges[is_hit] * np.cos(angles), ranges[is_hit] * np.sin(angles)
+    half = radius + SIDE
+    is_ahead = (along > 0.0) & (np.abs(across) < half)
+    reach = along[is_ahead] - np.sqrt(half * half - across[is_ahead] ** 2)
+    return max(float(reach.min(initial=geometry.range_max)), 0.0)
+
+
+def stopping_speed(distance: float, deceleration: float) -> float:
+    """Return the speed from which a robot stops within a distance [m/s]."""
+    return math.sqrt(2.0 * deceleration * max(distance, 0.0))
+
+
+def driven(
+    drive: Drive, pose: NDArray[np.float64], free: float, limits: Limits, settings: SrtSettings, arrived: float
+) -> tuple[Drive, float, float]:
+    """Return the next state of a drive, and the speed [m/s] and turn rate [rad/s] for one step.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive so far.
+    pose : (3,) float64
+        Where the robot takes itself to be [m, rad].
+    free : float
+        How far the way ahead is free [m].
+    limits : Limits
+        What it can do.
+    settings : SrtSettings
+        ``turn_advance`` or ``controls``, and the angles between which it turns.
+    arrived : float
+        Distance at which it is done [m].
+    """
+    gap = drive.target - pose[:2]
+    distance, error = math.hypot(*gap), wrapped(math.atan2(gap[1], gap[0]) - float(pose[2]))
+    if distance <= arrived:
+        return replace(drive, phase=Phase.DONE), 0.0, 0.0
+    fastest = min(limits.speed, stopping_speed(distance, limits.deceleration), stopping_speed(free - GAP, limits.deceleration))
+    if settings.drive == "controls":
+        speed, turn_rate = best_control(pose, drive.target, fastest, limits)
+        return replace(drive, phase=Phase.ADVANCE if speed > 0.0 else Phase.TURN), speed, turn_rate
+    limit = settings.turning_ends if drive.phase is Phase.TURN else settings.turning_starts
+    turn_rate = max(-limits.turn_rate, min(limits.turn_rate, TURN_GAIN * error))
+    if abs(error) > limit:
+        return replace(drive, phase=Phase.TURN), 0.0, turn_rate
+    return replace(drive, phase=Phase.ADVANCE), fastest * math.cos(error), turn_rate
+
+
+def best_control(pose: NDArray[np.float64], target: NDArray[np.float64], fastest: float, limits: Limits) -> tuple[float, float]:
+    """Return the speed and turn rate of the list of controls whose predicted pose is closest to a target, looking at it.
+
+    Parameters
+    ----------
+    pose : (3,) float64
+        Where the robot takes itself to be [m, rad].
+    target : (2,) float64
+        Where it wants to be [m].
+    fastest : float
+        Speed that the way ahead allows [m/s]; controls are no faster.
+    limits : Limits
+        What the robot can do.
+    """
+    best, least = (0.0, 0.0), math.inf
+    for speed_share in CONTROL_SPEEDS:
+        for turn_share in CONTROL_TURNS:
+            speed, turn_rate = min(speed_share * limits.speed, fastest), turn_share * limits.turn_rate
+            heading = float(pose[2]) + turn_rate * FORESIGHT_S
+            middle = float(pose[2]) + 0.5 * turn_rate * FORESIGHT_S
+            x = float(pose[0]) + speed * FORESIGHT_S * math.cos(middle)
+            y = float(pose[1]) + speed * FORESIGHT_S * math.sin(middle)
+            gap_x, gap_y = float(target[0]) - x, float(target[1]) - y
+            cost = math.hypot(gap_x, gap_y) + HEADING_WEIGHT * abs(wrapped(math.atan2(gap_y, gap_x) - heading))
+            if cost < least - 1e-12:
+                best, least = (speed, turn_rate), cost
+    return best

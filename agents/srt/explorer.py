@@ -1,0 +1,343 @@
+"""One robot that grows the tree: it looks, chooses, drives, comes back where nothing is open, and goes home in the end."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.candidates import Candidate, CandidateSource
+from lidarium.agents.srt.choice import Choice, choose, home_way
+from lidarium.agents.srt.drive import Drive, Phase, driven, free_way, limits_of
+from lidarium.agents.srt.frontier_arcs import Opening, openings_of
+from lidarium.agents.srt.memory import Memory
+from lidarium.agents.srt.safe_region import SafeRegion, joined_views, safe_region, seen_region, view_of
+from lidarium.agents.srt.senses import Senses
+from lidarium.agents.srt.settings import SrtSettings
+from lidarium.agents.srt.tree import Node, Tree, sees_back_and_forth
+from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.robots import Robot
+from lidarium.mapping.rigid import wrapped
+
+PATIENCE_S = 3.0
+"""A robot that has neither moved nor turned for this long while it drives is blocked [s]."""
+
+BLIND_S = 10.0
+"""A robot whose laser tells nothing for this long gives up [s]."""
+
+MOVED, TURNED = 0.05, 0.1
+"""What counts as having moved [m] and turned [rad]."""
+
+BACKING_S, BACKING_SPEED = 1.5, 0.12
+"""How long and how fast a blocked robot backs out [s, m/s]."""
+
+MATE_NEAR = 1.5
+"""A teammate within this distance may be what blocks a robot [m]."""
+
+ASIDES = 6
+"""How often a robot steps aside for teammates on its way before it gives its target up."""
+
+REVIEW_S = 0.5
+"""Time between looks at whether a target still stands [s]."""
+
+GOT_ON = 0.8
+"""A robot on its way along free rays goes on for this long before it asks whether they were seen through [m]."""
+
+NEW_NODE = 0.05
+"""A robot nearer than this to its last node makes no new one [m]."""
+
+Command = tuple[float, float]
+REST: Command = (0.0, 0.0)
+
+
+class Explorer:
+    """One robot of the tree.
+
+    Parameters
+    ----------
+    agent : str
+        Its name.
+    tree : Tree
+        The team's graph.
+    settings : SrtSettings
+        How the tree grows.
+    robot : Robot
+        Its body and drive.
+    lidar : Lidar
+        Its laser.
+    generator : numpy.random.Generator
+        Where its draws come from.
+
+    Attributes
+    ----------
+    known : set of int
+        Nodes that it knows: its own, and those of teammates that it was in contact with.
+    ending : str or None
+        Why it goes home, or is there.
+    is_home : bool
+        Whether it has ended its work and is back where it began, or as near as it gets.
+    """
+
+    def __init__(self, agent: str, tree: Tree, settings: SrtSettings, robot: Robot, lidar: Lidar, generator: np.random.Generator) -> None:
+        self.agent, self.known = agent, set[int]()
+        self.ending: str | None = None
+        self.is_home = False
+        self._tree, self._settings, self._lidar, self._generator = tree, settings, lidar, generator
+        self._limits = limits_of(robot, settings)
+        self._body = robot.radius + settings.margin
+        self._perception = min(settings.perception, lidar.range_max)
+        self._source = CandidateSource(settings, self._body, generator)
+        self._root = self._node = -1
+        self._own_nodes = 0
+        self._route: list[Choice] = []
+        self._drive: Drive | None = None
+        self._looks: list[float] = []
+        self._backs_until = self._blind_since = -math.inf
+        self._stood_since, self._stood_at = 0.0, np.zeros(3)
+        self._reviewed_at, self._asides, self._failures = -math.inf, 0, 0
+
+    @property
+    def target(self) -> Candidate | None:
+        """The candidate that it is on its way to."""
+        return self._route[-1].candidate if self._route else None
+
+    @property
+    def root(self) -> int:
+        """Number of its first node, -1 before it has one."""
+        return self._root
+
+    def step(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> Command:
+        """Return speed [m/s] and turn rate [rad/s] for one step; ``targets`` are those of teammates in contact."""
+        if senses.is_blind(self._lidar):
+            return self._wait_for_sight(senses)
+        self._blind_since = -math.inf
+        if self._root < 0:
+            self._root = self._add_node(senses, None, senses.pose, memory)
+            self._stand(senses)
+            self._begin_looks(senses)
+        if senses.time_s < self._backs_until:
+            return -BACKING_SPEED, 0.0
+        if self._looks:
+            turn = self._look(senses, memory)
+            if turn is not None:
+                return turn
+        if self._route and senses.time_s - self._reviewed_at >= REVIEW_S:
+            self._review(senses, memory)
+        if not self._route and not (self.is_home and senses.time_s - self._reviewed_at < REVIEW_S):
+            self._decide(senses, memory, targets)
+        if self._looks:
+            return REST
+        return self._follow(senses, memory) if self._route else REST
+
+    def _wait_for_sight(self, senses: Senses) -> Command:
+        if self._blind_since < 0.0:
+            self._blind_since = senses.time_s
+        if senses.time_s - self._blind_since >= BLIND_S:
+            self.ending, self.is_home = "blind", True
+        self._stand(senses)
+        return REST
+
+    def _add_node(self, senses: Senses, parent: int | None, pose: NDArray[np.float64], memory: Memory) -> int:
+        """Add a node where the robot is, and return its number."""
+        view = view_of(senses.scan, self._lidar, float(senses.pose[2]))
+        node = Node(len(self._tree.nodes), self.agent, np.array(pose), *self._regions(pose, view), parent, view)
+        self._insert(node, memory)
+        return node.number
+
+    def _insert(self, node: Node, memory: Memory) -> None:
+        def joins(first: Node, second: Node) -> bool:
+            return sees_back_and_forth(first, second) or (
+                self._settings.memory == "map"
+                and math.dist(first.place, second.place) <= self._perception
+                and memory.is_clear(first.place, second.place)
+            )
+
+        self._tree.add(node, joins if self._settings.backtrack == "open" else None, self.known)
+        self.known.add(node.number)
+        self._node = node.number
+        self._own_nodes += 1
+
+    def _regions(self, pose: NDArray[np.float64], view: NDArray[np.float64]) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
+        """Return where the robot is safe, what it has seen, and the openings, of a view."""
+        settings, place = self._settings, np.array(pose[:2])
+        safe = safe_region(place, view, float(pose[2]), settings.shape, self._body, self._perception, settings.turn_room)
+        openings = openings_of(place, view, self._perception, self._body, with_blind=settings.memory == "map")
+        return safe, seen_region(place, view, self._perception), openings
+
+    def _begin_looks(self, senses: Senses) -> None:
+        """Plan the turns after which the robot has seen the whole circle."""
+        field = self._lidar.field_of_view
+        turns = math.ceil(2.0 * math.pi / field - 1e-9) - 1
+        if not self._settings.looks_around or self._lidar.beams == 1 or turns > 8:
+            return
+        heading = float(senses.pose[2])
+        self._looks = [wrapped(heading + (2.0 * math.pi - field) * (turn + 1) / turns) for turn in range(turns)]
+
+    def _look(self, senses: Senses, memory: Memory) -> Command | None:
+        """Turn to the next heading to look at; None when all were seen, which the node then knows."""
+        error = wrapped(self._looks[0] - float(senses.pose[2]))
+        if abs(error) > self._settings.turning_ends and not self._is_stuck(senses):
+            return 0.0, max(-self._limits.turn_rate, min(self._limits.turn_rate, 2.0 * error))
+        node = self._tree.nodes[self._node]
+        view = joined_views(node.view, view_of(senses.scan, self._lidar, float(senses.pose[2])))
+        node.view = view
+        node.safe, node.seen, node.openings = self._regions(node.pose, view)
+        self._looks.pop(0)
+        self._stand(senses)
+        return REST if self._looks else None
+
+    def _review(self, senses: Senses, memory: Memory) -> None:
+        """Drop a target that was seen through on the way, make a node after a while, and turn to the goal once it is in sight."""
+        self._reviewed_at = senses.time_s
+        candidate, last = self._route[-1].candidate, self._route[-1]
+        if candidate is None or last.is_goal or self._settings.memory != "map":
+            return
+        is_direct = len(self._route) == 1
+        departed = senses.distance_to(self._tree.nodes[self._node].place)
+        in_sight = senses.goal is not None and memory.way(senses.pose[:2], senses.goal) is not None
+        # Every step sees a little more beyond free rays: a target there stands until the robot has got on.
+        may_drop = departed >= self._settings.least_step if candidate.opening is None or candidate.opening.is_gap else departed >= GOT_ON
+        if in_sight or (may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)):
+            self._pause(senses, memory)
+        elif is_direct and departed >= self._settings.passing_distance:
+            self._add_node(senses, self._node, senses.pose, memory)
+
+    def _pause(self, senses: Senses, memory: Memory) -> None:
+        """Drop the way, with a node where the robot is, so that all ways begin at nodes."""
+        self._route, self._drive = [], None
+        if senses.distance_to(self._tree.nodes[self._node].place) >= NEW_NODE:
+            self._add_node(senses, self._node, senses.pose, memory)
+
+    def _decide(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
+        """Choose where to go next, or to go home."""
+        self._reviewed_at = senses.time_s
+        if self.ending in ("budget", "goal_missed") or self._is_spent(senses):
+            self._go_home(self.ending if self.ending == "goal_missed" else "budget", senses, memory)
+            return
+        node = self._tree.nodes[self._node]
+        way = choose(node, self._tree, self.known, self._source, memory, self._settings, self._generator, senses, targets, self._limits)
+        if way:
+            self.ending, self.is_home, self._asides = None, False, 0
+            self._set_out(way, senses)
+        elif self._may_look(node):
+            node.has_looked = True
+            self._begin_looks(senses)
+        elif self._settings.backtrack == "parent" and node.parent is not None:
+            self._set_out([Choice(self._tree.nodes[node.parent].place, node.parent)], senses)
+        else:
+            self._go_home("explored" if senses.goal is None else "unreachable", senses, memory)
+
+    def _may_look(self, node: Node) -> bool:
+        return self._settings.memory == "regions" and self._settings.looks_around and not node.has_looked and node.number != self._root
+
+    def _is_spent(self, senses: Senses) -> bool:
+        return self._own_nodes >= self._settings.nodes or senses.time_s >= self._settings.time_s
+
+    def _go_home(self, ending: str, senses: Senses, memory: Memory) -> None:
+        """Set out for the first node; there, or without a way, the robot is at its end."""
+        self.ending = ending
+        self._route = home_way(self._tree, self._node, self._root, self.known, senses, memory)
+        self._drive = None
+        self._stand(senses)
+        self.is_home = not self._route
+
+    def _set_out(self, way: list[Choice], senses: Senses) -> None:
+        self._route, self._drive = way, None
+        self._tree.nodes[self._node].tried += 1
+        self._stand(senses)
+
+    def _follow(self, senses: Senses, memory: Memory) -> Command:
+        """Drive along the way, cutting corners where the map says that there is room."""
+        if self._drive is None:
+            self._cut_corner(senses, memory)
+            self._drive = Drive(self._route[0].place)
+        if self._is_stuck(senses):
+            self._settle_block(senses, memory)
+            return REST
+        leg = self._route[0]
+        free = free_way(senses.scan, self._lidar, self._limits.radius)
+        self._drive, speed, turn_rate = driven(
+            self._drive, senses.pose, free, self._limits, self._settings, 0.03 if leg.is_goal else self._settings.arrived
+        )
+        if self._drive.phase is Phase.DONE:
+            self._arrive(leg, senses, memory)
+            return REST
+        return speed, turn_rate
+
+    def _cut_corner(self, senses: Senses, memory: Memory) -> None:
+        if self._settings.memory != "map":
+            return
+        for skipped in range(len(self._route) - 1, 0, -1):
+            if memory.is_clear(senses.pose[:2], self._route[skipped].place):
+                del self._route[:skipped]
+                return
+
+    def _arrive(self, leg: Choice, senses: Senses, memory: Memory) -> None:
+        """Take note of where the robot has come."""
+        self._route, self._drive, self._failures = self._route[1:], None, 0
+        if leg.node is not None:
+            self._return_to(leg.node, memory)
+        elif leg.is_goal:
+            # The environment ends a robot that truly is there; this one only takes itself to be.
+            self._go_home("goal_missed", senses, memory)
+        else:
+            place = leg.place if self._settings.places_nodes_at_targets else senses.pose[:2]
+            self._add_node(senses, self._node, np.array([*place, senses.pose[2]]), memory)
+            if leg.candidate is not None:
+                self._source.note_tried(leg.candidate)
+
+    def _return_to(self, number: int, memory: Memory) -> None:
+        """Be at a node again; in the printed form of the thesis it is added once more, below the parent that it had."""
+        if number not in self._tree.nodes[self._node].neighbours:
+            self._tree.connect(self._node, number)
+        self._node = number
+        node = self._tree.nodes[number]
+        if self._settings.repeats_nodes and not self._route and self.ending is None and node.parent is not None:
+            again = Node(len(self._tree.nodes), self.agent, node.pose, node.safe, node.seen, node.openings, node.parent, node.view)
+            self._insert(again, memory)
+
+    def _stand(self, senses: Senses) -> None:
+        self._stood_since, self._stood_at = senses.time_s, senses.pose
+
+    def _is_stuck(self, senses: Senses) -> bool:
+        """Whether the robot has not got on for a while."""
+        gap = senses.pose - self._stood_at
+        if math.hypot(gap[0], gap[1]) > MOVED or abs(wrapped(float(gap[2]))) > TURNED:
+            self._stand(senses)
+        return senses.time_s - self._stood_since > PATIENCE_S
+
+    def _settle_block(self, senses: Senses, memory: Memory) -> None:
+        """Step aside for a teammate, or give the target up and back out."""
+        leg = self._route[0]
+        self._stand(senses)
+        self._failures += 1
+        has_mate = any(senses.distance_to(mate) < MATE_NEAR for mate in senses.mates)
+        departed = self._node
+        self._pause(senses, memory)
+        if has_mate and self._asides < ASIDES:
+            self._asides += 1
+            self._step_aside(senses)
+            return
+        self._asides = 0
+        if leg.node is not None:
+            self._tree.disconnect(departed, leg.node)
+            self._tree.disconnect(self._node, leg.node)
+        elif leg.candidate is not None:
+            self._source.note_tried(leg.candidate)
+        if self.ending is not None and self._failures > ASIDES:
+            self.is_home = True
+        self._backs_until = senses.time_s + BACKING_S
+
+    def _step_aside(self, senses: Senses) -> None:
+        """Go to a place in sight that is drawn, so that of two robots that block each other one lets the other pass."""
+        node = self._tree.nodes[self._node]
+        region = safe_region(
+            senses.pose[:2], view_of(senses.scan, self._lidar, float(senses.pose[2])), float(senses.pose[2]), "radial",
+            self._limits.radius, self._perception,
+        )  # fmt: skip
+        for _ in range(self._settings.tries):
+            angle, distance = float(self._generator.uniform(-math.pi, math.pi)), float(self._generator.uniform(0.3, 1.2))
+            if region.radius_at(angle) >= distance:
+                place = region.place + distance * np.array([math.cos(angle), math.sin(angle)])
+                self._set_out([Choice(place, None, Candidate(node.number, place, None, place))], senses)
+                return

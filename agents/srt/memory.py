@@ -1,0 +1,126 @@
+"""What tells which space was seen and where a straight way is clear: the robot's map, or the regions of the tree's nodes alone."""
+
+import math
+from collections.abc import Iterable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.tree import Node
+from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.envs.onboard.team_driver import footprint_of
+from lidarium.mapping.grid_planning import centres_of, plan
+
+CLEAR_MARGIN = 0.02
+"""Straight ways across the map keep the body this far from what is occupied [m]."""
+
+
+WALL = 0.08
+"""What is unknown this near to something occupied may well be its inside [m]."""
+
+
+class Memory(Protocol):
+    """What a robot remembers; places (..., 2) are in the frame of the map's first cell [m]."""
+
+    def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
+        """Whether points (n, 2) beyond the border of what was seen from a node were seen, shape (n,)."""
+        ...
+
+    def is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+        """Whether the robot is known to get through on a straight way."""
+        ...
+
+    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+        """Return the ends of the straight legs of a way across space that was seen, the last one ``end``; None where there is none."""
+        ...
+
+
+class MapMemory:
+    """The map tells: space is seen where it is known, and a way is clear where all of it is free with room for the robot.
+
+    Parameters
+    ----------
+    navigation : NavigationMap
+        The map.
+    radius : float
+        Radius of the robot [m].
+    """
+
+    def __init__(self, navigation: NavigationMap, radius: float) -> None:
+        self._map, self._radius, self._body = navigation, radius, radius + CLEAR_MARGIN
+
+    def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
+        """Whether points (n, 2) lie in known cells, or so near to what is occupied that they may lie in it, or outside of the map."""
+        rows, columns, is_inside = self._cells(points)
+        is_beside_wall = self._clearance(rows, columns) < WALL
+        return np.asarray(~is_inside | (self._map.log_odds[rows, columns] != 0) | is_beside_wall)
+
+    def is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+        """Whether all cells on a way are free, with room for the robot."""
+        count = max(math.ceil(math.dist(start, end) / (0.5 * self._map.resolution)), 1)
+        rows, columns, is_inside = self._cells(start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None])
+        clearance = self._clearance(rows, columns)
+        # Where the robot starts it may stand nearer to a wall than it would go.
+        is_near_start = np.arange(count + 1) * 0.5 * self._map.resolution < self._body
+        is_free = (self._map.log_odds[rows, columns] < 0) & ((clearance >= self._body) | is_near_start)
+        return bool((is_inside & is_free).all())
+
+    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+        """Return the way that the onboard planning finds across the map, its legs as long as they are clear."""
+        rows, columns, is_inside = self._cells(np.stack([start, end]))
+        if not is_inside.all() or self._map.log_odds[rows[1], columns[1]] >= 0:
+            return None
+        cells = [(int(row), int(column)) for row, column in zip(rows, columns, strict=True)]
+        found = plan(self._map.space, self._map.log_odds, self._map.clearance, cells[0], cells[1], footprint_of(self._radius))
+        if found is None:
+            return None
+        places = [*centres_of(found[1], (0.0, 0.0), self._map.resolution)[1:-1], end]
+        legs, at = [], start
+        while places:
+            clear = next((k for k in range(len(places) - 1, 0, -1) if self.is_clear(at, places[k])), 0)
+            at, places = places[clear], places[clear + 1 :]
+            legs.append(at)
+        return legs
+
+    def _clearance(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the distance of cells from what is occupied [m]."""
+        field = self._map.clearance
+        return np.sqrt(field.limit - field.closeness[rows, columns].astype(np.float64)) * 0.5 * field.resolution
+
+    def _cells(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Return rows and columns of points, and which of them lie on the map; the others get the nearest cell."""
+        cells = np.floor(points / self._map.resolution).astype(np.int64)
+        rows, columns = self._map.log_odds.shape
+        row, column = np.clip(cells[..., 1], 0, rows - 1), np.clip(cells[..., 0], 0, columns - 1)
+        return row, column, (row == cells[..., 1]) & (column == cells[..., 0])
+
+
+class RegionMemory:
+    """The nodes tell: space is seen where it lies in another node's seen region; a way is clear within one node's safe region.
+
+    Parameters
+    ----------
+    nodes : iterable of Node
+        The nodes that the robot knows.
+    """
+
+    def __init__(self, nodes: Iterable[Node]) -> None:
+        self._nodes = list(nodes)
+
+    def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
+        """Whether points (n, 2) lie in what was seen from another node."""
+        seen = np.zeros(len(points), np.bool_)
+        for node in self._nodes:
+            # A node made again at the same place sees what it saw before: its openings stay.
+            if node is not of and not np.array_equal(node.place, of.place):
+                seen |= node.seen.contains(points)
+        return seen
+
+    def is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+        """Whether a way begins at a node and ends within its safe region."""
+        return any(math.dist(node.place, start) <= 0.05 and bool(node.safe.contains(end)) for node in self._nodes)
+
+    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+        """Return None: regions know no way but the tree's."""
+        return None

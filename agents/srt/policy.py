@@ -1,0 +1,89 @@
+"""The policy: a team that explores by sensor-based random trees (Oriolo, Vendittelli, Freda and Troso 2004), joined to one graph."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.policy import Action, Stop, Team
+from lidarium.agents.srt.explorer import Explorer
+from lidarium.agents.srt.senses import NEWS_S, memory_of, senses_of
+from lidarium.agents.srt.settings import make_srt_settings
+from lidarium.agents.srt.tree import Tree
+from lidarium.envs.exploration import Observation
+
+
+class SensorBasedRandomTree:
+    """Grows a tree of places with the safe regions seen from them, towards the goal where there is one.
+
+    Each robot drives by its own scans. Robots that know each other's starts and are in contact share one graph, whose trees are
+    joined by bridges, and leave each other what they go for. A robot without work goes home; all stop when none has work.
+
+    Parameters
+    ----------
+    mode : str
+        ``default``, or ``thesis`` for the printed form of the thesis.
+    **settings
+        Any attribute of ``SrtSettings``.
+
+    Attributes
+    ----------
+    tree : Tree
+        The graph; places in the frame of the map's first cell.
+    """
+
+    level = "velocity"
+
+    def __init__(self, mode: str = "default", **settings: Any) -> None:  # noqa: ANN401
+        self.settings = make_srt_settings(mode, **settings)
+        self.shares_map = True
+        self.tree = Tree()
+        self._explorers: dict[str, Explorer] = {}
+
+    def reset(self, team: Team, seed: int) -> None:
+        """Begin an episode."""
+        self._team, self.tree = team, Tree()
+        children = np.random.SeedSequence(seed).spawn(len(team.agents))
+        self._explorers = {}
+        for agent, child in zip(team.agents, children, strict=True):
+            belief = team.belief(agent)
+            generator = np.random.default_rng(child)
+            self._explorers[agent] = Explorer(agent, self.tree, self.settings, belief.robot, belief.lidar, generator)
+
+    def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
+        """Drive every robot for a step.
+
+        Raises
+        ------
+        ValueError
+            Where the observations lack the scan.
+        """
+        if any("scan" not in observation for observation in observations.values()):
+            raise ValueError("a sensor-based random tree needs scan, which the robots do not observe; add it to settings.observe")
+        actions: dict[str, Action] = {}
+        for agent, observation in observations.items():
+            explorer, belief = self._explorers[agent], self._team.belief(agent)
+            in_contact = [self._explorers[mate] for mate in self._contacts(agent) if mate in observations]
+            for mate in in_contact:
+                mate.known |= explorer.known
+                explorer.known |= mate.known
+            targets = [mate.target for mate in in_contact if mate.target is not None]
+            memory = memory_of(belief, [self.tree.nodes[number] for number in sorted(explorer.known)], self.settings)
+            speed, turn_rate = explorer.step(senses_of(self._team.time_s, observation, belief), memory, targets)
+            actions[agent] = _shares(speed / belief.robot.max_speed, turn_rate / belief.robot.max_turn_rate)
+        explorers = [self._explorers[agent] for agent in observations]
+        if all(explorer.is_home for explorer in explorers):
+            return {explorer.agent: Stop(explorer.ending or "explored") for explorer in explorers}
+        return actions
+
+    def _contacts(self, agent: str) -> list[str]:
+        """Return the teammates with whom a robot has a frame and fresh news in common."""
+        belief = self._team.belief(agent)
+        if belief.shared_map is None:
+            return []
+        return [name for name, mate in belief.teammates.items() if mate.age_s <= NEWS_S and name in self._explorers]
+
+
+def _shares(speed: float, turn_rate: float) -> NDArray[np.float32]:
+    return np.clip(np.array([speed, turn_rate], np.float32), -1.0, 1.0)

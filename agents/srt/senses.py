@@ -1,0 +1,78 @@
+"""What one robot has before it decides: pose, scan and goal in the frame of the team's graph, and what it remembers."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.memory import MapMemory, Memory, RegionMemory
+from lidarium.agents.srt.settings import SrtSettings
+from lidarium.agents.srt.tree import Node
+from lidarium.envs.exploration import Observation
+from lidarium.envs.onboard.perception import Belief
+from lidarium.mapping.scans import ScanGeometry
+
+NEWS_S = 1.0
+"""Robots whose news are at most this old are in contact [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Senses:
+    """What a robot has before it decides.
+
+    Attributes
+    ----------
+    time_s : float
+        Simulated time [s].
+    pose : (3,) float64
+        Where it takes itself to be, in the frame of the map's first cell [m, rad].
+    scan : (beams,) float32
+        What the laser tells [m].
+    is_pressed : bool
+        Whether the bumper is pressed.
+    goal : (2,) float64 or None
+        Where it has to go [m].
+    mates : list of (2,) float64
+        Where teammates are, of those whom it has news of [m].
+    """
+
+    time_s: float
+    pose: NDArray[np.float64]
+    scan: NDArray[np.float32]
+    is_pressed: bool
+    goal: NDArray[np.float64] | None
+    mates: list[NDArray[np.float64]]
+
+    def is_blind(self, geometry: ScanGeometry) -> bool:
+        """Whether no beam tells anything."""
+        with np.errstate(invalid="ignore"):
+            return not bool((self.scan >= geometry.range_min).any())
+
+    def distance_to(self, place: NDArray[np.float64]) -> float:
+        """Return the distance to a place [m]."""
+        return math.dist(self.pose[:2], place)
+
+
+def senses_of(time_s: float, observation: Observation, belief: Belief) -> Senses:
+    """Return what a robot has, of an observation and its belief."""
+    origin = np.array(belief.map_origin)
+    pose = np.asarray(belief.pose, np.float64)
+    mates = [mate.pose[:2] - origin for mate in belief.teammates.values() if mate.age_s <= NEWS_S]
+    return Senses(
+        time_s,
+        np.array([*(pose[:2] - origin), pose[2]]),
+        observation["scan"],
+        bool(np.any(observation.get("bumper", 0))),
+        None if belief.goal is None else belief.goal - origin,
+        mates,
+    )
+
+
+def memory_of(belief: Belief, known: Iterable[Node], settings: SrtSettings) -> Memory:
+    """Return what a robot remembers: the map that reached it, or the nodes that it knows."""
+    if settings.memory == "regions":
+        return RegionMemory(known)
+    shared = belief.shared_map
+    return MapMemory(belief.map if shared is None else shared, belief.radius)

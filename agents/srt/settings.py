@@ -1,0 +1,182 @@
+"""Every knob of the sensor-based random tree, with its unit and default, and the choices of the thesis."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+SHAPES = ("ball", "star", "radial")
+"""Shapes of safe regions: one radius, one for each laser region, one for each ray."""
+
+CHOICES: dict[str, tuple[str, ...]] = {
+    "shape": SHAPES,
+    "algorithm": ("integrated", "base"),
+    "candidates": ("goal", "random", "farthest"),
+    "backtrack": ("open", "parent"),
+    "memory": ("map", "regions"),
+    "drive": ("turn_advance", "controls"),
+}
+"""Settings that are one of several words."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SrtSettings:
+    """How a sensor-based random tree grows.
+
+    Attributes
+    ----------
+    shape : str
+        Shape of the safe regions: ``ball``, ``star`` or ``radial``.
+    algorithm : str
+        ``integrated`` goes where the border of what was seen is open; ``base`` goes in random directions, wherever no other safe
+        region lies.
+    candidates : str
+        Where to go next: ``goal`` (least way, and least distance to the goal where there is one), ``random`` (an opening by its
+        angular width) or ``farthest`` (the longest ray of an opening).
+    backtrack : str
+        Where to go from a node without openings: ``open`` (the cheapest node that has one, along the tree and its bridges) or
+        ``parent``.
+    memory : str
+        What tells space that was seen: ``map`` (the robot's map) or ``regions`` (the nodes' own scans).
+    drive : str
+        ``turn_advance`` (turn, advance, done) or ``controls`` (the best of a list of controls).
+    places_nodes_at_targets : bool
+        Whether a node is placed where the robot wanted to go, as printed in the thesis, and not where it takes itself to be.
+    repeats_nodes : bool
+        Whether a node is added again when the robot comes back to it, as printed in the thesis.
+    step_share : float
+        Share of the safe radius that the robot goes, in (0, 1).
+    random_share : float
+        Share of random choices among those towards the goal.
+    way_weight : float
+        What a metre of way counts against a metre of distance to the goal.
+    least_step : float
+        Candidates lie farther than this from their node [m].
+    tries : int
+        How many candidates are drawn at a node.
+    nodes : int
+        Budget of nodes of each robot.
+    time_s : float
+        Budget of simulated time of each robot, without the way home [s].
+    perception : float
+        Rays count as far as this, and at most as the laser sees [m].
+    margin : float
+        Safe radii end this far before what was met, beside the robot's radius [m].
+    turn_room : float
+        A laser region with a return nearer than the robot's radius, the margin and this is not safe [m]; 0 for off.
+    passing_distance : float
+        On its way a robot adds a node after this distance [m].
+    looks_around : bool
+        Whether a robot turns to see what lies behind it, at its first node and at nodes that are left without openings.
+    turning_starts, turning_ends : float
+        The robot turns on the spot where its heading is off by more than the first, until it is off by less than the second [rad].
+    speed : float
+        Greatest speed [m/s]; the robot's cruise speed where that is lower.
+    turn_rate : float
+        Greatest turn rate [rad/s].
+    arrived : float
+        Distance at which a robot is where it wanted to go [m].
+    """
+
+    shape: str = "radial"
+    algorithm: str = "integrated"
+    candidates: str = "goal"
+    backtrack: str = "open"
+    memory: str = "map"
+    drive: str = "turn_advance"
+    places_nodes_at_targets: bool = False
+    repeats_nodes: bool = False
+    step_share: float = 0.8
+    random_share: float = 0.1
+    way_weight: float = 1.0
+    least_step: float = 0.3
+    tries: int = 20
+    nodes: int = 500
+    time_s: float = math.inf
+    perception: float = math.inf
+    margin: float = 0.05
+    turn_room: float = 0.0
+    passing_distance: float = 1.5
+    looks_around: bool = True
+    turning_starts: float = math.radians(40.0)
+    turning_ends: float = math.radians(15.0)
+    speed: float = math.inf
+    turn_rate: float = 1.5
+    arrived: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name, words in CHOICES.items():
+            if getattr(self, name) not in words:
+                raise ValueError(f"{name} of the tree is {getattr(self, name)!r}; want one of {', '.join(words)}")
+        for name in (
+            "way_weight",
+            "least_step",
+            "time_s",
+            "perception",
+            "passing_distance",
+            "speed",
+            "turn_rate",
+            "arrived",
+            "turning_ends",
+        ):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} of the tree is {getattr(self, name)}; want more than 0")
+        for name in ("margin", "turn_room"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} of the tree is {getattr(self, name)} m; want 0 or more")
+        for name in ("tries", "nodes"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} of the tree is {getattr(self, name)}; want at least 1")
+        if not 0.0 < self.step_share < 1.0:
+            raise ValueError(f"step_share of the tree is {self.step_share}; want a share in (0, 1)")
+        if not 0.0 <= self.random_share <= 1.0:
+            raise ValueError(f"random_share of the tree is {self.random_share}; want a share in [0, 1]")
+        if not self.turning_ends < self.turning_starts <= math.pi:
+            raise ValueError(
+                f"turning_starts is {self.turning_starts} rad; want more than turning_ends ({self.turning_ends} rad) and at most pi"
+            )
+
+
+THESIS: dict[str, Any] = {
+    "shape": "star",
+    "candidates": "random",
+    "backtrack": "parent",
+    "memory": "regions",
+    "places_nodes_at_targets": True,
+    "repeats_nodes": True,
+    "perception": 4.0,
+    "margin": 0.03,
+    "least_step": 0.5,
+    "turn_room": 0.05,
+    "looks_around": False,
+    "passing_distance": math.inf,
+    "turning_starts": math.radians(15.0),
+    "turning_ends": math.radians(5.0),
+    "speed": 0.3,
+    "turn_rate": 0.8,
+}
+"""What ``mode="thesis"`` stands for; settings that are given themselves come first."""
+
+
+def make_srt_settings(mode: str = "default", **settings: Any) -> SrtSettings:  # noqa: ANN401
+    """Return the settings of a mode, some of them given.
+
+    Parameters
+    ----------
+    mode : str
+        ``default``, or ``thesis`` for the printed form of the thesis.
+    **settings
+        Any attribute of ``SrtSettings``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Where the mode or a setting is unknown, or a value is no good.
+    """
+    modes: dict[str, dict[str, Any]] = {"default": {}, "thesis": THESIS}
+    if mode not in modes:
+        raise ValueError(f"mode of the tree is {mode!r}; want one of {', '.join(modes)}")
+    known = [field.name for field in fields(SrtSettings)]
+    for name in settings:
+        if name not in known:
+            raise TypeError(f"unknown setting {name!r} of the tree; known are mode, {', '.join(known)}")
+    return SrtSettings(**{**modes[mode], **settings})

@@ -1,0 +1,136 @@
+"""Runs of the sensor-based random tree: it reaches goals, explores, comes home, and says why it ended."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+import lidarium
+from lidarium.agents.srt.policy import SensorBasedRandomTree
+from lidarium.evaluation.runner import run_episode
+
+
+@lru_cache
+def finished(floor, robots=1, mode="default", seed=1, robot="pioneer", horizon_s=900.0, **chosen):
+    env = lidarium.parallel_env(floor, robots=robots, robot=robot, horizon_s=horizon_s, stop_coverage=None, map_cells=32)
+    return run_episode(SensorBasedRandomTree(mode, **chosen), env, seed)
+
+
+def away_from_start(episode):
+    """How far each robot is from the nearest of the floor's starts [m]."""
+    starts = np.asarray(episode.env.floor.starts)
+    return [min(math.dist(pose[:2], start[:2]) for start in starts) for pose in episode.env.world.poses]
+
+
+@pytest.mark.parametrize("floor", ["srt_corridor", "srt_l_room", "srt_lab", "srt_t_junction", "srt_cluttered_reachable"])
+def test_the_goal_of_each_world_is_reached_without_contact(floor):
+    env = finished(floor).env
+    assert env.scorer.ended_because == {"robot_0": "reached"}
+    assert env.world.collisions.sum() == 0
+
+
+def test_an_enclosed_goal_is_unreachable_and_the_robot_is_back_at_its_start():
+    episode = finished("srt_cluttered")
+    assert episode.env.scorer.ended_because == {"robot_0": "unreachable"}
+    assert episode.env.scorer.coverage > 0.98
+    assert max(away_from_start(episode)) < 0.2
+
+
+def test_without_a_goal_a_room_is_explored_and_the_robot_is_back_at_its_start():
+    episode = finished("scene_room", robot="kobuki")
+    assert episode.env.scorer.ended_because == {"robot_0": "explored"}
+    assert episode.env.scorer.coverage > 0.98
+    assert max(away_from_start(episode)) < 0.2
+
+
+@pytest.mark.parametrize("budget", [("nodes", 3), ("time_s", 15.0)])
+def test_a_spent_budget_sends_the_robot_home(budget):
+    episode = finished("srt_cluttered", **{budget[0]: budget[1]})
+    assert episode.env.scorer.ended_because == {"robot_0": "budget"}
+    assert max(away_from_start(episode)) < 0.2
+    assert episode.env.world.travelled[0] > 0.5
+
+
+def test_the_printed_form_of_the_thesis_runs_and_comes_home():
+    episode = finished("srt_cluttered", mode="thesis")
+    assert episode.env.scorer.ended_because == {"robot_0": "unreachable"}
+    assert max(away_from_start(episode)) < 0.3
+    assert finished("srt_lab", mode="thesis").env.scorer.ended_because == {"robot_0": "reached"}
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [{"shape": "ball"}, {"shape": "star", "candidates": "random"}, {"candidates": "farthest", "memory": "regions"}, {"drive": "controls"},
+     {"algorithm": "base", "memory": "regions", "nodes": 12}, {"backtrack": "parent"}],
+    ids=str,
+)  # fmt: skip
+def test_all_forms_end_with_a_reason(chosen):
+    env = finished("srt_lab", horizon_s=200.0, **chosen).env
+    assert set(env.scorer.ended_because.values()) <= {"reached", "unreachable", "budget"}
+    assert env.world.collisions.sum() == 0
+
+
+def test_every_chain_of_parents_ends_at_the_first_node():
+    tree = finished("srt_cluttered").policy.tree
+    for node in tree.nodes:
+        assert tree.chain(node.number)[-1] == 0
+
+
+def test_a_team_shares_one_graph_and_all_come_home():
+    episode = finished("apartment", robots=2, robot="kobuki")
+    env, tree = episode.env, episode.policy.tree
+    assert set(env.scorer.ended_because.values()) == {"explored"}
+    assert env.scorer.coverage > 0.98
+    assert {node.agent for node in tree.nodes} == {"robot_0", "robot_1"}
+    bridges = [
+        (node.number, other) for node in tree.nodes for other in node.neighbours if tree.nodes[other].agent != node.agent
+    ]  # fmt: skip
+    assert bridges
+    assert (env.world.travelled > 5.0).all()
+
+
+def test_robots_that_do_not_know_their_starts_keep_graphs_of_their_own():
+    env = lidarium.parallel_env("scene_room", robots=2, known_starts=False, horizon_s=15.0, stop_coverage=None, map_cells=32)
+    tree = run_episode(SensorBasedRandomTree(), env, 2).policy.tree
+    assert all(tree.nodes[other].agent == node.agent for node in tree.nodes for other in node.neighbours)
+
+
+def test_the_same_seed_gives_the_same_run():
+    first = finished("srt_cluttered_reachable")
+    second = finished.__wrapped__("srt_cluttered_reachable")
+    assert np.array_equal(first.env.world.poses, second.env.world.poses)
+    assert first.env.scorer.curve == second.env.scorer.curve
+    assert [node.pose.tolist() for node in first.policy.tree.nodes] == [node.pose.tolist() for node in second.policy.tree.nodes]
+
+
+class Seen(SensorBasedRandomTree):
+    """A tree whose robots see what a test wants."""
+
+    def __init__(self, value):
+        super().__init__()
+        self._value = value
+
+    def act(self, observations):
+        return super().act({agent: {**each, "scan": np.full(727, self._value, np.float32)} for agent, each in observations.items()})
+
+
+@pytest.mark.parametrize("value", [math.nan, 0.0])
+def test_a_robot_whose_laser_tells_nothing_ends_as_blind(value):
+    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=60.0, stop_coverage=None, map_cells=32)
+    run_episode(Seen(value), env, 1)
+    assert env.scorer.ended_because == {"robot_0": "blind"}
+    assert env.world.travelled[0] < 1e-6
+
+
+@pytest.mark.parametrize("value", [5.6, math.inf])
+def test_scans_without_any_return_are_survived(value):
+    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=20.0, stop_coverage=None, map_cells=32)
+    run_episode(Seen(value), env, 1)
+    assert set(env.scorer.ended_because.values()) <= {"horizon", "explored"}
+
+
+def test_a_tree_without_a_scan_is_refused():
+    env = lidarium.parallel_env("scene_room", robots=1, observe=["pose"])
+    with pytest.raises(ValueError, match="needs scan"):
+        run_episode(SensorBasedRandomTree(), env, 1)
