@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 DEFAULT_FOLDER = Path("runs")
 
+STOP_COVERAGE = 0.99
+"""Share of the floor at which a run without a goal ends."""
+
 NAMED_GIVEN_UP = 5
 """How many of the frontiers given up are named in the summary; result.json has all."""
 
@@ -38,8 +41,8 @@ class Run(TeamCommand):
     """metres per pixel, where the floor is a plain image"""
     horizon_s: float | None = None
     """simulated time after which the run is cut [s]; without it the run ends when the explorers do"""
-    stop_coverage: float = 0.99
-    """share of the floor at which the run ends"""
+    stop_coverage: float | None = None
+    """share of the floor at which the run ends; 0.99 where left out, and none on a floor with a goal"""
     starts: str | None = None
     """where the robots start: x,y,theta of each in metres and radians, separated by semicolons"""
     record: bool = False
@@ -79,9 +82,13 @@ def execute(command: Run) -> Answer:
 
 
 def _settings(command: Run) -> "ExplorationSettings":
+    from lidarium.envs.options import FloorChoice
     from lidarium.envs.settings import make_settings
 
-    return make_settings(robots=command.robots, horizon_s=command.horizon_s, stop_coverage=command.stop_coverage, **command.team_options)
+    stop = command.stop_coverage
+    if stop is None and not FloorChoice(command.floor, command.resolution).has_goal:
+        stop = STOP_COVERAGE
+    return make_settings(robots=command.robots, horizon_s=command.horizon_s, stop_coverage=stop, **command.team_options)
 
 
 def _recorder(command: Run) -> "Recorder | None":

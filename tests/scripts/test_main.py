@@ -326,3 +326,8 @@ def test_progress_is_a_line_every_few_seconds_where_there_is_no_terminal(capsys)
         progress.tell(env)
     progress.close()
     assert capsys.readouterr().err == "explored 50.0 %, simulated 12 s\n" * 2
+
+
+def test_a_run_on_a_floor_with_a_goal_ends_there(tmp_path, capsys):
+    assert main(["run", "--floor", "srt_l_room", "--robots", "1", "--policy", "srt", "--out", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ended_because"] == {"robot_0": "reached"}
