@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
-from lidarium.mapping.localization.settings import OdometrySettings
+from lidarium.mapping.localization.settings import OdometryUncertainty
 from lidarium.mapping.rigid import composed, relative
 
 
@@ -13,12 +13,12 @@ class Odometry:
 
     Parameters
     ----------
-    settings : OdometrySettings or None
+    settings : OdometryUncertainty or None
         By how much odometry may err.
     """
 
-    def __init__(self, settings: OdometrySettings | None = None) -> None:
-        self._settings = settings or OdometrySettings()
+    def __init__(self, settings: OdometryUncertainty | None = None) -> None:
+        self._settings = settings or OdometryUncertainty()
         self.reset(np.zeros(3), 0)
 
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:

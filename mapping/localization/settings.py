@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OdometrySettings:
+class OdometryUncertainty:
     """By how much dead reckoning may err, in standard deviations.
 
     Attributes
@@ -261,7 +261,7 @@ class SlamSettings:
     """
 
     uses_odometry: bool = True
-    odometry: OdometrySettings = field(default_factory=OdometrySettings)
+    odometry: OdometryUncertainty = field(default_factory=OdometryUncertainty)
     matching: MatchingSettings = field(default_factory=MatchingSettings)
     submaps: SubmapSettings = field(default_factory=SubmapSettings)
     closures: ClosureSettings = field(default_factory=ClosureSettings)
