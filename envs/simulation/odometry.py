@@ -106,6 +106,12 @@ ODOMETRY: dict[str, OdometrySettings] = {
 """Odometry by name."""
 
 
+@kernel(inline=True)
+def within_half_turns(angle: float) -> float:
+    """Return an angle in (-pi, pi] (kernel)."""
+    return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+
+
 def begin_wheels(settings: OdometrySettings, robots: int, seed: int) -> NDArray[np.float64]:
     """Return the wheel numbers of a team at the beginning of an episode, with the signs of the biases drawn from ``seed``."""
     signs = np.random.default_rng([seed, ENCODER_STREAM]).choice([-1.0, 1.0], (robots, 3))
@@ -180,5 +186,4 @@ def read_encoders(
     chord = distance if abs(turn) < 1e-9 else distance * math.sin(0.5 * turn) / (0.5 * turn)
     odometry[0] += chord * math.cos(middle)
     odometry[1] += chord * math.sin(middle)
-    heading = odometry[2] + turn
-    odometry[2] = heading - 2.0 * math.pi * math.ceil((heading - math.pi) / (2.0 * math.pi))
+    odometry[2] = within_half_turns(odometry[2] + turn)

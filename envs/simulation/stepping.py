@@ -14,7 +14,7 @@ from lidarium.envs.simulation.arrays import DEAD_RECKONING, ENDED, KNOWN_MATES, 
 from lidarium.envs.simulation.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
 from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import stream_key
-from lidarium.envs.simulation.odometry import TICKS_PER_METRE, WHEEL_BASE, disturb_commands, read_encoders
+from lidarium.envs.simulation.odometry import TICKS_PER_METRE, WHEEL_BASE, disturb_commands, read_encoders, within_half_turns
 from lidarium.envs.simulation.stages import TIME_STEP, invalidate_mates, perceive_robot, sense_and_perceive
 from lidarium.mapping.kernels import Array, kernel, word_grid_at
 
@@ -28,8 +28,7 @@ def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array
     cosine, sine = math.cos(start[2]), math.sin(start[2])
     gap_x, gap_y = pose[0] - start[0], pose[1] - start[1]
     believed[0], believed[1] = cosine * gap_x + sine * gap_y, cosine * gap_y - sine * gap_x
-    angle = pose[2] - start[2]
-    believed[2] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+    believed[2] = within_half_turns(pose[2] - start[2])
 
 
 @kernel(spliced=True)
@@ -41,8 +40,7 @@ def _believe_odometry(odometry: Array, start: Array, is_relative: bool, believed
     cosine, sine = math.cos(start[2]), math.sin(start[2])
     believed[0] = start[0] + cosine * odometry[0] - sine * odometry[1]
     believed[1] = start[1] + sine * odometry[0] + cosine * odometry[1]
-    angle = odometry[2] + start[2]
-    believed[2] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+    believed[2] = within_half_turns(odometry[2] + start[2])
 
 
 @kernel

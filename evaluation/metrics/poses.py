@@ -13,6 +13,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.rigid import composed, fit, relative
+
 Poses = NDArray[np.float64]
 """Poses in the order of time, (times, 3) float64 [m, m, rad]."""
 
@@ -30,21 +32,13 @@ def best_transform(points: NDArray[np.float64], onto: NDArray[np.float64]) -> ND
     points, onto : (times, 2 or more) float64
         Positions x, y first [m], at least one.
     """
-    p, q = np.asarray(points, np.float64)[:, :2], np.asarray(onto, np.float64)[:, :2]
-    p_mean, q_mean = p.mean(axis=0), q.mean(axis=0)
-    p, q = p - p_mean, q - q_mean
-    theta = math.atan2(float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum()))
-    cosine, sine = math.cos(theta), math.sin(theta)
-    x = q_mean[0] - (cosine * p_mean[0] - sine * p_mean[1])
-    y = q_mean[1] - (sine * p_mean[0] + cosine * p_mean[1])
-    return np.array([x, y, theta])
+    fitted = fit(np.asarray(points, np.float64)[:, :2], np.asarray(onto, np.float64)[:, :2])
+    return np.array([fitted.x, fitted.y, fitted.theta])
 
 
 def moved(poses: Poses, transform: NDArray[np.float64]) -> Poses:
     """Return poses moved by a transform x, y, theta [m, m, rad]."""
-    cosine, sine = math.cos(transform[2]), math.sin(transform[2])
-    x, y, theta = np.asarray(poses, np.float64).T
-    return np.stack([cosine * x - sine * y + transform[0], sine * x + cosine * y + transform[1], wrapped(theta + transform[2])], axis=1)
+    return composed(np.asarray(transform, np.float64), np.asarray(poses, np.float64))
 
 
 def absolute_error(believed: Poses, true: Poses, is_aligned: bool = True) -> float:
@@ -84,7 +78,5 @@ def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, flo
 
 def _motions(poses: Poses, steps: int) -> Poses:
     """Return the motions from each pose to the one so many steps later, in the frame of the former."""
-    before, after = np.asarray(poses, np.float64)[:-steps], np.asarray(poses, np.float64)[steps:]
-    cosine, sine = np.cos(before[:, 2]), np.sin(before[:, 2])
-    x, y = (after - before)[:, :2].T
-    return np.stack([cosine * x + sine * y, cosine * y - sine * x, after[:, 2] - before[:, 2]], axis=1)
+    poses = np.asarray(poses, np.float64)
+    return relative(poses[:-steps], poses[steps:])
