@@ -69,7 +69,7 @@ class LocalMapper:
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
-        self._matching, self._submaps, self._odometry = settings.matching, settings.submaps, settings.odometry
+        self._matching, self._submaps = settings.matching, settings.submaps
         self._uses_odometry, self._geometry = settings.uses_odometry, geometry
         self._active: list[_Active] = []
         self.usual_score = 0.0
@@ -86,11 +86,18 @@ class LocalMapper:
         self._add(node, np.zeros(3), ranges)
         return ended
 
-    def match(self, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64], failed: int) -> Match | None:
+    def match(
+        self,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        moved: NDArray[np.float64],
+        uncertainty: NDArray[np.float64],
+        failed: int,
+    ) -> Match | None:
         """Return where a scan lies on the older local map; None where it does not match.
 
-        Near what odometry says it is searched first. Where that does not convince, odometry may be wrong (a wheel slips, the robot was
-        pushed), and the search goes farther, without it; what is found there has to be clearly better.
+        Near what odometry says it is searched first, weighing both. Where that does not convince, odometry may be wrong (a wheel slips,
+        the robot was pushed), and the search goes farther, without it; what is found there has to be clearly better.
 
         Parameters
         ----------
@@ -100,12 +107,14 @@ class LocalMapper:
             Where the robot should be, in the local map's frame [m, rad].
         moved : (3,) float64
             The motion since the last match that led there.
+        uncertainty : (3, 3) float64
+            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2].
         failed : int
             How many scans in a row did not match before.
         """
         settings = self._matching
         is_blind = not self._uses_odometry or failed >= settings.wide_after
-        near = self._match_near(points, predicted, moved) if self._uses_odometry else None
+        near = self._match_near(points, predicted, uncertainty) if self._uses_odometry else None
         if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:
             return self._noted(near)
         distance = math.hypot(float(moved[0]), float(moved[1]))
@@ -126,9 +135,8 @@ class LocalMapper:
         self.usual_score = match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
         return match
 
-    @property
-    def _weight(self) -> float:
-        return self._matching.independent_points / self._matching.deviation**2
+    def _weight(self, points: NDArray[np.float64]) -> float:
+        return min(self._matching.independent_points, len(points)) / self._matching.deviation**2
 
     def _is_good(self, match: Match) -> bool:
         settings = self._matching
@@ -136,21 +144,21 @@ class LocalMapper:
         agrees = match.score >= least_score and match.overlap >= settings.least_overlap
         return agrees and match.contradiction <= settings.most_contradiction
 
-    def _match_near(self, points: NDArray[np.float64], predicted: NDArray[np.float64], moved: NDArray[np.float64]) -> Match:
+    def _match_near(self, points: NDArray[np.float64], predicted: NDArray[np.float64], uncertainty: NDArray[np.float64]) -> Match:
         settings, grid = self._matching, self._active[0].submap.grid
-        covariance = self._odometry.covariance(math.hypot(float(moved[0]), float(moved[1])), float(moved[2]))
-        spread = np.sqrt(np.diag(covariance))
+        spread = np.sqrt(np.diag(uncertainty))
         reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
         reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
-        start = search(grid, points, predicted, reach_m, reach_angle)
-        information = np.asarray(np.linalg.inv(settings.prior_deviations**2 * covariance), np.float64)
-        return refine(grid, points, start, predicted, information, self._weight)
+        information = turned(np.linalg.inv(uncertainty), float(predicted[2]))
+        weight = self._weight(points)
+        start = search(grid, points, predicted, reach_m, reach_angle, information, weight)
+        return refine(grid, points, start, predicted, information, weight)
 
     def _match_far(self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]) -> Match | None:
         settings, oldest = self._matching, self._active[0].submap
         least = 0.5 * settings.least_score * settings.least_overlap
         found, _ = place(pyramid(oldest.finished()), points, predicted, reach, least, settings.evaluations)
-        return None if found is None else refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), self._weight)
+        return None if found is None else refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), self._weight(points))
 
     def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:
         """Take in a scan at x, y, theta (3,) in the older local map's frame, so much way [m] after the last one.
@@ -195,6 +203,13 @@ class LocalMapper:
 
     def _ended(self, active: list[_Active]) -> list[Finished]:
         return [Finished(one.submap.finished(), one.node) for one in active if one.submap.scans >= self._submaps.least_scans // 2]
+
+
+def turned(matrix: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """Return a covariance or an information (3, 3) of x, y, theta in a frame in which its own is turned by an angle [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(turn @ matrix @ turn.T, np.float64)
 
 
 def way(motion: NDArray[np.float64]) -> float:

@@ -15,12 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.localization.submaps import AgreementGrid
+from lidarium.mapping.localization.submaps import UNSEEN, AgreementGrid
 
 FULL_AGREEMENT = 2.0 / 3.0
 """Smoothed agreement in the middle of a wall that lies along a row of cells: the most that there is.
 
 With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
+"""
+
+UNSEEN_DISAGREEMENT = 0.4
+"""Square of the disagreement of a point in what the map has not observed: as that of most points, so that it speaks neither for nor
+against a pose.
+
+If it counted in full, a wall that goes on beyond where the map ends would hold the robot back to where the scan covers the known part
+of it, and in a bare corridor nothing else speaks.
 """
 
 SURFACE_GAP = 0.3
@@ -41,21 +49,33 @@ class Match:
         Share of the points that do.
     contradiction : float
         Share of the points that lie in what the map knows to be free.
-    covariance : (3, 3) float64
-        Of the pose [m^2, m rad, rad^2].
+    told, prior : (3, 3) float64
+        What the points alone tell of the pose, and what was known before [1/m^2, 1/(m rad), 1/rad^2].
     """
 
     pose: NDArray[np.float64]
     score: float
     overlap: float
     contradiction: float
-    covariance: NDArray[np.float64]
+    told: NDArray[np.float64]
+    prior: NDArray[np.float64]
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the pose, (3, 3) [m^2, m rad, rad^2]; a metre and a radian at most, for what nothing tells."""
+        return np.asarray(np.linalg.inv(self.told + self.prior + np.eye(3)), np.float64)
 
 
 def search(
-    grid: AgreementGrid, points: NDArray[np.float64], around: NDArray[np.float64], reach_m: float, reach_angle: float
+    grid: AgreementGrid,
+    points: NDArray[np.float64],
+    around: NDArray[np.float64],
+    reach_m: float,
+    reach_angle: float,
+    information: NDArray[np.float64],
+    weight: float,
 ) -> NDArray[np.float64]:
-    """Return the pose (3,) at which the points agree best with the map, of all within reach, in steps of a cell.
+    """Return the pose (3,) of least cost (that of ``refine``, without smoothing) of all within reach, in steps of a cell.
 
     Parameters
     ----------
@@ -64,16 +84,20 @@ def search(
     points : (n, 2) float64
         Points in the robot's frame [m].
     around : (3,) float64
-        Middle of the search: x, y, theta in the map's frame [m, rad].
+        Middle of the search, where odometry says the robot is: x, y, theta in the map's frame [m, rad].
     reach_m, reach_angle : float
         How far the search goes to each side [m, rad].
+    information, weight
+        As for ``refine``.
     """
     step = angle_step(points, grid.resolution)
     steps, turns = math.ceil(reach_m / grid.resolution - 1e-9), math.ceil(reach_angle / step - 1e-9)
     if len(points) == 0 or steps + turns == 0:
         return around
     found = np.empty(3)
-    _search(grid.levels, grid.column, grid.row, grid.resolution, points, around, steps, turns, step, found)
+    _search(
+        grid.levels, grid.column, grid.row, grid.resolution, points, around, steps, turns, step, information, weight / len(points), found
+    )  # fmt: skip
     return found
 
 
@@ -96,13 +120,18 @@ def _search(
     steps: int,
     turns: int,
     step: float,
+    information: Array,
+    weight: float,
     found: Array,
 ) -> None:
     rows, columns = levels.shape
     width = 2 * steps + 1
     sums = np.empty((width, width), np.int64)
-    best = -1.0
+    # Squares of disagreement in parts of 255.
+    unseen, scale = int(255 * UNSEEN_DISAGREEMENT), weight / 255.0
+    least = np.inf
     found[:] = around
+    away = np.empty(3)
     for turn in range(-turns, turns + 1):
         heading = around[2] + turn * step
         cosine, sine = math.cos(heading) / side, math.sin(heading) / side
@@ -112,18 +141,19 @@ def _search(
             column = int(math.floor(cosine * points[k, 0] - sine * points[k, 1] + x0))
             row = int(math.floor(sine * points[k, 0] + cosine * points[k, 1] + y0))
             if column < 0 or row < 0 or column + width > columns or row + width > rows:
+                sums += unseen
                 continue
             for i in range(width):
                 for j in range(width):
-                    sums[i, j] += levels[row + i, column + j]
+                    level = int(levels[row + i, column + j])
+                    sums[i, j] += unseen if level == UNSEEN else ((256 - level) * (256 - level)) >> 8
         for i in range(width):
             for j in range(width):
-                # Of equals the nearest to the prediction wins.
-                away = ((i - steps) ** 2 + (j - steps) ** 2) / (steps * steps + 1.0) + turn * turn / (turns * turns + 1.0)
-                score = sums[i, j] * (1.0 - 0.05 * away)
-                if score > best:
-                    best = score
-                    found[0], found[1], found[2] = around[0] + (j - steps) * side, around[1] + (i - steps) * side, heading
+                away[0], away[1], away[2] = (j - steps) * side, (i - steps) * side, turn * step
+                cost = scale * sums[i, j] + away @ information @ away
+                if cost < least:
+                    least = cost
+                    found[:] = around + away
 
 
 def refine(
@@ -136,7 +166,8 @@ def refine(
 ) -> Match:
     """Return the pose near a start at which the points agree best with the map.
 
-    Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a prior one. Points move
+    Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a prior one; a point in what
+    the map has not observed counts as ``UNSEEN_DISAGREEMENT``. Points move
     across the surfaces that they lie on, not along: where a wall goes on beyond what the map has observed of it, the points there would
     draw the scan back to where the map ends, and a robot in a corridor with them.
 
@@ -156,17 +187,12 @@ def refine(
     pose, hessian, told = np.array(start, np.float64), np.empty((3, 3)), np.zeros(3)
     count = len(points)
     if count == 0:
-        return Match(pose, 0.0, 0.0, 0.0, _inverse(information))
+        return Match(pose, 0.0, 0.0, 0.0, np.zeros((3, 3)), information)
     normals = np.zeros((count, 2))
     _find_normals(points, normals)
     _refine(grid.levels, grid.column, grid.row, grid.resolution, points, normals, pose, prior, information, weight / count, hessian, told)
     score, overlap, contradiction = told.tolist()
-    return Match(pose, score, overlap, contradiction, _inverse(hessian))
-
-
-def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the covariance; a metre and a radian at most, for what nothing tells."""
-    return np.asarray(np.linalg.inv(information + np.eye(3)), np.float64)
+    return Match(pose, score, overlap, contradiction, hessian, information)
 
 
 @kernel(inline=True)
@@ -205,6 +231,13 @@ def _agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
     return value / 254.0, slope_x / 254.0, slope_y / 254.0
 
 
+@kernel(inline=True)
+def _is_unseen(levels: Array, x: float, y: float) -> bool:
+    """Whether the map has not observed the cell at x, y [cells]."""
+    column, row = int(math.floor(x)), int(math.floor(y))
+    return not (0 <= column < levels.shape[1] and 0 <= row < levels.shape[0]) or levels[row, column] == UNSEEN
+
+
 @kernel
 def _find_normals(points: Array, normals: Array) -> None:
     """Fill ``normals`` (n, 2) with unit vectors across the surface on which each point and its neighbours lie; zero for a point alone."""
@@ -240,7 +273,11 @@ def _normal_equations(
     cost = 0.0
     for k in range(points.shape[0]):
         x, y = cosine * points[k, 0] - sine * points[k, 1], sine * points[k, 0] + cosine * points[k, 1]
-        value, slope_x, slope_y = _agreement(levels, (x + pose[0]) / side - first_column, (y + pose[1]) / side - first_row)
+        u, v = (x + pose[0]) / side - first_column, (y + pose[1]) / side - first_row
+        value, slope_x, slope_y = _agreement(levels, u, v)
+        if value == 0.0 and _is_unseen(levels, u, v):
+            cost += UNSEEN_DISAGREEMENT
+            continue
         rest = 1.0 - value / FULL_AGREEMENT
         cost += rest * rest
         scale = 1.0 / (side * FULL_AGREEMENT)
@@ -311,7 +348,7 @@ def _refine(
             if damping > 1e3:
                 break
     # On the crest of a wall slopes vanish: how steep it is, is seen half a cell away.
-    hessian[:] = information
+    hessian[:] = 0.0
     for k in range(4):
         trial[:] = pose
         trial[k >> 1] += 0.5 * side if k & 1 else -0.5 * side

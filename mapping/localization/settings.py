@@ -22,6 +22,13 @@ class OdometryUncertainty:
         Of the heading over a distance [rad/m].
     distance_floor, turn_floor : float
         Of any motion at all [m, rad].
+    distance_noise, turn_noise, turn_noise_of_distance : float
+        What is different each time rather than the same, so that no one can learn it: of a distance from its root, of a turn from its
+        root, and of a turn from the root of the distance [m^(1/2), rad^(1/2), rad/m^(1/2)].
+    fading : float
+        Share of what it has learned of its wheels that a robot forgets in each metre or radian: tyres lose air, and floors differ.
+    most_deviations : float
+        By at most so many of the standard deviations above a robot corrects its odometry.
     """
 
     distance_share: float = 0.1
@@ -29,14 +36,27 @@ class OdometryUncertainty:
     turn_per_metre: float = 0.05
     distance_floor: float = 0.005
     turn_floor: float = 0.002
+    distance_noise: float = 0.03
+    turn_noise: float = 0.04
+    turn_noise_of_distance: float = 0.03
+    fading: float = 0.0005
+    most_deviations: float = 2.0
 
     def __post_init__(self) -> None:
-        _check_numbers(self)
+        _check_numbers(self, zero=("fading", "most_deviations"))
+        if self.fading >= 1.0:
+            raise ValueError(f"fading of OdometryUncertainty is {self.fading}; want a share below 1")
 
     def covariance(self, distance: float, turn: float) -> NDArray[np.float64]:
         """Return the covariance (3, 3) of a motion by so much, in the frame in which it began [m, rad]."""
         along = (self.distance_share * distance + self.distance_floor) ** 2
         heading = (self.turn_share * abs(turn) + self.turn_per_metre * distance + self.turn_floor) ** 2
+        return np.diag([along, along, heading])
+
+    def noise(self, distance: float, turn: float) -> NDArray[np.float64]:
+        """Return the covariance (3, 3) of what is different each time in a motion by so much [m, rad]."""
+        along = self.distance_noise**2 * abs(distance) + self.distance_floor**2
+        heading = self.turn_noise**2 * abs(turn) + self.turn_noise_of_distance**2 * abs(distance) + self.turn_floor**2
         return np.diag([along, along, heading])
 
 
@@ -60,15 +80,12 @@ class MatchingSettings:
         What the search around odometry reaches beyond its standard deviation [m, rad].
     search_deviations : float
         How many standard deviations of odometry the search reaches.
-    prior_deviations : float
-        By so much odometry is trusted less than its standard deviation says where the map tells something too: its errors are the same
-        from scan to scan and would add up.
     blind_m, blind_angle : float
         What the search reaches where there is no odometry, or odometry leads nowhere [m, rad].
     evaluations : int
         At most so many placements, and blocks of them, are looked at in such a search.
     independent_points : float
-        As how many independent measurements all returns of a scan count: neighbouring ones err together.
+        As how many independent measurements all returns of a scan count at most, each as one at most: neighbouring ones err together.
     deviation : float
         Standard deviation of how far a return is from full agreement with the map, which is 1.
     least_score, least_overlap : float
@@ -98,12 +115,11 @@ class MatchingSettings:
     search_m: float = 0.05
     search_angle: float = math.radians(1.0)
     search_deviations: float = 2.0
-    prior_deviations: float = 5.0
     blind_m: float = 1.2
     blind_angle: float = math.radians(50.0)
     evaluations: int = 100_000
     independent_points: float = 50.0
-    deviation: float = 0.3
+    deviation: float = 0.25
     least_score: float = 0.15
     least_share: float = 0.5
     least_overlap: float = 0.2

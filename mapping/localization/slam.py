@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.localization.calibration import OdometryCalibration
 from lidarium.mapping.localization.closures import Closure, ClosureFinder
-from lidarium.mapping.localization.local_mapping import Finished, LocalMapper, way
+from lidarium.mapping.localization.local_mapping import Finished, LocalMapper, turned, way
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.odometry import compounded
 from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
@@ -77,6 +78,8 @@ class Slam:
         self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
         self._spread = np.zeros((3, 3))
         self._velocity = np.zeros(3)
+        # What odometry has told since the last match: distance, negative backwards, and turn [m, rad].
+        self._calibration, self._told = OdometryCalibration(settings.odometry), np.zeros(2)
         self._path, self._failed = 0.0, 0
         self._is_corrected = False
         self._map, self._mapped = OccupancyGrid(), 0
@@ -134,7 +137,8 @@ class Slam:
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2]."""
         moved = relative(self._matched, self._local)
-        spread = compounded(np.zeros(3), self._spread, moved, self._growth(moved))
+        growth = turned(self._growth(), float(moved[2])) if self._told.any() else np.zeros((3, 3))
+        spread = compounded(np.zeros(3), self._spread, moved, growth)
         node, pose = self.place
         return compounded(self._nodes[node], self._node_covariance, pose, spread)
 
@@ -176,12 +180,15 @@ class Slam:
         if not self._settings.uses_odometry:
             return self._velocity
         ends = np.stack([self._last.odometry, sensing.odometry])
-        return relative(ends[0], ends[1]) if np.isfinite(ends).all() else np.zeros(3)
+        if not np.isfinite(ends).all():
+            return np.zeros(3)
+        motion = relative(ends[0], ends[1])
+        self._told += motion[[0, 2]]
+        return self._calibration.corrected(motion)
 
-    def _growth(self, moved: NDArray[np.float64]) -> NDArray[np.float64]:
-        if not moved.any():
-            return np.zeros((3, 3))
-        return self._settings.odometry.covariance(float(np.hypot(moved[0], moved[1])), float(moved[2]))
+    def _growth(self) -> NDArray[np.float64]:
+        """Return how far the robot may be from where odometry has led since the last match, in its frame now."""
+        return self._calibration.uncertainty(float(self._told[0]), float(self._told[1]))
 
     def _take(self, ranges: NDArray[np.float32], points: NDArray[np.float64], moved: NDArray[np.float64], time_s: float) -> None:
         """Match a scan and take it into the maps."""
@@ -191,10 +198,15 @@ class Slam:
             self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
             self._note_key(ranges)
             return
-        match = self._mapper.match(points, self._local, moved, self._failed)
+        match = self._mapper.match(points, self._local, moved, self._growth(), self._failed)
         if match is None:
             self._fail(ranges)
             return
+        if match.prior.any():
+            heading = float(self._local[2])
+            told, prior = turned(match.told, -heading), turned(match.prior, -heading)
+            self._calibration.learn(float(self._told[0]), float(self._told[1]), relative(self._local, match.pose), told, prior)
+        self._told[:] = 0.0
         self.counts.matches += 1
         self._failed = 0
         driven = relative(self._matched, match.pose)

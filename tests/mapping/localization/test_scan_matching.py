@@ -14,6 +14,7 @@ from lidarium.mapping.rigid import composed, relative
 from lidarium.mapping.scans import ScanGeometry
 
 ORIGIN = np.array([2.5, 1.5, 0.3])
+NOTHING_KNOWN = np.zeros((3, 3))
 
 
 def points_of(ranges):
@@ -41,7 +42,7 @@ def test_a_scan_is_laid_where_it_was_taken_from_anywhere_within_the_window(subma
     true = np.array(offset)
     points = points_of(cast(odd_room(), composed(ORIGIN, true)))
     predicted = true + np.array(error)
-    start = search(submap.grid, points, predicted, 0.25, 0.2)
+    start = search(submap.grid, points, predicted, 0.25, 0.2, NOTHING_KNOWN, 500.0)
     match = refine(submap.grid, points, start, start, np.zeros((3, 3)), 500.0)
     assert np.hypot(*(match.pose - true)[:2]) < 0.015
     assert abs(match.pose[2] - true[2]) < math.radians(0.4)
@@ -100,7 +101,7 @@ def test_placements_keep_away_from_a_pose(submap):
 
 def test_no_points_match_nowhere(submap):
     nothing = np.zeros((0, 2))
-    assert search(submap.grid, nothing, np.ones(3), 0.2, 0.1).tolist() == [1.0, 1.0, 1.0]
+    assert search(submap.grid, nothing, np.ones(3), 0.2, 0.1, NOTHING_KNOWN, 500.0).tolist() == [1.0, 1.0, 1.0]
     assert refine(submap.grid, nothing, np.ones(3), np.ones(3), np.eye(3), 1.0).score == 0.0
     assert place(pyramid(submap.finished()), nothing, np.zeros(3), (1.0, 1.0), 0.1, 100) == (None, True)
 
@@ -123,6 +124,29 @@ def test_odometry_holds_the_pose_where_walls_do_not():
     match = refine(submap.grid, points_of(cast(walls, np.array([0.2, 0.0, 0.0]))), prior, prior, np.diag([1e4, 1e2, 1e3]), 500.0)
     assert match.pose[0] == pytest.approx(0.2, abs=0.02)
     assert match.pose[1] == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_wall_that_goes_on_beyond_the_map_holds_no_one_back():
+    """The map ends soon ahead of where it was made; a scan farther on sees more of the walls than the map has."""
+    walls = np.array([(-30, -1, 30, -1), (-30, 1, 30, 1)], float)
+    submap = Submap(0.05, 14.0)
+    submap.insert(np.zeros(3), cast(walls, np.zeros(3)), GEOMETRY, 3.0)
+    predicted = np.array([2.0, 0.02, 0.01])
+    points = points_of(cast(walls, np.array([2.0, 0.0, 0.0])))
+    information = np.diag([400.0, 400.0, 400.0])
+    start = search(submap.grid, points, predicted, 0.3, 0.05, information, 500.0)
+    match = refine(submap.grid, points, start, predicted, information, 500.0)
+    assert match.pose[0] == pytest.approx(2.0, abs=0.06)
+    assert match.pose[1] == pytest.approx(0.0, abs=0.02)
+
+
+def test_of_poses_that_fit_alike_the_search_takes_the_one_that_odometry_expects(submap):
+    points = points_of(cast(odd_room(), ORIGIN))
+    expected = np.array([0.1, -0.05, 0.0])
+    sure, unsure = np.diag([1e6, 1e6, 1e6]), NOTHING_KNOWN
+    assert search(submap.grid, points, expected, 0.2, 0.05, sure, 500.0) == pytest.approx(expected)
+    found = search(submap.grid, points, expected, 0.2, 0.05, unsure, 500.0)
+    assert np.hypot(*found[:2]) < 0.06
 
 
 def test_what_moved_fades_and_what_stays_stays():
