@@ -44,6 +44,59 @@ class Target:
             raise ValueError(f"heading of the target is {self.heading}; want a finite angle or None")
 
 
+class OperatingState(Enum):
+    """Whether a robot takes part in the work of its team."""
+
+    OPERATING = "operating"
+    PAUSED = "paused"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
+    @classmethod
+    def _missing_(cls, value: object) -> None:
+        raise ValueError(f"operating state is {value!r}; want one of {', '.join(state.value for state in cls)}")
+
+
+class OrderKind(Enum):
+    """What a robot can be told to do."""
+
+    PAUSE = "pause"
+    RESUME = "resume"
+    STOP = "stop"
+    EXPLORE = "explore"
+    GO_TO = "go_to"
+
+    @classmethod
+    def _missing_(cls, value: object) -> None:
+        raise ValueError(f"kind of the order is {value!r}; want one of {', '.join(kind.value for kind in cls)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What a robot is told to do.
+
+    Attributes
+    ----------
+    kind : OrderKind
+        What; its name is taken, too.
+    target : Target or None
+        Where to, in the robot's map frame, with ``GO_TO``; None with all others.
+    reason : str
+        Why, for the records; with ``STOP`` what the robot ends with.
+    """
+
+    kind: OrderKind
+    target: Target | None = None
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kind", OrderKind(self.kind))
+        if self.kind is OrderKind.GO_TO and not isinstance(self.target, Target):
+            raise ValueError(f"target of the order {self.kind.value!r} is {self.target!r}; want a Target, the place to go to")
+        if self.kind is not OrderKind.GO_TO and self.target is not None:
+            raise ValueError(f"target of the order {self.kind.value!r} is {self.target!r}; want None, only 'go_to' has a target")
+
+
 class Orders(NamedTuple):
     """Targets of many robots.
 
