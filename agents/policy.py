@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.perception import Belief
-from lidarium.envs.onboard.state import DriveState, Target
+from lidarium.envs.onboard.reports import Report
+from lidarium.envs.onboard.state import DriveState, OperatingState, Order, Target
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +27,7 @@ class Stop:
     reason: str
 
 
-Action = NDArray[np.float32] | Target | int | Stop | None
+Action = NDArray[np.float32] | Target | int | Stop | Order | None
 
 
 class Team(Protocol):
@@ -48,6 +49,14 @@ class Team(Protocol):
 
     def drive_state(self, agent: str) -> DriveState:
         """Return what its driving is about."""
+        ...
+
+    def operating_state(self, agent: str) -> OperatingState:
+        """Return whether it takes part in the work, as it knows itself."""
+        ...
+
+    def report(self, agent: str) -> Report | None:
+        """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
         ...
 
 
@@ -209,3 +218,9 @@ class _Alone:
 
     def drive_state(self, agent: str) -> DriveState:
         return self._team.drive_state(agent)
+
+    def operating_state(self, agent: str) -> OperatingState:
+        return self._team.operating_state(agent)
+
+    def report(self, agent: str) -> Report | None:
+        raise ValueError(f"{self._agent} asked for the report of {agent}; a decentralised policy has no station")

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from lidarium.agents.policy import GivenUp, Policy, Stop
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.onboard.perception import Belief
-from lidarium.envs.onboard.state import DriveState
+from lidarium.envs.onboard.reports import Report
+from lidarium.envs.onboard.state import DriveState, OperatingState, Order
 from lidarium.envs.solo import at_level
 from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings
 from lidarium.envs.wrappers.waypoints import WaypointExploration
+from lidarium.evaluation.events import merge_event
 from lidarium.evaluation.watching import WatchedExploration
 
 Progress = Callable[[ExplorationEnv], None]
@@ -79,6 +81,14 @@ class RunningTeam:
         """Return what its driving is about."""
         return DriveState.IDLE if self._driver is None else self._driver.drive_state(agent)
 
+    def operating_state(self, agent: str) -> OperatingState:
+        """Return whether it takes part in the work, as it knows itself."""
+        return self._env.operating.states[self._env.possible_agents.index(agent)]
+
+    def report(self, agent: str) -> Report | None:
+        """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
+        return self._env.station.report(self._env.possible_agents.index(agent))
+
 
 def run_episode(
     policy: Policy,
@@ -141,17 +151,22 @@ def run_episode(
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(getattr(policy, "given_up", []))
     episode.merges = world.events if isinstance(world, MergedMaps) else []
+    if isinstance(env, WatchedExploration):
+        for merge in episode.merges:
+            env.tell(merge_event(env, merge))
     return episode
 
 
 def decide(
     policy: Policy, world: ExplorationEnv | WaypointExploration | FrontierExploration | MergedMaps, observations: Mapping[str, Observation]
 ) -> dict[str, NDArray[np.float32] | Any]:
-    """Ask a policy, and turn each ``Stop`` into an order to the environment."""
+    """Ask a policy, and hand each ``Stop`` and ``Order`` to the environment: these agents have no action."""
     actions: dict[str, Any] = {}
     for agent, action in policy.act(observations).items():
         if isinstance(action, Stop):
             world.stop(agent, action.reason)
+        elif isinstance(action, Order):
+            world.order(agent, action)
         else:
             actions[agent] = action
     return actions

@@ -5,13 +5,15 @@ with what planning needs (clearance and frontiers), brought up to date only wher
 """
 
 import os
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.belief import Belief as Belief
+from lidarium.envs.onboard.belief import Teammate as Teammate
 from lidarium.envs.onboard.exchange import NEVER, Exchange
+from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.navigation import (
     CLEARANCE_LIMIT,
     FLAGS,
@@ -28,106 +30,10 @@ from lidarium.envs.onboard.navigation import (
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
 from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.envs.simulation.lidar import Lidar
-from lidarium.envs.simulation.robots import Robot
 from lidarium.mapping.clearance import limit_of, stamp_of
 from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.localization.localizer import Localizer
 from lidarium.mapping.path_search import SearchMemory
-
-
-@dataclass(frozen=True, slots=True)
-class Teammate:
-    """What a robot knows of another.
-
-    Attributes
-    ----------
-    pose : (3,) float64
-        x, y, theta in the knowing robot's map frame [m, rad].
-    age_s : float
-        Age of the news [s].
-    radius : float
-        Radius of the body [m].
-    has_ended : bool
-        Whether it has ended and stands where it is.
-    """
-
-    pose: NDArray[np.float64]
-    age_s: float
-    radius: float
-    has_ended: bool
-
-
-class Belief:
-    """Read-only handle on what one robot knows; what it shows is valid until the next step.
-
-    All positions are in the robot's map frame: with known starts the floor's axes from the corner of its start cell.
-
-    Parameters
-    ----------
-    perception : Perception
-        The team's onboard software.
-    row : int
-        Which robot: episode * robots + robot.
-    """
-
-    def __init__(self, perception: "Perception", row: int) -> None:
-        self._perception, self._row = perception, row
-
-    @property
-    def pose(self) -> NDArray[np.float64]:
-        """x, y, theta as the localizer believes [m, rad], shape (3,)."""
-        return self._perception.pose_in_frame(self._row, self._row)
-
-    @property
-    def velocity(self) -> NDArray[np.float64]:
-        """Speed and turn rate as odometry tells [m/s, rad/s], shape (2,)."""
-        return np.array(self._perception.world.measured[self._row])
-
-    @property
-    def spread(self) -> NDArray[np.float64]:
-        """Standard deviation of the pose as the localizer tells [m, m, rad], shape (3,); zero where it claims to know."""
-        return self._perception.spread(self._row)
-
-    @property
-    def radius(self) -> float:
-        """Radius of the own body [m]."""
-        return self._perception.settings.robot.radius
-
-    @property
-    def robot(self) -> Robot:
-        """The own body and drive."""
-        return self._perception.settings.robot
-
-    @property
-    def lidar(self) -> Lidar:
-        """The own laser."""
-        return self._perception.settings.lidar
-
-    @property
-    def map(self) -> NavigationMap:
-        """The own map."""
-        return self._perception.own_map(self._row)
-
-    @property
-    def map_origin(self) -> tuple[float, float]:
-        """Lower left corner of cell (0, 0) of the own map, and of the shared map, in the map frame [m]."""
-        return self._perception.origin_in_frame(self._row)
-
-    @property
-    def shared_map(self) -> NavigationMap | None:
-        """The team's map, where it reached this robot; None with unknown starts."""
-        return self._perception.shared_map(self._row)
-
-    @property
-    def teammates(self) -> dict[str, Teammate]:
-        """What is known of the others, by name."""
-        return self._perception.teammates(self._row)
-
-    @property
-    def goal(self) -> NDArray[np.float64] | None:
-        """The goal in the map frame [m], shape (2,), or None."""
-        return self._perception.goal_of(self._row)
 
 
 class Perception:
@@ -154,6 +60,8 @@ class Perception:
         The radio traffic of each episode; none where the radio is ideal.
     localizers : list of Localizer or None
         What tells each robot's pose, by row; None where kernels do.
+    meters : Meters or None
+        Odometers and battery gauges of the robots of a lone episode; None in batches, which have none.
     """
 
     def __init__(self, world: KinematicWorld, settings: ExplorationSettings, offsets: NDArray[np.float64]) -> None:
@@ -174,6 +82,7 @@ class Perception:
         self.knows_mates = settings.known_starts and settings.radio.is_ideal
         self.exchanges = [] if settings.radio.is_ideal else [Exchange(world, settings, episode) for episode in range(self._episodes)]
         self.localizers: list[Localizer | None] = [None] * rows
+        self.meters: Meters | None = None
         self._heard: list[NavigationMap | None] = [None] * rows
         self._heard_records = np.zeros((rows, RECORD), np.int64)
 

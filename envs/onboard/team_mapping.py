@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.reports import known_map
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.merger import placed
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.occupancy import UNKNOWN, three_levels
+from lidarium.mapping.occupancy import UNKNOWN
 from lidarium.mapping.rigid import Transform
 
 Frames = dict[tuple[str, str], Transform]
@@ -107,7 +108,7 @@ class TeamMapping:
             How the frames of robots lie that were joined in this exchange, each pair in the order of the agents.
         """
         agents = self.perception.settings.agents
-        maps = {agent: self._map_of(row) for row, agent in enumerate(agents)}
+        maps = {agent: known_map(self.perception, row) for row, agent in enumerate(agents)}
         poses = {agent: Transform(*self.perception.pose_in_frame(row, row).tolist()) for row, agent in enumerate(agents)}
         pairs = [(a, b) for a, b in combinations(agents, 2) if any(a in cluster and b in cluster for cluster in clusters)]
         places = {agent: (pose.x, pose.y) for agent, pose in poses.items()}
@@ -134,15 +135,6 @@ class TeamMapping:
                 centre = placed(maps[b].origin).apply(result.agreement.centre).tolist() if is_direct and result is not None else places[b]
                 joined[a, b] = Joined(transform, (float(centre[0]), float(centre[1])))
         return joined
-
-    def _map_of(self, row: int) -> GrowingMap:
-        """Return what a robot's own map knows, cut out."""
-        log_odds = self.perception.own_map(row).log_odds
-        row_low, row_high, column_low, column_high = self.perception.known_window(row)
-        cut = three_levels(np.asarray(log_odds[row_low:row_high, column_low:column_high]))
-        resolution = self.perception.settings.occupancy.resolution
-        x, y = self.perception.origin_in_frame(row)
-        return GrowingMap(cut, (x + column_low * resolution, y + row_low * resolution))
 
     def _fused(self, agent: str, own: GrowingMap) -> FusedMap:
         got = [news for (to, _), news in self.news.items() if to == agent]
