@@ -82,7 +82,7 @@ class OdometryCalibration:
         grown = (1.0 - faded) * self.covariance + faded * self._at_first()
         before = np.linalg.inv(grown)
         after = before + lever.T @ told @ lever
-        self.covariance = np.linalg.inv(0.5 * (after + after.T))
+        self.covariance = np.asarray(np.linalg.inv(0.5 * (after + after.T)), np.float64)
         self.errors = self.errors + self.covariance @ (lever.T @ seen)
         bound = settings.most_deviations * np.sqrt(np.diag(self._at_first()))
         self.errors = np.clip(self.errors, -bound, bound)

@@ -149,7 +149,7 @@ class LocalMapper:
         spread = np.sqrt(np.diag(uncertainty))
         reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
         reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
-        information = turned(np.linalg.inv(uncertainty), float(predicted[2]))
+        information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
         weight = self._weight(points)
         start = search(grid, points, predicted, reach_m, reach_angle, information, weight)
         return refine(grid, points, start, predicted, information, weight)
