@@ -117,8 +117,8 @@ class ClosureFinder:
         best, _ = place(old.coarse, points, around, reach, least, settings.evaluations)
         if best is None:
             return None
-        weight = self._matching.independent_points / self._matching.deviation**2
-        match = refine(old.coarse.grid, points, best.pose, best.pose, np.zeros((3, 3)), weight)
+        matching = self._matching
+        match = refine(old.coarse.grid, points, best.pose, best.pose, np.zeros((3, 3)), matching.weight(len(points)), matching.unseen)
         if match.score < least_score or match.overlap < settings.least_overlap or match.contradiction > settings.most_contradiction:
             return None
         if reach[0] > settings.apart_m:

@@ -135,9 +135,6 @@ class LocalMapper:
         self.usual_score = match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
         return match
 
-    def _weight(self, points: NDArray[np.float64]) -> float:
-        return min(self._matching.independent_points, len(points)) / self._matching.deviation**2
-
     def _is_good(self, match: Match) -> bool:
         settings = self._matching
         least_score = max(settings.least_score, settings.least_share * self.usual_score)
@@ -150,15 +147,17 @@ class LocalMapper:
         reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
         reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
         information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
-        weight = self._weight(points)
-        start = search(grid, points, predicted, reach_m, reach_angle, information, weight)
-        return refine(grid, points, start, predicted, information, weight)
+        weight = settings.weight(len(points))
+        start = search(grid, points, predicted, reach_m, reach_angle, information, weight, settings.unseen)
+        return refine(grid, points, start, predicted, information, weight, settings.unseen)
 
     def _match_far(self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]) -> Match | None:
         settings, oldest = self._matching, self._active[0].submap
         least = 0.5 * settings.least_score * settings.least_overlap
         found, _ = place(pyramid(oldest.finished()), points, predicted, reach, least, settings.evaluations)
-        return None if found is None else refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), self._weight(points))
+        if found is None:
+            return None
+        return refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), settings.weight(len(points)), settings.unseen)
 
     def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:
         """Take in a scan at x, y, theta (3,) in the older local map's frame, so much way [m] after the last one.

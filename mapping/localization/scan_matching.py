@@ -23,14 +23,6 @@ FULL_AGREEMENT = 2.0 / 3.0
 With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
 """
 
-UNSEEN_DISAGREEMENT = 0.4
-"""Square of the disagreement of a point in what the map has not observed: as that of most points, so that it speaks neither for nor
-against a pose.
-
-If it counted in full, a wall that goes on beyond where the map ends would hold the robot back to where the scan covers the known part
-of it, and in a bare corridor nothing else speaks.
-"""
-
 SURFACE_GAP = 0.3
 """Neighbouring points lie on one surface where they are nearer to each other than this share of their distance, or so many metres."""
 
@@ -74,6 +66,7 @@ def search(
     reach_angle: float,
     information: NDArray[np.float64],
     weight: float,
+    unseen: float,
 ) -> NDArray[np.float64]:
     """Return the pose (3,) of least cost (that of ``refine``, without smoothing) of all within reach, in steps of a cell.
 
@@ -87,7 +80,7 @@ def search(
         Middle of the search, where odometry says the robot is: x, y, theta in the map's frame [m, rad].
     reach_m, reach_angle : float
         How far the search goes to each side [m, rad].
-    information, weight
+    information, weight, unseen
         As for ``refine``.
     """
     step = angle_step(points, grid.resolution)
@@ -96,7 +89,7 @@ def search(
         return around
     found = np.empty(3)
     _search(
-        grid.levels, grid.column, grid.row, grid.resolution, points, around, steps, turns, step, information, weight / len(points), found
+        grid.levels, grid.column, grid.row, grid.resolution, points, around, steps, turns, step, information, weight / len(points), unseen, found
     )  # fmt: skip
     return found
 
@@ -122,13 +115,14 @@ def _search(
     step: float,
     information: Array,
     weight: float,
+    unseen: float,
     found: Array,
 ) -> None:
     rows, columns = levels.shape
     width = 2 * steps + 1
     sums = np.empty((width, width), np.int64)
     # Squares of disagreement in parts of 255.
-    unseen, scale = int(255 * UNSEEN_DISAGREEMENT), weight / 255.0
+    unseen_cost, scale = int(255 * unseen), weight / 255.0
     least = np.inf
     found[:] = around
     away = np.empty(3)
@@ -141,12 +135,12 @@ def _search(
             column = int(math.floor(cosine * points[k, 0] - sine * points[k, 1] + x0))
             row = int(math.floor(sine * points[k, 0] + cosine * points[k, 1] + y0))
             if column < 0 or row < 0 or column + width > columns or row + width > rows:
-                sums += unseen
+                sums += unseen_cost
                 continue
             for i in range(width):
                 for j in range(width):
                     level = int(levels[row + i, column + j])
-                    sums[i, j] += unseen if level == UNSEEN else ((256 - level) * (256 - level)) >> 8
+                    sums[i, j] += unseen_cost if level == UNSEEN else ((256 - level) * (256 - level)) >> 8
         for i in range(width):
             for j in range(width):
                 away[0], away[1], away[2] = (j - steps) * side, (i - steps) * side, turn * step
@@ -163,11 +157,12 @@ def refine(
     prior: NDArray[np.float64],
     information: NDArray[np.float64],
     weight: float,
+    unseen: float,
 ) -> Match:
     """Return the pose near a start at which the points agree best with the map.
 
     Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a prior one; a point in what
-    the map has not observed counts as ``UNSEEN_DISAGREEMENT``. Points move
+    the map has not observed counts as ``unseen``. Points move
     across the surfaces that they lie on, not along: where a wall goes on beyond what the map has observed of it, the points there would
     draw the scan back to where the map ends, and a robot in a corridor with them.
 
@@ -183,6 +178,10 @@ def refine(
         How much that counts [1/m^2, 1/(m rad), 1/rad^2]; zero for not at all.
     weight : float
         How much full disagreement of all points counts: independent points / variance of the disagreement of one.
+    unseen : float
+        Square of the disagreement of a point in what the map has not observed. As that of most points, it speaks neither for nor against
+        a pose; if it counted in full, a wall that goes on beyond where the map ends would hold the robot back to where the scan covers
+        the known part of it, and in a bare corridor nothing else speaks.
     """
     pose, hessian, told = np.array(start, np.float64), np.empty((3, 3)), np.zeros(3)
     count = len(points)
@@ -190,7 +189,21 @@ def refine(
         return Match(pose, 0.0, 0.0, 0.0, np.zeros((3, 3)), information)
     normals = np.zeros((count, 2))
     _find_normals(points, normals)
-    _refine(grid.levels, grid.column, grid.row, grid.resolution, points, normals, pose, prior, information, weight / count, hessian, told)
+    _refine(
+        grid.levels,
+        grid.column,
+        grid.row,
+        grid.resolution,
+        points,
+        normals,
+        pose,
+        prior,
+        information,
+        weight / count,
+        unseen,
+        hessian,
+        told,
+    )
     score, overlap, contradiction = told.tolist()
     return Match(pose, score, overlap, contradiction, hessian, information)
 
@@ -264,6 +277,7 @@ def _normal_equations(
     points: Array,
     normals: Array,
     pose: Array,
+    unseen: float,
     hessian: Array,
     gradient: Array,
 ) -> float:
@@ -276,7 +290,7 @@ def _normal_equations(
         u, v = (x + pose[0]) / side - first_column, (y + pose[1]) / side - first_row
         value, slope_x, slope_y = _agreement(levels, u, v)
         if value == 0.0 and _is_unseen(levels, u, v):
-            cost += UNSEEN_DISAGREEMENT
+            cost += unseen
             continue
         rest = 1.0 - value / FULL_AGREEMENT
         cost += rest * rest
@@ -313,6 +327,7 @@ def _refine(
     prior: Array,
     information: Array,
     weight: float,
+    unseen: float,
     hessian: Array,
     told: Array,
 ) -> None:
@@ -321,7 +336,7 @@ def _refine(
     trial = np.empty(3)
     away = pose - prior
     cost = (
-        weight * _normal_equations(levels, first_column, first_row, side, points, normals, pose, hessian, gradient)
+        weight * _normal_equations(levels, first_column, first_row, side, points, normals, pose, unseen, hessian, gradient)
         + away @ information @ away
     )
     damping = 1e-3
@@ -333,7 +348,7 @@ def _refine(
         trial[:] = pose + move
         trial_away = trial - prior
         trial_cost = weight * _normal_equations(
-            levels, first_column, first_row, side, points, normals, trial, trial_hessian, trial_gradient
+            levels, first_column, first_row, side, points, normals, trial, unseen, trial_hessian, trial_gradient
         )
         trial_cost += trial_away @ information @ trial_away
         if trial_cost < cost:
@@ -352,7 +367,7 @@ def _refine(
     for k in range(4):
         trial[:] = pose
         trial[k >> 1] += 0.5 * side if k & 1 else -0.5 * side
-        _normal_equations(levels, first_column, first_row, side, points, normals, trial, trial_hessian, trial_gradient)
+        _normal_equations(levels, first_column, first_row, side, points, normals, trial, unseen, trial_hessian, trial_gradient)
         hessian += 0.25 * weight * trial_hessian
     _judge(levels, first_column, first_row, side, points, pose, told)
 

@@ -88,6 +88,8 @@ class MatchingSettings:
         As how many independent measurements all returns of a scan count at most, each as one at most: neighbouring ones err together.
     deviation : float
         Standard deviation of how far a return is from full agreement with the map, which is 1.
+    unseen : float
+        Square of the disagreement with which a return counts that lies in what the local map has not observed.
     least_score, least_overlap : float
         Agreement, and share of the returns near what the local map has observed, below which a match does not count.
     least_share : float
@@ -120,6 +122,7 @@ class MatchingSettings:
     evaluations: int = 100_000
     independent_points: float = 50.0
     deviation: float = 0.25
+    unseen: float = 0.3
     least_score: float = 0.15
     least_share: float = 0.5
     least_overlap: float = 0.2
@@ -132,7 +135,11 @@ class MatchingSettings:
     lost_angle: float = 0.5
 
     def __post_init__(self) -> None:
-        _check_numbers(self, zero=("beam_interval_s", "distance_m", "angle", "search_m", "search_angle"))
+        _check_numbers(self, zero=("beam_interval_s", "distance_m", "angle", "search_m", "search_angle", "unseen"))
+
+    def weight(self, points: int) -> float:
+        """Return how much full disagreement of all of so many points counts."""
+        return min(self.independent_points, points) / self.deviation**2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

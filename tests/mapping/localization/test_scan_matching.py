@@ -42,8 +42,8 @@ def test_a_scan_is_laid_where_it_was_taken_from_anywhere_within_the_window(subma
     true = np.array(offset)
     points = points_of(cast(odd_room(), composed(ORIGIN, true)))
     predicted = true + np.array(error)
-    start = search(submap.grid, points, predicted, 0.25, 0.2, NOTHING_KNOWN, 500.0)
-    match = refine(submap.grid, points, start, start, np.zeros((3, 3)), 500.0)
+    start = search(submap.grid, points, predicted, 0.25, 0.2, NOTHING_KNOWN, 500.0, 0.3)
+    match = refine(submap.grid, points, start, start, np.zeros((3, 3)), 500.0, 0.3)
     assert np.hypot(*(match.pose - true)[:2]) < 0.015
     assert abs(match.pose[2] - true[2]) < math.radians(0.4)
     assert match.score > 0.6
@@ -101,8 +101,8 @@ def test_placements_keep_away_from_a_pose(submap):
 
 def test_no_points_match_nowhere(submap):
     nothing = np.zeros((0, 2))
-    assert search(submap.grid, nothing, np.ones(3), 0.2, 0.1, NOTHING_KNOWN, 500.0).tolist() == [1.0, 1.0, 1.0]
-    assert refine(submap.grid, nothing, np.ones(3), np.ones(3), np.eye(3), 1.0).score == 0.0
+    assert search(submap.grid, nothing, np.ones(3), 0.2, 0.1, NOTHING_KNOWN, 500.0, 0.3).tolist() == [1.0, 1.0, 1.0]
+    assert refine(submap.grid, nothing, np.ones(3), np.ones(3), np.eye(3), 1.0, 0.3).score == 0.0
     assert place(pyramid(submap.finished()), nothing, np.zeros(3), (1.0, 1.0), 0.1, 100) == (None, True)
 
 
@@ -112,7 +112,7 @@ def test_the_covariance_grows_along_a_bare_corridor():
     for x in (0.0, 0.2, 0.4):
         submap.insert(np.array([x, 0.0, 0.0]), cast(walls, np.array([x, 0.0, 0.0])), GEOMETRY, 20.0)
     points = points_of(cast(walls, np.array([0.3, 0.0, 0.0])))
-    covariance = refine(submap.grid, points, np.array([0.3, 0, 0]), np.array([0.3, 0, 0]), np.zeros((3, 3)), 500.0).covariance
+    covariance = refine(submap.grid, points, np.array([0.3, 0, 0]), np.array([0.3, 0, 0]), np.zeros((3, 3)), 500.0, 0.3).covariance
     assert covariance[0, 0] > 10.0 * covariance[1, 1]
 
 
@@ -121,7 +121,7 @@ def test_odometry_holds_the_pose_where_walls_do_not():
     submap = Submap(0.05, 12.0)
     submap.insert(np.zeros(3), cast(walls, np.zeros(3)), GEOMETRY, 20.0)
     prior = np.array([0.2, 0.03, 0.0])
-    match = refine(submap.grid, points_of(cast(walls, np.array([0.2, 0.0, 0.0]))), prior, prior, np.diag([1e4, 1e2, 1e3]), 500.0)
+    match = refine(submap.grid, points_of(cast(walls, np.array([0.2, 0.0, 0.0]))), prior, prior, np.diag([1e4, 1e2, 1e3]), 500.0, 0.3)
     assert match.pose[0] == pytest.approx(0.2, abs=0.02)
     assert match.pose[1] == pytest.approx(0.0, abs=0.01)
 
@@ -134,8 +134,8 @@ def test_a_wall_that_goes_on_beyond_the_map_holds_no_one_back():
     predicted = np.array([2.0, 0.02, 0.01])
     points = points_of(cast(walls, np.array([2.0, 0.0, 0.0])))
     information = np.diag([400.0, 400.0, 400.0])
-    start = search(submap.grid, points, predicted, 0.3, 0.05, information, 500.0)
-    match = refine(submap.grid, points, start, predicted, information, 500.0)
+    start = search(submap.grid, points, predicted, 0.3, 0.05, information, 500.0, 0.3)
+    match = refine(submap.grid, points, start, predicted, information, 500.0, 0.3)
     assert match.pose[0] == pytest.approx(2.0, abs=0.06)
     assert match.pose[1] == pytest.approx(0.0, abs=0.02)
 
@@ -144,8 +144,8 @@ def test_of_poses_that_fit_alike_the_search_takes_the_one_that_odometry_expects(
     points = points_of(cast(odd_room(), ORIGIN))
     expected = np.array([0.1, -0.05, 0.0])
     sure, unsure = np.diag([1e6, 1e6, 1e6]), NOTHING_KNOWN
-    assert search(submap.grid, points, expected, 0.2, 0.05, sure, 500.0) == pytest.approx(expected)
-    found = search(submap.grid, points, expected, 0.2, 0.05, unsure, 500.0)
+    assert search(submap.grid, points, expected, 0.2, 0.05, sure, 500.0, 0.3) == pytest.approx(expected)
+    found = search(submap.grid, points, expected, 0.2, 0.05, unsure, 500.0, 0.3)
     assert np.hypot(*found[:2]) < 0.06
 
 
@@ -227,5 +227,5 @@ def test_noise_does_not_turn_scans_against_the_map():
         scans = [cast(odd_room(), pose) + generator.normal(0.0, 0.03, GEOMETRY.beams).astype(np.float32) for _ in range(2)]
         submap = Submap(0.05, 12.0)
         submap.insert(np.zeros(3), scans[0], GEOMETRY, 20.0)
-        turns.append(refine(submap.grid, points_of(scans[1]), np.zeros(3), np.zeros(3), np.zeros((3, 3)), 500.0).pose[2])
+        turns.append(refine(submap.grid, points_of(scans[1]), np.zeros(3), np.zeros(3), np.zeros((3, 3)), 500.0, 0.3).pose[2])
     assert abs(np.mean(turns)) < 3.0 * np.std(turns) / math.sqrt(len(turns))
