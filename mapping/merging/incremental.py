@@ -1,9 +1,12 @@
 """Maps that grow, merged again and again: only what has changed is described, and transforms that were verified are not searched for.
 
 A robot's map keeps its frame while it grows: its origin tells where the array's lower left corner lies in that frame.
+Two maps that know little can look alike without being of one place. Who acts on a merge can ask for a second finding: it is joined only
+when it is found once more, by a search of its own on maps that have grown, where it was before.
 """
 
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -35,13 +38,30 @@ class GrowingMap(NamedTuple):
     origin: tuple[float, float] = (0.0, 0.0)
 
 
+CONFIRMED_M, CONFIRMED_ANGLE = 0.1, math.radians(1.0)
+"""By how much two findings of one transform may differ [m, rad]."""
+
+
 @dataclass(slots=True)
 class _Tried:
-    """What is known of a pair: its result, the robots' transform if it is verified, and what the maps knew when it was searched for."""
+    """What is known of a pair.
+
+    Attributes
+    ----------
+    result : PairResult
+        What came of the last try.
+    frames : Transform or None
+        The robots' transform, if it is verified.
+    known_m2 : float
+        What the maps knew when it was searched for [m2].
+    is_confirmed : bool
+        Whether it has been found as often as is wanted.
+    """
 
     result: PairResult
     frames: Transform | None
     known_m2: float
+    is_confirmed: bool = False
 
 
 @dataclass(slots=True)
@@ -56,6 +76,8 @@ class IncrementalMerger:
         How; the defaults where None.
     search_growth_m2 : float
         A pair that was refused is searched for again when its maps together know so much more [m2].
+    confirmation_growth_m2 : float or None
+        A pair that was found joins its maps only when it is found once more, once they know so much more [m2]; at once where None.
 
     Attributes
     ----------
@@ -66,6 +88,7 @@ class IncrementalMerger:
     resolution: float
     settings: MergeSettings = field(default_factory=MergeSettings)
     search_growth_m2: float = 2.0
+    confirmation_growth_m2: float | None = None
     searched: int = 0
     verified: int = 0
     _maps: dict[str, GrowingMap] = field(default_factory=dict)
@@ -87,7 +110,8 @@ class IncrementalMerger:
         Returns
         -------
         Merged
-            Pairs, frames and fused maps; frames stay where they are while maps grow.
+            Pairs, frames and fused maps; frames stay where they are while maps grow. Pairs that are accepted and wait to be confirmed
+            join nothing.
 
         Raises
         ------
@@ -107,8 +131,9 @@ class IncrementalMerger:
                 pairs[pair] = tried
         self._pairs = pairs
         results = {pair: tried.result for pair, tried in pairs.items()}
+        believed = {pair: tried.result for pair, tried in pairs.items() if tried.is_confirmed}
         origins = {name: one.origin for name, one in maps.items()}
-        self._tree = joined_tree(self._features, results, self.settings, origins, self._tree)
+        self._tree = joined_tree(self._features, believed, self.settings, origins, self._tree)
         return Merged({name: one.levels for name, one in self._features.items()}, self.resolution, results, self._tree, origins)
 
     def _describe(self, maps: Mapping[str, GrowingMap]) -> set[str]:
@@ -128,16 +153,27 @@ class IncrementalMerger:
         known_m2 = sum(self._known_m2[name] for name in pair)
         if before is not None and before.frames is not None:
             result = verify_pair(a, b, first.inverse() @ before.frames @ second, self.settings)
-            if result.is_accepted and result.a_from_b is not None:
+            is_due = not before.is_confirmed and known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
+            if result.is_accepted and result.a_from_b is not None and not is_due:
                 self.verified += 1
-                return _Tried(result, first @ result.a_from_b @ second.inverse(), before.known_m2)
+                return _Tried(result, first @ result.a_from_b @ second.inverse(), before.known_m2, before.is_confirmed)
         elif before is not None and known_m2 < before.known_m2 + self.search_growth_m2:
             return before
         self.searched += 1
         result = merge_pair(a, b, self.settings)
         is_found = result.is_accepted and result.a_from_b is not None
         frames = first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
-        return _Tried(result, frames, known_m2)
+        return _Tried(result, frames, known_m2, self._confirms(pair, before, frames, result))
+
+    def _confirms(self, pair: tuple[str, str], before: _Tried | None, frames: Transform | None, result: PairResult) -> bool:
+        """Whether what was searched for and found is believed from now on."""
+        if self.confirmation_growth_m2 is None:
+            return True
+        if before is None or before.frames is None or frames is None or before.is_confirmed:
+            return False
+        at = placed(self._maps[pair[1]].origin).apply(result.agreement.centre)
+        distance, angle = frames.difference(before.frames, at)
+        return distance <= CONFIRMED_M and angle <= CONFIRMED_ANGLE
 
 
 def _is_same(before: GrowingMap | None, now: GrowingMap) -> bool:

@@ -84,6 +84,36 @@ def test_maps_that_are_missing_are_forgotten_and_pairs_that_may_not_be_tried_are
         merger.update({})
 
 
+def test_a_pair_that_wants_confirmation_joins_when_grown_maps_are_found_to_lie_the_same_way():
+    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0)
+    maps = {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    first = merger.update(maps)
+    assert first.pairs["a", "b"].is_accepted
+    assert first.groups() == [["a"], ["b"]]
+    little = merger.update({**maps, "a": GrowingMap(part(slice(0, 151), FIRST))})
+    assert (merger.searched, merger.verified) == (0, 1)
+    assert little.groups() == [["a"], ["b"]]
+    grown_maps = {**maps, "a": GrowingMap(part(slice(0, 170), FIRST))}
+    confirmed = merger.update(grown_maps)
+    assert (merger.searched, merger.verified) == (1, 0)
+    assert confirmed.groups() == [["a", "b"]]
+    merger.update({**grown_maps, "a": GrowingMap(part(slice(0, 190), FIRST))})
+    assert (merger.searched, merger.verified) == (0, 1)
+    contradicted = merger.update({**maps, "b": GrowingMap(room(blank(320, 320), 20, 20, 90, 130))})
+    assert contradicted.groups() == [["a"], ["b"]]
+
+
+def test_a_pair_that_is_found_elsewhere_the_second_time_is_not_confirmed():
+    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0)
+    merger.update({"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))})
+    # The second robot's frame has jumped by half a metre: what was found before is gone, and the new place waits in its turn.
+    jumped = GrowingMap(part(slice(60, 220), SECOND, 1), (0.5, 0.0))
+    moved_frame = merger.update({"a": GrowingMap(part(slice(0, 170), FIRST)), "b": jumped})
+    assert moved_frame.pairs["a", "b"].is_accepted
+    assert moved_frame.groups() == [["a"], ["b"]]
+    assert merger.update({"a": GrowingMap(part(slice(0, 190), FIRST)), "b": jumped}).groups() == [["a", "b"]]
+
+
 def test_verification_refines_a_transform_or_says_why_not():
     settings = merge_settings()
     a, b = (described(levels, RESOLUTION, settings) for levels in (part(slice(0, 150), FIRST), part(slice(60, 220), SECOND, 1)))
