@@ -12,6 +12,7 @@ from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.perception import Belief
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import DriveState, OperatingState, Order, Target
+from lidarium.mapping.merging.fusion import FusedMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,13 @@ class Team(Protocol):
 
     def report(self, agent: str) -> Report | None:
         """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
+        ...
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        """Tell an agent that does not know its start what others know, in its map frame; return whether that reached it.
+
+        It plans and explores on that from now on, where its policy looks at the shared map. None takes back what was told.
+        """
         ...
 
 
@@ -224,3 +232,6 @@ class _Alone:
 
     def report(self, agent: str) -> Report | None:
         raise ValueError(f"{self._agent} asked for the report of {agent}; a decentralised policy has no station")
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        raise ValueError(f"{self._agent} would tell {agent} what others know; a decentralised policy has no station")

@@ -37,6 +37,8 @@ class Report:
         What is left in its battery; None where it has no limit [J].
     start : Transform
         Where it began.
+    frame : Transform or None
+        How its map frame lies in one that all robots have in common; None where it does not know, as with unknown starts.
     """
 
     time_s: float
@@ -49,6 +51,7 @@ class Report:
     travelled_m: float
     energy_left_j: float | None
     start: Transform
+    frame: Transform | None = None
 
 
 def known_map(perception: Perception, row: int) -> GrowingMap:
