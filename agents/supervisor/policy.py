@@ -103,7 +103,7 @@ class Supervised:
         belief = team.belief(team.agents[0])
         knows_starts = belief.shared_map is not None
         settings = self.settings if not knows_starts else _trusting(self.settings)
-        station = Station(team.agents, belief.map.resolution, settings)
+        station = Station(team.agents, belief.map.resolution, belief.radius, settings)
         self._supervisor = Supervisor(station, footprint_of(belief.radius))
         self._tells = not knows_starts
         self._errands: dict[str, _Errand] = {}

@@ -5,15 +5,17 @@ from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.agents.supervisor.log import Join, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import OperatingState
 from lidarium.envs.wrappers.merged_maps import TEAM_VALIDATION
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.incremental import IncrementalMerger
+from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.merger import Merged, placed
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.occupancy import UNKNOWN
@@ -31,6 +33,8 @@ class Station:
         The team.
     resolution : float
         Side of a cell of the robots' maps [m].
+    radius : float
+        Of the robots' bodies [m].
     settings : SupervisorSettings
         How maps are joined.
     merge : MergeSettings or None
@@ -46,8 +50,10 @@ class Station:
         What happened.
     """
 
-    def __init__(self, agents: list[str], resolution: float, settings: SupervisorSettings, merge: MergeSettings | None = None) -> None:
-        self.agents, self.resolution, self.settings = list(agents), resolution, settings
+    def __init__(
+        self, agents: list[str], resolution: float, radius: float, settings: SupervisorSettings, merge: MergeSettings | None = None
+    ) -> None:
+        self.agents, self.resolution, self.settings, self._radius = list(agents), resolution, settings, radius
         merge = merge or MergeSettings(validation=TEAM_VALIDATION)
         self._merger = IncrementalMerger(resolution, merge, confirmation_growth_m2=settings.confirmation_growth_m2)
         self._merge = merge
@@ -55,6 +61,7 @@ class Station:
         self._found: set[Pair] = set()
         self._joined: set[Pair] = set()
         self._tracks: dict[str, deque[tuple[float, float]]] = {agent: deque() for agent in agents}
+        self._trails: dict[str, list[tuple[float, float]]] = {agent: [] for agent in agents}
         self.reports: dict[str, Report] = {}
         self.joins: list[Join] = []
         self.events: list[StationEvent] = []
@@ -70,6 +77,7 @@ class Station:
         if report.state is OperatingState.FAILED and (before is None or before.state is not OperatingState.FAILED):
             self._note(time_s, "excluded", (agent,), "it has failed; its map is not used any more")
         self.reports[agent] = report
+        self._trails[agent].append((report.pose.x, report.pose.y))
         track = self._tracks[agent]
         track.append((report.travelled_m, self.known_m2(agent)))
         while len(track) > 1 and track[1][0] <= report.travelled_m - self.settings.enclosed_way_m:
@@ -94,7 +102,7 @@ class Station:
         if self.settings.trusts_starts:
             self._join_by_starts(used)
         elif used:
-            merged = self._merger.update({agent: report.map for agent, report in used.items()})
+            merged = self._merger.update({agent: self._own_map(agent) for agent in used})
             self._tree = merged.tree
             self._note_found(merged, time_s)
         self._note_joins(time_s, used)
@@ -121,11 +129,25 @@ class Station:
 
     def fused(self, agents: list[str], into: str) -> FusedMap | None:
         """Return the map of some joined robots in the frame of one of their group; None where nobody knows anything."""
-        frames = {agent: self.lookup(into, agent) for agent in agents if self._is_used(agent)}
-        places = {agent: frame @ placed(self.reports[agent].map.origin) for agent, frame in frames.items() if frame is not None}
-        if not places:
+        frames = {agent: frame for agent in agents if self._is_used(agent) and (frame := self.lookup(into, agent)) is not None}
+        if not frames:
             return None
-        return fuse([self.reports[agent].map.levels for agent in places], list(places.values()), self.resolution)
+        maps = [self._map_without_bodies(agent) for agent in frames]
+        places = [frame @ placed(one.origin) for one, frame in zip(maps, frames.values(), strict=True)]
+        return fuse([one.levels for one in maps], places, self.resolution)
+
+    def _own_map(self, agent: str) -> GrowingMap:
+        """Return a robot's map as it is compared with others."""
+        return without_own_trail(self.reports[agent].map, self._trail(agent), self._radius, self.resolution)
+
+    def _map_without_bodies(self, agent: str) -> GrowingMap:
+        """Return a robot's map without what it may have drawn of those that it is joined with."""
+        mates = {mate: frame for mate in self.agents if mate != agent and (frame := self.lookup(agent, mate)) is not None}
+        trails = [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
+        return without_bodies(self.reports[agent].map, trails, self._radius, self.resolution)
+
+    def _trail(self, agent: str) -> NDArray[np.float64]:
+        return np.array(self._trails[agent], np.float64).reshape(-1, 2)
 
     def _is_used(self, agent: str) -> bool:
         """Whether a robot's map is used: it has reported something, and has not failed (rules 1 and 2)."""
