@@ -14,8 +14,12 @@ from pettingzoo import ParallelEnv
 from lidarium.envs.episodes import Beginning, begin, goal_of_robots, make_world, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
+from lidarium.envs.onboard.meters import Meters
+from lidarium.envs.onboard.operating import Operating
 from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.reports import Station
 from lidarium.envs.onboard.software import Software
+from lidarium.envs.onboard.state import Order
 from lidarium.envs.options import FloorChoice, read_options
 from lidarium.envs.scorer import Scorer, is_near
 from lidarium.envs.settings import ExplorationSettings
@@ -108,7 +112,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a tenth of a step.
         self._step = self._software.step if self._software.is_staged else self.world.step
         self._may_fail = self.settings.may_fail
-        self._stopping: dict[str, str] = {}
+        self._meters = self.perception.meters = Meters(self.world, self.settings)
+        self.station = Station(self.perception, self._meters)
+        self._stopping = self.operating.stopping
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations, the same object at each call."""
@@ -142,10 +148,11 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._offsets[:] = map_frames(beginning, self.settings)
         self._goals[:] = goal_of_robots(beginning, self.settings)
         self._commands[:] = 0.0
-        self._stopping.clear()
         self.agents = self.possible_agents[:]
         self.perception.start(self.goal)
         self._software.start(0, beginning.seed)
+        self._meters.start()
+        self.station.start()
         self._step(self._commands, moves_bodies=False)
         self.scorer.start()
         infos = self._infos(self.agents)
@@ -180,7 +187,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         for agent in self.agents:
             action = actions.get(agent)
             if action is None:
-                if agent in self._stopping:
+                if agent in self._stopping or self.operating.is_addressed(self._rows[agent]):
                     self._commands[self._rows[agent]] = 0.0
                     continue
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
@@ -193,9 +200,25 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.drive_at(self._commands)
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
-        """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s], without building observations."""
+        """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s], without building observations.
+
+        Those of robots that are paused, or back out after a pause, are overwritten.
+        """
+        operating = self.operating
+        is_active = operating.is_active
+        if is_active:
+            operating.before_step(commands)
         self._step(commands)
+        if is_active:
+            operating.after_step()
+        if self._meters.is_active:
+            self._meters.advance()
         self.scorer.advance()
+
+    @property
+    def operating(self) -> Operating:
+        """The robots' operating states and orders."""
+        return self.station.operating
 
     @property
     def stopping(self) -> dict[str, str]:
@@ -207,6 +230,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Return what ``step`` returns for the time since the last outcome, and let ended agents leave."""
         live = self.agents
+        self.operating.is_interrupting = False
         observations = self._observations(live)
         rewards_of_rows = self.scorer.take_rewards()
         endings, is_truncated = self._endings(live)
@@ -222,10 +246,19 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     infos[agent]["ended_because"] = self.scorer.ended_because[agent] = endings.get(agent, "horizon")
                     self.world.moves[rows[agent]] = 0
                     self.world.flags[rows[agent]] |= ENDED
+                    self._note_ending(agent, infos[agent])
             self.agents = [] if is_truncated else [agent for agent in live if agent not in endings]
         if self.render_mode == "human":
             self.render()
         return observations, rewards, terminations, truncations, infos
+
+    def _note_ending(self, agent: str, info: dict[str, Any]) -> None:
+        """Let a robot's state follow from why it ended; an empty battery takes its sensors and its radio as well."""
+        row = self._rows[agent]
+        self.operating.end(row, info["ended_because"])
+        info["state"] = self.operating.states[row].value
+        if info["ended_because"] == "battery":
+            self.world.failed[row] = 1
 
     def is_over(self) -> bool:
         """Whether the next outcome ends all agents (covered or at the horizon)."""
@@ -234,11 +267,17 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return (horizon is not None and steps >= horizon) or (cover is not None and self.scorer.coverage >= cover)
 
     def has_event(self) -> bool:
-        """Whether the next outcome ends some agent for what happened to it (the goal reached, a collision)."""
+        """Whether something happened to an agent: the goal reached, a collision, a fault, no energy left, a pause by itself."""
         settings = self.settings
         is_at_goal = self.goal is not None and any(self._is_at_goal(self._rows[agent]) for agent in self.agents)
-        has_failed = self._may_fail and any(self.world.failed[self._rows[agent]] for agent in self.agents)
-        return is_at_goal or has_failed or (settings.stop_on_contact and bool(self.scorer.touched.any()))
+        has_failed = self._may_fail and self._is_any_live(self.world.failed)
+        is_empty = self._meters.is_active and self._is_any_live(self._meters.is_empty)
+        has_touched = settings.stop_on_contact and bool(self.scorer.touched.any())
+        return is_at_goal or has_failed or is_empty or has_touched or self.operating.is_interrupting
+
+    def _is_any_live(self, mask: NDArray[Any]) -> bool:
+        """Whether any live agent's row of a mask (robots,) is set."""
+        return any(mask[self._rows[agent]] for agent in self.agents)
 
     def _is_at_goal(self, row: int) -> bool:
         assert self.goal is not None
@@ -249,6 +288,22 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         if agent not in self.agents:
             raise ValueError(f"{agent} is not among the live agents {self.agents}")
         self._stopping[agent] = reason
+
+    def order(self, agent: str, order: Order) -> None:
+        """Send an agent an order from the station; see docs/reference/station.md for what each does.
+
+        It takes effect at once or, over a radio that is not ideal, when it arrives; one that does not reach the robot, or that the robot
+        does not take, is noted in ``operating.events``. An agent that was given an order may be left out of the actions of later steps:
+        it then goes on as it was told.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such agent; one that has ended takes no order, which is no error.
+        """
+        if agent not in self._rows:
+            raise ValueError(f"{agent!r} is not among the agents {self.possible_agents}")
+        self.operating.order(self._rows[agent], order)
 
     def _endings(self, live: Sequence[str]) -> tuple[dict[str, str], bool]:
         """Return why agents end now, and whether the horizon cuts the episode."""
@@ -263,6 +318,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     endings[agent] = "reached"
         if settings.stop_on_contact and self.scorer.touched.any():
             endings |= {agent: "collision" for agent in live if self.scorer.touched[self._rows[agent]]}
+        if self._meters.is_active and self._meters.is_empty.any():
+            endings |= {agent: "battery" for agent in live if self._meters.is_empty[self._rows[agent]]}
         if self._may_fail and self.world.failed.any():
             endings |= {agent: "failed" for agent in live if self.world.failed[self._rows[agent]]}
         return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
@@ -273,9 +330,22 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return {agent: {name: array[rows[agent]] for name, array in arrays.items()} for agent in agents}
 
     def _infos(self, agents: Sequence[str]) -> dict[str, dict[str, Any]]:
-        """Return what a learner may not see, by agent."""
+        """Return what a learner may not see, and the operating states, by agent."""
         rows, coverage, poses, seen = self._rows, self.scorer.coverage, self.world.poses.copy(), self.world.seen.tolist()
-        return {agent: {"truth": {"pose": poses[rows[agent]], "coverage": coverage, "seen_cells": seen[rows[agent]]}} for agent in agents}
+        states, orders = self.operating.states, self.operating.orders
+        infos: dict[str, dict[str, Any]] = {}
+        for agent in agents:
+            row = rows[agent]
+            order = orders[row]
+            infos[agent] = {
+                "truth": {"pose": poses[row], "coverage": coverage, "seen_cells": seen[row]},
+                "state": states[row].value,
+                "order": "" if order is None else order.kind.value,
+            }
+        if self.settings.battery.is_limited:
+            for agent in agents:
+                infos[agent]["energy_j"] = float(self._meters.used_j[rows[agent]])
+        return infos
 
     def state(self) -> NDArray[np.float64]:
         """Return the true state of the team: x, y, theta, speed and turn rate of each robot, shape (robots * 5,)."""

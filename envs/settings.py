@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from numbers import Integral
 from typing import Any
 
+from lidarium.envs.simulation.battery import BATTERIES, Battery
 from lidarium.envs.simulation.faults import NO_FAULTS, FaultSettings
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.odometry import ODOMETRY, OdometrySettings
@@ -106,6 +107,10 @@ class ExplorationSettings:
         How robots reach each other.
     faults : FaultSettings
         What goes wrong with them.
+    battery : Battery
+        What energy each has.
+    pauses_when_blocked : bool
+        Whether a robot whose bumper touches anything, or whose way is blocked, pauses until it is told to resume.
     backend : str
         The world: ``kinematic``.
     time_step : float
@@ -144,6 +149,8 @@ class ExplorationSettings:
     odometry: OdometrySettings = ODOMETRY["ideal"]
     radio: RadioSettings = RADIO["all"]
     faults: FaultSettings = NO_FAULTS
+    battery: Battery = BATTERIES["none"]
+    pauses_when_blocked: bool = False
     backend: str = "kinematic"
     time_step: float = 0.1
     horizon_s: float | None = 600.0
@@ -228,11 +235,11 @@ class ExplorationSettings:
 
 PARTS: dict[str, type] = {
     "robot": Robot, "lidar": Lidar, "occupancy": OccupancySettings, "reward": RewardSettings, "odometry": OdometrySettings,
-    "radio": RadioSettings, "faults": FaultSettings,
+    "radio": RadioSettings, "faults": FaultSettings, "battery": Battery,
 }  # fmt: skip
 """Settings that are made of others."""
 
-_NAMES: dict[str, dict[str, Any]] = {"robot": ROBOTS, "lidar": LIDARS, "odometry": ODOMETRY, "radio": RADIO}
+_NAMES: dict[str, dict[str, Any]] = {"robot": ROBOTS, "lidar": LIDARS, "odometry": ODOMETRY, "radio": RADIO, "battery": BATTERIES}
 """Those of them that have names."""
 
 
@@ -281,9 +288,9 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     settings : ExplorationSettings or None
         Where to start from; the defaults where None.
     **options
-        Any attribute of ``ExplorationSettings``; ``robot``, ``lidar``, ``odometry`` and ``radio`` also by name, ``noise`` (none,
-        datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps) in place of
-        ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise, odometry, localization, radio and faults that is not given
+        Any attribute of ``ExplorationSettings``; ``robot``, ``lidar``, ``odometry``, ``radio`` and ``battery`` also by name,
+        ``noise`` (none, datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps) in
+        place of ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise, odometry, localization, radio and faults that is not given
         itself.
 
     Returns

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from lidarium.agents.policy import GivenUp, Policy, Stop
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.onboard.perception import Belief
-from lidarium.envs.onboard.state import DriveState
+from lidarium.envs.onboard.reports import Report
+from lidarium.envs.onboard.state import DriveState, OperatingState, Order
 from lidarium.envs.solo import at_level
 from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings
@@ -78,6 +79,14 @@ class RunningTeam:
     def drive_state(self, agent: str) -> DriveState:
         """Return what its driving is about."""
         return DriveState.IDLE if self._driver is None else self._driver.drive_state(agent)
+
+    def operating_state(self, agent: str) -> OperatingState:
+        """Return whether it takes part in the work, as it knows itself."""
+        return self._env.operating.states[self._env.possible_agents.index(agent)]
+
+    def report(self, agent: str) -> Report | None:
+        """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
+        return self._env.station.report(self._env.possible_agents.index(agent))
 
 
 def run_episode(
@@ -147,11 +156,13 @@ def run_episode(
 def decide(
     policy: Policy, world: ExplorationEnv | WaypointExploration | FrontierExploration | MergedMaps, observations: Mapping[str, Observation]
 ) -> dict[str, NDArray[np.float32] | Any]:
-    """Ask a policy, and turn each ``Stop`` into an order to the environment."""
+    """Ask a policy, and hand each ``Stop`` and ``Order`` to the environment: these agents have no action."""
     actions: dict[str, Any] = {}
     for agent, action in policy.act(observations).items():
         if isinstance(action, Stop):
             world.stop(agent, action.reason)
+        elif isinstance(action, Order):
+            world.order(agent, action)
         else:
             actions[agent] = action
     return actions

@@ -95,6 +95,11 @@ class EpisodeBatch:
             raise ValueError(f"the number of episodes is {episodes!r}; want a whole number of at least 1")
         self.episodes, self.robots, self.settings = int(episodes), settings.robots, settings
         self.rows = self.episodes * self.robots
+        if settings.battery.is_limited or settings.pauses_when_blocked:
+            raise ValueError(
+                f"capacity_j of the battery is {settings.battery.capacity_j}, pauses_when_blocked is {settings.pauses_when_blocked}; "
+                f"want None and False: many episodes at once have no batteries and nobody to end a pause; or use lidarium.parallel_env"
+            )
         self._choice = FloorChoice(floor, image_resolution)
         self.world = make_world(settings, self.episodes)
         self._offsets, self._goals = np.zeros((self.rows, 2)), np.full((self.rows, 2), np.nan)

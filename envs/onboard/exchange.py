@@ -2,18 +2,23 @@
 
 In every step each robot tells where it is; once a period, over each link, what the other does not have of any map that it holds: its
 own, and copies of others that reached it. So news travels on over robots that meet later. A message carries blocks of 64 cells.
+
+Where robots report, a station listens at the place where the first of them started. With every map goes what its robot told of itself
+when the map was as it is, and the station gets both over the same links, from the robots themselves or from those that hold copies.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.state import Status
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
 from lidarium.envs.simulation.faults import DEAD_RADIO, has_fault
 from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.envs.simulation.radio import RADIO_STREAM, links
+from lidarium.envs.simulation.radio import RADIO_STREAM, links, links_to
 from lidarium.mapping.kernels import Array, kernel
 
 BLOCK = 64
@@ -24,6 +29,12 @@ POSE_BYTES = 32
 
 HEADER_BYTES, BLOCK_BYTES = 32, 4 + BLOCK
 """A message with a part of a map: sender, whose map, when, and how many blocks; each block is its number and a byte for each cell."""
+
+STATUS_BYTES = 80
+"""What a robot tells of itself with its map: pose, target and three figures, 8 bytes each, and its states."""
+
+STATION_STREAM = 1
+"""Sets the draws for the station's links apart from those of the robots, which are the same with and without it."""
 
 NEVER = -2
 """Step of news that never came; the scan at the start is of step 0, before which is -1."""
@@ -65,6 +76,8 @@ class _Message:
         Whether the source had ended.
     blocks, cells : (blocks,) int64, (blocks, 64) int8
         Blocks of the source's map.
+    status : Status or None
+        What the source told of itself with its map.
     """
 
     arrives: int
@@ -75,6 +88,7 @@ class _Message:
     has_ended: bool
     blocks: NDArray[np.int64]
     cells: NDArray[np.int8]
+    status: Status | None = None
 
 
 _NO_BLOCKS, _NO_CELLS = np.zeros(0, np.int64), np.zeros((0, BLOCK), np.int8)
@@ -101,13 +115,21 @@ class Exchange:
     heard_ended : (robots, robots) bool
         Whether the source said that it has ended.
     copies : list of list of (rows, columns) int8 arrays
-        What each robot holds of each map (receiver, source), the map itself where it is its own.
-    copied_at : (robots, robots) int64
+        What each robot, and last the station, holds of each map (receiver, source), the map itself where it is its own.
+    copied_at : (robots + 1, robots) int64
         The step at which each copy was true.
+    statuses : list of list of Status or None
+        What each robot, and last the station, holds of what each robot told of itself (receiver, source) with its map.
+    tells : callable or None
+        Takes the number of a robot and returns what it tells of itself; where None, nobody reports and there is no station.
+    station_links : (robots,) bool
+        Who reached the station in the last step, and was reached by it.
     windows : (robots, 4) int64
         What part of the copies that each robot holds has changed since it was last looked at: rows and columns, low and high.
     bytes_sent : (robots,) int64
-        Bytes that each robot has sent, lost ones included.
+        Bytes that each robot has sent to others, lost ones included.
+    bytes_reported : (robots,) int64
+        Bytes that each robot has sent for the station's sake beside: to it, and as what goes with maps to others.
     """
 
     def __init__(self, world: KinematicWorld, settings: ExplorationSettings, episode: int = 0) -> None:
@@ -117,23 +139,30 @@ class Exchange:
         self._period = max(round(settings.radio.period_s / settings.time_step), 1)
         self._latency = round(settings.radio.latency_s / settings.time_step)
         self.links = np.zeros((robots, robots), np.bool_)
+        self.station_links = np.zeros(robots, np.bool_)
+        self.tells: Callable[[int], Status] | None = None
         self.start(0)
 
     def start(self, seed: int) -> None:
         """Begin an episode in which nobody knows anything of the others; chance comes from ``seed``."""
         robots, maps = self._settings.robots, self._world.log_odds[self._first : self._first + self._settings.robots]
         self._generator = np.random.default_rng([seed, RADIO_STREAM])
+        self._station_generator = np.random.default_rng([seed, RADIO_STREAM, STATION_STREAM])
+        self._station_chance = np.zeros(robots)
         self._chance = np.zeros((robots, robots))
         self._under_way: list[_Message] = []
-        self.links[:] = False
+        self.links[:], self.station_links[:] = False, False
         self.heard, self.heard_at = np.zeros((robots, robots, 3)), np.full((robots, robots), NEVER, np.int64)
         self.heard_ended = np.zeros((robots, robots), np.bool_)
-        self.copies = [[log_odds if i == j else np.zeros((0, BLOCK), np.int8) for j, log_odds in enumerate(maps)] for i in range(robots)]
-        self.copied_at = np.full((robots, robots), NEVER, np.int64)
+        self.copies = [
+            [log_odds if i == j else np.zeros((0, BLOCK), np.int8) for j, log_odds in enumerate(maps)] for i in range(robots + 1)
+        ]
+        self.copied_at = np.full((robots + 1, robots), NEVER, np.int64)
+        self.statuses: list[list[Status | None]] = [[None] * robots for _ in range(robots + 1)]
         self.windows = np.zeros((robots, 4), np.int64)
         for robot in range(robots):
             self._forget_changes(robot)
-        self.bytes_sent = np.zeros(robots, np.int64)
+        self.bytes_sent, self.bytes_reported = np.zeros(robots, np.int64), np.zeros(robots, np.int64)
 
     def take_window(self, robot: int) -> NDArray[np.int64]:
         """Return what part of a robot's copies has changed since the last call: rows, columns (4,); empty where low is not below high."""
@@ -160,6 +189,8 @@ class Exchange:
             [world.failed[row] == 0 and not has_fault(world.faults[row], DEAD_RADIO, step) for row in range(rows.start, rows.stop)]
         )
         self.links &= works[:, None] & works[None, :]
+        if self.tells is not None:
+            self.station_links = self._linked_to_station(is_time) & works
         self._tell_poses(step)
         if is_time:
             self._tell_maps(step)
@@ -168,8 +199,34 @@ class Exchange:
         for message in due:
             self._receive(message)
 
-    def _send(self, sender: int, message: _Message) -> None:
-        if self._settings.radio.loss == 0.0 or self._generator.random() >= self._settings.radio.loss:
+    def _linked_to_station(self, is_time: bool) -> NDArray[np.bool_]:
+        """Return which robots reach the place where the first of them started, (robots,)."""
+        world, radio, team = self._world, self._settings.radio, slice(self._first, self._first + self._settings.robots)
+        if is_time and radio.shadowing > 0.0:
+            self._station_chance = self._station_generator.standard_normal(len(self.station_links))
+        floor = world.floors[self._episode]
+        assert floor is not None
+        chance = self._station_chance if radio.shadowing > 0.0 else None
+        return links_to(radio, world.poses[team], world.starts[self._first], floor.laser, chance)
+
+    def order_delay(self, receiver: int) -> int | None:
+        """Return after how many steps an order of the station that is sent now reaches a robot.
+
+        An order goes over links that stand now, from robot to robot; None where there are none, or it is lost by chance.
+        """
+        reached, known = self.station_links.copy(), np.zeros_like(self.station_links)
+        while (reached != known).any():
+            known = reached
+            reached = known | self.links[known].any(axis=0)
+        is_lost = self._is_lost(self._station_generator)
+        return self._latency if reached[receiver] and not is_lost else None
+
+    def _is_lost(self, generator: np.random.Generator) -> bool:
+        return self._settings.radio.loss > 0.0 and bool(generator.random() < self._settings.radio.loss)
+
+    def _send(self, message: _Message) -> None:
+        is_to_station = message.receiver == self._settings.robots
+        if not self._is_lost(self._station_generator if is_to_station else self._generator):
             self._under_way.append(message)
 
     def _tell_poses(self, step: int) -> None:
@@ -179,28 +236,36 @@ class Exchange:
             # A pose is sent to all at once.
             self.bytes_sent[sender] += POSE_BYTES
             for receiver in np.flatnonzero(self.links[sender]).tolist():
-                self._send(sender, _Message(step + self._latency, receiver, sender, step, pose, has_ended, _NO_BLOCKS, _NO_CELLS))
+                self._send(_Message(step + self._latency, receiver, sender, step, pose, has_ended, _NO_BLOCKS, _NO_CELLS))
 
     def _tell_maps(self, step: int) -> None:
         robots = self._settings.robots
         np.fill_diagonal(self.copied_at, step)
+        if self.tells is not None:
+            for robot in range(robots):
+                self.statuses[robot][robot] = self.tells(robot)
         # What is sent is what was held when the exchange began: nothing goes on over two links at once.
         chosen = [
             (self._best_sender(receiver, source), receiver, source)
-            for receiver in range(robots)
+            for receiver in range(robots if self.tells is None else robots + 1)
             for source in range(robots)
             if receiver != source
         ]
         messages = [(sender, self._news(sender, receiver, source, step)) for sender, receiver, source in chosen if sender is not None]
         for sender, message in messages:
-            self.bytes_sent[sender] += HEADER_BYTES + BLOCK_BYTES * len(message.blocks)
-            self._send(sender, message)
+            size = HEADER_BYTES + BLOCK_BYTES * len(message.blocks)
+            is_to_station = message.receiver == robots
+            self.bytes_sent[sender] += 0 if is_to_station else size
+            self.bytes_reported[sender] += (size if is_to_station else 0) + (0 if message.status is None else STATUS_BYTES)
+            self._send(message)
 
     def _best_sender(self, receiver: int, source: int) -> int | None:
         """Return which of the robots that reach a receiver holds the latest copy of a map; None where none has news or it is under way."""
         if any(message.pose is None and (message.receiver, message.source) == (receiver, source) for message in self._under_way):
             return None
-        held_at = np.where(self.links[:, receiver], self.copied_at[:, source], NEVER)
+        robots = self._settings.robots
+        is_linked = self.station_links if receiver == robots else self.links[:, receiver]
+        held_at = np.where(is_linked, self.copied_at[:robots, source], NEVER)
         best = int(np.argmax(held_at))
         return best if held_at[best] > self.copied_at[receiver, source] else None
 
@@ -208,12 +273,14 @@ class Exchange:
         """Return what a sender holds of a map that the receiver does not."""
         held = self.copies[sender][source]
         copy = self._copy_of(receiver, source)
-        used = np.flatnonzero(held.view(np.uint64).any(axis=1)) if sender == source else np.arange(len(held))
+        # A correction of the past may have emptied rows that the receiver still holds.
+        used = np.flatnonzero(held.view(np.uint64).any(axis=1) | copy.view(np.uint64).any(axis=1))
         low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
         found = np.empty((high - low) * (held.shape[1] // BLOCK), np.int64)
         blocks = found[: _differing_blocks(held, copy, low, high, found)].copy()
         cells = held.reshape(-1, BLOCK)[blocks]
-        return _Message(step + self._latency, receiver, source, int(self.copied_at[sender, source]), None, False, blocks, cells)
+        true_at = int(self.copied_at[sender, source])
+        return _Message(step + self._latency, receiver, source, true_at, None, False, blocks, cells, self.statuses[sender][source])
 
     def _copy_of(self, receiver: int, source: int) -> NDArray[np.int8]:
         """Return what a robot holds of another's map, blank at first."""
@@ -232,8 +299,8 @@ class Exchange:
             return
         copy = self._copy_of(receiver, source)
         copy.reshape(-1, BLOCK)[message.blocks] = message.cells
-        self.copied_at[receiver, source] = message.step
-        if len(message.blocks):
+        self.copied_at[receiver, source], self.statuses[receiver][source] = message.step, message.status
+        if len(message.blocks) and receiver < self._settings.robots:
             rows, words = np.divmod(message.blocks, copy.shape[1] // BLOCK)
             window = self.windows[receiver]
             window[0], window[1] = min(window[0], rows.min()), max(window[1], rows.max() + 1)

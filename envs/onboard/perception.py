@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.exchange import NEVER, Exchange
+from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.navigation import (
     CLEARANCE_LIMIT,
     FLAGS,
@@ -129,6 +130,12 @@ class Belief:
         return self._perception.teammates(self._row)
 
     @property
+    def energy_left_j(self) -> float | None:
+        """What is left in the battery [J]; None where it has no limit."""
+        meters = self._perception.meters
+        return None if meters is None else meters.left_j(self._row)
+
+    @property
     def goal(self) -> NDArray[np.float64] | None:
         """The goal in the map frame [m], shape (2,), or None."""
         return self._perception.goal_of(self._row)
@@ -158,6 +165,8 @@ class Perception:
         The radio traffic of each episode; none where the radio is ideal.
     localizers : list of Localizer or None
         What tells each robot's pose, by row; None where kernels do.
+    meters : Meters or None
+        Odometers and battery gauges of the robots of a lone episode; None in batches, which have none.
     """
 
     def __init__(self, world: KinematicWorld, settings: ExplorationSettings, offsets: NDArray[np.float64]) -> None:
@@ -178,6 +187,7 @@ class Perception:
         self.knows_mates = settings.known_starts and settings.radio.is_ideal
         self.exchanges = [] if settings.radio.is_ideal else [Exchange(world, settings, episode) for episode in range(self._episodes)]
         self.localizers: list[Localizer | None] = [None] * rows
+        self.meters: Meters | None = None
         self._heard: list[NavigationMap | None] = [None] * rows
         self._heard_records = np.zeros((rows, RECORD), np.int64)
         self._told: list[NDArray[np.int8] | None] = [None] * rows

@@ -1,11 +1,19 @@
-"""What robots report to their station."""
+"""What robots report to their station.
+
+With the ideal radio the station knows at any time what is now. With any other it stands where the first robot started, and knows what
+has reached it there (`Exchange`); its orders reach a robot as long as the links do.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lidarium.envs.onboard.exchange import NEVER, Exchange
+from lidarium.envs.onboard.meters import Meters
+from lidarium.envs.onboard.operating import Operating
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.onboard.state import DriveState, OperatingState, Target
+from lidarium.envs.onboard.state import DriveState, OperatingState, Status, Target
 from lidarium.mapping.merging.incremental import GrowingMap
 from lidarium.mapping.occupancy import three_levels
 from lidarium.mapping.rigid import Transform
@@ -56,9 +64,96 @@ class Report:
 
 def known_map(perception: Perception, row: int) -> GrowingMap:
     """Return what a robot's own map knows, cut out."""
-    log_odds = perception.own_map(row).log_odds
-    row_low, row_high, column_low, column_high = perception.known_window(row)
-    cut = three_levels(np.asarray(log_odds[row_low:row_high, column_low:column_high]))
+    return _cut(perception, row, perception.own_map(row).log_odds, perception.known_window(row))
+
+
+def _cut(perception: Perception, row: int, log_odds: NDArray[np.int8], window: tuple[int, int, int, int]) -> GrowingMap:
+    """Return a window (rows and columns, low and high) of a map that has the place and the size of a robot's own."""
+    row_low, row_high, column_low, column_high = window
     resolution = perception.settings.occupancy.resolution
     x, y = perception.origin_in_frame(row)
-    return GrowingMap(cut, (x + column_low * resolution, y + row_low * resolution))
+    levels = three_levels(np.asarray(log_odds[row_low:row_high, column_low:column_high]))
+    return GrowingMap(levels, (x + column_low * resolution, y + row_low * resolution))
+
+
+def _window_of(log_odds: NDArray[np.int8]) -> tuple[int, int, int, int]:
+    """Return the first and last rows and columns, exclusive, that hold all that a map knows."""
+    rows, columns = np.flatnonzero(log_odds.any(axis=1)), np.flatnonzero(log_odds.any(axis=0))
+    if not len(rows):
+        return 0, 0, 0, 0
+    return int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1
+
+
+class Station:
+    """Where the reports of an episode's robots come in, and their orders come from.
+
+    Parameters
+    ----------
+    perception : Perception
+        What the robots know; of one episode.
+    meters : Meters
+        What they measure of themselves.
+    """
+
+    def __init__(self, perception: Perception, meters: Meters) -> None:
+        self._perception, self._meters = perception, meters
+        self.operating = Operating(perception, perception.settings, self._order_delay)
+        if self._exchange is not None:
+            self._exchange.tells = self._status
+        self.start()
+
+    @property
+    def _exchange(self) -> Exchange | None:
+        return self._perception.exchanges[0] if self._perception.exchanges else None
+
+    def start(self) -> None:
+        """Begin an episode, after its robots were placed: nobody has reported."""
+        robots = range(self._perception.settings.robots)
+        self.operating.start()
+        self._starts = [self._pose(row) for row in robots]
+        self._received: dict[int, Report] = {}
+
+    def report(self, row: int) -> Report | None:
+        """Return what last reached the station of a robot, None where nothing ever did."""
+        exchange = self._exchange
+        if exchange is None:
+            time_s = int(self._perception.world.steps[0]) * self._perception.settings.time_step
+            return self._report(row, time_s, known_map(self._perception, row), self._status(row))
+        step, status = int(exchange.copied_at[-1, row]), exchange.statuses[-1][row]
+        if step == NEVER or status is None:
+            return None
+        time_s = step * self._perception.settings.time_step
+        before = self._received.get(row)
+        if before is None or before.time_s != time_s:
+            log_odds = exchange.copies[-1][row]
+            self._received[row] = self._report(row, time_s, _cut(self._perception, row, log_odds, _window_of(log_odds)), status)
+        return self._received[row]
+
+    def _report(self, row: int, time_s: float, known: GrowingMap, status: Status) -> Report:
+        return Report(
+            time_s, known, status.pose, status.state, status.drive, status.target, status.path_left_m, status.travelled_m,
+            status.energy_left_j, self._starts[row],
+        )  # fmt: skip
+
+    def _status(self, row: int) -> Status:
+        """Return what a robot tells of itself now."""
+        self._meters.advance()
+        drive, target, path_left_m = self._drive(row)
+        state, meters = self.operating.states[row], self._meters
+        return Status(self._pose(row), state, drive, target, path_left_m, meters.travelled_m(row), meters.left_j(row))
+
+    def _drive(self, row: int) -> tuple[DriveState, Target | None, float]:
+        """Return what a robot's driving is about, where to, and how much of its path is left [m]."""
+        driver = self.operating.driver
+        # At the scan at the start the driver has not begun yet.
+        if driver is None or int(self._perception.world.steps[0]) == 0:
+            return DriveState.IDLE, None, 0.0
+        path = driver.path(row)
+        return driver.state(row), driver.target(row), float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+    def _pose(self, row: int) -> Transform:
+        return Transform(*self._perception.pose_in_frame(row, row).tolist())
+
+    def _order_delay(self, row: int) -> int | None:
+        """Return after how many steps an order reaches a robot, None where it does not."""
+        return 0 if self._exchange is None else self._exchange.order_delay(row)

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.rigid import Transform
+
 
 class DriveState(Enum):
     """What a robot's driving is about."""
@@ -95,6 +97,37 @@ class Order:
             raise ValueError(f"target of the order {self.kind.value!r} is {self.target!r}; want a Target, the place to go to")
         if self.kind is not OrderKind.GO_TO and self.target is not None:
             raise ValueError(f"target of the order {self.kind.value!r} is {self.target!r}; want None, only 'go_to' has a target")
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What a robot tells of itself beside its map; positions are in its map frame.
+
+    Attributes
+    ----------
+    pose : Transform
+        Where it believes to be.
+    state : OperatingState
+        Whether it takes part in the work.
+    drive : DriveState
+        What its driving is about.
+    target : Target or None
+        Where it drives to.
+    path_left_m : float
+        What is left of its path, 0 without one [m].
+    travelled_m : float
+        How far it has come by its own odometry [m].
+    energy_left_j : float or None
+        What is left in its battery; None where it has no limit [J].
+    """
+
+    pose: Transform
+    state: OperatingState
+    drive: DriveState
+    target: Target | None
+    path_left_m: float
+    travelled_m: float
+    energy_left_j: float | None
 
 
 class Orders(NamedTuple):

@@ -27,7 +27,7 @@ from lidarium.envs.onboard.planning import (
     prepare_teams_parallel,
     prepare_teams_serial,
 )
-from lidarium.envs.onboard.state import DriveState, Orders
+from lidarium.envs.onboard.state import DriveState, Orders, Target
 from lidarium.envs.onboard.traffic import find_refuge, obstructing
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
@@ -80,6 +80,8 @@ class TeamDriver:
         What every robot's drive is at; row = episode * robots + robot.
     following : Following
         What ``follow_team`` needs beside it.
+    held : (rows,) bool
+        Robots that stand still whatever their drives are about, and are driven round like those that have ended.
     """
 
     def __init__(self, perception: Perception, settings: ExplorationSettings, shares_map: bool = True) -> None:
@@ -94,6 +96,7 @@ class TeamDriver:
             perception.world.contact, perception.world.heard, np.ones(settings.robots, np.uint8), FORESIGHT_TIMES,
         )  # fmt: skip
         self._commands = np.zeros((self._rows, 2))
+        self.held: NDArray[np.bool_] = np.zeros(self._rows, np.bool_)
 
     def start(self, episode: int = 0) -> None:
         """Begin an episode: no robot has a target."""
@@ -117,6 +120,13 @@ class TeamDriver:
     def orders(self) -> Orders:
         """Return the targets that all robots have; the arrays are the driver's own."""
         return Orders(self.drives.is_ordered, self.drives.targets, self.drives.target_headings)
+
+    def target(self, row: int) -> Target | None:
+        """Return where a robot drives to, None where it has no target."""
+        if not self.drives.is_ordered[row]:
+            return None
+        (x, y), heading = self.drives.targets[row].tolist(), float(self.drives.target_headings[row])
+        return Target(x, y, None if math.isnan(heading) else heading)
 
     def states(self) -> NDArray[np.int8]:
         """Return the numbers of what all robots' driving is about, (rows,); ``DRIVE_STATES`` names them."""
@@ -179,7 +189,7 @@ class TeamDriver:
 
     def _live(self, episode: int) -> list[int]:
         team, flags = self._team(episode), self._perception.world.flags
-        return [row for row in range(team.start, team.stop) if not flags[row] & ENDED]
+        return [row for row in range(team.start, team.stop) if not flags[row] & ENDED and not self.held[row]]
 
     def planning(self, rows: NDArray[np.int64], *, with_frontiers: bool = False) -> Planning:
         """Return what planning needs in kernels, with the maps that the given rows plan on, if wanted with frontiers."""
@@ -190,7 +200,7 @@ class TeamDriver:
             settings.robots, perception.knows_mates, world.contact, world.heard, settings.robot.radius, resolution,
             self._footprint.radius + 2 * resolution,
             CLEARANCE_LIMIT, *self._passage, records, sharing, perception.memory.table, world.believed, world.origins, perception.offsets,
-            world.flags & ENDED != 0,
+            (world.flags & ENDED != 0) | self.held,
         )  # fmt: skip
 
     def _fresh_planning(self, row: int) -> Planning:

@@ -154,6 +154,26 @@ def path_loss(settings: RadioSettings, distance: NDArray[np.float64], walls: NDA
     return np.asarray(loss + np.where(walls > 0.0, through, 0.0), np.float64)
 
 
+def _reached(
+    settings: RadioSettings, distance: NDArray[np.float64], walls: NDArray[np.float64], chance: NDArray[np.float64] | None
+) -> NDArray[np.bool_]:
+    """Return over which ways a message comes, by their lengths and what of them is solid [m], and the draws for the shadowing."""
+    if settings.kind in ("all", "none"):
+        return np.full(distance.shape, settings.kind == "all")
+    if settings.kind == "range":
+        return np.asarray(distance <= settings.reach)
+    if settings.kind == "line_of_sight":
+        return np.asarray((distance <= settings.reach) & (walls == 0.0))
+    loss = path_loss(settings, distance, walls)
+    if chance is not None:
+        loss = loss + settings.shadowing * chance
+    return np.asarray(settings.power - loss > settings.threshold)
+
+
+def _asks_for_walls(settings: RadioSettings) -> bool:
+    return settings.kind in ("line_of_sight", "signal")
+
+
 def links(
     settings: RadioSettings, places: NDArray[np.float64], raster: Raster, chance: NDArray[np.float64] | None = None
 ) -> NDArray[np.bool_]:
@@ -171,19 +191,38 @@ def links(
         Standard Gaussian draws for the shadowing, of which those above the diagonal count; none where None.
     """
     robots = len(places)
-    others = ~np.eye(robots, dtype=np.bool_)
-    if settings.kind in ("all", "none"):
-        return others if settings.kind == "all" else np.zeros((robots, robots), np.bool_)
     distance = np.hypot(places[:, None, 0] - places[None, :, 0], places[:, None, 1] - places[None, :, 1])
-    if settings.kind == "range":
-        return np.asarray((distance <= settings.reach) & others)
     walls = np.zeros((robots, robots))
-    _wall_lengths(raster.solid, (places[:, :2] - raster.origin) / raster.resolution, walls)
-    walls *= raster.resolution
-    if settings.kind == "line_of_sight":
-        return np.asarray((distance <= settings.reach) & (walls == 0.0) & others)
-    loss = path_loss(settings, distance, walls)
-    if chance is not None:
-        above = np.triu(chance, 1)
-        loss = loss + settings.shadowing * (above + above.T)
-    return np.asarray((settings.power - loss > settings.threshold) & others)
+    if _asks_for_walls(settings):
+        _wall_lengths(raster.solid, (places[:, :2] - raster.origin) / raster.resolution, walls)
+        walls *= raster.resolution
+    above = None if chance is None else np.triu(chance, 1)
+    return np.asarray(_reached(settings, distance, walls, None if above is None else above + above.T) & ~np.eye(robots, dtype=np.bool_))
+
+
+def links_to(
+    settings: RadioSettings,
+    places: NDArray[np.float64],
+    place: NDArray[np.float64],
+    raster: Raster,
+    chance: NDArray[np.float64] | None = None,
+) -> NDArray[np.bool_]:
+    """Return which robots reach a place, and are reached from it, (robots,).
+
+    Parameters
+    ----------
+    settings, places, raster : as of ``links``
+        The radio, the robots and the floor.
+    place : (2,) float64
+        Where the other end is [m].
+    chance : (robots,) float64 or None
+        Standard Gaussian draws for the shadowing; none where None.
+    """
+    distance = np.hypot(places[:, 0] - place[0], places[:, 1] - place[1])
+    walls = np.zeros(len(places))
+    if _asks_for_walls(settings):
+        ends = (np.vstack([places[:, :2], place[None, :2]]) - raster.origin) / raster.resolution
+        x, y = ends[-1].tolist()
+        walls[:] = [solid_length(raster.solid, from_x, from_y, x, y) for from_x, from_y in ends[:-1].tolist()]
+        walls *= raster.resolution
+    return _reached(settings, distance, walls, chance)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.onboard.state import Order
 
 
 class DecisionWrapper(ParallelEnv[str, Observation, Any]):
@@ -37,6 +38,10 @@ class DecisionWrapper(ParallelEnv[str, Observation, Any]):
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason."""
         self.env.stop(agent, reason)
+
+    def order(self, agent: str, order: Order) -> None:
+        """Send an agent an order, as ``ExplorationEnv.order``."""
+        self.env.order(agent, order)
 
     def state(self) -> NDArray[np.float64]:
         """Return the true state of the team."""

@@ -66,7 +66,7 @@ class FrontierExploration(DecisionWrapper):
         numbers, choosing = np.full(env.settings.robots, CANDIDATES), []
         for agent in env.agents:
             if agent not in actions:
-                if agent in env.stopping:
+                if agent in env.stopping or env.operating.is_addressed(self.possible_agents.index(agent)):
                     continue
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
             number = int(actions[agent])
@@ -74,14 +74,19 @@ class FrontierExploration(DecisionWrapper):
                 raise ValueError(f"action of {agent} is {number}; want a frontier from 0 to {CANDIDATES - 1}, or {CANDIDATES} to stay")
             numbers[self.possible_agents.index(agent)] = number
             choosing.append(agent)
-        orders = offers.choose(self._rows(choosing), numbers)
-        if not offers.offers.counts[self._rows(env.agents)].any():
+        is_chosen = self._rows(choosing) | self._rows(list(env.stopping))
+        is_sent = np.isin(np.arange(env.settings.robots), list(env.operating.sent))
+        # Who is sent elsewhere by an order has no choice among frontiers any more, who is paused keeps its own.
+        numbers[is_sent] = CANDIDATES
+        orders = offers.choose(self._rows(choosing) & ~env.operating.held | is_sent, numbers)
+        is_left_alone = bool(is_chosen[self._rows(env.agents)].all()) and not is_sent.any()
+        if is_left_alone and not offers.offers.counts[self._rows(env.agents)].any():
             for agent in env.agents:
                 if agent not in env.stopping:
                     env.stop(agent, offers.why_without_work(self.possible_agents.index(agent)))
-        observations, rewards, terminations, truncations, infos = self.waypoints.carry_out(orders)
+        observations, rewards, terminations, truncations, infos = self.waypoints.carry_out(orders, is_chosen)
         self.agents = env.agents
-        reasons = offers.renew(self._rows(self.agents), self._rows(list(observations)))
+        reasons = offers.renew(self._rows(self.agents) & ~env.operating.held, self._rows(list(observations)))
         for row in np.flatnonzero(reasons).tolist():
             infos[self.possible_agents[row]]["given_up"] = (offers.target(row), REASONS[reasons[row]])
         return self._with_offers(observations), rewards, terminations, truncations, infos

@@ -12,6 +12,7 @@ from pettingzoo import ParallelEnv
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.observations import FARTHEST
+from lidarium.envs.onboard.state import Order
 from lidarium.envs.onboard.team_mapping import Frames, TeamMapping, crop_around
 from lidarium.envs.wrappers.decisions import boxes_of
 from lidarium.envs.wrappers.frontiers import FrontierExploration
@@ -172,6 +173,10 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason."""
         self.env.stop(agent, reason)
+
+    def order(self, agent: str, order: Order) -> None:
+        """Send an agent an order, as ``ExplorationEnv.order``."""
+        self.env.order(agent, order)
 
     def state(self) -> NDArray[np.float64]:
         """Return the true state of the team."""

@@ -12,7 +12,7 @@ from lidarium.envs.onboard.state import DriveState, Orders, Target
 from lidarium.envs.onboard.team_driver import TeamDriver
 from lidarium.envs.wrappers.decisions import DecisionWrapper
 
-Order = Target | NDArray[np.float32] | None
+Waypoint = Target | NDArray[np.float32] | None
 
 
 class WaypointExploration(DecisionWrapper):
@@ -23,8 +23,8 @@ class WaypointExploration(DecisionWrapper):
     directly, and None lets the robot stay and give way. The onboard driving plans a path over what the robot knows, so a point
     that is not known to be free is approached as near as planning can come: where there is no path, the robot stays.
 
-    A decision lasts ``decision_period_s``; it ends earlier when any robot with a target has arrived or found no path, or the
-    episode ends.
+    A decision lasts ``decision_period_s``; it ends earlier when any robot with a target has arrived or found no path, pauses by
+    itself or gets an order late, or the episode ends. A robot that was given an order may be left out of the actions, and then keeps its target.
 
     Parameters
     ----------
@@ -40,6 +40,7 @@ class WaypointExploration(DecisionWrapper):
         self._action_spaces = {agent: spaces.Box(-1.0, 1.0, (2,), np.float32) for agent in self.possible_agents}
         self._shares_map = shares_map
         self.driver = TeamDriver(env.perception, env.settings, shares_map)
+        env.operating.attach(self.driver)
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations."""
@@ -59,27 +60,30 @@ class WaypointExploration(DecisionWrapper):
         return outcome
 
     def step(
-        self, actions: Mapping[str, Order]
+        self, actions: Mapping[str, Waypoint]
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Drive to the targets for one decision; rewards are summed over its steps, ``infos[agent]["drive"]`` is a ``DriveState``."""
-        targets: list[Target | None] = [None] * self.env.settings.robots
-        stopping = self.env.stopping
-        for agent in self.env.agents:
-            if agent not in actions and agent not in stopping:
+        env = self.env
+        targets: list[Target | None] = [None] * env.settings.robots
+        is_chosen = np.zeros(env.settings.robots, np.bool_)
+        for agent in env.agents:
+            row = env.possible_agents.index(agent)
+            is_chosen[row] = agent in actions or agent in env.stopping
+            if agent in actions:
+                targets[row] = self._target(row, actions[agent])
+            elif agent not in env.stopping and not env.operating.is_addressed(row):
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-            row = self.env.possible_agents.index(agent)
-            targets[row] = self._target(row, actions.get(agent))
-        return self.carry_out(Orders.of(targets))
+        return self.carry_out(Orders.of(targets), is_chosen)
 
     def carry_out(
-        self, orders: Orders
+        self, orders: Orders, is_chosen: NDArray[np.bool_]
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Drive by the orders of all robots for one decision; as ``step``."""
+        """Drive for one decision by the orders of the robots that ``is_chosen`` (robots,) names; the others keep theirs. As ``step``."""
         env, driver = self.env, self.driver
         if not env.agents:
             return env.step({})
         rows = {agent: env.possible_agents.index(agent) for agent in env.agents}
-        driver.assign(np.isin(np.arange(env.settings.robots), list(rows.values())), orders)
+        self._assign(orders, is_chosen & np.isin(np.arange(env.settings.robots), list(rows.values())))
         driver.prepare()
         if not env.stopping:
             waiting = {row for row in rows.values() if driver.is_done(row)}
@@ -95,12 +99,20 @@ class WaypointExploration(DecisionWrapper):
             info["drive"] = driver.state(rows[agent])
         return outcome
 
-    def _target(self, row: int, order: Order) -> Target | None:
-        if order is None or isinstance(order, Target):
-            return order
-        share = np.asarray(order, np.float64)
+    def _assign(self, orders: Orders, is_chosen: NDArray[np.bool_]) -> None:
+        """Give robots their targets; who is paused keeps what it had, and where an order sends a robot goes before its policy's choice."""
+        operating, driver = self.env.operating, self.driver
+        driver.assign(is_chosen & ~operating.held, orders)
+        for row, target in operating.take_sent().items():
+            one = np.arange(self.env.settings.robots) == row
+            driver.assign(one, Orders.of([target] * self.env.settings.robots))
+
+    def _target(self, row: int, waypoint: Waypoint) -> Target | None:
+        if waypoint is None or isinstance(waypoint, Target):
+            return waypoint
+        share = np.asarray(waypoint, np.float64)
         if share.shape != (2,) or not np.isfinite(share).all():
-            raise ValueError(f"waypoint is {order}; want two finite numbers within [-1, 1], a Target or None")
+            raise ValueError(f"waypoint is {waypoint}; want two finite numbers within [-1, 1], a Target or None")
         x, y = self.env.perception.pose_in_frame(row, row)[:2] + np.clip(share, -1.0, 1.0) * self._half_side
         return Target(float(x), float(y))
 

@@ -1,6 +1,7 @@
 """Runs a recorded episode again, from its beginning and the speeds that its robots were driven at."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,8 @@ def drive_again(record: EpisodeRecord, floor: str | Path | Floor | None = None, 
     there = find_floor(header, floor)
     tables = floor_tables(there, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     goal = None if header["goal"] is None else (header["goal"][0], header["goal"][1])
-    env = WatchedExploration(there, settings, watchers=watchers)
+    # The recorded speeds have all pauses in them; nobody is there to end one that the re-run would make.
+    env = WatchedExploration(there, replace(settings, pauses_when_blocked=False), watchers=watchers)
     env.start(Beginning(there, tables, np.array(header["starts"], np.float64), header["noise_seed"], goal))
     endings: dict[int, list[tuple[str, str]]] = {}
     for step, agent, reason in header["endings"]:

@@ -1,0 +1,82 @@
+"""What the robots of an episode measure of themselves: how far they have come by their wheels, and what they have used of their batteries.
+
+Nothing is done in a step where wheels tell the truth and batteries have no limit.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.settings import ExplorationSettings
+from lidarium.envs.simulation.arrays import ENDED
+from lidarium.envs.simulation.kinematic import KinematicWorld
+
+
+class Meters:
+    """Odometers and battery gauges.
+
+    Parameters
+    ----------
+    world : KinematicWorld
+        Whose robots; of one episode.
+    settings : ExplorationSettings
+        Their wheels and batteries.
+
+    Attributes
+    ----------
+    is_active : bool
+        Whether anything has to be done in a step.
+    used_j : (robots,) float64
+        Energy used since the beginning [J]; 0 where batteries have no limit.
+    """
+
+    def __init__(self, world: KinematicWorld, settings: ExplorationSettings) -> None:
+        self._world, self._battery, self._time_step = world, settings.battery, settings.time_step
+        self._reckons_way, self._reckons_energy = not settings.odometry.is_ideal, settings.battery.is_limited
+        self.is_active = self._reckons_way or self._reckons_energy
+        self.used_j, self._way = np.zeros(settings.robots), np.zeros(settings.robots)
+        self.start()
+
+    def start(self) -> None:
+        """Begin an episode, after its robots were placed, with full batteries."""
+        self.used_j[:], self._way[:], self._taken_in = 0.0, 0.0, 0
+        self._remember()
+
+    def _remember(self) -> None:
+        self._headings, self._travelled = self._world.poses[:, 2].copy(), self._world.travelled.copy()
+
+    def advance(self) -> None:
+        """Take in the last step of the world, if that has not been done."""
+        step = int(self._world.steps[0])
+        if not self.is_active or step == self._taken_in:
+            return
+        self._taken_in = step
+        if self._reckons_way:
+            self._way += np.abs(self._world.measured[:, 0]) * self._time_step
+        if self._reckons_energy:
+            self._use_energy()
+
+    def _use_energy(self) -> None:
+        world, battery = self._world, self._battery
+        turning = np.abs((world.poses[:, 2] - self._headings + math.pi) % (2.0 * math.pi) - math.pi)
+        way = world.travelled - self._travelled
+        used = battery.idle_w * self._time_step + battery.per_metre_j * way + battery.per_radian_j * turning
+        # Who has ended is switched off.
+        self.used_j += np.where(world.flags & ENDED, 0.0, used)
+        self._remember()
+
+    def travelled_m(self, row: int) -> float:
+        """Return how far a robot has come as its wheels tell [m]."""
+        return float(self._way[row] if self._reckons_way else self._world.travelled[row])
+
+    def left_j(self, row: int) -> float | None:
+        """Return what is left in a robot's battery [J], None where it has no limit."""
+        capacity = self._battery.capacity_j
+        return None if capacity is None else max(capacity - float(self.used_j[row]), 0.0)
+
+    @property
+    def is_empty(self) -> NDArray[np.bool_]:
+        """Which robots have no energy left, (robots,)."""
+        capacity = self._battery.capacity_j
+        return np.zeros(len(self.used_j), np.bool_) if capacity is None else np.asarray(self.used_j >= capacity)
