@@ -56,6 +56,10 @@ class Team(Protocol):
         """Return whether it takes part in the work, as it knows itself."""
         ...
 
+    def last_order(self, agent: str) -> Order | None:
+        """Return the last order that an agent took, None where it took none."""
+        ...
+
     def report(self, agent: str) -> Report | None:
         """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
         ...
@@ -229,6 +233,9 @@ class _Alone:
 
     def operating_state(self, agent: str) -> OperatingState:
         return self._team.operating_state(agent)
+
+    def last_order(self, agent: str) -> Order | None:
+        return self._team.last_order(agent)
 
     def report(self, agent: str) -> Report | None:
         raise ValueError(f"{self._agent} asked for the report of {agent}; a decentralised policy has no station")

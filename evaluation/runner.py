@@ -18,6 +18,7 @@ from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 from lidarium.evaluation.watching import WatchedExploration
+from lidarium.mapping.merging.fusion import FusedMap
 
 Progress = Callable[[ExplorationEnv], None]
 
@@ -87,6 +88,14 @@ class RunningTeam:
     def report(self, agent: str) -> Report | None:
         """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
         return self._env.station.report(self._env.possible_agents.index(agent))
+
+    def last_order(self, agent: str) -> Order | None:
+        """Return the last order that an agent took, None where it took none."""
+        return self._env.operating.orders[self._env.possible_agents.index(agent)]
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        """Tell an agent that does not know its start what others know, in its map frame; return whether that reached it."""
+        return self._env.station.tell(self._env.possible_agents.index(agent), others)
 
 
 def run_episode(

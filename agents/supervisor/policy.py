@@ -13,12 +13,12 @@ from lidarium.agents.frontier import NearestFrontier
 from lidarium.agents.policy import Action, GivenUp, PerRobot, Policy, Stop, Team
 from lidarium.agents.supervisor.log import Decision, Join, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.station import Station
+from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.perception import Belief
 from lidarium.envs.onboard.reports import Report
-from lidarium.envs.onboard.state import DriveState, OperatingState, Order, OrderKind, Target
+from lidarium.envs.onboard.state import DriveState, OperatingState, Order, OrderKind
 from lidarium.envs.onboard.team_driver import footprint_of
 from lidarium.mapping.frontiers import FRONTIER
 from lidarium.mapping.grid_planning import cells_of
@@ -30,18 +30,20 @@ PATIENCE_S = 20.0
 MOVED_M = 0.15
 """What counts as having moved [m]."""
 
-NEAR_FRONTIER_M = 1.5
-"""Among the frontiers on offer, one this near to the goal is the goal [m]."""
+LOST_S = 2.0
+"""An order that a robot has not taken after this long has not reached it [s]."""
 
 
 @dataclass(slots=True)
 class _Errand:
-    """Where a robot was sent, and where it was when it last had moved."""
+    """Where a robot is sent by an order, and where it was when it last had moved."""
 
     command: Command
-    is_new: bool
+    order: Order
     since_s: float
     place: tuple[float, float]
+    is_new: bool = True
+    is_taken: bool = False
 
 
 class Supervised:
@@ -103,7 +105,7 @@ class Supervised:
         belief = team.belief(team.agents[0])
         knows_starts = belief.shared_map is not None
         settings = self.settings if not knows_starts else _trusting(self.settings)
-        station = Station(team.agents, belief.map.resolution, belief.radius, settings)
+        station = MergeStation(team.agents, belief.map.resolution, belief.radius, settings)
         self._supervisor = Supervisor(station, footprint_of(belief.radius))
         self._tells = not knows_starts
         self._errands: dict[str, _Errand] = {}
@@ -115,14 +117,14 @@ class Supervised:
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Let the policy decide for all robots that the supervisor has not sent anywhere."""
-        now, stops = self._team.time_s, self._supervise()
+        stops = self._supervise()
         for agent in observations:
             self._review(agent)
         standing = self._supervisor.standing_by
         free = {
             agent: observation
             for agent, observation in observations.items()
-            if agent not in stops and agent not in self._errands and agent not in standing
+            if agent not in stops and agent not in standing and not self._is_away(agent)
         }
         actions: dict[str, Action] = self.policy.act(free) if free else {}
         self._exploring.clear()
@@ -131,8 +133,10 @@ class Supervised:
         for agent in observations:
             if agent in stops:
                 actions[agent] = stops[agent]
-            elif agent in self._errands:
-                actions[agent] = self._sent(agent, observations[agent], now)
+            elif self._is_away(agent):
+                # Who is on his way needs no action: he goes on as he was told.
+                if (action := self._sent(agent)) is not None:
+                    actions[agent] = action
             elif agent in standing:
                 actions[agent] = self._rest(agent, observations[agent]) if is_work_left else Stop("no_frontier")
             elif is_work_left and isinstance(actions[agent], Stop):
@@ -186,19 +190,26 @@ class Supervised:
         if command.kind is OrderKind.STOP:
             self._errands.pop(agent, None)
             if agent not in self._supervisor.standing_by or self.settings.is_stop_final:
-                stops[agent] = Stop("no_frontier" if command.rule == 5 else "stopped")
+                stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == 5 else "stopped")
         elif command.target is not None:
             under_way = self._errands.get(agent)
             if under_way is not None and under_way.command.is_home and command.is_home:
                 return
             x, y, _ = self._team.belief(agent).pose.tolist()
-            self._errands[agent] = _Errand(command, True, self._team.time_s, (x, y))
+            order = Order(OrderKind.GO_TO, command.target, f"rule {command.rule}: {command.why}")
+            self._errands[agent] = _Errand(command, order, self._team.time_s, (x, y))
 
     def _review(self, agent: str) -> None:
         """End an errand that is done, or that cannot be."""
         errand = self._errands.get(agent)
         if errand is None or errand.is_new:
             return
+        if not errand.is_taken:
+            errand.is_taken = self._team.last_order(agent) is errand.order
+            if not errand.is_taken:
+                if self._team.time_s - errand.since_s > LOST_S:
+                    del self._errands[agent]
+                return
         belief, state = self._team.belief(agent), self._team.drive_state(agent)
         if errand.command.is_home:
             return
@@ -209,28 +220,20 @@ class Supervised:
         if state in (DriveState.ARRIVED, DriveState.NO_PATH) or is_stuck or not _is_frontier(belief, errand.command.looks_at):
             del self._errands[agent]
 
-    def _sent(self, agent: str, observation: Observation, now: float) -> Action:
-        """Return the action of a robot on an errand."""
-        errand = self._errands[agent]
-        command, state = errand.command, self._team.drive_state(agent)
-        if command.is_home and not errand.is_new and state in (DriveState.ARRIVED, DriveState.NO_PATH):
-            return Stop("returned" if state is DriveState.ARRIVED else "unreachable")
-        if self.level == "frontier":
-            return self._offer(agent, observation, command)
-        is_new, errand.is_new = errand.is_new, False
-        return Order(OrderKind.GO_TO, command.target, f"rule {command.rule}: {command.why}") if is_new else command.target
+    def _is_away(self, agent: str) -> bool:
+        """Whether a robot is on an errand or gets the order now; until it has taken the order the policy drives it."""
+        errand = self._errands.get(agent)
+        return errand is not None and (errand.is_new or errand.is_taken)
 
-    def _offer(self, agent: str, observation: Observation, command: Command) -> Action:
-        """Return the number of the frontier on offer that is the goal; the robot explores by itself from the next decision on."""
-        del self._errands[agent]
-        offers, count = observation["frontiers"], int(np.count_nonzero(observation["action_mask"][:-1]))
-        if command.target is None or count == 0:
-            return len(offers)
-        x, y, _ = self._team.belief(agent).pose.tolist()
-        place = command.looks_at or (command.target.x, command.target.y)
-        distances = np.hypot(*(offers[:count, :2] + (x, y) - place).T)
-        nearest = int(np.argmin(distances))
-        return nearest if distances[nearest] <= NEAR_FRONTIER_M else 0
+    def _sent(self, agent: str) -> Action:
+        """Return what a robot on an errand is told: its order at first, to end where it came home, else nothing."""
+        errand, state = self._errands[agent], self._team.drive_state(agent)
+        if errand.is_new:
+            errand.is_new = False
+            return errand.order
+        if errand.command.is_home and state in (DriveState.ARRIVED, DriveState.NO_PATH):
+            return Stop("returned" if state is DriveState.ARRIVED else "unreachable")
+        return None
 
     def _rest(self, agent: str, observation: Observation) -> Action:
         return len(observation["frontiers"]) if self.level == "frontier" else None
@@ -261,6 +264,9 @@ class _Led:
 
     def report(self, agent: str) -> Report | None:
         return self._team.report(agent)
+
+    def last_order(self, agent: str) -> Order | None:
+        return self._team.last_order(agent)
 
     def tell(self, agent: str, others: FusedMap | None) -> bool:
         return self._team.tell(agent, others)

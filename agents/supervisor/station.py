@@ -24,7 +24,7 @@ from lidarium.mapping.rigid import Transform
 Pair = tuple[str, str]
 
 
-class Station:
+class MergeStation:
     """What is known where all reports come together; it knows nothing else.
 
     Parameters

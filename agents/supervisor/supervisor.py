@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.supervisor.assignment import NOBODY, assign_by_cost, assign_by_utility, best_goal
 from lidarium.agents.supervisor.log import Decision, StationEvent
-from lidarium.agents.supervisor.station import Station
+from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.survey import Survey
 from lidarium.agents.supervisor.tree import HOME, OTHER, RICH, Case, Leaf, Node, RobotInputs, decide, decision_tree
 from lidarium.envs.onboard.state import OperatingState, OrderKind, Target
@@ -69,7 +69,7 @@ class Supervisor:
 
     Parameters
     ----------
-    station : Station
+    station : MergeStation
         What it knows.
     footprint : Footprint
         How the robots pass over a map.
@@ -82,7 +82,7 @@ class Supervisor:
         Robots that have no goal of their own while others of their group work.
     """
 
-    def __init__(self, station: Station, footprint: Footprint) -> None:
+    def __init__(self, station: MergeStation, footprint: Footprint) -> None:
         self.station, self.footprint, self._settings = station, footprint, station.settings
         self._tree = decision_tree(station.settings)
         self.decisions: list[Decision] = []
