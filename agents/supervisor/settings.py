@@ -60,7 +60,7 @@ class SupervisorSettings:
     confirmation_growth_m2: float = 2.0
     same_goal_m: float = 1.0
     least_frontier_m: float = 0.5
-    least_left_m: float = 0.2
+    least_left_m: float = 0.5
     unbalanced_share: float = 0.5
     enclosed_way_m: float = 10.0
     enclosed_gain_m2_per_m: float = 0.1
