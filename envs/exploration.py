@@ -216,6 +216,11 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.scorer.advance()
 
     @property
+    def energy_j(self) -> NDArray[np.float64]:
+        """What the robots have used of their batteries, (robots,) [J]; 0 where these have no limit."""
+        return self._meters.used_j.copy()
+
+    @property
     def operating(self) -> Operating:
         """The robots' operating states and orders."""
         return self.station.operating

@@ -292,9 +292,9 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         Where to start from; the defaults where None.
     **options
         Any attribute of ``ExplorationSettings``; ``robot``, ``lidar``, ``odometry``, ``radio`` and ``battery`` also by name,
-        ``noise`` (none, datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps) in
-        place of ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise, odometry, localization, radio and faults that is not given
-        itself.
+        ``noise`` (none, datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps)
+        in place of ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise, odometry, localization, radio and faults that
+        is not given itself.
 
     Returns
     -------

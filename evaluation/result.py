@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 from dataclasses import asdict
 from typing import Any
 
@@ -16,6 +15,7 @@ from lidarium.envs.scorer import THRESHOLDS
 from lidarium.envs.settings import REALISM, ExplorationSettings, make_settings
 from lidarium.evaluation import metrics
 from lidarium.evaluation.beliefs import free_as_held, maps_on_floor
+from lidarium.evaluation.events import in_floor_frame, operating_events
 from lidarium.evaluation.history import WHOLE, History
 from lidarium.evaluation.metrics.merges import merge_figures
 from lidarium.evaluation.runner import Episode
@@ -77,6 +77,8 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         "given_up": [_entry(env, given_up) for given_up in episode.given_up],
         **_pose_errors(env, history),
         **map_figures(env),
+        "energy_j": [round(float(used), 6) for used in env.energy_j] if settings.battery.is_limited else None,
+        "operating": operating_events(env),
         "merges": merge_figures(episode.merges, settings.occupancy.resolution),
         "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
         "peak_mb": _rounded(metrics.peak_megabytes(), 1),
@@ -179,19 +181,6 @@ def settings_sha256(settings: ExplorationSettings) -> str:
     """Return a hash of all settings that can change a result: of their JSON with sorted keys, without ``threads``."""
     values = {name: value for name, value in asdict(settings).items() if name != "threads"}
     return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
-
-
-def in_floor_frame(env: ExplorationEnv, agent: str, x: float, y: float) -> tuple[float, float]:
-    """Return a position of a robot's map frame in the floor's frame [m]."""
-    row = env.possible_agents.index(agent)
-    if env.settings.known_starts:
-        offset = env.perception.offset(row)
-        return float(x + offset[0]), float(y + offset[1])
-    start_x, start_y, theta = env.world.starts[row]
-    return (
-        float(start_x + math.cos(theta) * x - math.sin(theta) * y),
-        float(start_y + math.sin(theta) * x + math.cos(theta) * y),
-    )
 
 
 def _entry(env: ExplorationEnv, given_up: GivenUp) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from lidarium.envs.solo import at_level
 from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings
 from lidarium.envs.wrappers.waypoints import WaypointExploration
+from lidarium.evaluation.events import merge_event
 from lidarium.evaluation.watching import WatchedExploration
 from lidarium.mapping.merging.fusion import FusedMap
 
@@ -159,6 +160,9 @@ def run_episode(
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(getattr(policy, "given_up", []))
     episode.merges = world.events if isinstance(world, MergedMaps) else []
+    if isinstance(env, WatchedExploration):
+        for merge in episode.merges:
+            env.tell(merge_event(env, merge))
     return episode
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from lidarium.agents import make_policy
 from lidarium.envs.floors.catalogue import is_generated, load_floor, set_floors
 from lidarium.envs.settings import ExplorationSettings, RewardSettings, make_settings
+from lidarium.envs.simulation.battery import Battery
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.robots import Robot
 from lidarium.evaluation.stop_rules import stop_rule_of
@@ -20,7 +21,9 @@ Starts = tuple[tuple[float, float, float], ...]
 
 DEFAULT_VARIANT = "default"
 
-_PARTS: dict[str, Callable[..., Any]] = {"robot": Robot, "lidar": Lidar, "occupancy": OccupancySettings, "reward": RewardSettings}
+_PARTS: dict[str, Callable[..., Any]] = {
+    "robot": Robot, "lidar": Lidar, "occupancy": OccupancySettings, "reward": RewardSettings, "battery": Battery,
+}  # fmt: skip
 """Settings that are tables of their own, where they are not named."""
 
 

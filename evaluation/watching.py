@@ -94,3 +94,10 @@ class WatchedExploration(ExplorationEnv):
             look = getattr(watcher, "decision", None)
             if look is not None:
                 look(self, orders, given_up)
+
+    def tell(self, event: dict[str, Any]) -> None:
+        """Tell an event, such as a merge, to the watchers that take notes: ``kind``, ``time_s``, ``agent`` and whatever else is known."""
+        for watcher in self.watchers:
+            note = getattr(watcher, "note", None)
+            if note is not None:
+                note(**event)

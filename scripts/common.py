@@ -54,6 +54,10 @@ class TeamCommand(Command):
     """who says where a robot is: truth, odometry or a localizer; `lidarium show localizers` lists them"""
     radio: str | None = None
     """how robots reach each other: all, none, range, line_of_sight or signal"""
+    battery: str | None = None
+    """what energy the robots have: none (no limit) or kobuki; `lidarium show batteries` lists them"""
+    pauses_when_blocked: bool = False
+    """robots that touch something, or whose way is blocked, pause until they are told to resume"""
     unknown_starts: bool = False
     """robots do not know where they start, nor where the others do"""
     map_resolution: float = 0.025
@@ -62,10 +66,16 @@ class TeamCommand(Command):
     @property
     def team_options(self) -> dict[str, Any]:
         """What the options say of a team, as ``make_settings`` takes it; what was left out is left out."""
-        given = {name: getattr(self, name) for name in ("noise", "odometry", "localization", "radio") if getattr(self, name) is not None}
+        given = {
+            name: getattr(self, name)
+            for name in ("noise", "odometry", "localization", "radio", "battery")
+            if getattr(self, name) is not None
+        }
         starts = {"known_starts": False} if self.unknown_starts else {}
+        pauses = {"pauses_when_blocked": True} if self.pauses_when_blocked else {}
         return {
-            "robot": self.robot, "lidar": self.lidar, "realism": self.realism, **given, **starts, "resolution": self.map_resolution
+            "robot": self.robot, "lidar": self.lidar, "realism": self.realism, **given, **starts, **pauses,
+            "resolution": self.map_resolution,
         }  # fmt: skip
 
 

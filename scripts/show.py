@@ -12,7 +12,7 @@ from lidarium.scripts.common import Answer, Command, table
 class Show(Command):
     """Tell what can be chosen: policies, robots, lidars, what makes a world real, or all settings with their defaults."""
 
-    what: Positional[Literal["policies", "robots", "lidars", "realism", "odometry", "localizers", "radios", "settings"]]
+    what: Positional[Literal["policies", "robots", "lidars", "realism", "odometry", "localizers", "radios", "batteries", "settings"]]
     """what to list"""
 
 
@@ -101,6 +101,13 @@ def _radios() -> tuple[dict[str, Any], str]:
     return {"radios": values}, _side_by_side(values)
 
 
+def _batteries() -> tuple[dict[str, Any], str]:
+    from lidarium.envs.simulation.battery import BATTERIES
+
+    values = {name: asdict(battery) for name, battery in BATTERIES.items()}
+    return {"batteries": values}, _side_by_side(values)
+
+
 def _localizers() -> tuple[dict[str, Any], str]:
     from lidarium.mapping.localization.registry import LOCALIZERS
 
@@ -116,5 +123,5 @@ def _side_by_side(values: dict[str, dict[str, Any]]) -> str:
 
 _LISTS = {
     "policies": _policies, "robots": _robots, "lidars": _lidars, "realism": _realism, "odometry": _odometry, "localizers": _localizers,
-    "radios": _radios, "settings": _settings,
+    "radios": _radios, "batteries": _batteries, "settings": _settings,
 }  # fmt: skip

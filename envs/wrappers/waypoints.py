@@ -24,7 +24,8 @@ class WaypointExploration(DecisionWrapper):
     that is not known to be free is approached as near as planning can come: where there is no path, the robot stays.
 
     A decision lasts ``decision_period_s``; it ends earlier when any robot with a target has arrived or found no path, pauses by
-    itself or gets an order late, or the episode ends. A robot that was given an order may be left out of the actions, and then keeps its target.
+    itself or gets an order late, or the episode ends. A robot that was given an order may be left out of the actions, and then
+    keeps its target.
 
     Parameters
     ----------

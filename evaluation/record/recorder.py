@@ -15,11 +15,12 @@ import lidarium
 from lidarium.agents.policy import GivenUp
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.onboard.state import Orders
+from lidarium.evaluation.events import operating_events, place_of
 from lidarium.evaluation.record.display import DisplayTrack
 from lidarium.evaluation.record.episode_record import FORMAT, EpisodeRecord
 from lidarium.evaluation.record.map_sampler import MapSampler
 from lidarium.evaluation.record.state import state_sha256
-from lidarium.evaluation.result import in_floor_frame, settings_sha256
+from lidarium.evaluation.result import settings_sha256
 
 MAP_PERIOD_S = 2.0
 """Time between samples of the team's map [s]."""
@@ -180,7 +181,7 @@ class Recorder:
             self._maps.origin,
             env.settings.occupancy.resolution,
             self._maps.changes(),
-            sorted(self._events + ended, key=lambda event: float(event["time_s"])),
+            sorted([*self._events, *operating_events(env), *ended], key=lambda event: float(event["time_s"])),
         )
 
     def _note_targets(self, env: ExplorationEnv, orders: Orders, time_s: float) -> None:
@@ -189,7 +190,7 @@ class Recorder:
             target = (targets[robot][0], targets[robot][1]) if is_ordered[robot] else None
             if target != self._targets[robot]:
                 self._targets[robot] = target
-                self.note("decision", time_s, agent, **_rounded(None if target is None else in_floor_frame(env, agent, *target)))
+                self.note("decision", time_s, agent, **place_of(env, agent, target))
 
     def _note_given_up(self, env: ExplorationEnv, given_up: Sequence[GivenUp], time_s: float) -> None:
         """Note what is given up for the first time; what was seen later from elsewhere may leave the list, and come back."""
@@ -197,7 +198,7 @@ class Recorder:
         for entry in self._last_given_up:
             if entry not in self._given_up:
                 self._given_up.add(entry)
-                place = _rounded(in_floor_frame(env, entry.agent, entry.x, entry.y))
+                place = place_of(env, entry.agent, (entry.x, entry.y))
                 self.note("given_up", time_s, entry.agent, **place, size_m=round(entry.size_m, 3), reason=entry.reason)
 
     def _note_contacts(self, env: ExplorationEnv) -> None:
@@ -205,7 +206,3 @@ class Recorder:
         for robot in np.flatnonzero(collisions > self._collisions).tolist():
             self.note("contact", env.scorer.time, env.possible_agents[robot])
         self._collisions, self._told_collisions = collisions.copy(), collisions.tobytes()
-
-
-def _rounded(place: tuple[float, float] | None) -> dict[str, float | None]:
-    return {"x": None, "y": None} if place is None else {"x": round(place[0], 3), "y": round(place[1], 3)}

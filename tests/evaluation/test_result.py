@@ -8,9 +8,10 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings import ExplorationSettings, make_settings
 from lidarium.evaluation.beliefs import team_log_odds
 from lidarium.evaluation.episodes_file import TIMINGS
+from lidarium.evaluation.events import in_floor_frame
 from lidarium.evaluation.history import History
 from lidarium.evaluation.metrics import path_lengths
-from lidarium.evaluation.result import in_floor_frame, realism_of, result_of, settings_sha256
+from lidarium.evaluation.result import realism_of, result_of, settings_sha256
 from lidarium.evaluation.runner import run_episode
 from lidarium.evaluation.watching import WatchedExploration
 
@@ -19,11 +20,12 @@ KEYS = {
     "coverage_final": float, "time_s": float, "success": bool, "path_m": list, "path_balance": float, "overlap": float, "collisions": int,
     "ended_because": dict, "given_up": list, "ate_m": list, "c_known_final": float, "c_valid_final": float, "c_own_min_final": float,
     "c_own_mean_final": float, "balance": float, "iou_occupied": float, "f1_occupied": float, "free_error_rate": float, "merges": dict,
-    "decision_ms": dict, "peak_mb": float, "steps_per_s": float, "version": str, "floor_sha256": str, "settings_sha256": str,
+    "operating": list, "decision_ms": dict,
+    "peak_mb": float, "steps_per_s": float, "version": str, "floor_sha256": str, "settings_sha256": str,
 }  # fmt: skip
 AT_THRESHOLDS = [name.format(share) for name in ("t{}_s", "d{}_m", "d_sum{}_m", "n{}") for share in (85, 90, 95, 99)]
 OVER_TIME = ["overlap_eb", "overlap_mx_85", "overlap_mx_95", "overlap_mv", "rpe_m", "rpe_rad"]
-MAY_BE_NONE = ["horizon_s", "auc", "collisions_per_km", *AT_THRESHOLDS, *OVER_TIME]
+MAY_BE_NONE = ["horizon_s", "energy_j", "auc", "collisions_per_km", *AT_THRESHOLDS, *OVER_TIME]
 
 
 def explored(on_decision=None, **options):
