@@ -137,6 +137,7 @@ def _explore(command: Run, policy: Any, env: "WatchedExploration", options: dict
 
 def _film(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
     from lidarium.evaluation.runner import run_episode
+    from lidarium.evaluation.supervision import recent_supervision
     from lidarium.evaluation.video import Film, film
 
     with ExitStack() as stack:
@@ -145,9 +146,10 @@ def _film(command: Run, policy: Any, env: "WatchedExploration", options: dict[st
         def on_decision(current: "ExplorationEnv") -> None:
             # The folder is named by the floor, which a set draws at the reset; nothing is written before that.
             if not camera:
+                over = recent_supervision(policy)
                 assert current.floor is not None
                 path = _folder(command, current.floor.name) / "run.mp4"
-                camera.append(stack.enter_context(film(path, command.video_speed)))
+                camera.append(stack.enter_context(film(path, command.video_speed, draw_over=over)))
                 camera[0].begin(current)
                 env.watchers.append(camera[0])
             progress.tell(current)
@@ -168,8 +170,9 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
     import numpy as np
 
     from lidarium.evaluation.beliefs import team_log_odds
-    from lidarium.evaluation.output import write_json
+    from lidarium.evaluation.output import write_json, write_text
     from lidarium.evaluation.pictures import save_run_picture
+    from lidarium.evaluation.supervision import decision_lines, is_supervised
     from lidarium.mapping.map_files import write_ros_map
     from lidarium.mapping.occupancy import three_levels
 
@@ -181,7 +184,9 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
     log_odds, (x, y) = team_log_odds(episode.env)
     write_ros_map(folder, "map", three_levels(np.sign(log_odds).astype(np.int8)), (x, y, 0.0), command.map_resolution)
     save_run_picture(folder / "run.png", episode, command.policy)
-    asked_for = [*(["episode.npz"] if recorder is not None else []), *(["run.mp4"] if command.video else [])]
+    if is_supervised(episode.policy):
+        write_text(folder / "decisions.jsonl", decision_lines(episode.policy))
+    asked_for = [*(["decisions.jsonl"] if is_supervised(episode.policy) else []), *(["episode.npz"] if recorder is not None else []), *(["run.mp4"] if command.video else [])]
     return ["result.json", "map.yaml", "map.pgm", "run.png", *asked_for]
 
 

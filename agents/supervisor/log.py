@@ -1,5 +1,6 @@
 """What the supervisor writes down: every decision with what led to it, and what happened at the station."""
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -31,6 +32,8 @@ class Decision:
         The order, None where the robot goes on.
     why : str
         In words.
+    place : (float, float)
+        Where it was, in its own map frame [m].
     goal : (float, float) or None
         Where it is sent, in its own map frame [m].
     """
@@ -44,6 +47,7 @@ class Decision:
     rule: int
     order: str | None
     why: str
+    place: tuple[float, float]
     goal: tuple[float, float] | None = None
 
     def as_dict(self) -> dict[str, Any]:
@@ -59,6 +63,7 @@ class Decision:
             "rule": self.rule,
             "order": self.order,
             "why": self.why,
+            "place": [round(value, 4) for value in self.place],
             "goal": None if self.goal is None else [round(value, 4) for value in self.goal],
         }
 
@@ -118,4 +123,5 @@ class Join:
 
 def _inputs(inputs: RobotInputs) -> dict[str, Any]:
     values = asdict(inputs)
-    return {name: round(value, 4) if isinstance(value, float) else value for name, value in values.items()} | {"state": inputs.state.value}
+    finite = {name: value if not isinstance(value, float) or math.isfinite(value) else None for name, value in values.items()}
+    return {name: round(value, 4) if isinstance(value, float) else value for name, value in finite.items()} | {"state": inputs.state.value}

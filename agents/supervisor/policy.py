@@ -62,6 +62,8 @@ class Supervised:
 
     Attributes
     ----------
+    has_begun : bool
+        Whether there was an episode; before it there is nothing of what follows.
     decisions, events, joins : list
         What was decided, what happened at the station, and how the robots' frames lie as it found.
 
@@ -78,6 +80,7 @@ class Supervised:
             raise ValueError(f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other")
         self.policy, self.settings = policy, settings or SupervisorSettings(**options)
         self.level, self.shares_map = policy.level, True
+        self.has_begun = False
 
     @property
     def decisions(self) -> list[Decision]:
@@ -92,7 +95,7 @@ class Supervised:
     @property
     def joins(self) -> list[Join]:
         """How the frames of robots lie, as was found."""
-        return self._supervisor.station.joins
+        return self._supervisor.station.joins if self.has_begun else []
 
     @property
     def given_up(self) -> list[GivenUp]:
@@ -101,7 +104,7 @@ class Supervised:
 
     def reset(self, team: Team, seed: int) -> None:
         """Begin an episode."""
-        self._team = team
+        self._team, self.has_begun = team, True
         belief = team.belief(team.agents[0])
         knows_starts = belief.shared_map is not None
         settings = self.settings if not knows_starts else _trusting(self.settings)

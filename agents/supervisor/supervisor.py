@@ -272,10 +272,12 @@ class Supervisor:
 
     def _log(self, time_s: float, group: tuple[str, ...], one: _Judged) -> None:
         case, leaf, target = one.case, one.leaf, one.target
+        pose = self.station.reports[case.robot.agent].pose
         self.decisions.append(
             Decision(
                 time_s, case.robot.agent, group, case.robot, case.rival or case.opponent, one.answers, leaf.rule,
-                None if leaf.order is None else leaf.order.value, leaf.why, None if target is None else (target.x, target.y),
+                None if leaf.order is None else leaf.order.value, leaf.why, (pose.x, pose.y),
+                None if target is None else (target.x, target.y),
             )
         )  # fmt: skip
 
