@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.onboard.state import Order
 from lidarium.envs.settings import make_settings
 from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.waypoints import WaypointExploration
@@ -72,6 +73,10 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
     def stop(self, reason: str) -> None:
         """End the episode at the next step, with a reason."""
         self.parallel.stop(AGENT, reason)
+
+    def order(self, order: Order) -> None:
+        """Give the robot an order, as ``ExplorationEnv.order``."""
+        self.parallel.order(AGENT, order)
 
     def render(self) -> NDArray[Any] | None:
         """Draw the environment."""
