@@ -17,6 +17,7 @@ from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.merger import Merged, placed
+from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.occupancy import UNKNOWN
 from lidarium.mapping.rigid import Transform
@@ -61,6 +62,7 @@ class MergeStation:
         self._found: set[Pair] = set()
         self._joined: set[Pair] = set()
         self._tracks: dict[str, deque[tuple[float, float]]] = {agent: deque() for agent in agents}
+        self._middles: dict[Pair, tuple[float, float]] = {}
         self._trails: dict[str, list[tuple[float, float]]] = {agent: [] for agent in agents}
         self.reports: dict[str, Report] = {}
         self.joins: list[Join] = []
@@ -104,6 +106,7 @@ class MergeStation:
         elif used:
             merged = self._merger.update({agent: self._own_map(agent) for agent in used})
             self._tree = merged.tree
+            self._middles = {pair: self._middle(pair, result) for pair, result in merged.pairs.items() if result.is_accepted}
             self._note_found(merged, time_s)
         self._note_joins(time_s, used)
 
@@ -146,6 +149,15 @@ class MergeStation:
         trails = [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
         return without_bodies(self.reports[agent].map, trails, self._radius, self.resolution)
 
+    def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
+        """Return the middle of what two maps both know, in the second robot's map frame [m]."""
+        x, y = placed(self.reports[pair[1]].map.origin).apply(result.agreement.centre).tolist()
+        return x, y
+
+    def _place(self, agent: str) -> tuple[float, float]:
+        pose = self.reports[agent].pose
+        return pose.x, pose.y
+
     def _trail(self, agent: str) -> NDArray[np.float64]:
         return np.array(self._trails[agent], np.float64).reshape(-1, 2)
 
@@ -171,8 +183,7 @@ class MergeStation:
             if result.a_from_b is None or self.lookup(a, b) is not None:
                 continue
             first, second = (placed(self.reports[name].map.origin) for name in (a, b))
-            at = second.apply(result.agreement.centre).tolist()
-            self.joins.append(Join(time_s, a, b, first @ result.a_from_b @ second.inverse(), (at[0], at[1]), False))
+            self.joins.append(Join(time_s, a, b, first @ result.a_from_b @ second.inverse(), self._middles[a, b], False))
             self._note(time_s, "found", (a, b), f"{result.agreement.evidence_m:.1f} m of walls speak for it")
         self._found = found
 
@@ -184,8 +195,7 @@ class MergeStation:
             self._note(time_s, "dropped", (a, b), why)
         for (a, b), frame in joined.items():
             if (a, b) not in self._joined:
-                pose = self.reports[b].pose
-                self.joins.append(Join(time_s, a, b, frame, (pose.x, pose.y), True))
+                self.joins.append(Join(time_s, a, b, frame, self._middles.get((a, b), self._place(b)), True))
                 self._note(time_s, "joined", (a, b), f"x {frame.x:.2f} m, y {frame.y:.2f} m, theta {frame.theta:.3f} rad")
         self._joined = set(joined)
 
