@@ -17,6 +17,10 @@ class SupervisorSettings:
         Simulated time between two looks at the tree [s].
     merge_period_s : float
         Simulated time between two merges of the maps [s].
+    pairs_per_merge : int
+        Most pairs of maps that a merge compares; the others wait for their turn.
+    merge_resolution_m : float
+        Maps are compared in cells of this side, or of theirs where that is more [m].
     confirmation_growth_m2 : float
         Two maps are joined only when they were found twice, the second time when they know so much more [m2].
     same_goal_m : float
@@ -57,6 +61,8 @@ class SupervisorSettings:
 
     period_s: float = 10.0
     merge_period_s: float = 2.0
+    pairs_per_merge: int = 2
+    merge_resolution_m: float = 0.05
     confirmation_growth_m2: float = 2.0
     same_goal_m: float = 1.0
     least_frontier_m: float = 0.5
@@ -81,6 +87,8 @@ class SupervisorSettings:
                 raise ValueError(f"{field.name} of the supervisor is {value!r}; want true or false")
             if field.type is float and not (isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{field.name} of the supervisor is {value!r}; want a number of at least 0")
+        if isinstance(self.pairs_per_merge, bool) or not isinstance(self.pairs_per_merge, int) or self.pairs_per_merge < 1:
+            raise ValueError(f"pairs_per_merge of the supervisor is {self.pairs_per_merge!r}; want a whole number of at least 1")
         for name in ("period_s", "merge_period_s", "enclosed_way_m", "sensor_range_m"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} of the supervisor is 0; want a positive number")

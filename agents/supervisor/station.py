@@ -13,6 +13,7 @@ from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import OperatingState
 from lidarium.envs.wrappers.merged_maps import TEAM_VALIDATION
+from lidarium.mapping.merging.described_map import resampled
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
@@ -56,7 +57,13 @@ class MergeStation:
     ) -> None:
         self.agents, self.resolution, self.settings, self._radius = list(agents), resolution, settings, radius
         merge = merge or MergeSettings(validation=TEAM_VALIDATION)
-        self._merger = IncrementalMerger(resolution, merge, confirmation_growth_m2=settings.confirmation_growth_m2)
+        self._merge_resolution = max(resolution, settings.merge_resolution_m)
+        self._merger = IncrementalMerger(
+            self._merge_resolution,
+            merge,
+            confirmation_growth_m2=settings.confirmation_growth_m2,
+            tries_per_update=settings.pairs_per_merge,
+        )
         self._merge = merge
         self._tree: FrameTree[str] = FrameTree(merge.cycle_distance_m, merge.cycle_angle)
         self._found: set[Pair] = set()
@@ -141,7 +148,9 @@ class MergeStation:
 
     def _own_map(self, agent: str) -> GrowingMap:
         """Return a robot's map as it is compared with others."""
-        return without_own_trail(self.reports[agent].map, self._trail(agent), self._radius, self.resolution)
+        whole = self.reports[agent].map
+        coarse = GrowingMap(resampled(whole.levels, self.resolution, self._merge_resolution), whole.origin)
+        return without_own_trail(coarse, self._trail(agent), self._radius, self._merge_resolution)
 
     def _map_without_bodies(self, agent: str) -> GrowingMap:
         """Return a robot's map without what it may have drawn of those that it is joined with."""
