@@ -70,7 +70,7 @@ class Supervised:
     Raises
     ------
     ValueError
-        Where the policy decides speeds, or a setting cannot be used.
+        Where the policy decides speeds, or a setting cannot be used; at the reset, where starts are to be trusted that nobody knows.
     """
 
     def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
@@ -109,6 +109,9 @@ class Supervised:
         knows_starts = belief.shared_map is not None
         settings = self.settings if not knows_starts else _trusting(self.settings)
         station = MergeStation(team.agents, belief.map.resolution, belief.radius, settings)
+        reports = [report for agent in team.agents if (report := team.report(agent)) is not None]
+        if settings.trusts_starts and any(report.frame is None for report in reports):
+            raise ValueError("robots with unknown starts do not know how they stand to each other; want reveals_starts, which tells the station")
         self._supervisor = Supervisor(station, footprint_of(belief.radius))
         self._tells = not knows_starts
         self._errands: dict[str, _Errand] = {}
