@@ -16,6 +16,10 @@ register_policy(
 register_policy("utility_frontier", UtilityFrontier, "the team shares frontiers out by utility less cost (Burgard)")
 register_policy("explore_lite", ExploreLite, "least cost of distance less size of the frontier, both in metres (explore_lite)")
 register_policy("srt", SensorBasedRandomTree, "grows a tree of safe regions towards openings and the goal (sensor-based random tree)")
-register_policy("supervised", supervised, "robots explore alone; a station merges their maps, and redirects and stops them by a tree of rules")
+register_policy(
+    "supervised", supervised, "robots explore alone; a station merges their maps, and redirects and stops them by a tree of rules"
+)
 register_policy("independent", independent, "each robot explores the whole floor alone; a bound for teams that merge their maps")
-register_policy("oracle_starts", oracle_starts, "supervised robots that are told how they stand to each other; a bound for teams that merge")
+register_policy(
+    "oracle_starts", oracle_starts, "supervised robots that are told how they stand to each other; a bound for teams that merge"
+)

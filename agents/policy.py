@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import Observation
-from lidarium.envs.onboard.perception import Belief
+from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import DriveState, OperatingState, Order, Target
 from lidarium.mapping.merging.fusion import FusedMap

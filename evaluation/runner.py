@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import GivenUp, Policy, Stop
 from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.onboard.perception import Belief
+from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import DriveState, OperatingState, Order
 from lidarium.envs.solo import at_level

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from lidarium.agents.policy import Policy
-from lidarium.agents.supervisor.log import Decision
+from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.policy import Supervised
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.frame_parts import SHIFT, Frame, View, team_colours
@@ -50,7 +50,8 @@ def decision_lines(policy: Policy) -> str:
     """Return the log of a supervisor, a JSON object in each line, by time: what happened at the station, and every decision."""
     if not (isinstance(policy, Supervised) and policy.has_begun):
         return ""
-    entries = sorted([*policy.events, *policy.decisions], key=lambda entry: entry.time_s)
+    entries: list[StationEvent | Decision] = [*policy.events, *policy.decisions]
+    entries.sort(key=lambda entry: entry.time_s)
     return "".join(json.dumps(entry.as_dict(), allow_nan=False) + "\n" for entry in entries)
 
 
@@ -97,9 +98,7 @@ def recent_supervision(policy: Policy) -> DrawOver | None:
     return draw
 
 
-def _redirections(
-    env: ExplorationEnv, decisions: list[Decision]
-) -> Iterator[tuple[str, tuple[float, float], tuple[float, float]]]:
+def _redirections(env: ExplorationEnv, decisions: list[Decision]) -> Iterator[tuple[str, tuple[float, float], tuple[float, float]]]:
     """Yield who was redirected from where to where, in the floor's frame [m]."""
     for decision in decisions:
         if decision.goal is not None:

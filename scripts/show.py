@@ -10,10 +10,11 @@ from lidarium.scripts.common import Answer, Command, table
 
 @dataclass(frozen=True, kw_only=True)
 class Show(Command):
-    """Tell what can be chosen: policies, robots, lidars, what makes a world real, all settings with their defaults; or the supervisor's
-    decision tree, with --out also as a picture."""
+    """Tell what can be chosen, all settings with their defaults, or the supervisor's decision tree, with --out as a picture too."""
 
-    what: Positional[Literal["policies", "robots", "lidars", "realism", "odometry", "localizers", "radios", "batteries", "settings", "supervisor"]]
+    what: Positional[
+        Literal["policies", "robots", "lidars", "realism", "odometry", "localizers", "radios", "batteries", "settings", "supervisor"]
+    ]
     """what to list"""
 
 

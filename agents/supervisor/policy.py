@@ -16,7 +16,7 @@ from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
 from lidarium.envs.exploration import Observation
-from lidarium.envs.onboard.perception import Belief
+from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import DriveState, OperatingState, Order, OrderKind
 from lidarium.envs.onboard.team_driver import footprint_of
@@ -111,7 +111,9 @@ class Supervised:
         station = MergeStation(team.agents, belief.map.resolution, belief.radius, settings)
         reports = [report for agent in team.agents if (report := team.report(agent)) is not None]
         if settings.trusts_starts and any(report.frame is None for report in reports):
-            raise ValueError("robots with unknown starts do not know how they stand to each other; want reveals_starts, which tells the station")
+            raise ValueError(
+                "robots with unknown starts do not know how they stand to each other; want reveals_starts, which tells the station"
+            )
         self._supervisor = Supervisor(station, footprint_of(belief.radius))
         self._tells = not knows_starts
         self._errands: dict[str, _Errand] = {}

@@ -105,9 +105,9 @@ class Survey:
 
     @property
     def known_area_m2(self) -> float:
-        """What the map would know if all that the laser could see around it were known: its box, and as much further as that reaches [m2]."""
-        rows, columns = ((side - 2 * _MARGIN) * self.resolution for side in self._map.log_odds.shape)
-        return (rows + 2.0 * self._settings.sensor_range_m) * (columns + 2.0 * self._settings.sensor_range_m)
+        """Area of the box around what the map knows, made wider by the laser's range on all sides [m2]."""
+        height, width = ((int(side) - 2 * _MARGIN) * self.resolution for side in self._map.log_odds.shape)
+        return float((height + 2.0 * self._settings.sensor_range_m) * (width + 2.0 * self._settings.sensor_range_m))
 
     def has_frontier(self) -> bool:
         """Whether any of the robots can reach what is left to explore."""

@@ -63,4 +63,4 @@ def _swept(one: GrowingMap, trail: NDArray[np.float64], radius: float, resolutio
         points = np.rint(((trail - one.origin) / resolution - 0.5) * _CELL).astype(np.int32)
         thickness = max(round(2.0 * (radius + MARGIN_M) / resolution), 1)
         cv2.polylines(swept, [points.reshape(-1, 1, 2)], False, 1, thickness, cv2.LINE_8, _SUBCELL)
-    return swept != 0
+    return np.asarray(swept != 0)

@@ -6,12 +6,12 @@ up to date only where the map has changed.
 """
 
 import os
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.belief import Belief, Teammate
 from lidarium.envs.onboard.exchange import NEVER, Exchange
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.navigation import (
@@ -30,115 +30,12 @@ from lidarium.envs.onboard.navigation import (
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
 from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.envs.simulation.lidar import Lidar
-from lidarium.envs.simulation.robots import Robot
 from lidarium.mapping.clearance import limit_of, stamp_of
 from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.localization.localizer import Localizer
-from lidarium.mapping.merging.fusion import FREE_LOG_ODDS, OCCUPIED_LOG_ODDS, FusedMap
-from lidarium.mapping.occupancy import FREE, LOG_ODDS_UNIT, OCCUPIED
+from lidarium.mapping.merging.fusion import FusedMap, lay_over
 from lidarium.mapping.path_search import SearchMemory
-
-
-@dataclass(frozen=True, slots=True)
-class Teammate:
-    """What a robot knows of another.
-
-    Attributes
-    ----------
-    pose : (3,) float64
-        x, y, theta in the knowing robot's map frame [m, rad].
-    age_s : float
-        Age of the news [s].
-    radius : float
-        Radius of the body [m].
-    has_ended : bool
-        Whether it has ended and stands where it is.
-    """
-
-    pose: NDArray[np.float64]
-    age_s: float
-    radius: float
-    has_ended: bool
-
-
-class Belief:
-    """Read-only handle on what one robot knows; what it shows is valid until the next step.
-
-    All positions are in the robot's map frame: with known starts the floor's axes from the corner of its start cell.
-
-    Parameters
-    ----------
-    perception : Perception
-        The team's onboard software.
-    row : int
-        Which robot: episode * robots + robot.
-    """
-
-    def __init__(self, perception: "Perception", row: int) -> None:
-        self._perception, self._row = perception, row
-
-    @property
-    def pose(self) -> NDArray[np.float64]:
-        """x, y, theta as the localizer believes [m, rad], shape (3,)."""
-        return self._perception.pose_in_frame(self._row, self._row)
-
-    @property
-    def velocity(self) -> NDArray[np.float64]:
-        """Speed and turn rate as odometry tells [m/s, rad/s], shape (2,)."""
-        return np.array(self._perception.world.measured[self._row])
-
-    @property
-    def spread(self) -> NDArray[np.float64]:
-        """Standard deviation of the pose as the localizer tells [m, m, rad], shape (3,); zero where it claims to know."""
-        return self._perception.spread(self._row)
-
-    @property
-    def radius(self) -> float:
-        """Radius of the own body [m]."""
-        return self._perception.settings.robot.radius
-
-    @property
-    def robot(self) -> Robot:
-        """The own body and drive."""
-        return self._perception.settings.robot
-
-    @property
-    def lidar(self) -> Lidar:
-        """The own laser."""
-        return self._perception.settings.lidar
-
-    @property
-    def map(self) -> NavigationMap:
-        """The own map."""
-        return self._perception.own_map(self._row)
-
-    @property
-    def map_origin(self) -> tuple[float, float]:
-        """Lower left corner of cell (0, 0) of the own map, and of the shared map, in the map frame [m]."""
-        return self._perception.origin_in_frame(self._row)
-
-    @property
-    def shared_map(self) -> NavigationMap | None:
-        """The team's map, where it reached this robot; with unknown starts None until the robot is told what others know."""
-        return self._perception.shared_map(self._row)
-
-    @property
-    def teammates(self) -> dict[str, Teammate]:
-        """What is known of the others, by name."""
-        return self._perception.teammates(self._row)
-
-    @property
-    def energy_left_j(self) -> float | None:
-        """What is left in the battery [J]; None where it has no limit."""
-        meters = self._perception.meters
-        return None if meters is None else meters.left_j(self._row)
-
-    @property
-    def goal(self) -> NDArray[np.float64] | None:
-        """The goal in the map frame [m], shape (2,), or None."""
-        return self._perception.goal_of(self._row)
 
 
 class Perception:
@@ -307,7 +204,7 @@ class Perception:
             return
         told = np.zeros(self.world.log_odds[row].shape, np.int8)
         if others is not None:
-            _lay_over(told, others, self.origin_in_frame(row))
+            lay_over(told, others, self.origin_in_frame(row))
         before = self._told[row]
         is_other = told != 0 if before is None else told != before
         self._told[row], self._adds_up = told, True
@@ -455,15 +352,3 @@ class Perception:
             for navigation, record in zip(maps, records, strict=True):
                 if navigation is not None:
                     navigation.keep_record_in(record)
-
-
-def _lay_over(told: NDArray[np.int8], others: FusedMap, origin: tuple[float, float]) -> None:
-    """Write what others know into a blank map (rows, columns) whose lower left corner is ``origin`` [m]; what lies beyond is lost."""
-    weights = np.zeros(256, np.int8)
-    weights[OCCUPIED], weights[FREE] = round(OCCUPIED_LOG_ODDS / LOG_ODDS_UNIT), round(FREE_LOG_ODDS / LOG_ODDS_UNIT)
-    left, low = (round((place - own) / others.resolution) for place, own in zip(others.origin, origin, strict=True))
-    rows, columns = others.levels.shape
-    inside = told[max(low, 0) : max(low + rows, 0), max(left, 0) : max(left + columns, 0)]
-    first_row, first_column = max(-low, 0), max(-left, 0)
-    part = others.levels[first_row : first_row + inside.shape[0], first_column : first_column + inside.shape[1]]
-    inside[: part.shape[0], : part.shape[1]] = weights[part]

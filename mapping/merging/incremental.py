@@ -67,7 +67,7 @@ class _Tried:
     known_m2: float
     is_confirmed: bool = False
     at: int = 0
-    corner: Transform = Transform()
+    corner: Transform = field(default_factory=Transform)
 
 
 @dataclass(slots=True)
@@ -170,10 +170,13 @@ class IncrementalMerger:
             return False
         if before is not None and before.frames is not None:
             return True
-        if self.tries_per_update is not None and self._tree is not None and set(pair) <= set(self._tree.names):
-            if self._tree.lookup(*pair) is not None:
-                return False
+        if self.tries_per_update is not None and self._are_joined(pair):
+            return False
         return before is None or self._known_of(pair) >= before.known_m2 + self.search_growth_m2
+
+    def _are_joined(self, pair: tuple[str, str]) -> bool:
+        tree = self._tree
+        return tree is not None and set(pair) <= set(tree.names) and tree.lookup(*pair) is not None
 
     def _known_of(self, pair: tuple[str, str]) -> float:
         return sum(self._known_m2[name] for name in pair)
@@ -188,7 +191,9 @@ class IncrementalMerger:
         if before.result.a_from_b == a_from_b or before.result.a_from_b is None:
             return before
         # The middle of the overlap stays where it is on map a.
-        centre = a_from_b.inverse().apply((first.inverse() @ before.corner).apply(before.result.a_from_b.apply(before.result.agreement.centre)))
+        centre = a_from_b.inverse().apply(
+            (first.inverse() @ before.corner).apply(before.result.a_from_b.apply(before.result.agreement.centre))
+        )
         agreement = replace(before.result.agreement, centre=(float(centre[0]), float(centre[1])))
         return replace(before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first)
 
@@ -202,8 +207,8 @@ class IncrementalMerger:
             is_due = not before.is_confirmed and known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
             if result.is_accepted and result.a_from_b is not None and not is_due:
                 self.verified += 1
-                frames = first @ result.a_from_b @ second.inverse()
-                return _Tried(result, frames, before.known_m2, before.is_confirmed, self._updates, first)
+                refined = first @ result.a_from_b @ second.inverse()
+                return _Tried(result, refined, before.known_m2, before.is_confirmed, self._updates, first)
         self.searched += 1
         result = merge_pair(a, b, self.settings)
         is_found = result.is_accepted and result.a_from_b is not None

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.simulation.faults import Fault, FaultSettings
 from lidarium.agents.random_walk import RandomWalk
 from lidarium.agents.supervisor.policy import Supervised, supervised
 from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.envs.simulation.faults import Fault, FaultSettings
 from lidarium.evaluation.metrics.merges import transform_error
 from lidarium.evaluation.result import result_of
 from lidarium.evaluation.runner import run_episode

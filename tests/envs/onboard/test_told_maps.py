@@ -96,7 +96,7 @@ def test_frontiers_that_were_given_up_stay_given_up_when_a_robot_is_told_of_more
 
 
 def test_maps_of_other_cells_and_teams_with_known_starts_are_refused(env):
-    with pytest.raises(ValueError, match="0.1 m"):
+    with pytest.raises(ValueError, match=r"0\.1 m"):
         env.perception.tell(0, FusedMap(*[np.zeros((1, 1))] * 3, (0.0, 0.0), 0.1))
     knowing = ExplorationEnv("apartment", make_settings(robots=2))
     knowing.reset(seed=0)

@@ -1,0 +1,114 @@
+"""What one robot knows, to be read by whoever decides for it."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.robots import Robot
+
+if TYPE_CHECKING:
+    from lidarium.envs.onboard.perception import Perception
+
+
+@dataclass(frozen=True, slots=True)
+class Teammate:
+    """What a robot knows of another.
+
+    Attributes
+    ----------
+    pose : (3,) float64
+        x, y, theta in the knowing robot's map frame [m, rad].
+    age_s : float
+        Age of the news [s].
+    radius : float
+        Radius of the body [m].
+    has_ended : bool
+        Whether it has ended and stands where it is.
+    """
+
+    pose: NDArray[np.float64]
+    age_s: float
+    radius: float
+    has_ended: bool
+
+
+class Belief:
+    """Read-only handle on what one robot knows; what it shows is valid until the next step.
+
+    All positions are in the robot's map frame: with known starts the floor's axes from the corner of its start cell.
+
+    Parameters
+    ----------
+    perception : Perception
+        The team's onboard software.
+    row : int
+        Which robot: episode * robots + robot.
+    """
+
+    def __init__(self, perception: "Perception", row: int) -> None:
+        self._perception, self._row = perception, row
+
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """x, y, theta as the localizer believes [m, rad], shape (3,)."""
+        return self._perception.pose_in_frame(self._row, self._row)
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """Speed and turn rate as odometry tells [m/s, rad/s], shape (2,)."""
+        return np.array(self._perception.world.measured[self._row])
+
+    @property
+    def spread(self) -> NDArray[np.float64]:
+        """Standard deviation of the pose as the localizer tells [m, m, rad], shape (3,); zero where it claims to know."""
+        return self._perception.spread(self._row)
+
+    @property
+    def radius(self) -> float:
+        """Radius of the own body [m]."""
+        return self._perception.settings.robot.radius
+
+    @property
+    def robot(self) -> Robot:
+        """The own body and drive."""
+        return self._perception.settings.robot
+
+    @property
+    def lidar(self) -> Lidar:
+        """The own laser."""
+        return self._perception.settings.lidar
+
+    @property
+    def map(self) -> NavigationMap:
+        """The own map."""
+        return self._perception.own_map(self._row)
+
+    @property
+    def map_origin(self) -> tuple[float, float]:
+        """Lower left corner of cell (0, 0) of the own map, and of the shared map, in the map frame [m]."""
+        return self._perception.origin_in_frame(self._row)
+
+    @property
+    def shared_map(self) -> NavigationMap | None:
+        """The team's map, where it reached this robot; with unknown starts None until the robot is told what others know."""
+        return self._perception.shared_map(self._row)
+
+    @property
+    def teammates(self) -> dict[str, Teammate]:
+        """What is known of the others, by name."""
+        return self._perception.teammates(self._row)
+
+    @property
+    def energy_left_j(self) -> float | None:
+        """What is left in the battery [J]; None where it has no limit."""
+        meters = self._perception.meters
+        return None if meters is None else meters.left_j(self._row)
+
+    @property
+    def goal(self) -> NDArray[np.float64] | None:
+        """The goal in the map frame [m], shape (2,), or None."""
+        return self._perception.goal_of(self._row)
