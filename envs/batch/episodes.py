@@ -28,8 +28,10 @@ from lidarium.envs.batch.running import (
 from lidarium.envs.episodes import Beginning, begin, goal_of_robots, make_world, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, observation_space
+from lidarium.envs.onboard.operating import state_after
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
+from lidarium.envs.onboard.state import OperatingState
 from lidarium.envs.options import FloorChoice, ResetOptions
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
@@ -127,6 +129,7 @@ class EpisodeBatch:
             np.array(bounds, np.float64), self.live, np.zeros(self.rows, np.bool_),
         )  # fmt: skip
         self._commands = np.zeros((self.rows, 2))
+        self._states = np.full(self.rows, OperatingState.OPERATING.value, object)
 
     @property
     def rewards(self) -> NDArray[np.float64]:
@@ -270,6 +273,7 @@ class EpisodeBatch:
         self._goals[rows] = goal_of_robots(start, self.settings)
         self._tally.goals[episode] = np.nan if start.goal is None else start.goal
         self._commands[rows], self.live[rows] = 0.0, True
+        self._states[rows] = OperatingState.OPERATING.value
         self.perception.start(start.goal, episode)
         self._software.start(episode, start.seed)
         self.level.start(episode)
@@ -298,12 +302,16 @@ class EpisodeBatch:
             "coverage": np.repeat(self.world.coverages(), self.robots),
             "seen_cells": self.world.seen.copy(),
         }
-        self.infos = {"truth": truth, "_truth": everyone}
+        # Nobody gives orders here: states follow from the endings alone.
+        orders = np.full(self.rows, "", object)
+        self.infos = {"truth": truth, "_truth": everyone, "order": orders, "_order": everyone}
         if self.reasons.any():
             ended = self.reasons != 0
             names = np.full(self.rows, None, object)
             names[ended] = [REASONS[number] for number in self.reasons[ended]]
             self.infos["ended_because"], self.infos["_ended_because"] = names, ended
+            self._states[ended] = [state_after(name).value for name in names[ended]]
+        self.infos["state"], self.infos["_state"] = self._states.copy(), everyone
         # Episodes that have not run in this call have nothing to be looked at again.
         self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
 

@@ -1,4 +1,4 @@
-"""What one robot knows, to be read by whoever decides for it."""
+"""What a policy may look at of what one robot knows."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING

@@ -123,7 +123,7 @@ class Exchange:
     tells : callable or None
         Takes the number of a robot and returns what it tells of itself; where None, nobody reports and there is no station.
     station_links : (robots,) bool
-        Who reached the station in the last step, and was reached by it.
+        Who reached the station, and was reached by it, when maps were told or an order was sent last.
     windows : (robots, 4) int64
         What part of the copies that each robot holds has changed since it was last looked at: rows and columns, low and high.
     bytes_sent : (robots,) int64
@@ -185,12 +185,12 @@ class Exchange:
         assert floor is not None
         rows = slice(self._first, self._first + self._settings.robots)
         self.links = links(radio, world.poses[rows], floor.laser, self._chance if radio.shadowing > 0.0 else None)
-        works = np.array(
-            [world.failed[row] == 0 and not has_fault(world.faults[row], DEAD_RADIO, step) for row in range(rows.start, rows.stop)]
-        )
+        works = self._works(step)
         self.links &= works[:, None] & works[None, :]
-        if self.tells is not None:
-            self.station_links = self._linked_to_station(is_time) & works
+        if is_time and self.tells is not None:
+            if radio.shadowing > 0.0:
+                self._station_chance = self._station_generator.standard_normal(len(self.station_links))
+            self._find_station()
         self._tell_poses(step)
         if is_time:
             self._tell_maps(step)
@@ -199,21 +199,26 @@ class Exchange:
         for message in due:
             self._receive(message)
 
-    def _linked_to_station(self, is_time: bool) -> NDArray[np.bool_]:
-        """Return which robots reach the place where the first of them started, (robots,)."""
+    def _works(self, step: int) -> NDArray[np.bool_]:
+        """Return whose radio works, (robots,)."""
+        world, rows = self._world, range(self._first, self._first + self._settings.robots)
+        return np.array([world.failed[row] == 0 and not has_fault(world.faults[row], DEAD_RADIO, step) for row in rows])
+
+    def _find_station(self) -> None:
+        """Find out which robots reach the place where the first of them started."""
         world, radio, team = self._world, self._settings.radio, slice(self._first, self._first + self._settings.robots)
-        if is_time and radio.shadowing > 0.0:
-            self._station_chance = self._station_generator.standard_normal(len(self.station_links))
         floor = world.floors[self._episode]
         assert floor is not None
         chance = self._station_chance if radio.shadowing > 0.0 else None
-        return links_to(radio, world.poses[team], world.starts[self._first], floor.laser, chance)
+        is_linked = links_to(radio, world.poses[team], world.starts[self._first], floor.laser, chance)
+        self.station_links = is_linked & self._works(int(world.steps[self._episode]))
 
     def order_delay(self, receiver: int) -> int | None:
         """Return after how many steps an order of the station that is sent now reaches a robot.
 
         An order goes over links that stand now, from robot to robot; None where there are none, or it is lost by chance.
         """
+        self._find_station()
         reached, known = self.station_links.copy(), np.zeros_like(self.station_links)
         while (reached != known).any():
             known = reached

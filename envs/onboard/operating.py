@@ -34,6 +34,11 @@ FAULTS = frozenset({"failed"})
 """Endings that are faults; a robot that ends for any other reason was stopped."""
 
 
+def state_after(reason: str) -> OperatingState:
+    """Return the state of a robot that has ended for a reason."""
+    return OperatingState.FAILED if reason in FAULTS else OperatingState.STOPPED
+
+
 @dataclass(frozen=True, slots=True)
 class OperatingEvent:
     """Something that happened to a robot's state or orders.
@@ -180,7 +185,7 @@ class Operating:
         """Note that a robot has ended: it has failed, or was stopped."""
         self.held[row] = False
         self._retreating[row] = 0
-        self._enter(row, OperatingState.FAILED if reason in FAULTS else OperatingState.STOPPED, reason)
+        self._enter(row, state_after(reason), reason)
         self._note_activity()
 
     def _receive(self, row: int, order: Order) -> None:

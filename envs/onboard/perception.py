@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.onboard.belief import Belief, Teammate
+from lidarium.envs.onboard.belief import Belief as Belief
+from lidarium.envs.onboard.belief import Teammate as Teammate
 from lidarium.envs.onboard.exchange import NEVER, Exchange
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.navigation import (

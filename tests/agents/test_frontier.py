@@ -99,7 +99,20 @@ def test_policies_read_beliefs_and_never_the_truth():
     env.reset(seed=0)
     belief = env.perception.belief("robot_0")
     public = {name for name in dir(belief) if not name.startswith("_")}
-    assert public == {"pose", "velocity", "spread", "radius", "robot", "lidar", "map", "map_origin", "shared_map", "teammates", "goal"}
+    assert public == {
+        "pose",
+        "velocity",
+        "spread",
+        "radius",
+        "robot",
+        "lidar",
+        "map",
+        "map_origin",
+        "shared_map",
+        "teammates",
+        "energy_left_j",
+        "goal",
+    }
 
 
 @pytest.mark.parametrize("policy", [NearestFrontier, UtilityFrontier, ExploreLite])
