@@ -118,7 +118,7 @@ def test_a_team_is_supervised_where_nothing_is_said_and_its_decisions_are_writte
 def test_a_world_that_is_given_is_not_changed(floor, tmp_path, capsys):
     assert main(["run", "--floor", str(floor), "--robots", "2", "--json", "--noise", "none", "--out", str(tmp_path / "out")]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert (result["policy"], result["localization"], result["realism"]) == ("supervised", "truth", "custom")
+    assert (result["policy"], result["localization"], result["realism"]) == ("supervised", "truth", "ideal")
 
 
 def test_the_supervisors_tree_is_shown_and_drawn(tmp_path, capsys):

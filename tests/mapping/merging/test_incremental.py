@@ -156,3 +156,31 @@ def test_edges_can_be_replaced_while_the_world_stays():
     assert tree.groups()[0][0] == root
     tree.remove_map(root)
     assert all(root not in group for group in tree.groups())
+
+
+def test_few_pairs_are_tried_in_turn_and_those_that_others_join_are_not():
+    merger = IncrementalMerger(RESOLUTION, tries_per_update=1)
+    maps = {
+        "a": GrowingMap(part(slice(0, 150), FIRST)),
+        "b": GrowingMap(part(slice(60, 220), SECOND, 1)),
+        "c": GrowingMap(part(slice(30, 180), SECOND, 2)),
+    }
+    groups = []
+    for _ in range(4):
+        groups.append(merger.update(maps).groups())
+        assert merger.searched + merger.verified <= 1
+    assert groups[0] == [["a", "b"], ["c"]]
+    assert groups[1] == groups[3] == [["a", "b", "c"]]
+    assert len(merger.update(maps).pairs) == 2
+
+
+def test_a_pair_that_is_left_alone_stays_in_place_while_a_map_grows_beyond_its_corner():
+    merger = IncrementalMerger(RESOLUTION)
+    maps = {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    before = merger.update(maps).tree.lookup("a", "b")
+    larger = {"a": grown(maps["a"].levels, 30, 41), "b": grown(maps["b"].levels, 7, 0)}
+    after = merger.update(larger, frozenset())
+    assert (merger.searched, merger.verified) == (0, 0)
+    distance, angle = after.tree.lookup("a", "b").difference(before, (8.0, 8.0))
+    assert distance < 1e-9
+    assert angle < 1e-9
