@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import Observation
-from lidarium.envs.onboard.perception import Belief
+from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import DriveState, OperatingState, Order, Target
+from lidarium.mapping.merging.fusion import FusedMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +56,19 @@ class Team(Protocol):
         """Return whether it takes part in the work, as it knows itself."""
         ...
 
+    def last_order(self, agent: str) -> Order | None:
+        """Return the last order that an agent took, None where it took none."""
+        ...
+
     def report(self, agent: str) -> Report | None:
         """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
+        ...
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        """Tell an agent that does not know its start what others know, in its map frame; return whether that reached it.
+
+        It plans and explores on that from now on, where its policy looks at the shared map. None takes back what was told.
+        """
         ...
 
 
@@ -222,5 +234,11 @@ class _Alone:
     def operating_state(self, agent: str) -> OperatingState:
         return self._team.operating_state(agent)
 
+    def last_order(self, agent: str) -> Order | None:
+        return self._team.last_order(agent)
+
     def report(self, agent: str) -> Report | None:
         raise ValueError(f"{self._agent} asked for the report of {agent}; a decentralised policy has no station")
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        raise ValueError(f"{self._agent} would tell {agent} what others know; a decentralised policy has no station")

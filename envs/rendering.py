@@ -1,6 +1,7 @@
 """Frames: the floor from above, what is explored, the robots and what their lasers see."""
 
 import warnings
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -46,7 +47,7 @@ def view_of(tables: FloorTables, size: int) -> View:
     return view_around(raster.solid == 0, raster.origin, raster.resolution, size)
 
 
-def draw_frame(env: "ExplorationEnv", size: int = SIZE) -> Frame:
+def draw_frame(env: "ExplorationEnv", size: int = SIZE, draw_over: Callable[[Frame, View], None] | None = None) -> Frame:
     """Draw an environment from above.
 
     The truth: free floor is faint where unexplored and white where the team has sensed it, walls are dark where the team has
@@ -58,6 +59,8 @@ def draw_frame(env: "ExplorationEnv", size: int = SIZE) -> Frame:
         After ``reset``.
     size : int
         Longer side of the floor in the frame [pixels], at least 64.
+    draw_over : callable or None
+        Takes the picture and the view on the floor, and draws what else is to be seen.
 
     Returns
     -------
@@ -82,6 +85,8 @@ def draw_frame(env: "ExplorationEnv", size: int = SIZE) -> Frame:
     draw_paths(frame, view, np.stack([poses[:, :2] for _, poses in recent] + [env.world.poses[:, :2]]), colours)
     has_ended = [agent not in env.agents for agent in env.possible_agents]
     draw_robots(frame, view, env.world.poses, env.settings.robot.radius, has_ended, colours)
+    if draw_over is not None:
+        draw_over(frame, view)
     return with_header(frame, "" if env.floor is None else env.floor.name, env.scorer.coverage, env.scorer.time)
 
 

@@ -99,6 +99,8 @@ class ExplorationSettings:
         Weights of the reward.
     known_starts : bool
         Whether the robots know where they start; otherwise each believes to start at (0, 0, 0).
+    reveals_starts : bool
+        Whether reports tell where robots with unknown starts truly started, as a bound for what merging maps can reach.
     localization : str
         Who says where the robot is: ``truth``, ``odometry`` or one of ``localizer_names``.
     odometry : OdometrySettings
@@ -145,6 +147,7 @@ class ExplorationSettings:
     occupancy: OccupancySettings = field(default_factory=OccupancySettings)
     reward: RewardSettings = field(default_factory=RewardSettings)
     known_starts: bool = True
+    reveals_starts: bool = False
     localization: str = "truth"
     odometry: OdometrySettings = ODOMETRY["ideal"]
     radio: RadioSettings = RADIO["all"]

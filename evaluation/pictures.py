@@ -30,6 +30,7 @@ from lidarium.evaluation.picture_parts import (
     show_cells,
 )
 from lidarium.evaluation.runner import Episode
+from lidarium.evaluation.supervision import draw_supervision
 from lidarium.evaluation.truth import occupied_in_truth
 from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.grid_planning import centres_of
@@ -58,7 +59,8 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
     figure, floor_axes, curve_axes, team_axes = page((x_max - x_min) / (y_max - y_min))
     _draw_maps(floor_axes, episode)
     draw_ways(floor_axes, np.stack([poses for _, poses in scorer.track] + [env.world.poses]), env.settings.robot.radius)
-    _draw_legend(figure, *_draw_frontiers(floor_axes, episode))
+    entries = draw_supervision(floor_axes, env, episode.policy)
+    _draw_legend(figure, *_draw_frontiers(floor_axes, episode), entries)
     draw_curve(curve_axes, scorer.curve, scorer.times, scorer.time)
     _list_robots(team_axes, episode)
     area = float(env.world.counted[0]) * env.settings.occupancy.resolution**2
@@ -150,7 +152,7 @@ def _draw_frontiers(axes: Axes, episode: Episode) -> tuple[bool, bool]:
     return bool(len(left)), bool(len(given_up))
 
 
-def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool) -> None:
+def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool, more: list[Line2D]) -> None:
     start: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 1.6}
     entries: list[Patch | Line2D] = [
         Patch(facecolor="white", edgecolor=SOLID, label="explored"),
@@ -165,6 +167,7 @@ def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool) -> None:
         entries.append(Patch(facecolor=FRONTIER_COLOUR, label="frontier left"))
     if has_given_up:
         entries.append(Patch(facecolor=GIVEN_UP_COLOUR, label="frontier given up"))
+    entries += more
     columns = len(entries) if figure.get_figwidth() > 13.0 else 5
     figure.legend(handles=entries, loc="outside lower left", ncols=columns, frameon=False, fontsize=8.5, labelcolor=INK, handlelength=1.2)
 

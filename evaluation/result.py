@@ -19,6 +19,7 @@ from lidarium.evaluation.events import in_floor_frame, operating_events
 from lidarium.evaluation.history import WHOLE, History
 from lidarium.evaluation.metrics.merges import merge_figures
 from lidarium.evaluation.runner import Episode
+from lidarium.evaluation.supervision import supervision_figures
 from lidarium.evaluation.truth import truth_of
 
 
@@ -80,6 +81,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         "energy_j": [round(float(used), 6) for used in env.energy_j] if settings.battery.is_limited else None,
         "operating": operating_events(env),
         "merges": merge_figures(episode.merges, settings.occupancy.resolution),
+        "supervisor": supervision_figures(episode.policy),
         "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
         "peak_mb": _rounded(metrics.peak_megabytes(), 1),
         "steps_per_s": round(steps / episode.wall_seconds, 3) if episode.wall_seconds > 0.0 else None,

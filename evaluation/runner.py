@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import GivenUp, Policy, Stop
 from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.onboard.perception import Belief
+from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import DriveState, OperatingState, Order
 from lidarium.envs.solo import at_level
 from lidarium.envs.wrappers.frontiers import FrontierExploration
-from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings
+from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings, true_frames
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 from lidarium.evaluation.events import merge_event
 from lidarium.evaluation.watching import WatchedExploration
+from lidarium.mapping.merging.fusion import FusedMap
 
 Progress = Callable[[ExplorationEnv], None]
 
@@ -44,7 +45,7 @@ class Episode:
     is_interrupted : bool
         Whether the user broke it off.
     merges : list of MergeEvent
-        Which robots were joined, where maps are merged.
+        Which robots were joined, where maps are merged: by the environment, or by a policy that has ``joins``.
     """
 
     env: ExplorationEnv
@@ -88,6 +89,14 @@ class RunningTeam:
     def report(self, agent: str) -> Report | None:
         """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
         return self._env.station.report(self._env.possible_agents.index(agent))
+
+    def last_order(self, agent: str) -> Order | None:
+        """Return the last order that an agent took, None where it took none."""
+        return self._env.operating.orders[self._env.possible_agents.index(agent)]
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        """Tell an agent that does not know its start what others know, in its map frame; return whether that reached it."""
+        return self._env.station.tell(self._env.possible_agents.index(agent), others)
 
 
 def run_episode(
@@ -150,11 +159,24 @@ def run_episode(
         episode.is_interrupted = True
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(getattr(policy, "given_up", []))
-    episode.merges = world.events if isinstance(world, MergedMaps) else []
+    episode.merges = world.events if isinstance(world, MergedMaps) else merges_of(policy, env)
     if isinstance(env, WatchedExploration):
         for merge in episode.merges:
             env.tell(merge_event(env, merge))
     return episode
+
+
+def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
+    """Return the joins that a policy's decisions were built on beside the truth; none where it has no ``joins``."""
+    used = [join for join in getattr(policy, "joins", []) if join.is_used]
+    if not used:
+        return []
+    truth = true_frames(env)
+    poses = [(join, join.found, truth[join.a, join.b]) for join in used]
+    return [
+        MergeEvent(join.time_s, join.a, join.b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), join.at)
+        for join, found, true in poses
+    ]
 
 
 def decide(

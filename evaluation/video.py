@@ -1,7 +1,8 @@
 """Films of a run: frames at equal simulated time, as an mp4 that is there whole or not at all."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.frame_parts import Frame, View
 from lidarium.envs.rendering import draw_frame
 from lidarium.evaluation.output import whole_file
+
+DrawOver = Callable[[ExplorationEnv, Frame, View], None]
 
 FRAMES_PER_SECOND = 20
 
@@ -30,10 +34,12 @@ class Film:
         Simulated time between frames [s].
     size : int
         Longer side of the floor in a frame [pixels].
+    draw_over : callable or None
+        Takes the environment, a frame and the view on the floor, and draws what else is to be seen.
     """
 
-    def __init__(self, writer: Any, period_s: float, size: int) -> None:  # noqa: ANN401
-        self._writer, self._period_s, self._size = writer, period_s, size
+    def __init__(self, writer: Any, period_s: float, size: int, draw_over: DrawOver | None = None) -> None:  # noqa: ANN401
+        self._writer, self._period_s, self._size, self._draw_over = writer, period_s, size, draw_over
         self._next_s = 0.0
 
     def begin(self, env: ExplorationEnv) -> None:
@@ -49,18 +55,21 @@ class Film:
 
     def _take(self, env: ExplorationEnv) -> None:
         if env.scorer.time + 1e-9 >= self._next_s:
-            self._writer.append_data(draw_frame(env, self._size))
+            self._writer.append_data(self._frame(env))
             self._next_s += self._period_s
 
     def end(self, env: ExplorationEnv) -> None:
         """Hold the last picture for a moment."""
-        frame = draw_frame(env, self._size)
+        frame = self._frame(env)
         for _ in range(round(LAST_FRAME_S * FRAMES_PER_SECOND)):
             self._writer.append_data(frame)
 
+    def _frame(self, env: ExplorationEnv) -> NDArray[np.uint8]:
+        return draw_frame(env, self._size, None if self._draw_over is None else partial(self._draw_over, env))
+
 
 @contextmanager
-def film(path: Path, speed: float = 10.0, size: int = 960) -> Iterator[Film]:
+def film(path: Path, speed: float = 10.0, size: int = 960, draw_over: DrawOver | None = None) -> Iterator[Film]:
     """Film a run into an mp4 (H.264).
 
     Parameters
@@ -71,6 +80,8 @@ def film(path: Path, speed: float = 10.0, size: int = 960) -> Iterator[Film]:
         Simulated seconds per second of the film, above 0.
     size : int
         Longer side of the floor in a frame [pixels].
+    draw_over : callable or None
+        As of ``Film``.
 
     Raises
     ------
@@ -79,7 +90,7 @@ def film(path: Path, speed: float = 10.0, size: int = 960) -> Iterator[Film]:
     """
     check_speed(speed)
     with film_writer(path) as writer:
-        yield Film(writer, speed / FRAMES_PER_SECOND, size)
+        yield Film(writer, speed / FRAMES_PER_SECOND, size, draw_over)
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """`lidarium run`: a team explores a floor, and writes what it found."""
 
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 
 DEFAULT_FOLDER = Path("runs")
 
+LONE_POLICY, TEAM_POLICY = "nearest_frontier", "supervised"
+"""Who decides where nothing is said."""
+
+TEAM_WORLD: dict[str, Any] = {"noise": "datasheet", "odometry": "typical", "localization": "slam"}
+"""How real the world of a team is where nothing is said."""
+
 STOP_COVERAGE = 0.99
 """Share of the floor at which a run without a goal ends."""
 
@@ -35,8 +41,9 @@ class Run(TeamCommand):
     """name in the catalogue, building:SEED, set:NAME, or a file of any format that the importers know"""
     robots: int = 3
     """number of robots"""
-    policy: str = "nearest_frontier"
-    """who decides; `lidarium show policies` lists them"""
+    policy: str | None = None
+    """who decides; `lidarium show policies` lists them. Left out, a team is supervised: it does not know its starts, finds out where it
+    is by SLAM, and merges its maps; one robot, or robots with a goal, drive to the nearest frontier as the options say"""
     resolution: float | None = None
     """metres per pixel, where the floor is a plain image"""
     horizon_s: float | None = None
@@ -52,6 +59,11 @@ class Run(TeamCommand):
     video_speed: float = 10.0
     """simulated seconds per second of the film"""
 
+    @property
+    def chosen_policy(self) -> str:
+        """Who decides, once what was left out is known."""
+        return self.policy or LONE_POLICY
+
 
 def execute(command: Run) -> Answer:
     """Run one episode and write what it left.
@@ -65,7 +77,8 @@ def execute(command: Run) -> Answer:
     from lidarium.evaluation.output import check_writable
 
     check_writable(command.out or DEFAULT_FOLDER)
-    policy = lidarium.policy(command.policy)
+    command = _completed(command)
+    policy = lidarium.policy(command.chosen_policy)
     recorder = _recorder(command)
     env, history = _environment(command, recorder)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
@@ -76,9 +89,22 @@ def execute(command: Run) -> Answer:
     folder = _folder(command, env.floor.name)
     from lidarium.evaluation.result import result_of
 
-    result = result_of(episode, command.policy, history)
+    result = result_of(episode, command.chosen_policy, history)
     files = _write(command, episode, result, folder, recorder)
     return Answer(result, _summary(command, episode, result, folder, files), INTERRUPTED if episode.is_interrupted else 0)
+
+
+def _completed(command: Run) -> Run:
+    """Return a command with what it leaves out: who decides, and for supervised robots a world in which they need each other's maps."""
+    from lidarium.envs.options import FloorChoice
+
+    if command.policy is not None:
+        return command
+    if command.robots == 1 or FloorChoice(command.floor, command.resolution).has_goal:
+        return replace(command, policy=LONE_POLICY)
+    team = replace(command, policy=TEAM_POLICY, unknown_starts=True)
+    is_world_given = command.realism != "ideal" or any(getattr(command, name) is not None for name in TEAM_WORLD)
+    return team if is_world_given else replace(team, **TEAM_WORLD)
 
 
 def _settings(command: Run) -> "ExplorationSettings":
@@ -96,7 +122,7 @@ def _recorder(command: Run) -> "Recorder | None":
         return None
     from lidarium.evaluation.record import Recorder
 
-    return Recorder(command.policy, command.seed, command.floor, command.resolution)
+    return Recorder(command.chosen_policy, command.seed, command.floor, command.resolution)
 
 
 def _environment(command: Run, recorder: "Recorder | None") -> "tuple[WatchedExploration, History]":
@@ -137,6 +163,7 @@ def _explore(command: Run, policy: Any, env: "WatchedExploration", options: dict
 
 def _film(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
     from lidarium.evaluation.runner import run_episode
+    from lidarium.evaluation.supervision import recent_supervision
     from lidarium.evaluation.video import Film, film
 
     with ExitStack() as stack:
@@ -145,9 +172,10 @@ def _film(command: Run, policy: Any, env: "WatchedExploration", options: dict[st
         def on_decision(current: "ExplorationEnv") -> None:
             # The folder is named by the floor, which a set draws at the reset; nothing is written before that.
             if not camera:
+                over = recent_supervision(policy)
                 assert current.floor is not None
                 path = _folder(command, current.floor.name) / "run.mp4"
-                camera.append(stack.enter_context(film(path, command.video_speed)))
+                camera.append(stack.enter_context(film(path, command.video_speed, draw_over=over)))
                 camera[0].begin(current)
                 env.watchers.append(camera[0])
             progress.tell(current)
@@ -160,7 +188,7 @@ def _film(command: Run, policy: Any, env: "WatchedExploration", options: dict[st
 
 
 def _folder(command: Run, floor: str) -> Path:
-    return command.out or DEFAULT_FOLDER / file_name(f"{floor}-{command.policy}-{command.seed}")
+    return command.out or DEFAULT_FOLDER / file_name(f"{floor}-{command.chosen_policy}-{command.seed}")
 
 
 def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, recorder: "Recorder | None") -> list[str]:
@@ -168,8 +196,9 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
     import numpy as np
 
     from lidarium.evaluation.beliefs import team_log_odds
-    from lidarium.evaluation.output import write_json
+    from lidarium.evaluation.output import write_json, write_text
     from lidarium.evaluation.pictures import save_run_picture
+    from lidarium.evaluation.supervision import decision_lines, is_supervised
     from lidarium.mapping.map_files import write_ros_map
     from lidarium.mapping.occupancy import three_levels
 
@@ -180,8 +209,14 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
         write_record(folder / "episode.npz", recorder.finish(is_interrupted=episode.is_interrupted))
     log_odds, (x, y) = team_log_odds(episode.env)
     write_ros_map(folder, "map", three_levels(np.sign(log_odds).astype(np.int8)), (x, y, 0.0), command.map_resolution)
-    save_run_picture(folder / "run.png", episode, command.policy)
-    asked_for = [*(["episode.npz"] if recorder is not None else []), *(["run.mp4"] if command.video else [])]
+    save_run_picture(folder / "run.png", episode, command.chosen_policy)
+    if is_supervised(episode.policy):
+        write_text(folder / "decisions.jsonl", decision_lines(episode.policy))
+    asked_for = [
+        *(["decisions.jsonl"] if is_supervised(episode.policy) else []),
+        *(["episode.npz"] if recorder is not None else []),
+        *(["run.mp4"] if command.video else []),
+    ]
     return ["result.json", "map.yaml", "map.pgm", "run.png", *asked_for]
 
 
@@ -204,7 +239,7 @@ def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: P
         ("files", f"{folder}: {', '.join(files)}"),
     ]
     how = " (interrupted)" if episode.is_interrupted else ""
-    title = f"{result['floor']}: {command.policy}, seed {command.seed}, realism {result['realism']}{how}"
+    title = f"{result['floor']}: {command.chosen_policy}, seed {command.seed}, realism {result['realism']}{how}"
     return "\n".join([title, table(facts), "", table(ended, ("robot", "ended because", "drove", "saw"))])
 
 

@@ -1,4 +1,4 @@
-"""`lidarium show`: what can be chosen: policies, robots, lasers, what makes a world real, settings."""
+"""`lidarium show`: what can be chosen: policies, robots, lasers, what makes a world real, settings; and the supervisor's tree."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
@@ -10,9 +10,11 @@ from lidarium.scripts.common import Answer, Command, table
 
 @dataclass(frozen=True, kw_only=True)
 class Show(Command):
-    """Tell what can be chosen: policies, robots, lidars, what makes a world real, or all settings with their defaults."""
+    """Tell what can be chosen, all settings with their defaults, or the supervisor's decision tree, with --out as a picture too."""
 
-    what: Positional[Literal["policies", "robots", "lidars", "realism", "odometry", "localizers", "radios", "batteries", "settings"]]
+    what: Positional[
+        Literal["policies", "robots", "lidars", "realism", "odometry", "localizers", "radios", "batteries", "settings", "supervisor"]
+    ]
     """what to list"""
 
 
@@ -25,6 +27,10 @@ def execute(command: Show) -> Answer:
     result, text = _LISTS[command.what]()
     if command.out is not None:
         write_json(command.out / f"{command.what}.json", result)
+        if command.what == "supervisor":
+            from lidarium.evaluation.tree_picture import save_tree_picture
+
+            save_tree_picture(command.out / "supervisor.png")
     return Answer(result, text)
 
 
@@ -115,6 +121,17 @@ def _localizers() -> tuple[dict[str, Any], str]:
     return {"localizers": lines}, table(lines.items(), indent="")
 
 
+def _supervisor() -> tuple[dict[str, Any], str]:
+    from lidarium.agents.supervisor.settings import SupervisorSettings
+    from lidarium.agents.supervisor.tree import decision_tree, tree_data, tree_text
+
+    settings = SupervisorSettings()
+    tree = decision_tree(settings)
+    defaults = asdict(settings)
+    text = [tree_text(tree), "", "settings", table([(name, str(value)) for name, value in defaults.items()])]
+    return {"tree": tree_data(tree), "settings": defaults}, "\n".join(text)
+
+
 def _side_by_side(values: dict[str, dict[str, Any]]) -> str:
     """Return a table of settings, a column for each name."""
     fields = next(iter(values.values()))
@@ -123,5 +140,5 @@ def _side_by_side(values: dict[str, dict[str, Any]]) -> str:
 
 _LISTS = {
     "policies": _policies, "robots": _robots, "lidars": _lidars, "realism": _realism, "odometry": _odometry, "localizers": _localizers,
-    "radios": _radios, "batteries": _batteries, "settings": _settings,
+    "radios": _radios, "batteries": _batteries, "settings": _settings, "supervisor": _supervisor,
 }  # fmt: skip

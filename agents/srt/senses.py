@@ -11,7 +11,7 @@ from lidarium.agents.srt.memory import MapMemory, Memory, RegionMemory
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.exploration import Observation
-from lidarium.envs.onboard.perception import Belief
+from lidarium.envs.onboard.belief import Belief
 from lidarium.mapping.scans import ScanGeometry
 
 NEWS_S = 1.0

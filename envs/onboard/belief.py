@@ -94,7 +94,7 @@ class Belief:
 
     @property
     def shared_map(self) -> NavigationMap | None:
-        """The team's map, where it reached this robot; None with unknown starts."""
+        """The team's map, where it reached this robot; with unknown starts None until the robot is told what others know."""
         return self._perception.shared_map(self._row)
 
     @property

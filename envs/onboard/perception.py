@@ -1,7 +1,8 @@
 """What the robots' onboard software knows: their poses and maps, and what reached each of the others.
 
-With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. Both kinds of map come
-with what planning needs (clearance and frontiers), brought up to date only where the map has changed.
+With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. A robot that does not know its
+start can be told what others know, laid over its own map. All maps come with what planning needs (clearance and frontiers), brought
+up to date only where the map has changed.
 """
 
 import os
@@ -31,8 +32,10 @@ from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
 from lidarium.envs.simulation.kinematic import KinematicWorld
 from lidarium.mapping.clearance import limit_of, stamp_of
+from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.localization.localizer import Localizer
+from lidarium.mapping.merging.fusion import FusedMap, lay_over
 from lidarium.mapping.path_search import SearchMemory
 
 
@@ -85,6 +88,9 @@ class Perception:
         self.meters: Meters | None = None
         self._heard: list[NavigationMap | None] = [None] * rows
         self._heard_records = np.zeros((rows, RECORD), np.int64)
+        self._told: list[NDArray[np.int8] | None] = [None] * rows
+        # Whether robots plan on sums of their own map and of what came from others.
+        self._adds_up = self.hears
 
     def start(self, goal: tuple[float, float] | None = None, episode: int = 0) -> None:
         """Begin an episode."""
@@ -95,6 +101,8 @@ class Perception:
                 navigation.keep_record_in(np.zeros(RECORD, np.int64))
         self._own[first:last], self._shared[episode] = [None] * self._robots, None
         self._heard[first:last], self._heard_records[first:last] = [None] * self._robots, 0
+        self._told[first:last] = [None] * self._robots
+        self._adds_up = self.hears or any(told is not None for told in self._told)
         self._own_records[first:last], self._shared_records[episode] = 0, 0
         self._known[first:last] = [(rows, 0, columns, 0) for rows, columns in self.world.belief_rows[first:last, 1:3]]
         self._goals[episode], self._fresh_at[episode] = goal, -2
@@ -102,8 +110,8 @@ class Perception:
     @property
     def maps(self) -> TeamMaps:
         """The maps as kernels see them."""
-        if self.hears:
-            # What kernels bring up to date by themselves does not include what came by radio.
+        if self._adds_up:
+            # What kernels bring up to date by themselves does not include what came from others.
             for episode in range(self._episodes):
                 self._refresh(episode)
         return self._maps
@@ -153,9 +161,9 @@ class Perception:
         return low_row, max(min(high_row, rows), low_row), low_column, max(min(high_column, columns), low_column)
 
     def shared_map(self, row: int = 0) -> NavigationMap | None:
-        """Return the team's map as it reached a robot, up to date; a lone robot's is its own, with unknown starts there is none."""
+        """Return the team's map as it reached a robot, up to date; a lone robot's is its own, with unknown starts what it was told."""
         if not self.settings.known_starts:
-            return None
+            return None if self._told[row] is None else self._heard_map(row)
         if self.hears:
             return self._heard_map(row)
         if not self._shares:
@@ -173,8 +181,40 @@ class Perception:
             self._shared[episode] = navigation
         return navigation
 
+    def tell(self, row: int, others: FusedMap | None) -> None:
+        """Let a robot that does not know its start know what others know; it plans and explores on that as on its own map.
+
+        Parameters
+        ----------
+        row : int
+            Which robot.
+        others : FusedMap or None
+            What the others know, in the robot's map frame; it takes the place of what was told before. None takes that back.
+
+        Raises
+        ------
+        ValueError
+            Where the starts are known, so that the team's map is there anyway, or the sides of the cells differ.
+        """
+        resolution = self.settings.occupancy.resolution
+        if self.settings.known_starts:
+            raise ValueError("robots that know their starts have the team's map; want robots with unknown starts to be told of others")
+        if others is not None and others.resolution != resolution:
+            raise ValueError(f"the map that is told has cells of {others.resolution} m; want {resolution} m, as the robots' own maps")
+        if others is None and self._told[row] is None:
+            return
+        told = np.zeros(self.world.log_odds[row].shape, np.int8)
+        if others is not None:
+            lay_over(told, others, self.origin_in_frame(row))
+        before = self._told[row]
+        is_other = told != 0 if before is None else told != before
+        self._told[row], self._adds_up = told, True
+        rows, columns = np.flatnonzero(is_other.any(axis=1)), np.flatnonzero(is_other.any(axis=0))
+        if self._heard[row] is not None and len(rows):
+            self._sum_heard(row, np.array([rows[0], rows[-1] + 1, columns[0], columns[-1] + 1]))
+
     def _heard_map(self, row: int) -> NavigationMap:
-        """Return the sum of a robot's own map and of the teammates' maps that reached it, up to date."""
+        """Return the sum of a robot's own map and of what came to it from others, up to date."""
         self._refresh(self.episode_of(row))
         navigation = self._heard[row]
         if navigation is None:
@@ -184,19 +224,29 @@ class Perception:
             self._heard[row] = navigation
             _, rows, columns = self.world.belief_rows[row, :3]
             self._sum_heard(row, np.array([0, rows, 0, columns]))
+            own = self._own[row]
+            if not self.hears and own is not None and own.record[FLAGS] != 0:
+                # What the robot gave up on its own map it does not try again.
+                navigation.frontiers.ignore(np.argwhere(own.frontiers.flags == IGNORED))
         return navigation
 
     def _sum_heard(self, row: int, window: NDArray[np.int64]) -> None:
         """Bring the sum of what reached a robot up to date in a window (4,)."""
         episode, first = self.episode_of(row), self.episode_of(row) * self._robots
-        held = [
-            copy.ctypes.data for mate, copy in enumerate(self.exchanges[episode].copies[row - first]) if first + mate != row and copy.size
-        ]
+        told = self._told[row]
+        if self.hears:
+            copies = self.exchanges[episode].copies[row - first]
+            held = [copy.ctypes.data for mate, copy in enumerate(copies) if first + mate != row and copy.size]
+        else:
+            held = [] if told is None else [told.ctypes.data]
         beliefs = np.array([(address, *self.world.log_odds[row].shape) for address in (self.world.belief_rows[row, 0], *held)], np.int64)
         sum_maps(self._heard_records[row], beliefs, self._maps.limit, self._maps.stamp, window)
 
     def planning_map(self, row: int, shares_map: bool) -> NavigationMap:
         """Return the map that a robot plans on, up to date: the team's where it reaches the robot, else its own."""
+        if shares_map and self._adds_up:
+            # Also that of a robot to which nothing came: kernels look the maps of all up in one table.
+            return self._heard_map(row)
         shared = self.shared_map(row) if shares_map else None
         return self.own_map(row) if shared is None else shared
 
@@ -213,7 +263,7 @@ class Perception:
         records, sharing = self._own_records, 1
         if shares_map and self._shares:
             records, sharing = self._shared_records, self._robots
-        elif shares_map and self.hears:
+        elif shares_map and self._adds_up:
             records = self._heard_records
         places = np.unique(rows // sharing)
         for place in places[records[places, FLAGS if with_frontiers else LOG_ODDS] == 0]:
@@ -226,14 +276,15 @@ class Perception:
         """Take in what the maps of a team have changed since the last look."""
         if self._fresh_at[episode] == self.world.steps[episode]:
             return
-        if not self.hears:
+        if not self._adds_up:
             refresh_team(self._maps, episode)
             return
         first = episode * self._robots
         windows = self.world.windows[first : first + self._robots].copy()
         refresh_team(self._maps, episode)
         for robot, window in enumerate(windows):
-            extend_window(window, self.exchanges[episode].take_window(robot))
+            if self.hears:
+                extend_window(window, self.exchanges[episode].take_window(robot))
             if self._heard[first + robot] is not None and window[0] < window[1] and window[2] < window[3]:
                 self._sum_heard(first + robot, window)
 

@@ -14,6 +14,7 @@ from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.operating import Operating
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.state import DriveState, OperatingState, Status, Target
+from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.merging.incremental import GrowingMap
 from lidarium.mapping.occupancy import three_levels
 from lidarium.mapping.rigid import Transform
@@ -45,6 +46,8 @@ class Report:
         What is left in its battery; None where it has no limit [J].
     start : Transform
         Where it began.
+    frame : Transform or None
+        How its map frame lies in the floor's; None where it does not know: with unknown starts that are not revealed to the station.
     """
 
     time_s: float
@@ -57,6 +60,7 @@ class Report:
     travelled_m: float
     energy_left_j: float | None
     start: Transform
+    frame: Transform | None = None
 
 
 def known_map(perception: Perception, row: int) -> GrowingMap:
@@ -126,11 +130,27 @@ class Station:
             self._received[row] = self._report(row, time_s, _cut(self._perception, row, log_odds, _window_of(log_odds)), status)
         return self._received[row]
 
+    def tell(self, row: int, others: FusedMap | None) -> bool:
+        """Tell a robot what others know (`Perception.tell`), if the links to it stand; return whether they do.
+
+        It takes effect at once, however long the radio takes: what a station knows changes slowly.
+        """
+        if self._order_delay(row) is None:
+            return False
+        self._perception.tell(row, others)
+        return True
+
     def _report(self, row: int, time_s: float, known: GrowingMap, status: Status) -> Report:
         return Report(
             time_s, known, status.pose, status.state, status.drive, status.target, status.path_left_m, status.travelled_m,
-            status.energy_left_j, self._starts[row],
+            status.energy_left_j, self._starts[row], self._frame(row),
         )  # fmt: skip
+
+    def _frame(self, row: int) -> Transform | None:
+        """Return how a robot's map frame lies in the floor's, where it knows or is told."""
+        if self._perception.settings.known_starts:
+            return Transform(*self._perception.offset(row).tolist())
+        return Transform(*self._perception.world.starts[row].tolist()) if self._perception.settings.reveals_starts else None
 
     def _status(self, row: int) -> Status:
         """Return what a robot tells of itself now."""

@@ -200,7 +200,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
             return
         self._due = steps - steps % self._steps + self._steps
         time_s = self._base.scorer.time
-        truth = self._true_frames()
+        truth = true_frames(self._base)
         joined = self.team.exchange(self._clusters(time_s), time_s, truth if self.merging.known_starts else None)
         for (a, b), (found, at) in joined.items():
             if (a, b) in self._joined:
@@ -213,19 +213,6 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
                     infos[agent]["merges"].append(other)
                     infos[agent]["truth"]["merges"].append(event)
         self._joined = set(joined)
-
-    def _true_frames(self) -> Frames:
-        """Return how the map frames of all robots truly lie."""
-        base = self._base
-        if base.settings.known_starts:
-            frames = [
-                Transform(float(base.perception.offset(row)[0]), float(base.perception.offset(row)[1]))
-                for row in range(base.settings.robots)
-            ]
-        else:
-            frames = [Transform(*start) for start in base.world.starts.tolist()]
-        agents = self.possible_agents
-        return {(a, b): frames[i].inverse() @ frames[j] for i, a in enumerate(agents) for j, b in enumerate(agents) if i != j}
 
     def _clusters(self, time_s: float) -> list[list[str]]:
         """Return the robots that reach each other, some through others."""
@@ -262,6 +249,17 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
                 age = min(time_s - news.time_s, OLDEST_S)
                 table[row] = (np.clip(pose.x, -FARTHEST, FARTHEST), np.clip(pose.y, -FARTHEST, FARTHEST), pose.theta, age, 1.0)
         return table
+
+
+def true_frames(env: ExplorationEnv) -> Frames:
+    """Return how the map frames of all robots of an environment truly lie."""
+    if env.settings.known_starts:
+        offsets = (env.perception.offset(row) for row in range(env.settings.robots))
+        frames = [Transform(float(offset[0]), float(offset[1])) for offset in offsets]
+    else:
+        frames = [Transform(*start) for start in env.world.starts.tolist()]
+    agents = env.possible_agents
+    return {(a, b): frames[i].inverse() @ frames[j] for i, a in enumerate(agents) for j, b in enumerate(agents) if i != j}
 
 
 def team_boxes(robots: int, cells: int) -> dict[str, spaces.Space[Any]]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.occupancy import FREE, LOG_ODDS_UNIT, OCCUPIED, UNKNOWN
 from lidarium.mapping.rigid import Transform
 
 OCCUPIED_LOG_ODDS, FREE_LOG_ODDS = 1.0, -0.6
@@ -99,6 +99,27 @@ def _bounds(
         raise ValueError("none of the maps knows anything; want at least one known cell")
     points = np.concatenate(corners) / resolution
     return np.floor(points.min(axis=0) + 1e-6).astype(np.int64), np.ceil(points.max(axis=0) - 1e-6).astype(np.int64)
+
+
+def lay_over(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, float]) -> None:
+    """Write what a fused map knows into a blank map of the same cells, in its units; what lies beyond it is lost.
+
+    Parameters
+    ----------
+    log_odds : (rows, columns) int8
+        The blank map.
+    fused : FusedMap
+        The fused one.
+    origin : (x, y)
+        Lower left corner of the blank map in the frame of the fused one, whole cells apart from its corner [m].
+    """
+    weights = np.zeros(256, np.int8)
+    weights[OCCUPIED], weights[FREE] = round(OCCUPIED_LOG_ODDS / LOG_ODDS_UNIT), round(FREE_LOG_ODDS / LOG_ODDS_UNIT)
+    left, low = (round((place - own) / fused.resolution) for place, own in zip(fused.origin, origin, strict=True))
+    rows, columns = fused.levels.shape
+    inside = log_odds[max(low, 0) : max(low + rows, 0), max(left, 0) : max(left + columns, 0)]
+    first_row, first_column = max(-low, 0), max(-left, 0)
+    inside[:] = weights[fused.levels[first_row : first_row + inside.shape[0], first_column : first_column + inside.shape[1]]]
 
 
 @kernel

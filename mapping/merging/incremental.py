@@ -1,11 +1,14 @@
 """Maps that grow, merged again and again: only what has changed is described, and transforms that were verified are not searched for.
 
 A robot's map keeps its frame while it grows: its origin tells where the array's lower left corner lies in that frame.
+Two maps that know little can look alike without being of one place. Who acts on a merge can ask for a second finding: it is joined only
+when it is found once more, by a search of its own on maps that have grown, where it was before.
 """
 
 import itertools
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,13 +38,36 @@ class GrowingMap(NamedTuple):
     origin: tuple[float, float] = (0.0, 0.0)
 
 
+CONFIRMED_M, CONFIRMED_ANGLE = 0.1, math.radians(1.0)
+"""By how much two findings of one transform may differ [m, rad]."""
+
+
 @dataclass(slots=True)
 class _Tried:
-    """What is known of a pair: its result, the robots' transform if it is verified, and what the maps knew when it was searched for."""
+    """What is known of a pair.
+
+    Attributes
+    ----------
+    result : PairResult
+        What came of the last try.
+    frames : Transform or None
+        The robots' transform, if it is verified.
+    known_m2 : float
+        What the maps knew when it was searched for [m2].
+    is_confirmed : bool
+        Whether it has been found as often as is wanted.
+    at : int
+        The number of the update that tried it last.
+    corner : Transform
+        Where the lower left corner of the first map was in its frame then.
+    """
 
     result: PairResult
     frames: Transform | None
     known_m2: float
+    is_confirmed: bool = False
+    at: int = 0
+    corner: Transform = field(default_factory=Transform)
 
 
 @dataclass(slots=True)
@@ -56,6 +82,11 @@ class IncrementalMerger:
         How; the defaults where None.
     search_growth_m2 : float
         A pair that was refused is searched for again when its maps together know so much more [m2].
+    confirmation_growth_m2 : float or None
+        A pair that was found joins its maps only when it is found once more, once they know so much more [m2]; at once where None.
+    tries_per_update : int or None
+        Most pairs that an update verifies or searches for, those first whose turn was longest ago; pairs that others join are not searched
+        for then. All where None.
 
     Attributes
     ----------
@@ -66,6 +97,8 @@ class IncrementalMerger:
     resolution: float
     settings: MergeSettings = field(default_factory=MergeSettings)
     search_growth_m2: float = 2.0
+    confirmation_growth_m2: float | None = None
+    tries_per_update: int | None = None
     searched: int = 0
     verified: int = 0
     _maps: dict[str, GrowingMap] = field(default_factory=dict)
@@ -73,6 +106,8 @@ class IncrementalMerger:
     _known_m2: dict[str, float] = field(default_factory=dict)
     _pairs: dict[tuple[str, str], _Tried] = field(default_factory=dict)
     _tree: FrameTree[str] | None = None
+    _updates: int = 0
+    _changed_at: dict[str, int] = field(default_factory=dict)
 
     def update(self, maps: Mapping[str, GrowingMap], may_try: frozenset[tuple[str, str]] | None = None) -> Merged:
         """Take in the maps as they are now.
@@ -87,7 +122,8 @@ class IncrementalMerger:
         Returns
         -------
         Merged
-            Pairs, frames and fused maps; frames stay where they are while maps grow.
+            Pairs, frames and fused maps; frames stay where they are while maps grow. Pairs that are accepted and wait to be confirmed
+            join nothing.
 
         Raises
         ------
@@ -96,48 +132,98 @@ class IncrementalMerger:
         """
         if not maps:
             raise ValueError("there are no maps to merge; want at least one")
-        changed = self._describe(maps)
+        self._updates += 1
+        self._describe(maps)
         self.searched = self.verified = 0
-        pairs: dict[tuple[str, str], _Tried] = {}
-        for pair in itertools.combinations(maps, 2):
-            tried = self._pairs.get(pair)
-            if tried is None or (changed & set(pair) and (may_try is None or pair in may_try)):
-                tried = self._tried(pair, tried) if may_try is None or pair in may_try else tried
-            if tried is not None:
-                pairs[pair] = tried
+        every = list(itertools.combinations(maps, 2))
+        due = self._due([pair for pair in every if may_try is None or pair in may_try])
+        tried_now = {pair: self._tried(pair, self._pairs.get(pair)) for pair in due}
+        pairs = {pair: tried for pair in every if (tried := tried_now.get(pair) or self._kept(pair)) is not None}
         self._pairs = pairs
         results = {pair: tried.result for pair, tried in pairs.items()}
+        believed = {pair: tried.result for pair, tried in pairs.items() if tried.is_confirmed}
         origins = {name: one.origin for name, one in maps.items()}
-        self._tree = joined_tree(self._features, results, self.settings, origins, self._tree)
+        self._tree = joined_tree(self._features, believed, self.settings, origins, self._tree)
         return Merged({name: one.levels for name, one in self._features.items()}, self.resolution, results, self._tree, origins)
 
-    def _describe(self, maps: Mapping[str, GrowingMap]) -> set[str]:
-        """Describe the maps that are new or have changed, and return their names."""
+    def _describe(self, maps: Mapping[str, GrowingMap]) -> None:
+        """Describe the maps that are new or have changed."""
         changed = {name for name, one in maps.items() if not _is_same(self._maps.get(name), one)}
         fresh = {name: described(maps[name].levels, self.resolution, self.settings) for name in maps if name in changed}
         self._features = {name: fresh.get(name) or self._features[name] for name in maps}
         for name in changed:
             self._known_m2[name] = float(np.count_nonzero(self._features[name].levels != UNKNOWN)) * self.resolution**2
+            self._changed_at[name] = self._updates
         self._maps = dict(maps)
-        return changed
+
+    def _due(self, pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
+        """Return the pairs whose turn it is to be verified or searched for."""
+        due = [pair for pair in pairs if self._has_news(pair)]
+        if self.tries_per_update is not None:
+            due.sort(key=lambda pair: self._pairs[pair].at if pair in self._pairs else 0)
+        return due[: self.tries_per_update]
+
+    def _has_news(self, pair: tuple[str, str]) -> bool:
+        """Whether maps have changed so much since a pair was tried that it is to be tried again."""
+        before = self._pairs.get(pair)
+        if before is not None and max(self._changed_at[name] for name in pair) <= before.at:
+            return False
+        if before is not None and before.frames is not None:
+            return True
+        if self.tries_per_update is not None and self._are_joined(pair):
+            return False
+        return before is None or self._known_of(pair) >= before.known_m2 + self.search_growth_m2
+
+    def _are_joined(self, pair: tuple[str, str]) -> bool:
+        tree = self._tree
+        return tree is not None and set(pair) <= set(tree.names) and tree.lookup(*pair) is not None
+
+    def _known_of(self, pair: tuple[str, str]) -> float:
+        return sum(self._known_m2[name] for name in pair)
+
+    def _kept(self, pair: tuple[str, str]) -> _Tried | None:
+        """Return what is known of a pair that is not tried now, by the corners that its maps have now."""
+        before = self._pairs.get(pair)
+        if before is None or before.frames is None:
+            return before
+        first, second = (placed(self._maps[name].origin) for name in pair)
+        a_from_b = first.inverse() @ before.frames @ second
+        if before.result.a_from_b == a_from_b or before.result.a_from_b is None:
+            return before
+        # The middle of the overlap stays where it is on map a.
+        centre = a_from_b.inverse().apply(
+            (first.inverse() @ before.corner).apply(before.result.a_from_b.apply(before.result.agreement.centre))
+        )
+        agreement = replace(before.result.agreement, centre=(float(centre[0]), float(centre[1])))
+        return replace(before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first)
 
     def _tried(self, pair: tuple[str, str], before: _Tried | None) -> _Tried:
         """Verify the transform of a pair; search where there is none, or it is refused by now."""
         a, b = (self._features[name] for name in pair)
         first, second = (placed(self._maps[name].origin) for name in pair)
-        known_m2 = sum(self._known_m2[name] for name in pair)
+        known_m2 = self._known_of(pair)
         if before is not None and before.frames is not None:
             result = verify_pair(a, b, first.inverse() @ before.frames @ second, self.settings)
-            if result.is_accepted and result.a_from_b is not None:
+            is_due = not before.is_confirmed and known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
+            if result.is_accepted and result.a_from_b is not None and not is_due:
                 self.verified += 1
-                return _Tried(result, first @ result.a_from_b @ second.inverse(), before.known_m2)
-        elif before is not None and known_m2 < before.known_m2 + self.search_growth_m2:
-            return before
+                refined = first @ result.a_from_b @ second.inverse()
+                return _Tried(result, refined, before.known_m2, before.is_confirmed, self._updates, first)
         self.searched += 1
         result = merge_pair(a, b, self.settings)
         is_found = result.is_accepted and result.a_from_b is not None
         frames = first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
-        return _Tried(result, frames, known_m2)
+        return _Tried(result, frames, known_m2, self._confirms(pair, before, frames, result), self._updates, first)
+
+    def _confirms(self, pair: tuple[str, str], before: _Tried | None, frames: Transform | None, result: PairResult) -> bool:
+        """Whether what was searched for and found is believed from now on."""
+        if self.confirmation_growth_m2 is None:
+            return True
+        if before is None or before.frames is None or frames is None or before.is_confirmed:
+            return False
+        at = placed(self._maps[pair[1]].origin).apply(result.agreement.centre)
+        distance, angle = frames.difference(before.frames, at)
+        return distance <= CONFIRMED_M and angle <= CONFIRMED_ANGLE
 
 
 def _is_same(before: GrowingMap | None, now: GrowingMap) -> bool:

@@ -25,7 +25,7 @@ KEYS = {
 }  # fmt: skip
 AT_THRESHOLDS = [name.format(share) for name in ("t{}_s", "d{}_m", "d_sum{}_m", "n{}") for share in (85, 90, 95, 99)]
 OVER_TIME = ["overlap_eb", "overlap_mx_85", "overlap_mx_95", "overlap_mv", "rpe_m", "rpe_rad"]
-MAY_BE_NONE = ["horizon_s", "energy_j", "auc", "collisions_per_km", *AT_THRESHOLDS, *OVER_TIME]
+MAY_BE_NONE = ["horizon_s", "energy_j", "supervisor", "auc", "collisions_per_km", *AT_THRESHOLDS, *OVER_TIME]
 
 
 def explored(on_decision=None, **options):

@@ -93,7 +93,8 @@ def test_every_command_has_seed_out_and_json(command, capsys):
 
 
 def test_a_run_writes_its_figures_map_and_picture(floor, tmp_path, capsys):
-    assert main(["run", "--floor", str(floor), "--robots", "2", "--out", str(tmp_path / "out")]) == 0
+    arguments = ["run", "--floor", str(floor), "--robots", "2", "--policy", "nearest_frontier", "--out", str(tmp_path / "out")]
+    assert main(arguments) == 0
     told = capsys.readouterr()
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["map.pgm", "map.yaml", "result.json", "run.png"]
     result = json.loads((tmp_path / "out" / "result.json").read_text())
@@ -102,6 +103,29 @@ def test_a_run_writes_its_figures_map_and_picture(floor, tmp_path, capsys):
     assert "robot_1" in told.out
     assert "covered" in told.out
     assert str(tmp_path / "out") in told.out
+
+
+def test_a_team_is_supervised_where_nothing_is_said_and_its_decisions_are_written(floor, tmp_path, capsys):
+    arguments = ["run", "--floor", str(floor), "--robots", "2", "--json", "--map-resolution", "0.05", "--out", str(tmp_path / "out")]
+    assert main(arguments) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["policy"], result["localization"], result["realism"]) == ("supervised", "slam", "lab")
+    lines = [json.loads(line) for line in (tmp_path / "out" / "decisions.jsonl").read_text().splitlines()]
+    assert sum(line["event"] == "decision" for line in lines) == result["supervisor"]["decisions"]
+    assert [line["time_s"] for line in lines] == sorted(line["time_s"] for line in lines)
+
+
+def test_a_world_that_is_given_is_not_changed(floor, tmp_path, capsys):
+    assert main(["run", "--floor", str(floor), "--robots", "2", "--json", "--noise", "none", "--out", str(tmp_path / "out")]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["policy"], result["localization"], result["realism"]) == ("supervised", "truth", "ideal")
+
+
+def test_the_supervisors_tree_is_shown_and_drawn(tmp_path, capsys):
+    assert main(["show", "supervisor", "--out", str(tmp_path)]) == 0
+    assert "rule 3: go to another goal" in capsys.readouterr().out
+    assert json.loads((tmp_path / "supervisor.json").read_text())["tree"]["test"] == "failed"
+    assert cv2.imread(str(tmp_path / "supervisor.png")).shape[2] == 3
 
 
 def test_the_map_of_a_run_lies_where_the_floor_lies(floor, tmp_path):

@@ -23,7 +23,7 @@ def run_folder(tmp_path_factory):
     write_ros_map(folder / "in", "hall", levels, (0.0, 0.0, 0.0), 0.1)
     with contextlib.chdir(folder):
         options = ["--robots", "2", "--horizon-s", "8", "--stop-coverage", "1", "--record", "--out", "run"]
-        assert main(["run", "--floor", "in/hall.yaml", *options]) == 0
+        assert main(["run", "--floor", "in/hall.yaml", "--policy", "nearest_frontier", *options]) == 0
     return folder
 
 

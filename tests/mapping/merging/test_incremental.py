@@ -84,6 +84,36 @@ def test_maps_that_are_missing_are_forgotten_and_pairs_that_may_not_be_tried_are
         merger.update({})
 
 
+def test_a_pair_that_wants_confirmation_joins_when_grown_maps_are_found_to_lie_the_same_way():
+    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0)
+    maps = {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    first = merger.update(maps)
+    assert first.pairs["a", "b"].is_accepted
+    assert first.groups() == [["a"], ["b"]]
+    little = merger.update({**maps, "a": GrowingMap(part(slice(0, 151), FIRST))})
+    assert (merger.searched, merger.verified) == (0, 1)
+    assert little.groups() == [["a"], ["b"]]
+    grown_maps = {**maps, "a": GrowingMap(part(slice(0, 170), FIRST))}
+    confirmed = merger.update(grown_maps)
+    assert (merger.searched, merger.verified) == (1, 0)
+    assert confirmed.groups() == [["a", "b"]]
+    merger.update({**grown_maps, "a": GrowingMap(part(slice(0, 190), FIRST))})
+    assert (merger.searched, merger.verified) == (0, 1)
+    contradicted = merger.update({**maps, "b": GrowingMap(room(blank(320, 320), 20, 20, 90, 130))})
+    assert contradicted.groups() == [["a"], ["b"]]
+
+
+def test_a_pair_that_is_found_elsewhere_the_second_time_is_not_confirmed():
+    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0)
+    merger.update({"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))})
+    # The second robot's frame has jumped by half a metre: what was found before is gone, and the new place waits in its turn.
+    jumped = GrowingMap(part(slice(60, 220), SECOND, 1), (0.5, 0.0))
+    moved_frame = merger.update({"a": GrowingMap(part(slice(0, 170), FIRST)), "b": jumped})
+    assert moved_frame.pairs["a", "b"].is_accepted
+    assert moved_frame.groups() == [["a"], ["b"]]
+    assert merger.update({"a": GrowingMap(part(slice(0, 190), FIRST)), "b": jumped}).groups() == [["a", "b"]]
+
+
 def test_verification_refines_a_transform_or_says_why_not():
     settings = merge_settings()
     a, b = (described(levels, RESOLUTION, settings) for levels in (part(slice(0, 150), FIRST), part(slice(60, 220), SECOND, 1)))
@@ -126,3 +156,31 @@ def test_edges_can_be_replaced_while_the_world_stays():
     assert tree.groups()[0][0] == root
     tree.remove_map(root)
     assert all(root not in group for group in tree.groups())
+
+
+def test_few_pairs_are_tried_in_turn_and_those_that_others_join_are_not():
+    merger = IncrementalMerger(RESOLUTION, tries_per_update=1)
+    maps = {
+        "a": GrowingMap(part(slice(0, 150), FIRST)),
+        "b": GrowingMap(part(slice(60, 220), SECOND, 1)),
+        "c": GrowingMap(part(slice(30, 180), SECOND, 2)),
+    }
+    groups = []
+    for _ in range(4):
+        groups.append(merger.update(maps).groups())
+        assert merger.searched + merger.verified <= 1
+    assert groups[0] == [["a", "b"], ["c"]]
+    assert groups[1] == groups[3] == [["a", "b", "c"]]
+    assert len(merger.update(maps).pairs) == 2
+
+
+def test_a_pair_that_is_left_alone_stays_in_place_while_a_map_grows_beyond_its_corner():
+    merger = IncrementalMerger(RESOLUTION)
+    maps = {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    before = merger.update(maps).tree.lookup("a", "b")
+    larger = {"a": grown(maps["a"].levels, 30, 41), "b": grown(maps["b"].levels, 7, 0)}
+    after = merger.update(larger, frozenset())
+    assert (merger.searched, merger.verified) == (0, 0)
+    distance, angle = after.tree.lookup("a", "b").difference(before, (8.0, 8.0))
+    assert distance < 1e-9
+    assert angle < 1e-9

@@ -1,0 +1,314 @@
+"""Policies that are led: a supervisor over any policy that goes to goals, and what it is compared with."""
+
+import math
+from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.frontier import NearestFrontier
+from lidarium.agents.policy import Action, GivenUp, PerRobot, Policy, Stop, Team
+from lidarium.agents.supervisor.log import Decision, Join, StationEvent
+from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.agents.supervisor.station import MergeStation
+from lidarium.agents.supervisor.supervisor import Command, Supervisor
+from lidarium.envs.exploration import Observation
+from lidarium.envs.onboard.belief import Belief
+from lidarium.envs.onboard.reports import Report
+from lidarium.envs.onboard.state import DriveState, OperatingState, Order, OrderKind
+from lidarium.envs.onboard.team_driver import footprint_of
+from lidarium.mapping.frontiers import FRONTIER
+from lidarium.mapping.grid_planning import cells_of
+from lidarium.mapping.merging.fusion import FusedMap
+
+PATIENCE_S = 20.0
+"""A robot that was sent somewhere and has not moved for this long explores by itself again [s]."""
+
+MOVED_M = 0.15
+"""What counts as having moved [m]."""
+
+LOST_S = 2.0
+"""An order that a robot has not taken after this long has not reached it [s]."""
+
+
+@dataclass(slots=True)
+class _Errand:
+    """Where a robot is sent by an order, and where it was when it last had moved."""
+
+    command: Command
+    order: Order
+    since_s: float
+    place: tuple[float, float]
+    is_new: bool = True
+    is_taken: bool = False
+
+
+class Supervised:
+    """A supervisor over a policy: robots explore by that policy, the station merges their maps, and the tree redirects and stops them.
+
+    Robots that are joined are told what the others know, so the policy explores on the merged map where it looks at the shared one.
+
+    Parameters
+    ----------
+    policy : Policy
+        What each robot explores by, of level ``waypoint`` or ``frontier``.
+    settings : SupervisorSettings or None
+        How it is led; the defaults where None.
+    **options
+        Settings by name, in place of ``settings``.
+
+    Attributes
+    ----------
+    has_begun : bool
+        Whether there was an episode; before it there is nothing of what follows.
+    decisions, events, joins : list
+        What was decided, what happened at the station, and how the robots' frames lie as it found.
+
+    Raises
+    ------
+    ValueError
+        Where the policy decides speeds, or a setting cannot be used; at the reset, where starts are to be trusted that nobody knows.
+    """
+
+    def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
+        if policy.level not in ("waypoint", "frontier"):
+            raise ValueError(f"a policy of level {policy.level!r} goes to no goals; want one of level 'waypoint' or 'frontier'")
+        if settings is not None and options:
+            raise ValueError(f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other")
+        self.policy, self.settings = policy, settings or SupervisorSettings(**options)
+        self.level, self.shares_map = policy.level, True
+        self.has_begun = False
+
+    @property
+    def decisions(self) -> list[Decision]:
+        """All decisions of the episode."""
+        return self._supervisor.decisions
+
+    @property
+    def events(self) -> list[StationEvent]:
+        """What happened at the station."""
+        return self._supervisor.station.events
+
+    @property
+    def joins(self) -> list[Join]:
+        """How the frames of robots lie, as was found."""
+        return self._supervisor.station.joins if self.has_begun else []
+
+    @property
+    def given_up(self) -> list[GivenUp]:
+        """What the robots left unexplored."""
+        return list(getattr(self.policy, "given_up", []))
+
+    def reset(self, team: Team, seed: int) -> None:
+        """Begin an episode."""
+        self._team, self.has_begun = team, True
+        belief = team.belief(team.agents[0])
+        knows_starts = belief.shared_map is not None
+        settings = self.settings if not knows_starts else _trusting(self.settings)
+        station = MergeStation(team.agents, belief.map.resolution, belief.radius, settings)
+        reports = [report for agent in team.agents if (report := team.report(agent)) is not None]
+        if settings.trusts_starts and any(report.frame is None for report in reports):
+            raise ValueError(
+                "robots with unknown starts do not know how they stand to each other; want reveals_starts, which tells the station"
+            )
+        self._supervisor = Supervisor(station, footprint_of(belief.radius))
+        self._tells = not knows_starts
+        self._errands: dict[str, _Errand] = {}
+        self._given_up: dict[str, NDArray[np.float64]] = {}
+        self._told: set[str] = set()
+        self._look_due, self._merge_due = settings.period_s, 0.0
+        self._exploring: set[str] = set()
+        self.policy.reset(_Led(team, self._exploring), seed)
+
+    def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
+        """Let the policy decide for all robots that the supervisor has not sent anywhere."""
+        stops = self._supervise()
+        for agent in observations:
+            self._review(agent)
+        standing = self._supervisor.standing_by
+        free = {
+            agent: observation
+            for agent, observation in observations.items()
+            if agent not in stops and agent not in standing and not self._is_away(agent)
+        }
+        actions: dict[str, Action] = self.policy.act(free) if free else {}
+        self._exploring.clear()
+        self._exploring.update(free)
+        is_work_left = any(not isinstance(action, Stop) for action in actions.values()) or bool(self._errands)
+        for agent in observations:
+            if agent in stops:
+                actions[agent] = stops[agent]
+            elif self._is_away(agent):
+                # Who is on his way needs no action: he goes on as he was told.
+                if (action := self._sent(agent)) is not None:
+                    actions[agent] = action
+            elif agent in standing:
+                actions[agent] = self._rest(agent, observations[agent]) if is_work_left else Stop("no_frontier")
+            elif is_work_left and isinstance(actions[agent], Stop):
+                # It may have to move aside, or get work when the others find more.
+                actions[agent] = self._rest(agent, observations[agent])
+        return actions
+
+    def _supervise(self) -> dict[str, Action]:
+        """Take in reports, merge and look at the tree where it is time; return the robots that stop."""
+        now, settings, station = self._team.time_s, self.settings, self._supervisor.station
+        is_look, is_merge = now >= self._look_due, now >= self._merge_due
+        if not (is_look or is_merge):
+            return {}
+        self._collect(now)
+        self._merge_due = _next(now, settings.merge_period_s)
+        station.merge(now)
+        if self._tells:
+            self._tell()
+        if not is_look:
+            return {}
+        self._look_due = _next(now, settings.period_s)
+        stops: dict[str, Action] = {}
+        for command in self._supervisor.look(now, self._given_up):
+            self._obey(command, stops)
+        return stops
+
+    def _collect(self, now: float) -> None:
+        """Take in what has reached the station."""
+        station = self._supervisor.station
+        for agent in station.agents:
+            report = self._team.report(agent)
+            station.receive(agent, report, now)
+            if report is not None and report is station.reports.get(agent) and math.isclose(report.time_s, now, abs_tol=1e-6):
+                places = [(entry.x, entry.y) for entry in self.given_up if entry.agent == agent]
+                self._given_up[agent] = np.array(places, np.float64).reshape(-1, 2)
+
+    def _tell(self) -> None:
+        """Tell each robot what the others of its group know; take it back from one that is joined no more."""
+        station = self._supervisor.station
+        for group in station.groups():
+            for agent in group:
+                others = [mate for mate in group if mate != agent]
+                if not others and agent not in self._told:
+                    continue
+                if self._team.tell(agent, station.fused(others, agent) if others else None):
+                    (self._told.add if others else self._told.discard)(agent)
+
+    def _obey(self, command: Command, stops: dict[str, Action]) -> None:
+        """Begin what a robot is ordered to do."""
+        agent = command.agent
+        if command.kind is OrderKind.STOP:
+            self._errands.pop(agent, None)
+            if agent not in self._supervisor.standing_by or self.settings.is_stop_final:
+                stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == 5 else "stopped")
+        elif command.target is not None:
+            under_way = self._errands.get(agent)
+            if under_way is not None and under_way.command.is_home and command.is_home:
+                return
+            x, y, _ = self._team.belief(agent).pose.tolist()
+            order = Order(OrderKind.GO_TO, command.target, f"rule {command.rule}: {command.why}")
+            self._errands[agent] = _Errand(command, order, self._team.time_s, (x, y))
+
+    def _review(self, agent: str) -> None:
+        """End an errand that is done, or that cannot be."""
+        errand = self._errands.get(agent)
+        if errand is None or errand.is_new:
+            return
+        if not errand.is_taken:
+            errand.is_taken = self._team.last_order(agent) is errand.order
+            if not errand.is_taken:
+                if self._team.time_s - errand.since_s > LOST_S:
+                    del self._errands[agent]
+                return
+        belief, state = self._team.belief(agent), self._team.drive_state(agent)
+        if errand.command.is_home:
+            return
+        x, y, _ = belief.pose.tolist()
+        if state is DriveState.GIVING_WAY or math.dist((x, y), errand.place) > MOVED_M:
+            errand.since_s, errand.place = self._team.time_s, (x, y)
+        is_stuck = self._team.time_s - errand.since_s > PATIENCE_S
+        if state in (DriveState.ARRIVED, DriveState.NO_PATH) or is_stuck or not _is_frontier(belief, errand.command.looks_at):
+            del self._errands[agent]
+
+    def _is_away(self, agent: str) -> bool:
+        """Whether a robot is on an errand or gets the order now; until it has taken the order the policy drives it."""
+        errand = self._errands.get(agent)
+        return errand is not None and (errand.is_new or errand.is_taken)
+
+    def _sent(self, agent: str) -> Action:
+        """Return what a robot on an errand is told: its order at first, to end where it came home, else nothing."""
+        errand, state = self._errands[agent], self._team.drive_state(agent)
+        if errand.is_new:
+            errand.is_new = False
+            return errand.order
+        if errand.command.is_home and state in (DriveState.ARRIVED, DriveState.NO_PATH):
+            return Stop("returned" if state is DriveState.ARRIVED else "unreachable")
+        return None
+
+    def _rest(self, agent: str, observation: Observation) -> Action:
+        return len(observation["frontiers"]) if self.level == "frontier" else None
+
+
+class _Led:
+    """A team as the policy under a supervisor sees it: what a robot drives for the supervisor is none of its business."""
+
+    def __init__(self, team: Team, exploring: AbstractSet[str]) -> None:
+        self._team, self._exploring = team, exploring
+
+    @property
+    def agents(self) -> list[str]:
+        return self._team.agents
+
+    @property
+    def time_s(self) -> float:
+        return self._team.time_s
+
+    def belief(self, agent: str) -> Belief:
+        return self._team.belief(agent)
+
+    def drive_state(self, agent: str) -> DriveState:
+        return self._team.drive_state(agent) if agent in self._exploring else DriveState.IDLE
+
+    def operating_state(self, agent: str) -> OperatingState:
+        return self._team.operating_state(agent)
+
+    def report(self, agent: str) -> Report | None:
+        return self._team.report(agent)
+
+    def last_order(self, agent: str) -> Order | None:
+        return self._team.last_order(agent)
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        return self._team.tell(agent, others)
+
+
+def supervised(**options: Any) -> Supervised:  # noqa: ANN401
+    """Return nearest-frontier explorers under a supervisor; options are those of ``SupervisorSettings``."""
+    return Supervised(NearestFrontier(), **options)
+
+
+def oracle_starts(**options: Any) -> Supervised:  # noqa: ANN401
+    """Return the same, for robots that are told how they stand to each other at the start, as a bound."""
+    return Supervised(NearestFrontier(), **{"trusts_starts": True, **options})
+
+
+def independent() -> PerRobot:
+    """Return nearest-frontier explorers that know nothing of each other, as a bound."""
+    return PerRobot(lambda: NearestFrontier(shares_map=False))
+
+
+def _trusting(settings: SupervisorSettings) -> SupervisorSettings:
+    return replace(settings, trusts_starts=True)
+
+
+def _next(now: float, period_s: float) -> float:
+    return (math.floor(now / period_s + 1e-9) + 1.0) * period_s
+
+
+def _is_frontier(belief: Belief, place: tuple[float, float] | None) -> bool:
+    """Whether there still is a frontier at a place of a robot's map frame [m], within what frames may miss each other by."""
+    if place is None:
+        return True
+    navigation = belief.map if belief.shared_map is None else belief.shared_map
+    row, column = cells_of(np.asarray(place), belief.map_origin, navigation.resolution).tolist()
+    reach = round(0.3 / navigation.resolution)
+    around = navigation.frontiers.flags[max(row - reach, 0) : max(row + reach + 1, 0), max(column - reach, 0) : max(column + reach + 1, 0)]
+    return bool((around == FRONTIER).any())

@@ -1,0 +1,96 @@
+"""What can be chosen about the supervisor: its periods, what the thesis leaves open, and what goes beyond it."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal, get_args
+
+Assignment = Literal["pairs", "hungarian", "utility"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SupervisorSettings:
+    """How a supervisor merges maps and leads its robots.
+
+    Attributes
+    ----------
+    period_s : float
+        Simulated time between two looks at the tree [s].
+    merge_period_s : float
+        Simulated time between two merges of the maps [s].
+    pairs_per_merge : int
+        Most pairs of maps that a merge compares; the others wait for their turn.
+    merge_resolution_m : float
+        Maps are compared in cells of this side, or of theirs where that is more [m].
+    confirmation_growth_m2 : float
+        Two maps are joined only when they were found twice, the second time when they know so much more [m2].
+    same_goal_m : float
+        Goals that lie nearer to each other than this are one [m].
+    least_frontier_m : float
+        Frontiers shorter than this are no goals [m].
+    least_left_m : float
+        The work of a group is done when no frontier of this length is left on its map within reach [m].
+    unbalanced_share : float
+        A robot whose share of the map is smaller than this part of its teammates' mean is sent where there is more to map.
+    enclosed_way_m, enclosed_gain_m2_per_m : float
+        A robot that has mapped less than this on each metre of its last way of this length is enclosed [m, m2/m].
+    cost_weight : float
+        Utility of a goal that a metre of way costs [1/m].
+    sensor_range_m : float
+        What a robot at its goal sees, and how far around the map there may be more of it [m].
+    assignment : str
+        Who is given goals: ``pairs`` those robots alone that the rules redirect, one after the other; ``hungarian`` all robots of a group
+        at each look, by the least sum of costs; ``utility`` likewise, best pair of robot and goal first.
+    is_stop_final : bool
+        Whether a robot that the rules stop while its teammates work has ended; otherwise it stands by and goes on when there is a goal.
+    avoids_rendezvous : bool
+        Whether robots are separated that are about to meet at goals near each other.
+    rendezvous_m : float
+        How near such goals are [m].
+    returns_home : bool
+        Whether the robots drive to where they began when the work is done.
+    battery_margin : float
+        A robot turns back when what its battery holds is less than this many times what the way home costs; 0 for never.
+    trusts_starts : bool
+        Whether robots that know how their frames lie in a common one are joined by that; nothing is searched for then.
+
+    Raises
+    ------
+    ValueError
+        Where a setting cannot be used; it is named.
+    """
+
+    period_s: float = 10.0
+    merge_period_s: float = 2.0
+    pairs_per_merge: int = 2
+    merge_resolution_m: float = 0.05
+    confirmation_growth_m2: float = 2.0
+    same_goal_m: float = 1.0
+    least_frontier_m: float = 0.5
+    least_left_m: float = 0.5
+    unbalanced_share: float = 0.5
+    enclosed_way_m: float = 10.0
+    enclosed_gain_m2_per_m: float = 0.1
+    cost_weight: float = 0.05
+    sensor_range_m: float = 5.6
+    assignment: Assignment = "pairs"
+    is_stop_final: bool = False
+    avoids_rendezvous: bool = False
+    rendezvous_m: float = 3.0
+    returns_home: bool = False
+    battery_margin: float = 0.0
+    trusts_starts: bool = False
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.type is bool and not isinstance(value, bool):
+                raise ValueError(f"{field.name} of the supervisor is {value!r}; want true or false")
+            if field.type is float and not (isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{field.name} of the supervisor is {value!r}; want a number of at least 0")
+        if isinstance(self.pairs_per_merge, bool) or not isinstance(self.pairs_per_merge, int) or self.pairs_per_merge < 1:
+            raise ValueError(f"pairs_per_merge of the supervisor is {self.pairs_per_merge!r}; want a whole number of at least 1")
+        for name in ("period_s", "merge_period_s", "enclosed_way_m", "sensor_range_m"):
+            if getattr(self, name) == 0.0:
+                raise ValueError(f"{name} of the supervisor is 0; want a positive number")
+        if self.assignment not in get_args(Assignment):
+            raise ValueError(f"assignment of the supervisor is {self.assignment!r}; want one of {', '.join(get_args(Assignment))}")

@@ -1,0 +1,212 @@
+"""The station: it collects what robots report, merges their maps, and knows how the frames of those lie that it has joined."""
+
+from collections import deque
+from collections.abc import Mapping
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.supervisor.log import Join, StationEvent
+from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
+from lidarium.envs.onboard.reports import Report
+from lidarium.envs.onboard.state import OperatingState
+from lidarium.envs.wrappers.merged_maps import TEAM_VALIDATION
+from lidarium.mapping.merging.described_map import resampled
+from lidarium.mapping.merging.frame_tree import Edge, FrameTree
+from lidarium.mapping.merging.fusion import FusedMap, fuse
+from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
+from lidarium.mapping.merging.merger import Merged, placed
+from lidarium.mapping.merging.pair import PairResult
+from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.occupancy import UNKNOWN
+from lidarium.mapping.rigid import Transform
+
+Pair = tuple[str, str]
+
+
+class MergeStation:
+    """What is known where all reports come together; it knows nothing else.
+
+    Parameters
+    ----------
+    agents : list of str
+        The team.
+    resolution : float
+        Side of a cell of the robots' maps [m].
+    radius : float
+        Of the robots' bodies [m].
+    settings : SupervisorSettings
+        How maps are joined.
+    merge : MergeSettings or None
+        How maps are merged; by default with the bounds for teams whose robots map each other's bodies.
+
+    Attributes
+    ----------
+    reports : dict of str to Report
+        The latest of each robot that ever reported.
+    joins : list of Join
+        All transforms that were found, in their order in time.
+    events : list of StationEvent
+        What happened.
+    """
+
+    def __init__(
+        self, agents: list[str], resolution: float, radius: float, settings: SupervisorSettings, merge: MergeSettings | None = None
+    ) -> None:
+        self.agents, self.resolution, self.settings, self._radius = list(agents), resolution, settings, radius
+        merge = merge or MergeSettings(validation=TEAM_VALIDATION)
+        self._merge_resolution = max(resolution, settings.merge_resolution_m)
+        self._merger = IncrementalMerger(
+            self._merge_resolution,
+            merge,
+            confirmation_growth_m2=settings.confirmation_growth_m2,
+            tries_per_update=settings.pairs_per_merge,
+        )
+        self._merge = merge
+        self._tree: FrameTree[str] = FrameTree(merge.cycle_distance_m, merge.cycle_angle)
+        self._found: set[Pair] = set()
+        self._joined: set[Pair] = set()
+        self._tracks: dict[str, deque[tuple[float, float]]] = {agent: deque() for agent in agents}
+        self._middles: dict[Pair, tuple[float, float]] = {}
+        self._trails: dict[str, list[tuple[float, float]]] = {agent: [] for agent in agents}
+        self.reports: dict[str, Report] = {}
+        self.joins: list[Join] = []
+        self.events: list[StationEvent] = []
+
+    def receive(self, agent: str, report: Report | None, time_s: float) -> None:
+        """Take a report in; one that is older than the last one is dropped, and None is none."""
+        before = self.reports.get(agent)
+        if report is None or report is before:
+            return
+        if before is not None and report.time_s < before.time_s:
+            self._note(time_s, "late", (agent,), f"of {report.time_s:.1f} s, there is one of {before.time_s:.1f} s")
+            return
+        if report.state is OperatingState.FAILED and (before is None or before.state is not OperatingState.FAILED):
+            self._note(time_s, "excluded", (agent,), "it has failed; its map is not used any more")
+        self.reports[agent] = report
+        self._trails[agent].append((report.pose.x, report.pose.y))
+        track = self._tracks[agent]
+        track.append((report.travelled_m, self.known_m2(agent)))
+        while len(track) > 1 and track[1][0] <= report.travelled_m - self.settings.enclosed_way_m:
+            track.popleft()
+
+    def known_m2(self, agent: str) -> float:
+        """Return how much a robot's own map knows [m2], 0 where it never reported."""
+        report = self.reports.get(agent)
+        return 0.0 if report is None else float(np.count_nonzero(report.map.levels != UNKNOWN)) * self.resolution**2
+
+    def is_enclosed(self, agent: str) -> bool:
+        """Whether a robot has mapped too little on the last of its way."""
+        track = self._tracks[agent]
+        if not track or track[-1][0] - track[0][0] < self.settings.enclosed_way_m:
+            return False
+        way, gain = (last - first for first, last in zip(track[0], track[-1], strict=True))
+        return gain < self.settings.enclosed_gain_m2_per_m * way
+
+    def merge(self, time_s: float) -> None:
+        """Merge the maps of all robots that have not failed."""
+        used = {agent: self.reports[agent] for agent in self.agents if self._is_used(agent)}
+        if self.settings.trusts_starts:
+            self._join_by_starts(used)
+        elif used:
+            merged = self._merger.update({agent: self._own_map(agent) for agent in used})
+            self._tree = merged.tree
+            self._middles = {pair: self._middle(pair, result) for pair, result in merged.pairs.items() if result.is_accepted}
+            self._note_found(merged, time_s)
+        self._note_joins(time_s, used)
+
+    def groups(self) -> list[list[str]]:
+        """Return the robots that are joined with one another and have maps to use, each group in the order of the team."""
+        groups: list[list[str]] = []
+        for agent in self.agents:
+            if not self._is_used(agent):
+                continue
+            group = next((one for one in groups if self.lookup(one[0], agent) is not None), None)
+            if group is None:
+                groups.append([agent])
+            else:
+                group.append(agent)
+        return groups
+
+    def lookup(self, target: str, source: str) -> Transform | None:
+        """Return the transform of a robot's map frame into that of another, None where they are not joined."""
+        if target == source:
+            return Transform()
+        names = self._tree.names
+        return self._tree.lookup(target, source) if target in names and source in names else None
+
+    def fused(self, agents: list[str], into: str) -> FusedMap | None:
+        """Return the map of some joined robots in the frame of one of their group; None where nobody knows anything."""
+        frames = {agent: frame for agent in agents if self._is_used(agent) and (frame := self.lookup(into, agent)) is not None}
+        if not frames:
+            return None
+        maps = [self._map_without_bodies(agent) for agent in frames]
+        places = [frame @ placed(one.origin) for one, frame in zip(maps, frames.values(), strict=True)]
+        return fuse([one.levels for one in maps], places, self.resolution)
+
+    def _own_map(self, agent: str) -> GrowingMap:
+        """Return a robot's map as it is compared with others."""
+        whole = self.reports[agent].map
+        coarse = GrowingMap(resampled(whole.levels, self.resolution, self._merge_resolution), whole.origin)
+        return without_own_trail(coarse, self._trail(agent), self._radius, self._merge_resolution)
+
+    def _map_without_bodies(self, agent: str) -> GrowingMap:
+        """Return a robot's map without what it may have drawn of those that it is joined with."""
+        mates = {mate: frame for mate in self.agents if mate != agent and (frame := self.lookup(agent, mate)) is not None}
+        trails = [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
+        return without_bodies(self.reports[agent].map, trails, self._radius, self.resolution)
+
+    def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
+        """Return the middle of what two maps both know, in the second robot's map frame [m]."""
+        x, y = placed(self.reports[pair[1]].map.origin).apply(result.agreement.centre).tolist()
+        return x, y
+
+    def _place(self, agent: str) -> tuple[float, float]:
+        pose = self.reports[agent].pose
+        return pose.x, pose.y
+
+    def _trail(self, agent: str) -> NDArray[np.float64]:
+        return np.array(self._trails[agent], np.float64).reshape(-1, 2)
+
+    def _is_used(self, agent: str) -> bool:
+        """Whether a robot's map is used: it has reported something, and has not failed (rules 1 and 2)."""
+        report = self.reports.get(agent)
+        return report is not None and report.state is not OperatingState.FAILED and bool((report.map.levels != UNKNOWN).any())
+
+    def _join_by_starts(self, used: Mapping[str, Report]) -> None:
+        """Join all robots that know how their frames lie in a common one."""
+        known = {agent: report.frame for agent, report in used.items() if report.frame is not None}
+        self._tree = FrameTree(self._merge.cycle_distance_m, self._merge.cycle_angle)
+        for agent in used:
+            self._tree.add_map(agent)
+        for a, b in list(zip(known, list(known)[1:], strict=False)):
+            self._tree.add_edge(Edge(a, b, known[a].inverse() @ known[b], 1.0))
+
+    def _note_found(self, merged: Merged, time_s: float) -> None:
+        """Note pairs that were found and wait to be confirmed."""
+        found = {pair for pair, result in merged.pairs.items() if result.is_accepted}
+        for a, b in sorted(found - self._found):
+            result = merged.pairs[a, b]
+            if result.a_from_b is None or self.lookup(a, b) is not None:
+                continue
+            first, second = (placed(self.reports[name].map.origin) for name in (a, b))
+            self.joins.append(Join(time_s, a, b, first @ result.a_from_b @ second.inverse(), self._middles[a, b], False))
+            self._note(time_s, "found", (a, b), f"{result.agreement.evidence_m:.1f} m of walls speak for it")
+        self._found = found
+
+    def _note_joins(self, time_s: float, used: Mapping[str, Report]) -> None:
+        """Note which robots have come to be joined, and which are no more."""
+        joined = {pair: frame for pair in combinations(used, 2) if (frame := self.lookup(*pair)) is not None}
+        for a, b in sorted(self._joined - set(joined)):
+            why = "a robot has failed" if not (a in used and b in used) else "the maps contradict it by now"
+            self._note(time_s, "dropped", (a, b), why)
+        for (a, b), frame in joined.items():
+            if (a, b) not in self._joined:
+                self.joins.append(Join(time_s, a, b, frame, self._middles.get((a, b), self._place(b)), True))
+                self._note(time_s, "joined", (a, b), f"x {frame.x:.2f} m, y {frame.y:.2f} m, theta {frame.theta:.3f} rad")
+        self._joined = set(joined)
+
+    def _note(self, time_s: float, event: str, agents: tuple[str, ...], words: str) -> None:
+        self.events.append(StationEvent(time_s, event, agents, words))

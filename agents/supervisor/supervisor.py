@@ -1,0 +1,287 @@
+"""A look at the tree: what the station knows of each robot becomes a case, the tree answers it, and orders to go get their goals."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.supervisor.assignment import NOBODY, assign_by_cost, assign_by_utility, best_goal
+from lidarium.agents.supervisor.log import Decision, StationEvent
+from lidarium.agents.supervisor.station import MergeStation
+from lidarium.agents.supervisor.survey import Survey
+from lidarium.agents.supervisor.tree import HOME, OTHER, RICH, Case, Leaf, Node, RobotInputs, decide, decision_tree
+from lidarium.envs.onboard.state import OperatingState, OrderKind, Target
+from lidarium.mapping.grid_planning import Footprint
+
+STICKINESS_M = 1.0
+"""Where all robots get goals at once, the one that a robot has counts as so much nearer [m]."""
+
+LEAST_WAY_M = 1.0
+"""What a metre costs a battery is told after a way of this length [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """An order to a robot, and what it leads to.
+
+    Attributes
+    ----------
+    agent : str
+        The robot.
+    kind : OrderKind
+        ``STOP`` or ``GO_TO``.
+    rule : int
+        The rule behind it.
+    why : str
+        In words.
+    target : Target or None
+        Where to go, in its map frame.
+    looks_at : (float, float) or None
+        The frontier to see from there, in its map frame [m].
+    is_home : bool
+        Whether it ends where it gets to.
+    """
+
+    agent: str
+    kind: OrderKind
+    rule: int
+    why: str
+    target: Target | None = None
+    looks_at: tuple[float, float] | None = None
+    is_home: bool = False
+
+
+@dataclass(slots=True)
+class _Judged:
+    """A case, what the tree said of it, and the goal that was chosen."""
+
+    case: Case
+    leaf: Leaf
+    answers: tuple[tuple[str, bool], ...]
+    goal: int = NOBODY
+    target: Target | None = None
+
+
+class Supervisor:
+    """Leads the robots of a station.
+
+    Parameters
+    ----------
+    station : MergeStation
+        What it knows.
+    footprint : Footprint
+        How the robots pass over a map.
+
+    Attributes
+    ----------
+    decisions : list of Decision
+        All that it decided.
+    standing_by : set of str
+        Robots that have no goal of their own while others of their group work.
+    """
+
+    def __init__(self, station: MergeStation, footprint: Footprint) -> None:
+        self.station, self.footprint, self._settings = station, footprint, station.settings
+        self._tree = decision_tree(station.settings)
+        self.decisions: list[Decision] = []
+        self.standing_by: set[str] = set()
+        self._silent: set[str] = set()
+        self._full_j: dict[str, float] = {}
+
+    def look(self, time_s: float, given_up: Mapping[str, NDArray[np.float64]]) -> list[Command]:
+        """Decide about all robots.
+
+        Parameters
+        ----------
+        time_s : float
+            Now [s].
+        given_up : mapping of str to (N, 2) float64
+            Where robots say that they gave frontiers up, in their map frames [m].
+
+        Returns
+        -------
+        list of Command
+            The orders that follow; a robot without one goes on.
+        """
+        commands: list[Command] = []
+        grouped = self.station.groups()
+        for group in grouped:
+            commands += self._look_at(group, time_s, given_up)
+        for agent in self.station.agents:
+            if not any(agent in group for group in grouped):
+                self._pass_over(agent, time_s)
+        return commands
+
+    def _pass_over(self, agent: str, time_s: float) -> None:
+        """Log a robot that has failed, or of which nothing is known."""
+        if agent in self.station.reports:
+            case = Case(self._inputs(agent, 0.0))
+            self._log(time_s, (agent,), _judged(case, self._tree))
+        elif agent not in self._silent:
+            self._silent.add(agent)
+            self.station.events.append(StationEvent(time_s, "silent", (agent,), "it has not reported yet, and gets no orders"))
+
+    def _look_at(self, group: list[str], time_s: float, given_up: Mapping[str, NDArray[np.float64]]) -> list[Command]:
+        """Decide about the robots of a group."""
+        station = self.station
+        workers = [agent for agent in group if station.reports[agent].state is OperatingState.OPERATING]
+        fused = station.fused(group, group[0])
+        frames = {agent: frame for agent in group if (frame := station.lookup(group[0], agent)) is not None}
+        if fused is None:
+            return []
+        places = [frames[agent].apply(given_up[agent]) for agent in group if agent in given_up and len(given_up[agent])]
+        all_given_up = np.concatenate(places) if places else np.zeros((0, 2))
+        survey = Survey(fused, frames, station.reports, workers, all_given_up, self.footprint, self._settings)
+        judged: dict[str, _Judged] = {}
+        taken: dict[str, int] = dict(survey.going)
+        for agent in group:
+            one = self._judge(agent, group, workers, survey, taken)
+            judged[agent] = one
+            if one.goal != NOBODY:
+                taken[agent] = one.goal
+        if self._settings.assignment != "pairs":
+            self._assign_all(judged, workers, survey)
+        return [command for one in judged.values() if (command := self._command(one, survey, time_s, tuple(group))) is not None]
+
+    def _judge(self, agent: str, group: list[str], workers: list[str], survey: Survey, taken: Mapping[str, int]) -> _Judged:
+        """Put a robot before the tree, and choose its goal where it is to get another."""
+        inputs = self._inputs(agent, survey.known_area_m2)
+        if agent not in workers:
+            return _judged(Case(inputs), self._tree)
+        row = workers.index(agent)
+        rival = self._rival(agent, workers, survey)
+        if agent in self.standing_by and rival is not None:
+            # It has no path of its own; what counts is its way to the goal of the other.
+            goal = survey.going[rival.agent]
+            inputs = replace(inputs, remaining_m=float(survey.goals.costs[row, goal]) if goal != NOBODY else math.inf)
+        others = [mate for mate in workers if mate != agent]
+        worth = np.where(survey.is_goal(), 1.0, -np.inf)
+        for mate in others:
+            place = survey.places[mate]
+            if place is not None:
+                worth = worth - survey.seen_at(place)
+            if taken[mate] != NOBODY:
+                worth[taken[mate]] = -np.inf
+        if survey.going[agent] != NOBODY and rival is not None:
+            worth[survey.going[agent]] = -np.inf
+        costs, weight = survey.goals.costs[row], self._settings.cost_weight
+        other = best_goal(costs, worth, weight)
+        areas = survey.goals.areas
+        richer = best_goal(costs, np.where(np.isfinite(worth), areas / max(float(areas.max(initial=0.0)), 1e-9), -np.inf), weight)
+        going = survey.going[agent]
+        case = Case(
+            robot=inputs,
+            rival=rival,
+            opponent=self._opponent(agent, others, survey) if rival is None and self._settings.avoids_rendezvous else None,
+            has_frontier=survey.has_frontier(),
+            has_other_goal=other != NOBODY,
+            has_richer_goal=richer not in (NOBODY, going) and (going == NOBODY or areas[richer] > areas[going]),
+            is_behind=self._is_behind(agent, group),
+            is_enclosed=self.station.is_enclosed(agent),
+            is_battery_low=self._settings.battery_margin > 0.0 and self._is_battery_low(agent, survey),
+        )
+        one = _judged(case, self._tree)
+        one.goal = {OTHER: other, RICH: richer}.get(one.leaf.aim, NOBODY)
+        return one
+
+    def _inputs(self, agent: str, area_m2: float) -> RobotInputs:
+        report = self.station.reports[agent]
+        share = self.station.known_m2(agent) / area_m2 if area_m2 > 0.0 else 0.0
+        return RobotInputs(agent, report.path_left_m, report.state, min(share, 1.0), report.travelled_m)
+
+    def _rival(self, agent: str, workers: list[str], survey: Survey) -> RobotInputs | None:
+        """Return the nearest other robot with the same goal; to a robot that stands by, the nearest one that has any goal."""
+        is_waiting = agent in self.standing_by
+        mates = [
+            self._inputs(mate, survey.known_area_m2)
+            for mate in workers
+            if mate != agent
+            and mate not in self.standing_by
+            and (survey.places[mate] is not None if is_waiting else survey.is_same_goal(agent, mate, self._settings.same_goal_m))
+        ]
+        return min(mates, key=lambda mate: (mate.remaining_m, mate.agent), default=None)
+
+    def _opponent(self, agent: str, others: list[str], survey: Survey) -> RobotInputs | None:
+        """Return the nearest robot that an agent is about to meet."""
+        mates = [self._inputs(mate, survey.known_area_m2) for mate in others if survey.are_meeting(agent, mate)]
+        return min(mates, key=lambda mate: (mate.remaining_m, mate.agent), default=None)
+
+    def _is_behind(self, agent: str, group: list[str]) -> bool:
+        known = [self.station.known_m2(mate) for mate in group if mate != agent]
+        return bool(known) and self.station.known_m2(agent) < self._settings.unbalanced_share * float(np.mean(known))
+
+    def _is_battery_low(self, agent: str, survey: Survey) -> bool:
+        """Whether what is left would soon not bring a robot home, as metres have cost it until now."""
+        report = self.station.reports[agent]
+        if report.energy_left_j is None:
+            return False
+        full = self._full_j.setdefault(agent, report.energy_left_j)
+        if report.travelled_m < LEAST_WAY_M:
+            return False
+        metre = (full - report.energy_left_j) / report.travelled_m
+        way = survey.way_home_m(agent, report.start)
+        # Where the merged map knows no way, the way that it came is one.
+        return report.energy_left_j < self._settings.battery_margin * metre * min(way, report.travelled_m)
+
+    def _assign_all(self, judged: Mapping[str, _Judged], workers: list[str], survey: Survey) -> None:
+        """Give goals to all robots of a group at once that are to explore."""
+        exploring = [agent for agent in workers if judged[agent].leaf.rule in (0, 3, 4, 7)]
+        rows = [workers.index(agent) for agent in exploring]
+        is_goal = survey.is_goal()
+        costs = np.where(is_goal, survey.goals.costs[rows], math.inf)
+        for row, agent in enumerate(exploring):
+            going = survey.going[agent]
+            if going != NOBODY:
+                costs[row, going] = max(costs[row, going] - STICKINESS_M, 0.0)
+        if self._settings.assignment == "hungarian":
+            goals = assign_by_cost(costs)
+        else:
+            goals = assign_by_utility(costs, survey.seen(), is_goal.astype(np.float64), self._settings.cost_weight)
+        for agent, goal in zip(exploring, goals.tolist(), strict=True):
+            one = judged[agent]
+            if goal == NOBODY:
+                # More robots than goals; whom the rules stop or let go on, they do.
+                if one.leaf.order is OrderKind.GO_TO:
+                    one.leaf, one.goal = Leaf(6, OrderKind.STOP, "the others have all goals"), NOBODY
+            elif goal == survey.going[agent]:
+                one.leaf, one.goal = Leaf(6, None, "it has the goal that it should have"), NOBODY
+            else:
+                one.leaf, one.goal = Leaf(6, OrderKind.GO_TO, "all robots got goals at once", OTHER), goal
+
+    def _command(self, one: _Judged, survey: Survey, time_s: float, group: tuple[str, ...]) -> Command | None:
+        """Return the order to a robot, and log the decision."""
+        agent, leaf = one.case.robot.agent, one.leaf
+        looks_at = None
+        if leaf.order is OrderKind.GO_TO and leaf.aim == HOME:
+            start = self.station.reports[agent].start
+            one.target = Target(start.x, start.y)
+        elif leaf.order is OrderKind.GO_TO:
+            one.target, looks_at = Target(*survey.stand(agent, one.goal)), survey.looks_at(agent, one.goal)
+        self._log(time_s, group, one)
+        if leaf.order is None:
+            if leaf.rule != 2:
+                self.standing_by.discard(agent)
+            return None
+        if leaf.order is OrderKind.STOP and leaf.rule in (3, 6):
+            self.standing_by.add(agent)
+        else:
+            self.standing_by.discard(agent)
+        return Command(agent, leaf.order, leaf.rule, leaf.why, one.target, looks_at, leaf.aim == HOME)
+
+    def _log(self, time_s: float, group: tuple[str, ...], one: _Judged) -> None:
+        case, leaf, target = one.case, one.leaf, one.target
+        pose = self.station.reports[case.robot.agent].pose
+        self.decisions.append(
+            Decision(
+                time_s, case.robot.agent, group, case.robot, case.rival or case.opponent, one.answers, leaf.rule,
+                None if leaf.order is None else leaf.order.value, leaf.why, (pose.x, pose.y),
+                None if target is None else (target.x, target.y),
+            )
+        )  # fmt: skip
+
+
+def _judged(case: Case, tree: Node) -> _Judged:
+    leaf, answers = decide(tree, case)
+    return _Judged(case, leaf, tuple(answers))

@@ -1,0 +1,213 @@
+"""The decision tree, as data: what is asked of a robot, and what follows from the answers.
+
+The rules are those of the thesis, reconstructed from its prose, as its figure is lost; they keep their numbers:
+
+1. A robot that has failed is left out: its map is not used, it gets no order.
+2. The maps of all others are merged, but only robots that operate get orders: one that is paused or stopped may stand against
+   something that moves, and would draw that into its map and trap itself.
+3. Of two robots with one goal the nearer one, by the length of its path, keeps it. The other one gets another goal on the merged map,
+   or is stopped where there is none. (In the thesis's reported run the nearer robot was diverted; see the tests.)
+4. A robot that knows much less of the map than the others is sent where there is more to map. One that is enclosed, having driven far
+   for little, is stopped where there is no such way.
+5. Where the merged map has no frontier left the work is done, and all stop.
+
+Beyond the thesis, each only where it is switched on: 6. all robots of a group get goals at once; 7. robots that would meet are
+separated; 8. robots drive home when the work is done; 9. a robot turns back before its battery is too low for that.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.envs.onboard.state import OperatingState, OrderKind
+
+
+@dataclass(frozen=True, slots=True)
+class RobotInputs:
+    """What the tree knows of a robot.
+
+    Attributes
+    ----------
+    agent : str
+        Its name.
+    remaining_m : float
+        What is left of its path, ``d_rest`` [m].
+    state : OperatingState
+        Its state, ``rob_sta``.
+    map_known : float
+        Share of its group's floor that its own map knows, ``map_kno``.
+    travelled_m : float
+        How far it has come, ``d_trav`` [m].
+    """
+
+    agent: str
+    remaining_m: float
+    state: OperatingState
+    map_known: float
+    travelled_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A robot before the tree: its inputs, and what the station finds out from those of its group and from the merged map.
+
+    Attributes
+    ----------
+    robot : RobotInputs
+        The robot.
+    rival : RobotInputs or None
+        The nearest other operating robot of its group with the same goal.
+    opponent : RobotInputs or None
+        The one that it is about to meet, where such robots are separated.
+    has_frontier : bool
+        Whether any robot of its group can reach a frontier of the merged map.
+    has_other_goal : bool
+        Whether the merged map offers it a goal that no other robot has.
+    has_richer_goal : bool
+        Whether one of these has more to map than where it goes now.
+    is_behind : bool
+        Whether its map is much smaller than those of its group.
+    is_enclosed : bool
+        Whether it has mapped little on a long way.
+    is_battery_low : bool
+        Whether its battery would soon not bring it home.
+    """
+
+    robot: RobotInputs
+    rival: RobotInputs | None = None
+    opponent: RobotInputs | None = None
+    has_frontier: bool = True
+    has_other_goal: bool = True
+    has_richer_goal: bool = False
+    is_behind: bool = False
+    is_enclosed: bool = False
+    is_battery_low: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A question that a case answers with yes or no."""
+
+    name: str
+    words: str
+    holds: Callable[[Case], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """What follows: by which rule, the order or None, and why. ``aim`` says what an order to go leads to."""
+
+    rule: int
+    order: OrderKind | None
+    why: str
+    aim: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A question and what follows from either answer."""
+
+    question: Question
+    yes: "Node | Leaf"
+    no: "Node | Leaf"
+
+
+def _keeps_before(robot: RobotInputs, other: RobotInputs | None) -> bool:
+    """Whether a robot is nearer than another; of two equally near ones the first by name."""
+    return other is None or (robot.remaining_m, robot.agent) <= (other.remaining_m, other.agent)
+
+
+FAILED = Question("failed", "has it failed?", lambda case: case.robot.state is OperatingState.FAILED)
+OPERATING = Question("operating", "does it operate?", lambda case: case.robot.state is OperatingState.OPERATING)
+FRONTIER = Question("frontier", "does the merged map have a frontier left in reach?", lambda case: case.has_frontier)
+SAME_GOAL = Question("same_goal", "has another robot of its group the same goal?", lambda case: case.rival is not None)
+NEARER = Question("nearer", "is it nearer to the goal?", lambda case: _keeps_before(case.robot, case.rival))
+OTHER_GOAL = Question("other_goal", "does the merged map offer another goal?", lambda case: case.has_other_goal)
+BEHIND = Question("behind", "does it know much less of the map than its group?", lambda case: case.is_behind)
+RICHER = Question("richer", "is there a way with more to map?", lambda case: case.has_richer_goal)
+ENCLOSED = Question("enclosed", "has it driven far and mapped little?", lambda case: case.is_enclosed)
+LOW_BATTERY = Question("low_battery", "is its battery just enough to get home?", lambda case: case.is_battery_low)
+MEETING = Question(
+    "meeting",
+    "would it meet a nearer robot, and has another goal on offer?",
+    lambda case: case.has_other_goal and not _keeps_before(case.robot, case.opponent),
+)
+
+OTHER, RICH, HOME = "other", "richer", "home"
+"""What orders to go lead to: a goal that no other robot has, one with more to map, the start."""
+
+
+def decision_tree(settings: SupervisorSettings) -> Node:
+    """Return the tree of the thesis, with the nodes that the settings add."""
+    goes_on = Leaf(0, None, "goes on by itself")
+    balance = Node(
+        BEHIND,
+        Node(
+            RICHER,
+            Leaf(4, OrderKind.GO_TO, "it knows less of the map, and there is more to map elsewhere", RICH),
+            Node(ENCLOSED, Leaf(4, OrderKind.STOP, "it is enclosed"), goes_on),
+        ),
+        goes_on,
+    )
+    if settings.avoids_rendezvous:
+        balance = Node(MEETING, Leaf(7, OrderKind.GO_TO, "it would meet a robot that is nearer", OTHER), balance)
+    rivals = Node(
+        NEARER,
+        Leaf(3, None, "it is the nearer one and keeps the goal"),
+        Node(
+            OTHER_GOAL,
+            Leaf(3, OrderKind.GO_TO, "another robot is nearer to the goal", OTHER),
+            Leaf(3, OrderKind.STOP, "another robot is nearer to the only goal"),
+        ),
+    )
+    done = Leaf(5, OrderKind.STOP, "no frontier is left, the work is done")
+    if settings.returns_home:
+        done = Leaf(8, OrderKind.GO_TO, "no frontier is left, it drives home", HOME)
+    work = Node(FRONTIER, Node(SAME_GOAL, rivals, balance), done)
+    if settings.battery_margin > 0.0:
+        work = Node(LOW_BATTERY, Leaf(9, OrderKind.GO_TO, "its battery is just enough to get home", HOME), work)
+    operating = Node(OPERATING, work, Leaf(2, None, "its map is merged, it gets no order"))
+    return Node(FAILED, Leaf(1, None, "it has failed and is left out"), operating)
+
+
+def decide(tree: Node, case: Case) -> tuple[Leaf, list[tuple[str, bool]]]:
+    """Return the leaf of a case, and the answers on the way to it as names of questions with yes or no."""
+    answers: list[tuple[str, bool]] = []
+    place: Node | Leaf = tree
+    while isinstance(place, Node):
+        is_so = place.question.holds(case)
+        answers.append((place.question.name, is_so))
+        place = place.yes if is_so else place.no
+    return place, answers
+
+
+def leaves(tree: Node | Leaf) -> Iterator[Leaf]:
+    """Yield all leaves, that of yes before that of no."""
+    if isinstance(tree, Leaf):
+        yield tree
+    else:
+        yield from leaves(tree.yes)
+        yield from leaves(tree.no)
+
+
+def words_of(leaf: Leaf) -> str:
+    """Return a leaf in one line."""
+    rule = f"rule {leaf.rule}: " if leaf.rule else ""
+    aims = {OTHER: "another goal", RICH: "where there is more to map", HOME: "home"}
+    order = "no order" if leaf.order is None else " ".join([leaf.order.value.replace("_", " "), *([aims[leaf.aim]] if leaf.aim else [])])
+    return f"{rule}{order} ({leaf.why})"
+
+
+def tree_text(tree: Node | Leaf, indent: str = "") -> str:
+    """Return the tree as indented lines, as `lidarium show supervisor` prints it."""
+    if isinstance(tree, Leaf):
+        return indent + words_of(tree)
+    branches = [(answer, tree_text(branch, indent + "    ").lstrip()) for answer, branch in (("yes", tree.yes), ("no", tree.no))]
+    return "\n".join([indent + tree.question.words, *(f"{indent}  {answer}: {text}" for answer, text in branches)])
+
+
+def tree_data(tree: Node | Leaf) -> dict[str, object]:
+    """Return the tree as a dictionary for JSON."""
+    if isinstance(tree, Leaf):
+        return {"rule": tree.rule, "order": None if tree.order is None else tree.order.value, "why": tree.why}
+    return {"test": tree.question.name, "question": tree.question.words, "yes": tree_data(tree.yes), "no": tree_data(tree.no)}

@@ -1,0 +1,91 @@
+"""The station joins what it has found twice, drops what contradicts, and fuses maps without the bodies of robots."""
+
+import math
+
+import numpy as np
+import pytest
+from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
+from reported_halls import RADIUS, hall, report
+
+from lidarium.agents.supervisor.settings import SupervisorSettings
+from lidarium.agents.supervisor.station import MergeStation
+from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
+from lidarium.mapping.merging.incremental import GrowingMap
+
+FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
+
+
+def part(columns, pose, seed=0):
+    return GrowingMap(noisy(moved(kept(apartment(), slice(0, 180), columns), pose), seed))
+
+
+@pytest.fixture
+def station():
+    """A station at which two robots were found, and confirmed when the first one's map had grown."""
+    station = MergeStation(["a", "b"], RESOLUTION, RADIUS, SupervisorSettings(merge_resolution_m=RESOLUTION))
+    for time_s, columns in ((2.0, 150), (4.0, 151), (6.0, 170)):
+        for agent, known in (("a", part(slice(0, columns), FIRST)), ("b", part(slice(60, 220), SECOND, 1))):
+            station.receive(agent, report(known, 8.0, 8.0, time_s=time_s, frame=None), time_s)
+        station.merge(time_s)
+    return station
+
+
+def test_a_join_is_used_only_after_it_was_found_twice(station):
+    assert [(join.time_s, join.is_used) for join in station.joins] == [(2.0, False), (6.0, True)]
+    assert [event.event for event in station.events] == ["found", "joined"]
+    true = FIRST @ SECOND.inverse()
+    for join in station.joins:
+        distance, angle = join.found.difference(true, join.at)
+        assert distance < 0.1
+        assert angle < math.radians(1.0)
+    assert station.groups() == [["a", "b"]]
+    assert station.lookup("a", "b").difference(true, (8.0, 8.0))[0] < 0.1
+
+
+def test_a_join_that_maps_contradict_is_dropped_at_once_and_noted(station):
+    station.receive("b", report(GrowingMap(room(blank(320, 320), 20, 20, 90, 130)), 8.0, 8.0, time_s=8.0, frame=None), 8.0)
+    station.merge(8.0)
+    assert station.groups() == [["a"], ["b"]]
+    assert [event.event for event in station.events][-1] == "dropped"
+    assert station.lookup("a", "b") is None
+
+
+def test_a_map_frame_that_jumps_is_followed(station):
+    """After a closure a robot's map may lie elsewhere in its frame: the old transform is refused, and the new one has to be confirmed."""
+    for time_s, columns in ((8.0, 170), (10.0, 180), (12.0, 190)):
+        jumped = GrowingMap(part(slice(60, 220), SECOND, 1).levels, (2.0, -1.0))
+        station.receive("a", report(part(slice(0, columns), FIRST), 8.0, 8.0, time_s=time_s, frame=None), time_s)
+        station.receive("b", report(jumped, 10.0, 7.0, time_s=time_s, frame=None), time_s)
+        station.merge(time_s)
+    assert station.groups() == [["a", "b"]]
+    x, y = station.lookup("a", "b").apply((10.0, 7.0)).tolist()
+    true_x, true_y = (FIRST @ SECOND.inverse()).apply((8.0, 8.0)).tolist()
+    assert math.dist((x, y), (true_x, true_y)) < 0.1
+
+
+def test_robots_that_are_not_joined_have_maps_of_their_own(station):
+    alone = MergeStation(["a", "b"], RESOLUTION, RADIUS, SupervisorSettings())
+    alone.receive("a", report(hall(), 2.0, 2.0, frame=None), 2.0)
+    assert alone.lookup("a", "b") is None
+    assert alone.fused(["a", "b"], "b") is None
+    alone.merge(2.0)
+    assert alone.groups() == [["a"]]
+    assert alone.fused(["a", "b"], "a").levels.shape == hall().levels.shape
+    assert np.count_nonzero(station.fused(["a", "b"], "a").sources == 3) > 1000
+
+
+def test_where_another_robot_has_been_there_is_no_wall():
+    levels = hall().levels.copy()
+    levels[20:30, 60:70] = 0
+    trail = np.array([[1.0, 1.25], [5.0, 1.25]])
+    cleaned = without_bodies(GrowingMap(levels), [trail], RADIUS, RESOLUTION).levels
+    assert (cleaned[20:30, 60:70] == 127).all()
+    assert (cleaned[[0, -1]] == 0).all()
+    assert (cleaned[levels == 255] == 255).all()
+
+
+def test_a_robot_claims_nothing_of_where_it_has_been():
+    trail = np.array([[1.0, 1.25], [5.0, 1.25]])
+    levels = without_own_trail(hall(), trail, RADIUS, RESOLUTION).levels
+    assert (levels[20:30, 20:100] == 127).all()
+    assert np.count_nonzero(levels == 127) == pytest.approx((4.0 + 0.66) * 0.66 / RESOLUTION**2, rel=0.15)
