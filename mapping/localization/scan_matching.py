@@ -89,7 +89,8 @@ def search(
         return around
     found = np.empty(3)
     _search(
-        grid.levels, grid.column, grid.row, grid.resolution, points, around, steps, turns, step, information, weight / len(points), unseen, found
+        grid.levels, grid.column, grid.row, grid.resolution, points, around, steps, turns, step, information, weight / len(points), unseen,
+        found,
     )  # fmt: skip
     return found
 
