@@ -1,5 +1,6 @@
 """Which way a robot takes: to the goal where it is in sight of a node, through the cheapest opening, or home."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -82,8 +83,15 @@ def choose(
             if found:
                 best = found[int(generator.integers(len(found)))]
                 break
+    if settings.candidates == "goal":
+        cost = math.inf if best is None else _cost(best, tree, lengths, before, settings, senses, limits)
+        at_frontier = _to_frontier(node, memory, settings, senses, targets, limits, cost)
+        if at_frontier:
+            return at_frontier
+        if best is None:
+            return _across(others, source, memory, senses, targets)
     if best is None:
-        return _across(others, source, memory, senses, targets) if settings.candidates == "goal" else []
+        return []
     return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
 
 
@@ -134,15 +142,50 @@ def _cheapest(
     """Return the candidate of least way, with the turn that begins it, and of least distance to the goal where there is one."""
     if not found:
         return None
+    return min(found, key=lambda candidate: _cost(candidate, tree, lengths, before, settings, senses, limits))
 
-    def cost(candidate: Candidate) -> float:
-        legs = way_to(candidate.node, before)
-        first = tree.nodes[legs[0]].place if legs else candidate.place
-        gap = first - senses.pose[:2]
-        turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
-        way = (
-            lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place) + turn * limits.speed / limits.turn_rate
-        )
-        return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(candidate.place, senses.goal))
 
-    return min(found, key=cost)
+def _cost(
+    candidate: Candidate,
+    tree: Tree,
+    lengths: dict[int, float],
+    before: dict[int, int],
+    settings: SrtSettings,
+    senses: Senses,
+    limits: Limits,
+) -> float:
+    legs = [tree.nodes[number].place for number in way_to(candidate.node, before)]
+    way = lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place)
+    return _weighed(way, legs[0] if legs else candidate.place, candidate.place, settings, senses, limits)
+
+
+def _weighed(
+    way: float, first: NDArray[np.float64], last: NDArray[np.float64], settings: SrtSettings, senses: Senses, limits: Limits
+) -> float:
+    """Return what a way costs [m]: its length, the turn towards its first place, and how far from the goal it ends."""
+    gap = first - senses.pose[:2]
+    turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
+    way += turn * limits.speed / limits.turn_rate
+    return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(last, senses.goal))
+
+
+def _to_frontier(
+    node: Node,
+    memory: Memory,
+    settings: SrtSettings,
+    senses: Senses,
+    targets: Sequence[Candidate],
+    limits: Limits,
+    most: float,
+) -> list[Choice]:
+    """Return the way to the nearest frontier of the map, where it costs less than ``most`` and no teammate goes there."""
+    found = memory.frontier(senses.pose[:2], settings.least_frontier)
+    if found is None:
+        return []
+    legs, focus = found
+    candidate = Candidate(node.number, legs[-1], None, focus, is_frontier=True)
+    ends = [senses.pose[:2], *legs]
+    way = sum(math.dist(start, end) for start, end in itertools.pairwise(ends))
+    if not _left_by(targets, [candidate]) or _weighed(way, legs[0], legs[-1], settings, senses, limits) >= most:
+        return []
+    return [*(Choice(place, None) for place in legs[:-1]), Choice(legs[-1], None, candidate)]

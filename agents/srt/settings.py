@@ -51,6 +51,9 @@ class SrtSettings:
         What a metre of way counts against a metre of distance to the goal.
     least_step : float
         Candidates lie farther than this from their node [m].
+    least_frontier : float
+        With ``candidates`` ``goal`` and ``memory`` ``map``, frontiers of the map of at least this length are gone to, where they
+        cost less than all openings [m].
     tries : int
         How many candidates are drawn at a node.
     nodes : int
@@ -89,6 +92,7 @@ class SrtSettings:
     random_share: float = 0.1
     way_weight: float = 1.0
     least_step: float = 0.3
+    least_frontier: float = 0.3
     tries: int = 20
     nodes: int = 500
     time_s: float = math.inf
@@ -110,6 +114,7 @@ class SrtSettings:
         for name in (
             "way_weight",
             "least_step",
+            "least_frontier",
             "time_s",
             "perception",
             "passing_distance",
@@ -143,9 +148,10 @@ THESIS: dict[str, Any] = {
     "memory": "regions",
     "places_nodes_at_targets": True,
     "repeats_nodes": True,
-    "perception": 4.0,
+    "step_share": 0.9,
+    "perception": 0.9,
     "margin": 0.03,
-    "least_step": 0.5,
+    "least_step": 0.25,
     "turn_room": 0.05,
     "looks_around": False,
     "passing_distance": math.inf,
