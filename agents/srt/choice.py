@@ -22,6 +22,9 @@ MATE_SPREAD = 5.0
 MATE_SAME = 1.0
 """What lies this near to what a teammate goes for is the teammate's [m]."""
 
+LAST_FRONTIER = 0.3
+"""Frontiers of the map of at least this length are gone to when nothing else is left [m]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Choice:
@@ -85,12 +88,16 @@ def choose(
                 break
     if settings.candidates == "goal":
         cost = math.inf if best is None else _cost(best, tree, lengths, before, settings, senses, limits)
-        at_frontier = _to_frontier(node, memory, settings, senses, targets, limits, cost)
-        if at_frontier:
+        # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
+        is_asked = best is None or senses.goal is None
+        at_frontier = _to_frontier(node, memory, settings.least_frontier, settings, senses, targets, limits, cost) if is_asked else []
+        if best is None and not at_frontier:
+            at_frontier = _across(others, source, memory, senses, targets)
+        if best is None and not at_frontier:
+            at_frontier = _to_frontier(node, memory, LAST_FRONTIER, settings, senses, targets, limits, cost)
+        if at_frontier or best is None:
             return at_frontier
-        if best is None:
-            return _across(others, source, memory, senses, targets)
-    if best is None:
+    elif best is None:
         return []
     return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
 
@@ -172,14 +179,15 @@ def _weighed(
 def _to_frontier(
     node: Node,
     memory: Memory,
+    least: float,
     settings: SrtSettings,
     senses: Senses,
     targets: Sequence[Candidate],
     limits: Limits,
     most: float,
 ) -> list[Choice]:
-    """Return the way to the nearest frontier of the map, where it costs less than ``most`` and no teammate goes there."""
-    found = memory.frontier(senses.pose[:2], settings.least_frontier)
+    """Return the way to the nearest frontier of the map of at least a length [m], where it costs less than ``most`` and no teammate goes there."""
+    found = memory.frontier(senses.pose[:2], least)
     if found is None:
         return []
     legs, focus = found

@@ -46,14 +46,14 @@ class SrtSettings:
     step_share : float
         Share of the safe radius that the robot goes, in (0, 1).
     random_share : float
-        Share of random choices among those towards the goal.
+        Share of random choices among those of least cost. The tree is complete without: frontiers of the map are gone to in the end.
     way_weight : float
         What a metre of way counts against a metre of distance to the goal.
     least_step : float
         Candidates lie farther than this from their node [m].
     least_frontier : float
         With ``candidates`` ``goal`` and ``memory`` ``map``, frontiers of the map of at least this length are gone to, where they
-        cost less than all openings [m].
+        cost less than all openings; shorter ones when nothing else is left [m].
     tries : int
         How many candidates are drawn at a node.
     nodes : int
@@ -89,17 +89,17 @@ class SrtSettings:
     places_nodes_at_targets: bool = False
     repeats_nodes: bool = False
     step_share: float = 0.8
-    random_share: float = 0.1
+    random_share: float = 0.0
     way_weight: float = 1.0
     least_step: float = 0.3
-    least_frontier: float = 0.3
+    least_frontier: float = 0.6
     tries: int = 20
     nodes: int = 500
     time_s: float = math.inf
     perception: float = math.inf
     margin: float = 0.05
     turn_room: float = 0.0
-    passing_distance: float = 1.5
+    passing_distance: float = 2.5
     looks_around: bool = True
     turning_starts: float = math.radians(40.0)
     turning_ends: float = math.radians(15.0)
