@@ -186,7 +186,7 @@ def _to_frontier(
     limits: Limits,
     most: float,
 ) -> list[Choice]:
-    """Return the way to the nearest frontier of the map of at least a length [m], where it costs less than ``most`` and no teammate goes there."""
+    """Return the way to the map's nearest frontier of at least a length [m], where it costs less than ``most`` and is no teammate's."""
     found = memory.frontier(senses.pose[:2], least)
     if found is None:
         return []

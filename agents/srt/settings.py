@@ -90,7 +90,7 @@ class SrtSettings:
     repeats_nodes: bool = False
     step_share: float = 0.8
     random_share: float = 0.0
-    way_weight: float = 1.0
+    way_weight: float = 0.7
     least_step: float = 0.3
     least_frontier: float = 0.6
     tries: int = 20

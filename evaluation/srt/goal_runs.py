@@ -105,7 +105,9 @@ def measure_goal_run(run: GoalRun) -> dict[str, Any]:
     episode, policy, way = drive_to_goal(run)
     env = episode.env
     world, floor, goal, tables = env.world, env.floor, env.goal, env.world.floors[0]
-    assert floor is not None and goal is not None and tables is not None
+    assert floor is not None
+    assert goal is not None
+    assert tables is not None
     start = way.true[0][:2]
     shortest = shortest_path(tables, (float(start[0]), float(start[1])), goal, env.settings.robot.radius)
     curve = [*way.coverage[::CURVE_PERIOD], way.coverage[-1]]

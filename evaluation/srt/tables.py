@@ -174,9 +174,7 @@ def _spread(runs: Sequence[Line], key: str, digits: int) -> str:
     return f"{statistics.median(values):.{digits}f} ({min(values):.{digits}f} to {max(values):.{digits}f})"
 
 
-def _worst(
-    runs: Sequence[Line], key: str, scale: float, digits: int, worst: Callable[[list[float]], float] = max, unit: str = ""
-) -> str:
+def _worst(runs: Sequence[Line], key: str, scale: float, digits: int, worst: Callable[[list[float]], float] = max, unit: str = "") -> str:
     """Return the mean and, in brackets, the worst of the runs."""
     values = [scale * run[key] for run in runs]
     return f"{statistics.fmean(values):.{digits}f}{unit} ({worst(values):.{digits}f})"
