@@ -202,9 +202,12 @@ class Explorer:
         # Every step sees a little more beyond free rays: a target there stands until the robot has got on.
         is_along_rays = candidate.opening is not None and not candidate.opening.is_gap
         may_drop = departed >= (GOT_ON if is_along_rays else self._settings.least_step)
-        if in_sight or (may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)):
+        has_passed = departed >= self._settings.passing_distance
+        is_dropped = may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)
+        # Without a goal what was seen since may make another way the better one; towards a goal it seldom does.
+        if in_sight or is_dropped or (has_passed and senses.goal is None):
             self._pause(senses, memory)
-        elif is_direct and departed >= self._settings.passing_distance:
+        elif is_direct and has_passed:
             self._add_node(senses, self._node, senses.pose, memory)
 
     def _pause(self, senses: Senses, memory: Memory) -> None:

@@ -67,7 +67,7 @@ class SrtSettings:
     turn_room : float
         A laser region with a return nearer than the robot's radius, the margin and this is not safe [m]; 0 for off.
     passing_distance : float
-        On its way a robot adds a node after this distance [m].
+        On its way a robot adds a node after this distance and, where there is no goal, chooses anew [m].
     looks_around : bool
         Whether a robot turns to see what lies behind it, at its first node and at nodes that are left without openings.
     turning_starts, turning_ends : float
@@ -99,7 +99,7 @@ class SrtSettings:
     perception: float = math.inf
     margin: float = 0.05
     turn_room: float = 0.0
-    passing_distance: float = 2.5
+    passing_distance: float = 1.5
     looks_around: bool = True
     turning_starts: float = math.radians(40.0)
     turning_ends: float = math.radians(15.0)
