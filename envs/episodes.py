@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.starts import check_starts, draw_starts
+from lidarium.envs.floors.starts import check_goal, check_starts, draw_starts
 from lidarium.envs.options import FloorChoice, ResetOptions
 from lidarium.envs.scorer import reward_weights
 from lidarium.envs.settings import ExplorationSettings
@@ -68,8 +68,11 @@ def begin(generator: np.random.Generator, choice: FloorChoice, chosen: ResetOpti
         starts = chosen.starts
     else:
         starts = draw_starts(tables.body, radius, settings.robots, generator, floor.starts)
+    goal = (chosen.goal or floor.goal) if choice.has_goal else None
+    if goal is not None:
+        check_goal(tables.body, goal)
     seed = int(generator.integers(2**63))
-    return Beginning(floor, tables, starts, seed, (chosen.goal or floor.goal) if choice.has_goal else None)
+    return Beginning(floor, tables, starts, seed, goal)
 
 
 def make_world(settings: ExplorationSettings, episodes: int = 1) -> KinematicWorld:

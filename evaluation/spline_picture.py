@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -37,6 +37,7 @@ def save_spline_picture(
     believed_path: NDArray[np.float64] | None = None,
     tree: Sequence[tuple[tuple[float, float], tuple[float, float]]] = (),
     title: str | None = None,
+    safe_regions: Sequence[NDArray[np.float64]] = (),
 ) -> None:
     """Draw a spline map over the true floor.
 
@@ -54,6 +55,8 @@ def save_spline_picture(
         Edges of an exploration tree, parent first [m].
     title : str or None
         The floor's name where None.
+    safe_regions : sequence of (n, 2) float64
+        Outlines of the safe regions of the tree's nodes [m].
     """
     raster = floor.raster(0.01, LASER_HEIGHT, LASER_HEIGHT)
     box = box_around(raster.solid == 0, raster.origin, raster.resolution)
@@ -63,6 +66,7 @@ def save_spline_picture(
     show_cells(axes, np.stack([rgb("#ffffff"), rgb(SOLID)])[solid], box, SOLID)
     handles = [*_draw_map(axes, spline_map), *_draw_paths(axes, true_path, believed_path)]
     if tree:
+        axes.add_collection(PolyCollection(list(safe_regions), facecolors=TREE_COLOUR, alpha=0.06, edgecolors="none", zorder=1))
         axes.add_collection(LineCollection([np.array(edge) for edge in tree], colors=TREE_COLOUR, linewidths=1.1, zorder=4))
         nodes = np.array([point for edge in tree for point in edge])
         axes.plot(*nodes.T, "o", color=TREE_COLOUR, markersize=3.5, zorder=5)

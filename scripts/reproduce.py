@@ -22,7 +22,7 @@ SECONDS_BETWEEN_NEWS = 10.0
 class Reproduce(Command):
     """Run what a page of docs/results shows, and write the page to --out; what has been run before is not run again."""
 
-    name: Positional[Literal["leaderboard", "merging"]]
+    name: Positional[Literal["leaderboard", "merging", "srt"]]
     """which page"""
     data: Path | None = None
     """folder of real floors; without it generated floors alone"""

@@ -42,15 +42,18 @@ class Candidate:
     place : (2,) float64
         Where [m].
     opening : Opening or None
-        What for; None in the base algorithm and for the goal.
+        What for; None in the base algorithm, for the goal and for a frontier of the map.
     focus : (2,) float64
         What there is to look at [m].
+    is_frontier : bool
+        Whether it is for a frontier of the map.
     """
 
     node: int
     place: NDArray[np.float64]
     opening: Opening | None
     focus: NDArray[np.float64]
+    is_frontier: bool = False
 
 
 class CandidateSource:
@@ -108,6 +111,8 @@ class CandidateSource:
 
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
         """Whether what a candidate is for is still open."""
+        if candidate.is_frontier:
+            return memory.is_frontier(candidate.focus)
         return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
 
     def _open(self, node: Node, opening: Opening, memory: Memory) -> NDArray[np.int64]:
@@ -175,11 +180,15 @@ class CandidateSource:
         return []
 
     def is_valid(self, candidate: Candidate, node: Node, others: Iterable[Node]) -> bool:
-        """Whether a candidate is far enough from its node, within its safe region, outside of the others', and was not tried."""
-        if math.dist(candidate.place, node.place) <= self._settings.least_step or not node.safe.contains(candidate.place):
+        """Whether a candidate is far enough from all nodes, within its own one's safe region, outside of the others', and was not tried."""
+        if not node.safe.contains(candidate.place):
             return False
-        if any(bool(other.safe.contains(candidate.place)) for other in others if not np.array_equal(other.place, node.place)):
-            return False
+        for other in (node, *others):
+            # Where a region is empty, as beside a wall, the distance alone keeps a robot from coming again and again.
+            if math.dist(candidate.place, other.place) <= self._settings.least_step:
+                return False
+            if bool(other.safe.contains(candidate.place)) and not np.array_equal(other.place, node.place):
+                return False
         return not self._was_tried(candidate)
 
     def _was_tried(self, candidate: Candidate) -> bool:

@@ -1,5 +1,6 @@
 """Which way a robot takes: to the goal where it is in sight of a node, through the cheapest opening, or home."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +21,9 @@ MATE_SPREAD = 5.0
 
 MATE_SAME = 1.0
 """What lies this near to what a teammate goes for is the teammate's [m]."""
+
+LAST_FRONTIER = 0.3
+"""Frontiers of the map of at least this length are gone to when nothing else is left [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +86,19 @@ def choose(
             if found:
                 best = found[int(generator.integers(len(found)))]
                 break
-    if best is None:
-        return _across(others, source, memory, senses, targets) if settings.candidates == "goal" else []
+    if settings.candidates == "goal":
+        cost = math.inf if best is None else _cost(best, tree, lengths, before, settings, senses, limits)
+        # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
+        is_asked = best is None or senses.goal is None
+        at_frontier = _to_frontier(node, memory, settings.least_frontier, settings, senses, targets, limits, cost) if is_asked else []
+        if best is None and not at_frontier:
+            at_frontier = _across(others, source, memory, senses, targets)
+        if best is None and not at_frontier:
+            at_frontier = _to_frontier(node, memory, LAST_FRONTIER, settings, senses, targets, limits, cost)
+        if at_frontier or best is None:
+            return at_frontier
+    elif best is None:
+        return []
     return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
 
 
@@ -134,15 +149,51 @@ def _cheapest(
     """Return the candidate of least way, with the turn that begins it, and of least distance to the goal where there is one."""
     if not found:
         return None
+    return min(found, key=lambda candidate: _cost(candidate, tree, lengths, before, settings, senses, limits))
 
-    def cost(candidate: Candidate) -> float:
-        legs = way_to(candidate.node, before)
-        first = tree.nodes[legs[0]].place if legs else candidate.place
-        gap = first - senses.pose[:2]
-        turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
-        way = (
-            lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place) + turn * limits.speed / limits.turn_rate
-        )
-        return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(candidate.place, senses.goal))
 
-    return min(found, key=cost)
+def _cost(
+    candidate: Candidate,
+    tree: Tree,
+    lengths: dict[int, float],
+    before: dict[int, int],
+    settings: SrtSettings,
+    senses: Senses,
+    limits: Limits,
+) -> float:
+    legs = [tree.nodes[number].place for number in way_to(candidate.node, before)]
+    way = lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place)
+    return _weighed(way, legs[0] if legs else candidate.place, candidate.place, settings, senses, limits)
+
+
+def _weighed(
+    way: float, first: NDArray[np.float64], last: NDArray[np.float64], settings: SrtSettings, senses: Senses, limits: Limits
+) -> float:
+    """Return what a way costs [m]: its length, the turn towards its first place, and how far from the goal it ends."""
+    gap = first - senses.pose[:2]
+    turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
+    way += turn * limits.speed / limits.turn_rate
+    return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(last, senses.goal))
+
+
+def _to_frontier(
+    node: Node,
+    memory: Memory,
+    least: float,
+    settings: SrtSettings,
+    senses: Senses,
+    targets: Sequence[Candidate],
+    limits: Limits,
+    most: float,
+) -> list[Choice]:
+    """Return the way to the map's nearest frontier of at least a length [m], where it costs less than ``most`` and is no teammate's."""
+    found = memory.frontier(senses.pose[:2], least)
+    if found is None:
+        return []
+    legs, focus = found
+    candidate = Candidate(node.number, legs[-1], None, focus, is_frontier=True)
+    ends = [senses.pose[:2], *legs]
+    way = sum(math.dist(start, end) for start, end in itertools.pairwise(ends))
+    if not _left_by(targets, [candidate]) or _weighed(way, legs[0], legs[-1], settings, senses, limits) >= most:
+        return []
+    return [*(Choice(place, None) for place in legs[:-1]), Choice(legs[-1], None, candidate)]

@@ -43,6 +43,9 @@ REVIEW_S = 0.5
 GOT_ON = 0.8
 """A robot on its way along free rays goes on for this long before it asks whether they were seen through [m]."""
 
+NEAR_NODE = 0.5
+"""A robot that gets no nearer to a node than this takes itself to be there [m]."""
+
 NEW_NODE = 0.05
 """A robot nearer than this to its last node makes no new one [m]."""
 
@@ -92,6 +95,7 @@ class Explorer:
         self._route: list[Choice] = []
         self._drive: Drive | None = None
         self._looks: list[float] = []
+        self._looked_at: NDArray[np.float64] | None = None
         self._backs_until = self._blind_since = -math.inf
         self._stood_since, self._stood_at = 0.0, np.zeros(3)
         self._reviewed_at, self._asides, self._failures = -math.inf, 0, 0
@@ -196,10 +200,14 @@ class Explorer:
         departed = senses.distance_to(self._tree.nodes[self._node].place)
         in_sight = senses.goal is not None and memory.way(senses.pose[:2], senses.goal) is not None
         # Every step sees a little more beyond free rays: a target there stands until the robot has got on.
-        may_drop = departed >= self._settings.least_step if candidate.opening is None or candidate.opening.is_gap else departed >= GOT_ON
-        if in_sight or (may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)):
+        is_along_rays = candidate.opening is not None and not candidate.opening.is_gap
+        may_drop = departed >= (GOT_ON if is_along_rays else self._settings.least_step)
+        has_passed = departed >= self._settings.passing_distance
+        is_dropped = may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)
+        # Without a goal what was seen since may make another way the better one; towards a goal it seldom does.
+        if in_sight or is_dropped or (has_passed and senses.goal is None):
             self._pause(senses, memory)
-        elif is_direct and departed >= self._settings.passing_distance:
+        elif is_direct and has_passed:
             self._add_node(senses, self._node, senses.pose, memory)
 
     def _pause(self, senses: Senses, memory: Memory) -> None:
@@ -210,6 +218,9 @@ class Explorer:
 
     def _decide(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
         """Choose where to go next, or to go home."""
+        if self._looked_at is not None:
+            memory.give_up(self._looked_at)
+            self._looked_at = None
         self._reviewed_at = senses.time_s
         if self.ending in ("budget", "goal_missed") or self._is_spent(senses):
             self._go_home(self.ending if self.ending == "goal_missed" else "budget", senses, memory)
@@ -276,7 +287,7 @@ class Explorer:
         """Take note of where the robot has come."""
         self._route, self._drive, self._failures = self._route[1:], None, 0
         if leg.node is not None:
-            self._return_to(leg.node, memory)
+            self._return_to(leg.node, senses, memory)
         elif leg.is_goal:
             # The environment ends a robot that truly is there; this one only takes itself to be.
             self._go_home("goal_missed", senses, memory)
@@ -285,16 +296,22 @@ class Explorer:
             self._add_node(senses, self._node, np.array([*place, senses.pose[2]]), memory)
             if leg.candidate is not None:
                 self._source.note_tried(leg.candidate)
+                if leg.candidate.is_frontier and memory.is_frontier(leg.candidate.focus):
+                    self._look_at(leg.candidate.focus, senses)
 
-    def _return_to(self, number: int, memory: Memory) -> None:
-        """Be at a node again; in the printed form of the thesis it is added once more, below the parent that it had."""
+    def _look_at(self, focus: NDArray[np.float64], senses: Senses) -> None:
+        """Turn to a frontier that is not seen through from where the robot came for it; what stays unseen then is given up."""
+        gap = focus - senses.pose[:2]
+        self._looks, self._looked_at = [math.atan2(gap[1], gap[0])], focus
+
+    def _return_to(self, number: int, senses: Senses, memory: Memory) -> None:
+        """Be at a node again; in the printed form of the thesis it is seen and added anew, below the parent that it had."""
         if number not in self._tree.nodes[self._node].neighbours:
             self._tree.connect(self._node, number)
         self._node = number
         node = self._tree.nodes[number]
-        if self._settings.repeats_nodes and not self._route and self.ending is None and node.parent is not None:
-            again = Node(len(self._tree.nodes), self.agent, node.pose, node.safe, node.seen, node.openings, node.parent, node.view)
-            self._insert(again, memory)
+        if self._settings.repeats_nodes and not self._route and self.ending is None:
+            self._add_node(senses, node.parent, np.array([*node.place, senses.pose[2]]), memory)
 
     def _stand(self, senses: Senses) -> None:
         self._stood_since, self._stood_at = senses.time_s, senses.pose
@@ -308,8 +325,11 @@ class Explorer:
 
     def _settle_block(self, senses: Senses, memory: Memory) -> None:
         """Step aside for a teammate, or give the target up and back out."""
-        leg = self._route[0]
+        leg, target = self._route[0], self.target
         self._stand(senses)
+        if leg.node is not None and senses.distance_to(leg.place) < NEAR_NODE:
+            self._arrive(leg, senses, memory)
+            return
         self._failures += 1
         has_mate = any(senses.distance_to(mate) < MATE_NEAR for mate in senses.mates)
         departed = self._node
@@ -322,8 +342,10 @@ class Explorer:
         if leg.node is not None:
             self._tree.disconnect(departed, leg.node)
             self._tree.disconnect(self._node, leg.node)
-        elif leg.candidate is not None:
-            self._source.note_tried(leg.candidate)
+        elif target is not None:
+            self._source.note_tried(target)
+            if target.is_frontier:
+                memory.give_up(target.focus)
         if self.ending is not None and self._failures > ASIDES:
             self.is_home = True
         self._backs_until = senses.time_s + BACKING_S

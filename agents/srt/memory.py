@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.team_driver import footprint_of
+from lidarium.mapping.frontier_approach import default_reach, nearest_frontier
+from lidarium.mapping.frontiers import FRONTIER
 from lidarium.mapping.grid_planning import centres_of, plan
 
 CLEAR_MARGIN = 0.02
@@ -19,6 +21,9 @@ CLEAR_MARGIN = 0.02
 WALL = 0.08
 """What is unknown this near to something occupied may well be its inside [m]."""
 
+Place = NDArray[np.float64]
+Legs = list[Place]
+
 
 class Memory(Protocol):
     """What a robot remembers; places (..., 2) are in the frame of the map's first cell [m]."""
@@ -27,12 +32,24 @@ class Memory(Protocol):
         """Whether points (n, 2) beyond the border of what was seen from a node were seen, shape (n,)."""
         ...
 
-    def is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+    def is_clear(self, start: Place, end: Place) -> bool:
         """Whether the robot is known to get through on a straight way."""
         ...
 
-    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+    def way(self, start: Place, end: Place) -> Legs | None:
         """Return the ends of the straight legs of a way across space that was seen, the last one ``end``; None where there is none."""
+        ...
+
+    def frontier(self, start: Place, least: float) -> tuple[Legs, Place] | None:
+        """Return the way to the nearest frontier of at least that length [m], and what to look at there; None where there is none."""
+        ...
+
+    def is_frontier(self, focus: Place) -> bool:
+        """Whether what a frontier was gone to for is not seen yet."""
+        ...
+
+    def give_up(self, focus: Place) -> None:
+        """Ask no more for a frontier that was looked at and cannot be seen through."""
         ...
 
 
@@ -56,7 +73,7 @@ class MapMemory:
         is_beside_wall = self._clearance(rows, columns) < WALL
         return np.asarray(~is_inside | (self._map.log_odds[rows, columns] != 0) | is_beside_wall)
 
-    def is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+    def is_clear(self, start: Place, end: Place) -> bool:
         """Whether all cells on a way are free, with room for the robot."""
         count = max(math.ceil(math.dist(start, end) / (0.5 * self._map.resolution)), 1)
         rows, columns, is_inside = self._cells(start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None])
@@ -66,22 +83,52 @@ class MapMemory:
         is_free = (self._map.log_odds[rows, columns] < 0) & ((clearance >= self._body) | is_near_start)
         return bool((is_inside & is_free).all())
 
-    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+    def way(self, start: Place, end: Place) -> Legs | None:
         """Return the way that the onboard planning finds across the map, its legs as long as they are clear."""
         rows, columns, is_inside = self._cells(np.stack([start, end]))
         if not is_inside.all() or self._map.log_odds[rows[1], columns[1]] >= 0:
             return None
         cells = [(int(row), int(column)) for row, column in zip(rows, columns, strict=True)]
         found = plan(self._map.space, self._map.log_odds, self._map.clearance, cells[0], cells[1], footprint_of(self._radius))
+        return None if found is None else self._legs(start, [*self._centres(found[1])[1:-1], end])
+
+    def frontier(self, start: Place, least: float) -> tuple[Legs, Place] | None:
+        """Return the way that costs least to where the robot sees a frontier, its legs as long as they are clear."""
+        rows, columns, is_inside = self._cells(start[None])
+        frontiers = self._map.long_frontiers(least)
+        if not (is_inside.all() and len(frontiers)):
+            return None
+        cell, footprint = (int(rows[0]), int(columns[0])), footprint_of(self._body)
+        found = nearest_frontier(frontiers, self._map.space, self._map.log_odds, self._map.clearance, cell, footprint)
         if found is None:
             return None
-        places = [*centres_of(found[1], (0.0, 0.0), self._map.resolution)[1:-1], end]
-        legs, at = [], start
+        places = self._centres(found.path)
+        return self._legs(start, places[1:] or places), self._centres(np.array([found.frontier_cell]))[0]
+
+    def is_frontier(self, focus: Place) -> bool:
+        """Whether the cell is a frontier of the map."""
+        return bool(self._map.frontiers.flags[self._cell(focus)] == FRONTIER)
+
+    def give_up(self, focus: Place) -> None:
+        """Ignore the frontier around the cell, as frontier explorers do."""
+        self._map.frontiers.ignore_near(self._cell(focus), default_reach(footprint_of(self._radius), self._map.resolution))
+
+    def _legs(self, start: Place, places: Legs) -> Legs:
+        """Return a way with places left out wherever the straight way past them is clear."""
+        legs: Legs = []
+        at = start
         while places:
             clear = next((k for k in range(len(places) - 1, 0, -1) if self.is_clear(at, places[k])), 0)
             at, places = places[clear], places[clear + 1 :]
             legs.append(at)
         return legs
+
+    def _centres(self, path: NDArray[np.int64]) -> Legs:
+        return list(centres_of(path, (0.0, 0.0), self._map.resolution))
+
+    def _cell(self, place: Place) -> tuple[int, int]:
+        rows, columns, _ = self._cells(place[None])
+        return int(rows[0]), int(columns[0])
 
     def _clearance(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the distance of cells from what is occupied [m]."""
@@ -97,7 +144,7 @@ class MapMemory:
 
 
 class RegionMemory:
-    """The nodes tell: space is seen where it lies in another node's seen region; a way is clear within one node's safe region.
+    """The nodes tell: space is seen where it lies in another node's safe region; a way is clear within one node's safe region.
 
     Parameters
     ----------
@@ -109,18 +156,29 @@ class RegionMemory:
         self._nodes = list(nodes)
 
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
-        """Whether points (n, 2) lie in what was seen from another node."""
+        """Whether points (n, 2) lie where another node is safe."""
         seen = np.zeros(len(points), np.bool_)
         for node in self._nodes:
             # A node made again at the same place sees what it saw before: its openings stay.
             if node is not of and not np.array_equal(node.place, of.place):
-                seen |= node.seen.contains(points)
+                seen |= node.safe.contains(points)
         return seen
 
-    def is_clear(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+    def is_clear(self, start: Place, end: Place) -> bool:
         """Whether a way begins at a node and ends within its safe region."""
         return any(math.dist(node.place, start) <= 0.05 and bool(node.safe.contains(end)) for node in self._nodes)
 
-    def way(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> list[NDArray[np.float64]] | None:
+    def way(self, start: Place, end: Place) -> Legs | None:
         """Return None: regions know no way but the tree's."""
         return None
+
+    def frontier(self, start: Place, least: float) -> tuple[Legs, Place] | None:
+        """Return None: regions have openings alone."""
+        return None
+
+    def is_frontier(self, focus: Place) -> bool:
+        """Return False: there are no frontiers."""
+        return False
+
+    def give_up(self, focus: Place) -> None:
+        """Do nothing."""

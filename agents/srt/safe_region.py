@@ -96,6 +96,11 @@ class SafeRegion:
     place: NDArray[np.float64]
     radii: NDArray[np.float64]
 
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """The region's border around its place, (directions, 2) [m]."""
+        return np.asarray(self.radii[:, None] * UNIT)
+
     def radius_at(self, angle: float) -> float:
         """Return how far the region reaches in a direction of the map frame [rad]."""
         return float(self.radii[round(angle / STEP) % DIRECTIONS])

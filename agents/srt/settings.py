@@ -46,11 +46,14 @@ class SrtSettings:
     step_share : float
         Share of the safe radius that the robot goes, in (0, 1).
     random_share : float
-        Share of random choices among those towards the goal.
+        Share of random choices among those of least cost. The tree is complete without: frontiers of the map are gone to in the end.
     way_weight : float
         What a metre of way counts against a metre of distance to the goal.
     least_step : float
         Candidates lie farther than this from their node [m].
+    least_frontier : float
+        With ``candidates`` ``goal`` and ``memory`` ``map``, frontiers of the map of at least this length are gone to, where they
+        cost less than all openings; shorter ones when nothing else is left [m].
     tries : int
         How many candidates are drawn at a node.
     nodes : int
@@ -64,7 +67,7 @@ class SrtSettings:
     turn_room : float
         A laser region with a return nearer than the robot's radius, the margin and this is not safe [m]; 0 for off.
     passing_distance : float
-        On its way a robot adds a node after this distance [m].
+        On its way a robot adds a node after this distance and, where there is no goal, chooses anew [m].
     looks_around : bool
         Whether a robot turns to see what lies behind it, at its first node and at nodes that are left without openings.
     turning_starts, turning_ends : float
@@ -86,9 +89,10 @@ class SrtSettings:
     places_nodes_at_targets: bool = False
     repeats_nodes: bool = False
     step_share: float = 0.8
-    random_share: float = 0.1
-    way_weight: float = 1.0
+    random_share: float = 0.0
+    way_weight: float = 0.7
     least_step: float = 0.3
+    least_frontier: float = 0.6
     tries: int = 20
     nodes: int = 500
     time_s: float = math.inf
@@ -110,6 +114,7 @@ class SrtSettings:
         for name in (
             "way_weight",
             "least_step",
+            "least_frontier",
             "time_s",
             "perception",
             "passing_distance",
@@ -143,9 +148,10 @@ THESIS: dict[str, Any] = {
     "memory": "regions",
     "places_nodes_at_targets": True,
     "repeats_nodes": True,
-    "perception": 4.0,
+    "step_share": 0.9,
+    "perception": 0.9,
     "margin": 0.03,
-    "least_step": 0.5,
+    "least_step": 0.25,
     "turn_room": 0.05,
     "looks_around": False,
     "passing_distance": math.inf,

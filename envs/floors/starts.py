@@ -171,6 +171,34 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
                 raise ValueError(f"starts of robots {other} and {robot} are {apart:.3f} m apart; want at least {2.0 * radius} m")
 
 
+def check_goal(raster: Raster, goal: tuple[float, float]) -> None:
+    """Check that a goal lies on the floor and outside of all that is solid; whether a robot gets there is for the robot to find out.
+
+    Parameters
+    ----------
+    raster : Raster
+        Solid cells at the body's height.
+    goal : (x, y)
+        [m]
+
+    Raises
+    ------
+    ValueError
+        If it does not.
+    """
+    rows, columns = raster.solid.shape
+    row = math.floor((goal[1] - raster.origin[1]) / raster.resolution)
+    column = math.floor((goal[0] - raster.origin[0]) / raster.resolution)
+    if not (0 <= row < rows and 0 <= column < columns):
+        (x, y), side = raster.origin, raster.resolution
+        raise ValueError(
+            f"goal ({goal[0]:.3f}, {goal[1]:.3f}) m is outside of the floor; want x from {x:.3f} to {x + columns * side:.3f} m "
+            f"and y from {y:.3f} to {y + rows * side:.3f} m"
+        )
+    if raster.solid[row, column]:
+        raise ValueError(f"goal ({goal[0]:.3f}, {goal[1]:.3f}) m is inside a wall; want one in free space")
+
+
 def _fitting(
     raster: Raster, labels: NDArray[np.int32], radius: float, count: int, proposed: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:

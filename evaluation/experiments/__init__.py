@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from lidarium.evaluation.experiments import leaderboard, merging
+from lidarium.evaluation.experiments import leaderboard, merging, srt
 from lidarium.evaluation.suite import Suite
 
 
@@ -48,6 +48,13 @@ EXPERIMENTS: dict[str, Experiment] = {
         merging.page,
         work=merging.work,
         pictures=merging.pictures,
+    ),
+    "srt": Experiment(
+        "the sensor-based random tree towards goals in both modes, full exploration, and ablations of localization on curves",
+        srt.page,
+        srt.suites,
+        srt.work,
+        srt.pictures,
     ),
 }
 """By name; the page of one is ``docs/results/NAME.md``."""

@@ -173,6 +173,13 @@ def test_a_robot_at_the_goal_has_reached_it_and_the_others_go_on():
     assert env.agents == ["robot_1"]
 
 
+@pytest.mark.parametrize(("goal", "told"), [((9.0, 1.0), "outside of the floor"), ((2.1, 1.0), "inside a wall")])
+def test_a_goal_that_no_robot_can_be_at_is_refused_before_the_run(goal, told):
+    env = make(box(solids=[WALL_ACROSS], goal=(1.5, 3.0)))
+    with pytest.raises(ValueError, match=told):
+        env.reset(seed=1, options={"goal": goal})
+
+
 def test_the_goal_stays_where_it_is_as_the_frame_of_the_pose_sees_it():
     env = make(box(goal=(4.0, 3.0)))
     observations, _ = env.reset(seed=0)
