@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.localization.scan_matching import angle_step
+from lidarium.mapping.localization.scan_search import angle_step
 from lidarium.mapping.localization.submaps import AgreementGrid
 
 LEVELS = 6

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.localization.branch_and_bound import place, pyramid
-from lidarium.mapping.localization.scan_matching import Match, refine, search
+from lidarium.mapping.localization.scan_matching import Match, refine
+from lidarium.mapping.localization.scan_search import search
 from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.localization.submaps import AgreementGrid, Submap
 from lidarium.mapping.rigid import relative

@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.mapping.localization.branch_and_bound import place, pyramid
-from lidarium.mapping.localization.scan_matching import refine, search
+from lidarium.mapping.localization.scan_matching import refine
 from lidarium.mapping.localization.scan_points import at_last_beam, scan_points
+from lidarium.mapping.localization.scan_search import search
 from lidarium.mapping.localization.submaps import FREE_LEVEL, UNSEEN, Submap
 from lidarium.mapping.rigid import composed, relative
 from lidarium.mapping.scans import ScanGeometry
