@@ -1,0 +1,44 @@
+"""What the tutorials show can be run as it stands."""
+
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from lidarium.agents import policy as policies
+from lidarium.scripts.main import Choice
+
+TUTORIALS = Path(__file__).parents[1] / "docs" / "tutorials"
+
+
+def code_of(name):
+    """Return all Python of a tutorial, in one piece."""
+    return "\n".join(re.findall(r"```python\n(.*?)```", (TUTORIALS / name).read_text(encoding="utf-8"), re.DOTALL))
+
+
+def test_the_policy_of_the_tutorial_explores_the_apartment(monkeypatch, capsys):
+    monkeypatch.setattr(policies, "_POLICIES", dict(policies._POLICIES))
+    exec(compile(code_of("add_a_policy.md"), "add_a_policy.md", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["keep_apart", "nearest_frontier"]
+    assert all("0.99" in line for line in lines)
+
+
+def test_the_floors_of_the_tutorial_can_be_explored(capsys):
+    exec(compile(code_of("add_a_floor.md"), "add_a_floor.md", "exec"), {})
+    coverage, building = capsys.readouterr().out.splitlines()
+    assert 0.5 < float(coverage) < 1.0
+    assert building.startswith("office")
+
+
+def known_commands():
+    """Return the names that `lidarium --help` lists."""
+    return {argument.__metadata__[0].name for argument in get_args(Choice)}
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in TUTORIALS.glob("*.md")))
+def test_commands_of_tutorials_exist(name):
+    text = (TUTORIALS / name).read_text(encoding="utf-8")
+    named = set(re.findall(r"lidarium (?!-)([a-z][a-z-]+)", " ".join(re.findall(r"```bash\n(.*?)```", text, re.DOTALL))))
+    assert named <= known_commands()
