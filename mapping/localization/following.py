@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.laser_logs import LaserLog
 from lidarium.mapping.localization.localizer import Sensing
-from lidarium.mapping.localization.settings import MatchingSettings, SlamSettings, SubmapSettings
+from lidarium.mapping.localization.settings import GraphSettings, MatchingSettings, SlamSettings, SubmapSettings
 from lidarium.mapping.localization.slam import Slam
 from lidarium.mapping.rigid import composed, relative
 
 LOG_SETTINGS = SlamSettings(
     matching=MatchingSettings(distance_m=0.02, angle=math.radians(1.0), spacing_m=0.08, points=250, unseen=0.5),
     submaps=SubmapSettings(path_m=8.0),
+    graph=GraphSettings(deviation_angle=math.radians(0.3)),
 )
 """Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and time is plenty. Lasers of
 logs reach far, so that a local map of a shorter way holds enough, and places are recognised by more of them. Where scans are a metre apart
-much of each is new, and what is new must not outweigh what agrees."""
+much of each is new, and what is new must not outweigh what agrees; headings between them are less sure."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
