@@ -15,7 +15,7 @@ from lidarium.mapping.localization.slam import Slam
 from lidarium.mapping.rigid import composed, relative
 
 LOG_SETTINGS = SlamSettings(
-    matching=MatchingSettings(distance_m=0.02, angle=math.radians(1.0), spacing_m=0.08, points=250, unseen=0.5),
+    matching=MatchingSettings(distance_m=0.02, angle=math.radians(1.0), spacing_m=0.08, points=250, deviation=0.25, unseen=0.5),
     submaps=SubmapSettings(path_m=8.0),
     graph=GraphSettings(deviation_angle=math.radians(0.3)),
 )

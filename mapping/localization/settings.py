@@ -121,7 +121,7 @@ class MatchingSettings:
     blind_angle: float = math.radians(50.0)
     evaluations: int = 100_000
     independent_points: float = 50.0
-    deviation: float = 0.25
+    deviation: float = 0.2
     unseen: float = 0.3
     least_score: float = 0.15
     least_share: float = 0.5
