@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from lidarium.evaluation.experiments import leaderboard, merging
+from lidarium.evaluation.experiments import leaderboard, merging, supervisor
 from lidarium.evaluation.suite import Suite
 
 
@@ -48,6 +48,12 @@ EXPERIMENTS: dict[str, Experiment] = {
         merging.page,
         work=merging.work,
         pictures=merging.pictures,
+    ),
+    "supervisor": Experiment(
+        "teams with unknown starts under the supervisor, beside robots alone and teams that are told their starts",
+        supervisor.page,
+        supervisor.suites,
+        work=supervisor.work,
     ),
 }
 """By name; the page of one is ``docs/results/NAME.md``."""
