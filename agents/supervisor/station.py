@@ -150,13 +150,18 @@ class MergeStation:
         """Return a robot's map as it is compared with others."""
         whole = self.reports[agent].map
         coarse = GrowingMap(resampled(whole.levels, self.resolution, self._merge_resolution), whole.origin)
-        return without_own_trail(coarse, self._trail(agent), self._radius, self._merge_resolution)
+        # A third robot's image on the one map would contradict the floor on which the other one saw it drive on.
+        bare = without_bodies(coarse, self._mates_trails(agent), self._radius, self._merge_resolution)
+        return without_own_trail(bare, self._trail(agent), self._radius, self._merge_resolution)
 
     def _map_without_bodies(self, agent: str) -> GrowingMap:
         """Return a robot's map without what it may have drawn of those that it is joined with."""
+        return without_bodies(self.reports[agent].map, self._mates_trails(agent), self._radius, self.resolution)
+
+    def _mates_trails(self, agent: str) -> list[NDArray[np.float64]]:
+        """Return where those have been that a robot is joined with, in its map frame [m]."""
         mates = {mate: frame for mate in self.agents if mate != agent and (frame := self.lookup(agent, mate)) is not None}
-        trails = [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
-        return without_bodies(self.reports[agent].map, trails, self._radius, self.resolution)
+        return [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
 
     def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
         """Return the middle of what two maps both know, in the second robot's map frame [m]."""
