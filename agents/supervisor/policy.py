@@ -174,7 +174,8 @@ class Supervised:
         settings, station = self.settings, self._supervisor.station
         self._collect(now)
         self._merge_due = _next(now, settings.merge_period_s)
-        station.merge(now)
+        # A station that looks as often as it merges has no other time to search.
+        station.merge(now, may_search=not is_look or settings.period_s <= settings.merge_period_s)
         if self._tells:
             self._tell()
         if not is_look:

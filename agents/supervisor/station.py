@@ -62,7 +62,7 @@ class MergeStation:
             self._merge_resolution,
             merge,
             confirmation_growth_m2=settings.confirmation_growth_m2,
-            tries_per_update=settings.pairs_per_merge,
+            searches_per_update=settings.searches_per_merge,
         )
         self._merge = merge
         self._tree: FrameTree[str] = FrameTree(merge.cycle_distance_m, merge.cycle_angle)
@@ -105,13 +105,13 @@ class MergeStation:
         way, gain = (last - first for first, last in zip(track[0], track[-1], strict=True))
         return gain < self.settings.enclosed_gain_m2_per_m * way
 
-    def merge(self, time_s: float) -> None:
-        """Merge the maps of all robots that have not failed."""
+    def merge(self, time_s: float, may_search: bool = True) -> None:
+        """Merge the maps of all robots that have not failed; what was found is verified alone where there is no time for searches."""
         used = {agent: self.reports[agent] for agent in self.agents if self._is_used(agent)}
         if self.settings.trusts_starts:
             self._join_by_starts(used)
         elif used:
-            merged = self._merger.update({agent: self._own_map(agent) for agent in used})
+            merged = self._merger.update({agent: self._own_map(agent) for agent in used}, may_search=may_search)
             self._tree = merged.tree
             self._middles = {pair: self._middle(pair, result) for pair, result in merged.pairs.items() if result.is_accepted}
             self._note_found(merged, time_s)
