@@ -24,6 +24,9 @@ SETTINGS: Mapping[str, Any] = {
 }  # fmt: skip
 """Reports tell the true starts to whoever trusts in them, ``oracle_starts`` alone."""
 
+TO_THE_END: Mapping[str, Any] = {"stop_coverage": None, "horizon_s": 600.0}
+"""In place of these settings, where it is of interest what robots do when all is seen."""
+
 GENERATED: Mapping[str, float] = {
     "building:3000003": 72.0, "building:3000004": 81.0, "building:3000016": 86.0, "building:3000013": 93.0, "building:3000018": 112.0,
     "building:3000012": 151.0, "building:3000010": 173.0, "building:3000007": 210.0, "building:3000011": 380.0, "building:3000009": 398.0,
@@ -131,7 +134,7 @@ def five_floors(floors: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _extensions(seeds: tuple[int, ...], few: int) -> dict[str, Suite]:
-    """Return the suites of extensions, on floors that robots do not leave when they are seen: what they do then is of interest, too."""
+    """Return the suites of extensions."""
     floors = EXTENDED[::few]
     budget = {"energy budget": {"policy": "supervised", "battery_margin": MARGIN}}
     every = {"assignment": "utility", "avoids_rendezvous": True, "returns_home": True, "battery_margin": MARGIN}
@@ -141,7 +144,7 @@ def _extensions(seeds: tuple[int, ...], few: int) -> dict[str, Suite]:
         settings = {name: {"policy": "supervised", **values} for name, values in options.items()}
         return Suite(
             policies=("supervised", *settings), floors=floors, robots=(3,), seeds=seeds, policy_settings=settings,
-            variants={name: {**SETTINGS, "stop_coverage": None, "horizon_s": 600.0, **values} for name, values in variants.items()},
+            variants={name: {**SETTINGS, **TO_THE_END, **values} for name, values in variants.items()},
         )  # fmt: skip
 
     return {
