@@ -174,7 +174,7 @@ def map_figures(env: ExplorationEnv) -> dict[str, Any]:
 
 
 def others_coverage(env: ExplorationEnv) -> float | None:
-    """Return how much the robots that have not failed have sensed of what the bodies of those that have leave in reach; None without such."""
+    """Return the share that robots which have not failed have sensed of what the bodies of the others leave in reach; None without such."""
     left = left_by_failed(env)
     if left is None:
         return None

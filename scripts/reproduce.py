@@ -59,8 +59,7 @@ def execute(command: Reproduce) -> Answer:
     folder = command.runs / command.name
     workers = command.workers or len(os.sched_getaffinity(0))
     campaigns = {
-        name: Campaign(suite, folder / name, workers, command.records)
-        for name, suite in experiment.suites(command.data, every).items()
+        name: Campaign(suite, folder / name, workers, command.records) for name, suite in experiment.suites(command.data, every).items()
     }
     for name, campaign in campaigns.items():
         if not _ran(campaign, name, command.json):

@@ -16,7 +16,7 @@ from lidarium.evaluation.runner import run_episode
 from lidarium.evaluation.suite import Suite, Trial
 from lidarium.evaluation.supervision import decision_lines
 from lidarium.evaluation.teams import tables
-from lidarium.evaluation.teams.figures import Row, chosen, floor_of, time_of, time_shares
+from lidarium.evaluation.teams.figures import Row, chosen, floor_of, has_wrong_merge, time_of, time_shares
 from lidarium.evaluation.teams.goals import SUPERVISED, Goal, goals_of
 from lidarium.evaluation.teams.suites import (
     FEWEST_SEEDS,
@@ -117,6 +117,7 @@ def page(folder: Path, command: str) -> str:
         _about(alone),
         "## What was to be reached\n\n" + tables.goals_table(goals),
         _notes(),
+        *_wrong_section(every),
         *_logs_section(_kept_logs(folder)),
         "## Test 1: each robot alone\n\n" + tables.alone_table(rows["alone"]),
         *(
@@ -160,11 +161,26 @@ def _log_of(suite: Suite, key: str) -> list[str]:
     return decision_lines(episode.policy).splitlines()
 
 
+def _wrong_section(rows: Sequence[Row]) -> list[str]:
+    """Return the runs that used a wrong merge, with what the robots' own maps err by."""
+    wrong = [row for row in rows if has_wrong_merge(row)]
+    if not wrong:
+        return []
+    words = (
+        "Runs with a merge that is off by so much, with the error of each robot's own trajectory: maps that have drifted apart are joined "
+        "where their walls agree, and are then off at the starts."
+    )
+    return ["### Wrong merges\n\n" + words + "\n\n" + tables.wrong_table(wrong)]
+
+
 def _logs_section(logs: Mapping[str, Any]) -> list[str]:
     """Return the logs of typical runs where something was missed."""
     if not logs:
         return []
-    parts = ["### Typical runs\n\nWhere a figure was missed, what the station noted and ordered in the run whose share of one robot's time is the median."]
+    parts = [
+        "### Typical runs\n\nWhere a figure was missed, what the station noted and ordered in the run whose share of one robot's "
+        "time is the median."
+    ]
     for name, log in logs.items():
         told = [line for entry in log["lines"] if (line := _told(json.loads(entry)))]
         left_out = len(told) - LINES_SHOWN
@@ -202,33 +218,34 @@ def _about(alone: Sequence[Row]) -> str:
     is_real = any("/" in floor for floor in floors)
     stand_ins = "" if is_real else " No folder of real floors was given: generated offices and corridors stand in for them."
     return (
-        "Kobuki robots with the URG-04LX laser, noise as of its data sheet, typical wheel odometry, SLAM, starts that nobody knows, maps of "
-        f"5 cm, cut at {SETTINGS['horizon_s']:.0f} s. Scenario 1 is `apartment`, scenario 2 `clinic`; Jade, Luna and Mars start at A, B and C. "
-        f"The others are {len(floors)} floors, {len(large)} of them over 300 m2; starts are drawn by the seed, the same for every policy, and "
-        f"that of one robot is that of a team's first.{stand_ins} `independent` merges nothing, `oracle_starts` is told how the robots stand "
-        "to each other ([supervisor](../reference/supervisor.md)). Entries are medians over runs, ratios and differences those of paired "
-        "runs, with intervals of 95 %; what was not done by the horizon counts as never, and as done then where others are divided by it. "
+        "Kobuki robots with the URG-04LX laser, noise as of its data sheet, typical wheel odometry, SLAM, starts that nobody knows, maps "
+        f"of 5 cm, cut at {SETTINGS['horizon_s']:.0f} s. Scenario 1 is `apartment`, scenario 2 `clinic`; Jade, Luna and Mars start at A, B "
+        f"and C. The others are {len(floors)} floors, {len(large)} of them over 300 m2; starts are drawn by the seed, the same for every "
+        f"policy, and that of one robot is that of a team's first.{stand_ins} `independent` merges nothing, `oracle_starts` is told how the robots "
+        "stand to each other ([supervisor](../reference/supervisor.md)). Entries are medians over runs, ratios and differences those of "
+        "paired runs, with intervals of 95 %; what was not done by the horizon counts as never, and as done then where others are divided by it. "
         "Where a team starts at starts that robots tried alone, as in the scenarios, one robot's figure is the mean of theirs."
     )
 
 
 def _notes() -> str:
     return (
-        "A merge is wrong where the transform that was found is off by more than 0.3 m or 3 degrees at the centroid of what both maps know. "
-        "With SLAM a map drifts by some centimetres, so beside it stands the stricter count of `result.json`, 2 cells and 0.01 rad. A tick is a look "
-        "at the tree every 10 s, with its merge and what robots are told, on one core of a machine that others share."
+        "A merge is wrong where the transform that was found is off by more than 0.3 m or 3 degrees at the centroid of what both maps "
+        "know. With SLAM a map drifts by some centimetres, so beside it stands the stricter count of `result.json`, 2 cells and 0.01 rad. "
+        "A tick is a look at the tree every 10 s, with its merge and what robots are told, on one core of a machine that others share."
     )
 
 
 def _about_failing() -> str:
     return (
         "`robot_0` dies at half the time in which the whole supervised team of that floor and seed saw 99 %. Its body stands where it is. "
-        "Its map is used no more, so the others cover its part, too: counted is what they have seen themselves, of what the body leaves in reach."
+        "Its map is used no more, so the others cover its part, too: counted is what they have seen themselves, of what the body "
+        "leaves in reach."
     )
 
 
 def _about_extensions() -> str:
     return (
-        f"Three robots, {FEWEST_SEEDS} seeds on each of two floors; runs are not ended at 99 %, since what robots do then is of interest, too. "
+        f"Three robots, {FEWEST_SEEDS} seeds on each of two floors; runs are not ended at 99 %, since what robots do then counts, too. "
         f"`energy budget` turns back at {MARGIN:g} times what the way home costs. `all together` is every one at once, with `utility`."
     )

@@ -20,7 +20,11 @@ def floor_of(row: Row) -> str:
 
 
 def chosen(
-    rows: Iterable[Row], policy: str, robots: int | None = None, is_floor: Callable[[str], bool] = lambda _: True, variant: str | None = None
+    rows: Iterable[Row],
+    policy: str,
+    robots: int | None = None,
+    is_floor: Callable[[str], bool] = lambda _: True,
+    variant: str | None = None,
 ) -> list[Row]:
     """Return the runs of a policy: of teams of a size, on floors and of a variant of settings, in the order of their keys; None for all."""
     found = [

@@ -1,5 +1,6 @@
 """The tables of the page on supervised teams, as markdown."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -73,7 +74,8 @@ def one_table(rows: Sequence[Row]) -> str:
     for floor in dict.fromkeys(floor_of(row) for row in rows):
         runs = chosen(rows, ALONE, is_floor=floor.__eq__)
         times = [time_of(row) for row in runs]
-        lines.append((f"`{Path(floor).name}`", str(len(runs)), _reached(runs), shown(median(times), 0), shown(median([path_of(row) for row in runs]), 0)))
+        ways = [path_of(row) for row in runs]
+        lines.append((f"`{Path(floor).name}`", str(len(runs)), _reached(runs), shown(median(times), 0), shown(median(ways), 0)))
     return _table(("floor", "runs", "reached 99 %", "time to 99 % [s]", "way [m]"), lines)
 
 
@@ -86,7 +88,17 @@ def five_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
         found = [_of_ticks(ticks, name) for name in ("p50", "p95", "merge_p50", "merge_p95")]
         lines.append((f"`{policy}`", str(len(runs)), _reached(runs), shown(median([time_of(row) for row in runs]), 0),
                       shown(median(time_shares(runs, alone))), *found))  # fmt: skip
-    head = ("policy", "runs", "reached 99 %", "time to 99 % [s]", "/ one robot's", "tick p50 [ms]", "p95", "merges between, p50 [ms]", "p95")
+    head = (
+        "policy",
+        "runs",
+        "reached 99 %",
+        "time to 99 % [s]",
+        "/ one robot's",
+        "tick p50 [ms]",
+        "p95",
+        "merges between, p50 [ms]",
+        "p95",
+    )
     return _table(head, lines)
 
 
@@ -124,6 +136,24 @@ def extension_table(rows: Sequence[Row]) -> str:
         "robots home [%]", "batteries empty [%]",
     )  # fmt: skip
     return _table(head, lines)
+
+
+def wrong_table(rows: Sequence[Row]) -> str:
+    """Return runs that used a wrong merge."""
+    lines = [
+        (
+            f"`{Path(floor_of(row)).name}`",
+            f"`{row['policy']}`",
+            f"{row['robots']}",
+            f"{row['seed']}",
+            f"{row['merges']['wrong']} of {row['merges']['accepted']}",
+            f"{row['merges']['worst_m']:.2f}",
+            f"{math.degrees(row['merges']['worst_rad']):.1f}",
+            ", ".join(f"{error:.2f}" for error in row["ate_m"] or ()),
+        )
+        for row in rows
+    ]
+    return _table(("floor", "policy", "robots", "seed", "merges", "worst [m]", "[deg]", "trajectories of the robots [m]"), lines)
 
 
 def shown(found: Interval | None, digits: int = 2) -> str:

@@ -11,6 +11,7 @@ from lidarium.evaluation.experiments.supervisor import failing_suite, typical_ru
 from lidarium.evaluation.statistics import Interval
 from lidarium.evaluation.teams import suites as plan
 from lidarium.evaluation.teams.goals import Goal
+from lidarium.evaluation.teams.tables import failing_table
 
 SMALL = {**plan.SETTINGS, "localization": "truth", "odometry": "ideal", "horizon_s": 6.0}
 
@@ -41,7 +42,7 @@ def test_floors_are_as_large_as_is_said(name):
 
 
 def test_a_folder_without_the_real_floors_is_refused(tmp_path):
-    with pytest.raises(FileNotFoundError, match="no floor .*lifull"):
+    with pytest.raises(FileNotFoundError, match=r"no floor .*lifull"):
         plan.suites(tmp_path)
 
 
@@ -76,7 +77,8 @@ def test_a_tiny_share_runs_from_end_to_end_and_is_not_run_again(tiny, tmp_path):
 
 def row(policy, robots, seed, t99, floor="f", start=(0.0, 0.0, 0.0), **more):
     return {
-        "key": f"default | {floor} | {robots} | seed {seed} | {policy}", "policy": policy, "robots": robots, "seed": seed, "variant": "default",
+        "key": f"default | {floor} | {robots} | seed {seed} | {policy}", "policy": policy, "robots": robots, "seed": seed,
+        "variant": "default",
         "t99_s": t99, "horizon_s": 100.0, "starts": [list(start)] * robots, "path_m": [t99 or 100.0] * robots, "overlap": 0.5, **more,
     }  # fmt: skip
 
@@ -97,3 +99,13 @@ def test_a_robot_dies_at_half_of_what_its_own_team_took():
     fault = suite.settings(trials[0].variant, 3).faults.schedule[0]
     assert (fault.kind, fault.robot, fault.at_s) == ("dead_robot", 0, 40.0)
     assert failing_suite([row("supervised", 3, 0, None, floor)], teams) == (None, [])
+
+
+def test_what_the_others_cover_of_what_a_dead_robot_leaves_is_told(tiny, tmp_path):
+    teams = plan.suites(None, 10)["teams"]
+    suite, trials = failing_suite([row("supervised", 2, 0, 4.0, "apartment")], teams)
+    lines = list(Campaign(suite, tmp_path, records=False, trials=trials[:1]).run())
+    assert [line["policy"] for line in lines] == ["supervised"]
+    assert lines[0]["ended_because"]["robot_0"] == "failed"
+    assert 0.0 < lines[0]["c_others_final"] < lines[0]["coverage_final"]
+    assert f"| 2 | `supervised` | 0 of 1 | {100.0 * lines[0]['c_others_final']:.1f} |" in failing_table(lines)
