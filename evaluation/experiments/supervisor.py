@@ -221,10 +221,11 @@ def _about(alone: Sequence[Row]) -> str:
         "Kobuki robots with the URG-04LX laser, noise as of its data sheet, typical wheel odometry, SLAM, starts that nobody knows, maps "
         f"of 5 cm, cut at {SETTINGS['horizon_s']:.0f} s. Scenario 1 is `apartment`, scenario 2 `clinic`; Jade, Luna and Mars start at A, B "
         f"and C. The others are {len(floors)} floors, {len(large)} of them over 300 m2; starts are drawn by the seed, the same for every "
-        f"policy, and that of one robot is that of a team's first.{stand_ins} `independent` merges nothing, `oracle_starts` is told how the robots "
-        "stand to each other ([supervisor](../reference/supervisor.md)). Entries are medians over runs, ratios and differences those of "
-        "paired runs, with intervals of 95 %; what was not done by the horizon counts as never, and as done then where others are divided by it. "
-        "Where a team starts at starts that robots tried alone, as in the scenarios, one robot's figure is the mean of theirs."
+        f"policy, and that of one robot is that of a team's first.{stand_ins} `independent` merges nothing, `oracle_starts` is told how "
+        "the robots stand to each other ([supervisor](../reference/supervisor.md)). Entries are medians over runs, ratios and differences "
+        "those of paired runs, with intervals of 95 %; what was not done by the horizon counts as never, and as done then where others are "
+        "divided by it. Where a team starts at starts that robots tried alone, as in the scenarios, one robot's figure is the mean of "
+        "theirs."
     )
 
 
