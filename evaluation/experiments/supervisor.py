@@ -45,7 +45,8 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Iterator[
     Yields what is being done, how much of it is, and of how much; what the folder has is not done again.
     """
     plan = suites(data, every)
-    rows = {name: _read(folder / name) for name in plan}
+    # The folder may hold more, of a call for a larger share.
+    rows = {name: _of_suite(_read(folder / name), suite) for name, suite in plan.items()}
     failing, trials = failing_suite(rows["teams"], plan["teams"])
     if failing is not None:
         campaign = Campaign(failing, folder / FAILING, workers, records=False, trials=trials)
@@ -144,6 +145,12 @@ def page(folder: Path, command: str) -> str:
 
 def _read(folder: Path) -> list[Row]:
     return list(read_episodes(folder / EPISODES_FILE))
+
+
+def _of_suite(rows: Sequence[Row], suite: Suite) -> list[Row]:
+    """Return the runs that a suite asks for."""
+    keys = {trial.key for trial in suite.trials()}
+    return [row for row in rows if row[KEY] in keys]
 
 
 def _kept_logs(folder: Path) -> dict[str, Any]:
