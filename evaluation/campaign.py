@@ -8,7 +8,7 @@ leaves the same lines, though in another order.
 import json
 import shutil
 import time
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -41,6 +41,8 @@ class Campaign:
         How many processes; the calling one does the work where 1.
     records : bool
         Whether every episode's record is kept.
+    trials : sequence of Trial or None
+        Those of the suite that are run; all where None.
 
     Attributes
     ----------
@@ -56,6 +58,7 @@ class Campaign:
     folder: Path
     workers: int = 1
     records: bool = True
+    trials: Sequence[Trial] | None = None
     failures: list[tuple[Trial, Exception]] = field(default_factory=list)
     done: int = 0
     total: int = 0
@@ -72,7 +75,7 @@ class Campaign:
         """
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
-        trials = list(self.suite.trials())
+        trials = list(self.suite.trials() if self.trials is None else self.trials)
         self.total, self.failures = len(trials), []
         with EpisodesFile(self.folder / EPISODES_FILE) as file:
             check_same(file.episodes, self.suite, self.folder)
@@ -109,7 +112,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     rule = stop_rule_of(suite.stop)
     starts = suite.starts_of(trial) or (drawn_starts(trial.floor, settings, trial.seed, image_resolution) if suite.draws_starts else None)
     options = None if starts is None else {"starts": starts}
-    episode = run_episode(lidarium.policy(trial.policy), env, trial.seed, options, None if rule is None else Stopper(rule, history))
+    episode = run_episode(suite.make_policy(trial.policy), env, trial.seed, options, None if rule is None else Stopper(rule, history))
     result = result_of(episode, trial.policy, history)
     if records is not None:
         write_record(records / f"{trial.file_name}.npz", recorder.finish())
@@ -157,6 +160,9 @@ def check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> No
     for name, options in kept.get("variants", {}).items():
         if name in suite.variants:
             _check_same_options(folder, name, options, suite.as_dict()["variants"][name])
+    for name, options in kept.get("policy_settings", {}).items():
+        if name in suite.policies and suite.as_dict()["policy_settings"].get(name) != options:
+            raise ValueError(f"{folder} holds episodes of policy {name!r} with other settings, {options}; choose another folder")
     if kept and kept.get("stop") != suite.as_dict()["stop"]:
         raise ValueError(
             f"{folder} holds episodes that ended by the rule {kept.get('stop')}, this suite has {suite.stop}; choose another folder"

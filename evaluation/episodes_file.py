@@ -16,7 +16,7 @@ from typing import Any, Self
 KEY = "key"
 """What tells an episode from all others of its file."""
 
-TIMINGS = ("decision_ms", "steps_per_s", "wall_s", "peak_mb")
+TIMINGS = ("decision_ms", "tick_ms", "steps_per_s", "wall_s", "peak_mb")
 """What differs between two runs of the same episode."""
 
 

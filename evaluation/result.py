@@ -19,8 +19,8 @@ from lidarium.evaluation.events import in_floor_frame, operating_events
 from lidarium.evaluation.history import WHOLE, History
 from lidarium.evaluation.metrics.merges import merge_figures
 from lidarium.evaluation.runner import Episode
-from lidarium.evaluation.supervision import supervision_figures
-from lidarium.evaluation.truth import truth_of
+from lidarium.evaluation.supervision import supervision_figures, tick_percentiles
+from lidarium.evaluation.truth import left_by_failed, truth_of
 
 
 def result_of(episode: Episode, policy: str | None = None, history: History | None = None) -> dict[str, Any]:
@@ -83,6 +83,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         "merges": merge_figures(episode.merges, settings.occupancy.resolution),
         "supervisor": supervision_figures(episode.policy),
         "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
+        "tick_ms": tick_percentiles(episode.policy),
         "peak_mb": _rounded(metrics.peak_megabytes(), 1),
         "steps_per_s": round(steps / episode.wall_seconds, 3) if episode.wall_seconds > 0.0 else None,
         "version": lidarium.__version__,
@@ -164,11 +165,21 @@ def map_figures(env: ExplorationEnv) -> dict[str, Any]:
         "c_valid_final": round(metrics.valid_coverage(known, truth.counted, truth.occupied), 9),
         "c_own_min_final": round(own_least, 9),
         "c_own_mean_final": round(own_mean, 9),
+        "c_others_final": _rounded(others_coverage(env), 9),
         "balance": round(metrics.balance([metrics.known_coverage(own != 0, truth.knowable) for own in maps]), 9),
         "iou_occupied": round(metrics.occupied_iou(believed, truth.occupied, sensed), 9),
         "f1_occupied": round(metrics.occupied_f1(believed, truth.occupied, wanted=metrics.surface(truth.occupied, sensed)), 9),
         "free_error_rate": round(metrics.free_error_rate(believed_free, truth.occupied), 9),
     }
+
+
+def others_coverage(env: ExplorationEnv) -> float | None:
+    """Return the share that robots which have not failed have sensed of what the bodies of the others leave in reach; None without such."""
+    left = left_by_failed(env)
+    if left is None:
+        return None
+    seen = [unpack_bits(mask, left.shape[1]) for mask, failed in zip(env.world.masks, env.world.failed, strict=True) if not failed]
+    return metrics.free_coverage(np.any(seen, axis=0), left)
 
 
 def realism_of(settings: ExplorationSettings) -> str:

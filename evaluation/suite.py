@@ -8,11 +8,13 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from lidarium.agents import make_policy
+from lidarium.agents import Policy, make_policy
 from lidarium.envs.floors.catalogue import is_generated, load_floor, set_floors
 from lidarium.envs.settings import ExplorationSettings, RewardSettings, make_settings
 from lidarium.envs.simulation.battery import Battery
+from lidarium.envs.simulation.faults import FaultSettings
 from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.simulation.radio import RadioSettings
 from lidarium.envs.simulation.robots import Robot
 from lidarium.evaluation.stop_rules import stop_rule_of
 from lidarium.mapping.occupancy import OccupancySettings
@@ -23,6 +25,7 @@ DEFAULT_VARIANT = "default"
 
 _PARTS: dict[str, Callable[..., Any]] = {
     "robot": Robot, "lidar": Lidar, "occupancy": OccupancySettings, "reward": RewardSettings, "battery": Battery,
+    "radio": RadioSettings, "faults": FaultSettings,
 }  # fmt: skip
 """Settings that are tables of their own, where they are not named."""
 
@@ -76,7 +79,7 @@ class Suite:
     Attributes
     ----------
     policies, floors : tuple of str
-        Names of policies; floors as for ``load_floor``, and ``set:NAME`` for all floors of a set.
+        Names of policies, or of ``policy_settings``; floors as for ``load_floor``, and ``set:NAME`` for all floors of a set.
     robots, seeds : tuple of int
         Sizes of teams; seeds.
     variants : dict
@@ -90,6 +93,8 @@ class Suite:
         When episodes end beside what the settings say, as ``StopRule``.
     image_resolution : float or None
         Metres per pixel, where floors are plain images.
+    policy_settings : dict
+        By a name among the policies: options that the policy is made with, and ``policy``, which one it is, where the name is another.
 
     Raises
     ------
@@ -106,6 +111,7 @@ class Suite:
     draws_starts: bool = True
     stop: Mapping[str, Any] | None = None
     image_resolution: float | None = None
+    policy_settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("policies", "floors", "robots", "seeds", "variants"):
@@ -119,8 +125,11 @@ class Suite:
             for number in numbers:
                 if isinstance(number, bool) or not isinstance(number, int) or number < least:
                     raise ValueError(f"{what} of the suite has {number!r}; want whole numbers of at least {least}")
+        for name in self.policy_settings:
+            if name not in self.policies:
+                raise ValueError(f"the suite has settings of a policy {name!r}, which is not among its policies")
         for name in self.policies:
-            make_policy(name)
+            self.make_policy(name)
         for floor in self.floors:
             _check_floor(floor, self.image_resolution)
         for variant in self.variants:
@@ -153,6 +162,22 @@ class Suite:
             return make_settings(robots=robots, **options)
         except (ValueError, TypeError) as error:
             raise ValueError(f"variant {variant!r} with {robots} robots cannot be used: {error}") from error
+
+    def make_policy(self, name: str) -> Policy:
+        """Return a new policy by its name among the policies.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such policy, or its settings cannot be used; the name is told.
+        """
+        options = dict(self.policy_settings.get(name, {}))
+        try:
+            return make_policy(options.pop("policy", name), **options)
+        except (ValueError, TypeError) as error:
+            if name not in self.policy_settings:
+                raise
+            raise ValueError(f"policy {name!r} of the suite cannot be made: {error}") from error
 
     def trials(self) -> Iterator[Trial]:
         """Yield all trials; those that are paired come one after the other, so that a suite that is cut short is still paired."""
@@ -207,7 +232,7 @@ def suite_of(content: Mapping[str, Any]) -> Suite:
     content : mapping
         ``policies``, ``floors``, ``robots``, ``seeds`` (a list, or how many from 0 on), ``settings`` (for all variants),
         ``variants``, ``starts``, ``draws_starts``, ``stop``,
-        ``image_resolution``.
+        ``image_resolution``, ``policy_settings``.
 
     Raises
     ------
@@ -237,6 +262,7 @@ def suite_of(content: Mapping[str, Any]) -> Suite:
         draws_starts=bool(content.get("draws_starts", True)),
         stop=content.get("stop"),
         image_resolution=content.get("image_resolution"),
+        policy_settings=content.get("policy_settings", {}),
     )
 
 

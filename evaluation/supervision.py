@@ -16,6 +16,7 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.frame_parts import SHIFT, Frame, View, team_colours
 from lidarium.envs.onboard.state import OrderKind
 from lidarium.evaluation.events import in_floor_frame
+from lidarium.evaluation.metrics import decision_percentiles
 from lidarium.evaluation.picture_parts import INK, hex_colours
 from lidarium.evaluation.video import DrawOver
 
@@ -44,6 +45,14 @@ def supervision_figures(policy: Policy) -> dict[str, Any] | None:
         "joined": sum(event.event == "joined" for event in policy.events),
         "dropped": sum(event.event == "dropped" for event in policy.events),
     }
+
+
+def tick_percentiles(policy: Policy) -> dict[str, float | None] | None:
+    """Return the entry ``tick_ms`` of ``result.json``: wall time of looks at the tree and of merges between; None without a supervisor."""
+    if not (isinstance(policy, Supervised) and policy.has_begun):
+        return None
+    ticks, merges = (decision_percentiles(seconds) for seconds in (policy.tick_seconds, policy.merge_seconds))
+    return {**ticks, **{f"merge_{name}": value for name, value in merges.items()}}
 
 
 def decision_lines(policy: Policy) -> str:

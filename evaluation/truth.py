@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.floor import Raster
+from lidarium.envs.floors.starts import swept_free_space
+from lidarium.envs.simulation.kinematic import counted_cells
 from lidarium.evaluation.metrics import surface
 from lidarium.evaluation.metrics.shares import Mask
 
@@ -42,6 +45,29 @@ def truth_of(env: ExplorationEnv) -> Truth:
     counted = unpack_bits(world.counted_masks[0], occupied.shape[1])
     free = _connected_free(env, occupied)
     return Truth(occupied, counted, free | surface(occupied, free), counted | surface(occupied, counted))
+
+
+def left_by_failed(env: ExplorationEnv) -> Mask | None:
+    """Return the part of F that the others can get to past the bodies of robots that have failed, from where they are now.
+
+    None where none has failed, or all have.
+    """
+    world, tables = env.world, env.world.floors[0]
+    failed = world.failed.astype(np.bool_)
+    if tables is None or not failed.any() or failed.all():
+        return None
+    body, resolution = tables.body, tables.body.resolution
+    solid = body.solid.copy()
+    rows, columns = np.indices(solid.shape)
+    for x, y, _ in world.poses[failed]:
+        # A cell less than the body: a robot that touches it still fits beside it.
+        near = np.hypot(body.origin[0] + (columns + 0.5) * resolution - x, body.origin[1] + (rows + 0.5) * resolution - y)
+        solid[near < env.settings.robot.radius - resolution] = 1
+    free = swept_free_space(Raster(solid, body.origin, resolution), world.smallest_radius, world.poses[~failed])
+    free &= tables.laser.solid == 0
+    left = counted_cells(free, round(env.settings.occupancy.resolution / resolution))
+    counted = unpack_bits(world.counted_masks[0], left.shape[1])
+    return np.asarray(left & counted)
 
 
 def occupied_in_truth(env: ExplorationEnv) -> NDArray[np.bool_]:

@@ -22,12 +22,14 @@ SECONDS_BETWEEN_NEWS = 10.0
 class Reproduce(Command):
     """Run what a page of docs/results shows, and write the page to --out; what has been run before is not run again."""
 
-    name: Positional[Literal["leaderboard", "merging", "srt"]]
+    name: Positional[Literal["leaderboard", "merging", "srt", "supervisor"]]
     """which page"""
     data: Path | None = None
     """folder of real floors; without it generated floors alone"""
     every: int = 1
-    """of each kind of floor every so many-th, for a shorter run"""
+    """of each kind of floor (of the supervisor's seeds, then floors) every so many-th, for a shorter run"""
+    share: float | None = None
+    """the same as a share: 0.1 is --every 10"""
     runs: Path = Path("runs/reproduce")
     """folder for the episodes"""
     workers: int = 0
@@ -50,19 +52,19 @@ def execute(command: Reproduce) -> Answer:
 
     if command.every < 1 or command.workers < 0:
         raise ValueError(f"--every is {command.every} and --workers {command.workers}; want at least 1, and at least 0")
+    every = _every(command)
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
     experiment = EXPERIMENTS[command.name]
     folder = command.runs / command.name
     workers = command.workers or len(os.sched_getaffinity(0))
     campaigns = {
-        name: Campaign(suite, folder / name, workers, command.records)
-        for name, suite in experiment.suites(command.data, command.every).items()
+        name: Campaign(suite, folder / name, workers, command.records) for name, suite in experiment.suites(command.data, every).items()
     }
     for name, campaign in campaigns.items():
         if not _ran(campaign, name, command.json):
             return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
-    if experiment.work is not None and not _worked(experiment.work(folder, command.data, command.every, workers), command.json):
+    if experiment.work is not None and not _worked(experiment.work(folder, command.data, every, workers), command.json):
         return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
     if experiment.pictures is not None:
         experiment.pictures(folder, out)
@@ -72,6 +74,17 @@ def execute(command: Reproduce) -> Answer:
     for trial, error in failures:
         tell(f"{trial.key}: {type(error).__name__}: {error}")
     return Answer({**_told(campaigns), "page": str(page)}, f"{page} is written", DEFECT if failures else 0)
+
+
+def _every(command: Reproduce) -> int:
+    """Return every how many-th part is run."""
+    if command.share is None:
+        return command.every
+    if command.every != 1:
+        raise ValueError(f"--share is {command.share} and --every {command.every}; want one of them")
+    if not 0.0 < command.share <= 1.0:
+        raise ValueError(f"--share is {command.share}; want a share above 0, up to 1")
+    return max(round(1.0 / command.share), 1)
 
 
 def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
@@ -111,4 +124,7 @@ def _told(campaigns: dict[str, "Campaign"]) -> dict[str, Any]:
 
 def _command_line(command: Reproduce) -> str:
     data = "" if command.data is None else f" --data {command.data.name if command.data.is_absolute() else command.data}"
-    return f"lidarium reproduce {command.name}{data}{f' --every {command.every}' if command.every > 1 else ''}"
+    part = f" --every {command.every}" if command.every > 1 else ""
+    if command.share is not None:
+        part = f" --share {command.share:g}"
+    return f"lidarium reproduce {command.name}{data}{part}"

@@ -1,6 +1,7 @@
 """Policies that are led: a supervisor over any policy that goes to goals, and what it is compared with."""
 
 import math
+import time
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
@@ -66,6 +67,8 @@ class Supervised:
         Whether there was an episode; before it there is nothing of what follows.
     decisions, events, joins : list
         What was decided, what happened at the station, and how the robots' frames lie as it found.
+    tick_seconds, merge_seconds : list of float
+        Wall time of each look at the tree, its merge and what the robots are told included, and of each merge between looks [s].
 
     Raises
     ------
@@ -81,6 +84,8 @@ class Supervised:
         self.policy, self.settings = policy, settings or SupervisorSettings(**options)
         self.level, self.shares_map = policy.level, True
         self.has_begun = False
+        self.tick_seconds: list[float] = []
+        self.merge_seconds: list[float] = []
 
     @property
     def decisions(self) -> list[Decision]:
@@ -121,6 +126,7 @@ class Supervised:
         self._told: set[str] = set()
         self._look_due, self._merge_due = settings.period_s, 0.0
         self._exploring: set[str] = set()
+        self.tick_seconds, self.merge_seconds = [], []
         self.policy.reset(_Led(team, self._exploring), seed)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
@@ -154,13 +160,22 @@ class Supervised:
 
     def _supervise(self) -> dict[str, Action]:
         """Take in reports, merge and look at the tree where it is time; return the robots that stop."""
-        now, settings, station = self._team.time_s, self.settings, self._supervisor.station
+        now = self._team.time_s
         is_look, is_merge = now >= self._look_due, now >= self._merge_due
         if not (is_look or is_merge):
             return {}
+        began = time.perf_counter()
+        stops = self._tick(now, is_look)
+        (self.tick_seconds if is_look else self.merge_seconds).append(time.perf_counter() - began)
+        return stops
+
+    def _tick(self, now: float, is_look: bool) -> dict[str, Action]:
+        """Do what `_supervise` does when it is time."""
+        settings, station = self.settings, self._supervisor.station
         self._collect(now)
         self._merge_due = _next(now, settings.merge_period_s)
-        station.merge(now)
+        # A station that looks as often as it merges has no other time to search.
+        station.merge(now, may_search=not is_look or settings.period_s <= settings.merge_period_s)
         if self._tells:
             self._tell()
         if not is_look:

@@ -17,8 +17,9 @@ class SupervisorSettings:
         Simulated time between two looks at the tree [s].
     merge_period_s : float
         Simulated time between two merges of the maps [s].
-    pairs_per_merge : int
-        Most pairs of maps that a merge compares; the others wait for their turn.
+    searches_per_merge : int
+        For how many pairs of maps a merge searches at most; the others wait for their turn. With a look there is no search: it has work
+        of its own.
     merge_resolution_m : float
         Maps are compared in cells of this side, or of theirs where that is more [m].
     confirmation_growth_m2 : float
@@ -61,7 +62,7 @@ class SupervisorSettings:
 
     period_s: float = 10.0
     merge_period_s: float = 2.0
-    pairs_per_merge: int = 2
+    searches_per_merge: int = 1
     merge_resolution_m: float = 0.05
     confirmation_growth_m2: float = 2.0
     same_goal_m: float = 1.0
@@ -87,8 +88,8 @@ class SupervisorSettings:
                 raise ValueError(f"{field.name} of the supervisor is {value!r}; want true or false")
             if field.type is float and not (isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{field.name} of the supervisor is {value!r}; want a number of at least 0")
-        if isinstance(self.pairs_per_merge, bool) or not isinstance(self.pairs_per_merge, int) or self.pairs_per_merge < 1:
-            raise ValueError(f"pairs_per_merge of the supervisor is {self.pairs_per_merge!r}; want a whole number of at least 1")
+        if isinstance(self.searches_per_merge, bool) or not isinstance(self.searches_per_merge, int) or self.searches_per_merge < 1:
+            raise ValueError(f"searches_per_merge of the supervisor is {self.searches_per_merge!r}; want a whole number of at least 1")
         for name in ("period_s", "merge_period_s", "enclosed_way_m", "sensor_range_m"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} of the supervisor is 0; want a positive number")

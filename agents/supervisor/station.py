@@ -62,7 +62,7 @@ class MergeStation:
             self._merge_resolution,
             merge,
             confirmation_growth_m2=settings.confirmation_growth_m2,
-            tries_per_update=settings.pairs_per_merge,
+            searches_per_update=settings.searches_per_merge,
         )
         self._merge = merge
         self._tree: FrameTree[str] = FrameTree(merge.cycle_distance_m, merge.cycle_angle)
@@ -105,13 +105,13 @@ class MergeStation:
         way, gain = (last - first for first, last in zip(track[0], track[-1], strict=True))
         return gain < self.settings.enclosed_gain_m2_per_m * way
 
-    def merge(self, time_s: float) -> None:
-        """Merge the maps of all robots that have not failed."""
+    def merge(self, time_s: float, may_search: bool = True) -> None:
+        """Merge the maps of all robots that have not failed; what was found is verified alone where there is no time for searches."""
         used = {agent: self.reports[agent] for agent in self.agents if self._is_used(agent)}
         if self.settings.trusts_starts:
             self._join_by_starts(used)
         elif used:
-            merged = self._merger.update({agent: self._own_map(agent) for agent in used})
+            merged = self._merger.update({agent: self._own_map(agent) for agent in used}, may_search=may_search)
             self._tree = merged.tree
             self._middles = {pair: self._middle(pair, result) for pair, result in merged.pairs.items() if result.is_accepted}
             self._note_found(merged, time_s)
@@ -150,13 +150,18 @@ class MergeStation:
         """Return a robot's map as it is compared with others."""
         whole = self.reports[agent].map
         coarse = GrowingMap(resampled(whole.levels, self.resolution, self._merge_resolution), whole.origin)
-        return without_own_trail(coarse, self._trail(agent), self._radius, self._merge_resolution)
+        # A third robot's image on the one map would contradict the floor on which the other one saw it drive on.
+        bare = without_bodies(coarse, self._mates_trails(agent), self._radius, self._merge_resolution)
+        return without_own_trail(bare, self._trail(agent), self._radius, self._merge_resolution)
 
     def _map_without_bodies(self, agent: str) -> GrowingMap:
         """Return a robot's map without what it may have drawn of those that it is joined with."""
+        return without_bodies(self.reports[agent].map, self._mates_trails(agent), self._radius, self.resolution)
+
+    def _mates_trails(self, agent: str) -> list[NDArray[np.float64]]:
+        """Return where those have been that a robot is joined with, in its map frame [m]."""
         mates = {mate: frame for mate in self.agents if mate != agent and (frame := self.lookup(agent, mate)) is not None}
-        trails = [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
-        return without_bodies(self.reports[agent].map, trails, self._radius, self.resolution)
+        return [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
 
     def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
         """Return the middle of what two maps both know, in the second robot's map frame [m]."""

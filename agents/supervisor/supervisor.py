@@ -230,11 +230,13 @@ class Supervisor:
         exploring = [agent for agent in workers if judged[agent].leaf.rule in (0, 3, 4, 7)]
         rows = [workers.index(agent) for agent in exploring]
         is_goal = survey.is_goal()
-        costs = np.where(is_goal, survey.goals.costs[rows], math.inf)
+        ways = survey.goals.costs[rows]
+        costs = np.where(is_goal, ways, math.inf)
         for row, agent in enumerate(exploring):
             going = survey.going[agent]
             if going != NOBODY:
-                costs[row, going] = max(costs[row, going] - STICKINESS_M, 0.0)
+                # What has become short while a robot drives to it is still its goal: else it is left for later, which costs another way.
+                costs[row, going], is_goal[going] = max(ways[row, going] - STICKINESS_M, 0.0), True
         if self._settings.assignment == "hungarian":
             goals = assign_by_cost(costs)
         else:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from lidarium.evaluation.experiments import leaderboard, merging, srt
+from lidarium.evaluation.experiments import leaderboard, merging, srt, supervisor
 from lidarium.evaluation.suite import Suite
 
 
@@ -55,6 +55,12 @@ EXPERIMENTS: dict[str, Experiment] = {
         srt.suites,
         srt.work,
         srt.pictures,
+    ),
+    "supervisor": Experiment(
+        "teams with unknown starts under the supervisor, beside robots alone and teams that are told their starts",
+        supervisor.page,
+        supervisor.suites,
+        work=supervisor.work,
     ),
 }
 """By name; the page of one is ``docs/results/NAME.md``."""

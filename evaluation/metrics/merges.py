@@ -20,6 +20,9 @@ ROTATION_TOLERANCE = 1e-2
 TRANSLATION_TOLERANCE = 2.0
 """Largest error of the translation of a correct merge [cells]."""
 
+WRONG_TRANSLATION, WRONG_ROTATION = 0.3, math.radians(3.0)
+"""A merge that errs by more than one of these puts a team's walls where there are none [m, rad]; drift of a map errs by less."""
+
 LEAST_OVERLAP = 0.10
 """Share of the area that maps must have in common for a merge to be expected."""
 
@@ -59,6 +62,11 @@ def is_correct(translation_error: float, rotation_error: float, resolution: floa
     return rotation_error <= ROTATION_TOLERANCE and translation_error <= (TRANSLATION_TOLERANCE + 1e-6) * resolution
 
 
+def is_wrong(translation_error: float, rotation_error: float) -> bool:
+    """Return whether a merge is wrong: beyond ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``, errors as of `transform_error` [m, rad]."""
+    return translation_error > WRONG_TRANSLATION or rotation_error > WRONG_ROTATION
+
+
 def merge_figures(events: Sequence[MergeEvent], resolution: float) -> dict[str, Any]:
     """Return the entry ``merges`` of ``result.json``.
 
@@ -72,16 +80,21 @@ def merge_figures(events: Sequence[MergeEvent], resolution: float) -> dict[str, 
     Returns
     -------
     dict
-        ``accepted``, ``correct`` and ``false`` are numbers of events, ``first_correct_s`` is a time or None.
+        ``accepted``, ``correct``, ``false`` (not correct) and ``wrong`` (`is_wrong`) are numbers of events, ``first_correct_s`` is a time,
+        ``worst_m`` and ``worst_rad`` are the largest errors; these are None where there is nothing to tell.
     """
     accepted = np.ones(len(events), np.bool_)
-    correct = np.array([is_correct(*transform_error(one.found, one.true, one.at), resolution) for one in events], np.bool_)
+    errors = [transform_error(one.found, one.true, one.at) for one in events]
+    correct = np.array([is_correct(*error, resolution) for error in errors], np.bool_)
     right = int(np.count_nonzero(correct))
     times = [one.time_s for one in events]
     return {
         "accepted": len(events),
         "correct": right,
         "false": len(events) - right,
+        "wrong": sum(is_wrong(*error) for error in errors),
+        "worst_m": max((round(distance, 6) for distance, _ in errors), default=None),
+        "worst_rad": max((round(angle, 6) for _, angle in errors), default=None),
         "first_correct_s": first_correct_time(times, accepted, correct),
     }
 

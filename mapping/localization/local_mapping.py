@@ -98,7 +98,8 @@ class LocalMapper:
         """Return where a scan lies on the older local map; None where it does not match.
 
         Near what odometry says it is searched first, weighing both. Where that does not convince, odometry may be wrong (a wheel slips,
-        the robot was pushed), and the search goes farther, without it; what is found there has to be clearly better.
+        the robot was pushed), and the search goes farther, without it; what is found there has to be clearly better. On new ground, and where a
+        scan hardly has a return, nothing but odometry tells where the robot is.
 
         Parameters
         ----------
@@ -116,6 +117,8 @@ class LocalMapper:
         settings = self._matching
         is_blind = not self._uses_odometry or failed >= settings.wide_after
         near = self._match_near(points, predicted, uncertainty) if self._uses_odometry else None
+        if near is not None and self._is_new_ground(near, len(points)):
+            return Match(predicted, near.score, near.overlap, near.contradiction, np.zeros((3, 3)), near.prior)
         if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:
             return self._noted(near)
         distance = math.hypot(float(moved[0]), float(moved[1]))
@@ -135,6 +138,12 @@ class LocalMapper:
     def _noted(self, match: Match) -> Match:
         self.usual_score = match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
         return match
+
+    def _is_new_ground(self, match: Match, points: int) -> bool:
+        """Whether a scan hardly sees anything that the local map has observed, or hardly anything at all."""
+        settings = self._matching
+        is_sparse = points < min(settings.least_points, self._geometry.beams // 8)
+        return is_sparse or (match.overlap < settings.least_overlap and match.contradiction <= settings.most_contradiction)
 
     def _is_good(self, match: Match) -> bool:
         settings = self._matching

@@ -76,6 +76,8 @@ class MatchingSettings:
         Returns that are nearer to each other than this count as one [m].
     points : int
         At most so many returns of a scan are matched.
+    least_points : int
+        With fewer returns than this (or an eighth of the beams, if that is less) a scan says nothing of the pose: they fit in many places.
     search_m, search_angle : float
         What the search around odometry reaches beyond its standard deviation [m, rad].
     search_deviations : float
@@ -114,6 +116,7 @@ class MatchingSettings:
     range_m: float = 20.0
     spacing_m: float = 0.05
     points: int = 350
+    least_points: int = 15
     search_m: float = 0.05
     search_angle: float = math.radians(1.0)
     search_deviations: float = 2.0

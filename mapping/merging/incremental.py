@@ -84,9 +84,9 @@ class IncrementalMerger:
         A pair that was refused is searched for again when its maps together know so much more [m2].
     confirmation_growth_m2 : float or None
         A pair that was found joins its maps only when it is found once more, once they know so much more [m2]; at once where None.
-    tries_per_update : int or None
-        Most pairs that an update verifies or searches for, those first whose turn was longest ago; pairs that others join are not searched
-        for then. All where None.
+    searches_per_update : int or None
+        Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn was longest ago; pairs that
+        others join are not searched for then. All where None. Verifying costs little: whatever has news is verified.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class IncrementalMerger:
     settings: MergeSettings = field(default_factory=MergeSettings)
     search_growth_m2: float = 2.0
     confirmation_growth_m2: float | None = None
-    tries_per_update: int | None = None
+    searches_per_update: int | None = None
     searched: int = 0
     verified: int = 0
     _maps: dict[str, GrowingMap] = field(default_factory=dict)
@@ -109,7 +109,9 @@ class IncrementalMerger:
     _updates: int = 0
     _changed_at: dict[str, int] = field(default_factory=dict)
 
-    def update(self, maps: Mapping[str, GrowingMap], may_try: frozenset[tuple[str, str]] | None = None) -> Merged:
+    def update(
+        self, maps: Mapping[str, GrowingMap], may_try: frozenset[tuple[str, str]] | None = None, *, may_search: bool = True
+    ) -> Merged:
         """Take in the maps as they are now.
 
         Parameters
@@ -118,6 +120,8 @@ class IncrementalMerger:
             All of them, also those that have not changed; one that is missing is forgotten. Maps are kept, not copied.
         may_try : frozenset of (str, str) or None
             Pairs, in the order of the maps, whose robots can talk to each other now: the others keep what they had found. All where None.
+        may_search : bool
+            Whether there is time for searches; otherwise they wait for the next update, and what was found is verified alone.
 
         Returns
         -------
@@ -136,8 +140,12 @@ class IncrementalMerger:
         self._describe(maps)
         self.searched = self.verified = 0
         every = list(itertools.combinations(maps, 2))
-        due = self._due([pair for pair in every if may_try is None or pair in may_try])
-        tried_now = {pair: self._tried(pair, self._pairs.get(pair)) for pair in due}
+        most = self.searches_per_update if may_search else 0
+        tried_now: dict[tuple[str, str], _Tried] = {}
+        for pair in self._due([pair for pair in every if may_try is None or pair in may_try]):
+            tried = self._tried(pair, self._pairs.get(pair), most is None or self.searched < most)
+            if tried is not None:
+                tried_now[pair] = tried
         pairs = {pair: tried for pair in every if (tried := tried_now.get(pair) or self._kept(pair)) is not None}
         self._pairs = pairs
         results = {pair: tried.result for pair, tried in pairs.items()}
@@ -159,9 +167,14 @@ class IncrementalMerger:
     def _due(self, pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
         """Return the pairs whose turn it is to be verified or searched for."""
         due = [pair for pair in pairs if self._has_news(pair)]
-        if self.tries_per_update is not None:
-            due.sort(key=lambda pair: self._pairs[pair].at if pair in self._pairs else 0)
-        return due[: self.tries_per_update]
+        if self.searches_per_update is not None:
+            due.sort(key=lambda pair: (not self._waits(pair), self._pairs[pair].at if pair in self._pairs else 0))
+        return due
+
+    def _waits(self, pair: tuple[str, str]) -> bool:
+        """Whether a pair was found and is to be found once more."""
+        before = self._pairs.get(pair)
+        return before is not None and before.frames is not None and not before.is_confirmed
 
     def _has_news(self, pair: tuple[str, str]) -> bool:
         """Whether maps have changed so much since a pair was tried that it is to be tried again."""
@@ -170,7 +183,7 @@ class IncrementalMerger:
             return False
         if before is not None and before.frames is not None:
             return True
-        if self.tries_per_update is not None and self._are_joined(pair):
+        if self.searches_per_update is not None and self._are_joined(pair):
             return False
         return before is None or self._known_of(pair) >= before.known_m2 + self.search_growth_m2
 
@@ -197,18 +210,23 @@ class IncrementalMerger:
         agreement = replace(before.result.agreement, centre=(float(centre[0]), float(centre[1])))
         return replace(before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first)
 
-    def _tried(self, pair: tuple[str, str], before: _Tried | None) -> _Tried:
-        """Verify the transform of a pair; search where there is none, or it is refused by now."""
+    def _tried(self, pair: tuple[str, str], before: _Tried | None, may_search: bool) -> _Tried | None:
+        """Verify the transform of a pair; search where there is none, or it is refused by now. None where that has to wait."""
         a, b = (self._features[name] for name in pair)
         first, second = (placed(self._maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
         if before is not None and before.frames is not None:
             result = verify_pair(a, b, first.inverse() @ before.frames @ second, self.settings)
             is_due = not before.is_confirmed and known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
-            if result.is_accepted and result.a_from_b is not None and not is_due:
+            if result.is_accepted and result.a_from_b is not None and not (is_due and may_search):
                 self.verified += 1
                 refined = first @ result.a_from_b @ second.inverse()
-                return _Tried(result, refined, before.known_m2, before.is_confirmed, self._updates, first)
+                # A confirmation that has to wait is due whether maps grow any more or not.
+                return _Tried(result, refined, before.known_m2, before.is_confirmed, before.at if is_due else self._updates, first)
+            if not result.is_accepted and not may_search:
+                return _Tried(result, None, -math.inf, False, before.at, first)
+        if not may_search:
+            return None
         self.searched += 1
         result = merge_pair(a, b, self.settings)
         is_found = result.is_accepted and result.a_from_b is not None

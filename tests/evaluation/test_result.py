@@ -25,7 +25,7 @@ KEYS = {
 }  # fmt: skip
 AT_THRESHOLDS = [name.format(share) for name in ("t{}_s", "d{}_m", "d_sum{}_m", "n{}") for share in (85, 90, 95, 99)]
 OVER_TIME = ["overlap_eb", "overlap_mx_85", "overlap_mx_95", "overlap_mv", "rpe_m", "rpe_rad"]
-MAY_BE_NONE = ["horizon_s", "energy_j", "supervisor", "auc", "collisions_per_km", *AT_THRESHOLDS, *OVER_TIME]
+MAY_BE_NONE = ["horizon_s", "energy_j", "supervisor", "tick_ms", "c_others_final", "auc", "collisions_per_km", *AT_THRESHOLDS, *OVER_TIME]
 
 
 def explored(on_decision=None, **options):
@@ -48,7 +48,8 @@ def test_a_result_has_the_keys_of_the_design_and_is_json():
     for key, kind in KEYS.items():
         assert isinstance(result[key], kind), key
     assert result["ended_because"] == {"robot_0": "horizon", "robot_1": "horizon"}
-    assert result["merges"] == {"accepted": 0, "correct": 0, "false": 0, "first_correct_s": None}
+    none = {"accepted": 0, "correct": 0, "false": 0, "wrong": 0, "worst_m": None, "worst_rad": None, "first_correct_s": None}
+    assert result["merges"] == none
     assert result["ate_m"] == [0.0, 0.0]
     assert result["realism"] == "ideal"
     assert result["time_s"] == 30.0

@@ -134,8 +134,14 @@ def test_figures_tell_right_merges_from_wrong_ones():
         MergeEvent(1.0, "a", "c", (1.2, 2.0, 0.5), pose, (0.0, 0.0)),
         MergeEvent(2.0, "b", "c", pose, pose, (0.0, 0.0)),
     ]
-    assert merge_figures(events, 0.05) == {"accepted": 3, "correct": 2, "false": 1, "first_correct_s": 2.0}
-    assert merge_figures([], 0.05) == {"accepted": 0, "correct": 0, "false": 0, "first_correct_s": None}
+    figures = merge_figures(events, 0.05)
+    assert figures == {
+        "accepted": 3, "correct": 2, "false": 1, "wrong": 0, "worst_m": 0.2, "worst_rad": 0.0, "first_correct_s": 2.0
+    }  # fmt: skip
+    assert merge_figures([], 0.05)["worst_m"] is None
+    far = MergeEvent(1.0, "a", "c", (1.31, 2.0, 0.5), pose, (0.0, 0.0))
+    turned = MergeEvent(1.0, "a", "c", (1.0, 2.0, 0.56), pose, (0.0, 0.0))
+    assert merge_figures([*events, far, turned], 0.05)["wrong"] == 2
 
 
 def test_bad_wrappings_are_refused():
