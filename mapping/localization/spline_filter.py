@@ -17,7 +17,6 @@ from lidarium.mapping.localization.spline_matches import Matches
 from lidarium.mapping.localization.spline_tracking import SplineTracker, TrackingSettings, steps_of
 from lidarium.mapping.rigid import Transform
 from lidarium.mapping.scans import ScanGeometry
-from lidarium.mapping.splines.curve_lookup import piece_at, piece_distance
 from lidarium.mapping.splines.features import Observation
 
 _HIT_SHARE = 0.95
@@ -119,7 +118,7 @@ class SplineFilter(SplineTracker):
         return self._mean()
 
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
-        tracking, lookup = self.tracking, self._lookup
+        tracking = self.tracking
         numbers = np.array([tracking.feature_sigma, tracking.line_angle_sigma, tracking.ray_share])
         logarithms, fits = np.empty(len(self.particles)), np.empty(len(self.particles))
         _weigh(
@@ -131,9 +130,7 @@ class SplineFilter(SplineTracker):
             matches.known_lines,
             matches.line_sigmas,
             matches.rays,
-            lookup.pieces,
-            lookup.nearest,
-            lookup.frame,
+            matches.pieces,
             self._ray_table,
             numbers,
             logarithms,
@@ -192,8 +189,6 @@ def _weigh(
     line_sigmas: Array,
     rays: Array,
     pieces: Array,
-    nearest: Array,
-    frame: Array,
     ray_table: Array,
     numbers: Array,
     logarithms: Array,
@@ -201,32 +196,33 @@ def _weigh(
 ) -> None:
     """Write the logarithm of each particle's likelihood, and how well rays fit in the mean, 0.05 to 1."""
     feature_sigma, angle_sigma, ray_share = numbers
-    last_entry = ray_table.shape[0] - 1
-    for i in range(particles.shape[0]):
-        x, y, theta = particles[i]
-        cosine, sine = math.cos(theta), math.sin(theta)
-        total = 0.0
-        for k in range(points.shape[0]):
-            dx = x + cosine * points[k, 0] - sine * points[k, 1] - known_points[k, 0]
-            dy = y + sine * points[k, 0] + cosine * points[k, 1] - known_points[k, 1]
-            sigma = max(feature_sigma, point_sigmas[k])
-            total -= 0.5 * (dx * dx + dy * dy) / (sigma * sigma)
-        for k in range(lines.shape[0]):
-            dx = x + cosine * lines[k, 0] - sine * lines[k, 1] - known_lines[k, 0]
-            dy = y + sine * lines[k, 0] + cosine * lines[k, 1] - known_lines[k, 1]
-            aside = dy * math.cos(known_lines[k, 2]) - dx * math.sin(known_lines[k, 2])
-            turn = theta + lines[k, 2] - known_lines[k, 2]
-            turn = math.atan2(math.sin(turn), math.cos(turn))
-            sigma = max(feature_sigma, line_sigmas[k])
-            total -= 0.5 * ((aside / sigma) ** 2 + (turn / angle_sigma) ** 2)
-        ray_total, fit = 0.0, 0.0
-        for k in range(rays.shape[0]):
-            ray_x, ray_y = x + cosine * rays[k, 0] - sine * rays[k, 1], y + sine * rays[k, 0] + cosine * rays[k, 1]
-            piece = piece_at(nearest, frame, ray_x, ray_y)
-            entry = last_entry
-            if piece >= 0:
-                entry = min(int(piece_distance(pieces, piece, ray_x, ray_y) * _ENTRIES_PER_METRE), last_entry)
-            ray_total += ray_table[entry, 0]
-            fit += ray_table[entry, 1]
-        logarithms[i] = total + ray_share * ray_total
-        fits[i] = fit / max(rays.shape[0], 1)
+    count, last_entry = particles.shape[0], ray_table.shape[0] - 1
+    cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
+    logarithms[:], fits[:] = 0.0, 0.0
+    for k in range(points.shape[0]):
+        sigma = max(feature_sigma, point_sigmas[k])
+        for i in range(count):
+            dx = particles[i, 0] + cosines[i] * points[k, 0] - sines[i] * points[k, 1] - known_points[k, 0]
+            dy = particles[i, 1] + sines[i] * points[k, 0] + cosines[i] * points[k, 1] - known_points[k, 1]
+            logarithms[i] -= 0.5 * (dx * dx + dy * dy) / (sigma * sigma)
+    for k in range(lines.shape[0]):
+        sigma = max(feature_sigma, line_sigmas[k])
+        along_x, along_y = math.cos(known_lines[k, 2]), math.sin(known_lines[k, 2])
+        for i in range(count):
+            dx = particles[i, 0] + cosines[i] * lines[k, 0] - sines[i] * lines[k, 1] - known_lines[k, 0]
+            dy = particles[i, 1] + sines[i] * lines[k, 0] + cosines[i] * lines[k, 1] - known_lines[k, 1]
+            aside = dy * along_x - dx * along_y
+            turns = (particles[i, 2] + lines[k, 2] - known_lines[k, 2]) / (2.0 * math.pi)
+            turn = (turns - math.floor(turns + 0.5)) * (2.0 * math.pi)
+            logarithms[i] -= 0.5 * ((aside / sigma) ** 2 + (turn / angle_sigma) ** 2)
+    for k in range(rays.shape[0]):
+        ray_x, ray_y = rays[k]
+        middle_x, middle_y, along_x, along_y, _ = pieces[k]
+        for i in range(count):
+            dx = particles[i, 0] + cosines[i] * ray_x - sines[i] * ray_y - middle_x
+            dy = particles[i, 1] + sines[i] * ray_x + cosines[i] * ray_y - middle_y
+            entry = min(int(abs(dy * along_x - dx * along_y) * _ENTRIES_PER_METRE), last_entry)
+            logarithms[i] += ray_share * ray_table[entry, 0]
+            fits[i] += ray_table[entry, 1]
+    for i in range(count):
+        fits[i] /= max(rays.shape[0], 1)
