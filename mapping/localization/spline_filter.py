@@ -121,7 +121,9 @@ class SplineFilter(SplineTracker):
         spread = np.array([settings.start_distance, settings.start_distance, settings.start_turn])
         self.particles = pose + spread * self._generator.standard_normal((settings.particles, 3))
         self.weights = np.full(settings.particles, 1.0 / settings.particles)
-        self.scales = 1.0 + np.array([settings.distance_bias, settings.turn_bias]) * self._generator.standard_normal((settings.particles, 2))
+        self.scales = 1.0 + np.array([settings.distance_bias, settings.turn_bias]) * self._generator.standard_normal(
+            (settings.particles, 2)
+        )
         self.resamplings, self._lost_steps = 0, 0
         self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
 
