@@ -30,8 +30,8 @@ PICTURE_SEED = SEEDS[0]
 
 TUNED_ON = (
     f"Seeds are {SEEDS[0]} and on; choices were made on others of the same worlds: what the thesis never printed (free rays of 0.9 m, "
-    "step, least distance) among about twenty settings with seeds 0 to 19, for goals that are reached, slower and with more nodes than others "
-    "that were tried, which flatters the ratios to it; the default mode with seeds 0 to 5, and its localization with seeds 0 to 3, "
+    "step, least distance) among about twenty settings with seeds 0 to 19, for goals that are reached, slower and with more nodes than "
+    "others that were tried, which flatters the ratios to it; the default mode with seeds 0 to 5, and its localization with seeds 0 to 3, "
     "with a look at 100 to 102."
 )
 """What the runs towards goals owe to choices that were made on the same worlds."""
