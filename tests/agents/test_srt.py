@@ -91,6 +91,27 @@ def test_every_chain_of_parents_ends_at_the_first_node():
         assert tree.chain(node.number)[-1] == 0
 
 
+def test_no_edge_of_the_tree_crosses_what_stands_there():
+    episode = finished("scene_room", robot="kobuki")
+    env, tree = episode.env, episode.policy.tree
+    belief = env.perception.belief("robot_0")
+    origin = np.array(belief.map_origin) + env.world.poses[0, :2] - belief.pose[:2]
+    raster = env.floor.raster(0.01, 0.3, 0.3)
+    edges = [(tree.nodes[node.parent].place, node.place) for node in tree.nodes if node.parent is not None]
+    assert edges
+    for start, end in edges:
+        points = origin + start + (end - start) * np.linspace(0.0, 1.0, 200)[:, None]
+        columns, rows = np.floor((points - np.array(raster.origin[:2])) / raster.resolution).astype(int).T
+        assert (raster.solid[rows, columns] == 0).all()
+
+
+def test_a_goal_in_sight_of_the_first_node_is_reached_in_one_move():
+    env = lidarium.parallel_env("srt_cluttered", robots=1, robot="pioneer", horizon_s=60.0, stop_coverage=None, map_cells=32)
+    tree = run_episode(SensorBasedRandomTree(), env, 1, {"goal": (0.9, 0.6)}).policy.tree
+    assert env.scorer.ended_because == {"robot_0": "reached"}
+    assert len(tree.nodes) == 1
+
+
 def test_a_team_shares_one_graph_and_all_come_home():
     episode = finished("apartment", robots=2, robot="kobuki")
     env, tree = episode.env, episode.policy.tree
