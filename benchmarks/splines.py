@@ -28,26 +28,15 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings import make_settings
-from lidarium.evaluation.metrics import (
-    absolute_error,
-    curve_precision,
-    end_point_bytes,
-    grid_bytes,
-    hits_of_beams,
-    moved,
-    seen_walls,
-    wall_error,
-    wall_recall,
-)
 from lidarium.evaluation.output import write_text
 from lidarium.evaluation.runner import run_episode
 from lidarium.evaluation.spline_picture import save_spline_picture
+from lidarium.evaluation.srt.map_figures import MapFigures, map_figures
 from lidarium.evaluation.watching import WatchedExploration
 from lidarium.mapping.localization.localizer import Sensing
 from lidarium.mapping.localization.spline_ekf import SplineEkf
 from lidarium.mapping.localization.spline_filter import SplineFilter
 from lidarium.mapping.rigid import Transform
-from lidarium.mapping.splines.spline_files import compact_bytes
 
 TUNED_ON = ("srt_corridor", "srt_l_room", "srt_lab", "srt_t_junction", "srt_cluttered", "srt_cluttered_reachable")
 FLOORS = (*TUNED_ON, "apartment")
@@ -55,7 +44,6 @@ FLOORS = (*TUNED_ON, "apartment")
 
 LOCALIZERS = {"splines": SplineFilter, "splines_ekf": SplineEkf}
 POLICY, RASTER, RESOLUTION, TIME_STEP = "nearest_frontier", 0.01, 0.05, 0.1
-_SPACING = 0.01
 
 
 @dataclass(slots=True)
@@ -80,19 +68,9 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Figures of one run: lengths in metres, angles in degrees, shares, bytes, milliseconds."""
+    """Figures of one run, and what a step took [ms]."""
 
-    ate_m: float
-    end_m: float
-    end_deg: float
-    odometry_ate_m: float
-    wall_mean_m: float
-    wall_p95_m: float
-    recall: float
-    precision: float
-    size_bytes: int
-    of_end_points: float
-    of_grid: float
+    figures: MapFigures
     step_ms: float
     step_p95_ms: float
 
@@ -136,29 +114,11 @@ def measure(name: str, floor: Floor, walk: Drive, seed: int, bias: float, pictur
         believed.append(localizer.localize(Sensing(k * TIME_STEP, told[k], ranges)))
         seconds.append(time.process_time() - began)
         returns += int(np.isfinite(ranges).sum()) if localizer.map.updates > updates else 0
-    track, alone = np.array(believed), moved(told, poses[0])
-    curves = localizer.map.sample(_SPACING)
-    edges = np.concatenate([solid.edges for solid in floor.solids])
-    hits = hits_of_beams(edges, poses, localizer.geometry.angles, localizer.geometry.range_max)
-    walls, size = wall_error(curves, edges), compact_bytes(localizer.map)
+    track = np.array(believed)
     if picture is not None:
         save_spline_picture(picture, floor, localizer.map, poses, track)
-    turn = track[-1, 2] - poses[-1, 2]
-    return Run(
-        absolute_error(track, poses, is_aligned=False),
-        math.dist(track[-1, :2], poses[-1, :2]),
-        math.degrees(abs(math.atan2(math.sin(turn), math.cos(turn)))),
-        absolute_error(alone, poses, is_aligned=False),
-        walls.mean,
-        walls.p95,
-        wall_recall(seen_walls(edges, hits), curves),
-        curve_precision(curves, edges),
-        size,
-        size / end_point_bytes(returns),
-        size / grid_bytes(floor.bounds),
-        1000.0 * statistics.median(seconds[1:]),
-        1000.0 * float(np.quantile(seconds[1:], 0.95)),
-    )
+    figures = map_figures(floor, localizer.map, localizer.geometry, poses, track, told, returns)
+    return Run(figures, 1000.0 * statistics.median(seconds[1:]), 1000.0 * float(np.quantile(seconds[1:], 0.95)))
 
 
 HEADER = (
@@ -169,13 +129,14 @@ HEADER = (
 
 def row(floor: str, name: str, runs: list[Run]) -> str:
     """Return a line of the table: the worst of the runs, of times the median."""
-    ratio = min(run.odometry_ate_m / run.ate_m for run in runs)
+    figures = [run.figures for run in runs]
+    ratio = min(each.odometry_ate_m / each.ate_m for each in figures)
     return (
-        f"| {floor} | `{name}` | {1000 * max(run.ate_m for run in runs):.0f} | {1000 * max(run.end_m for run in runs):.0f} | "
-        f"{max(run.end_deg for run in runs):.2f} | {ratio:.1f} | {1000 * max(run.wall_mean_m for run in runs):.1f} | "
-        f"{1000 * max(run.wall_p95_m for run in runs):.0f} | {100 * min(run.recall for run in runs):.1f} % | "
-        f"{100 * min(run.precision for run in runs):.1f} % | {max(run.size_bytes for run in runs)} | "
-        f"{100 * max(run.of_end_points for run in runs):.1f} % | {100 * max(run.of_grid for run in runs):.1f} % | "
+        f"| {floor} | `{name}` | {1000 * max(each.ate_m for each in figures):.0f} | {1000 * max(each.end_m for each in figures):.0f} | "
+        f"{max(each.end_deg for each in figures):.2f} | {ratio:.1f} | {1000 * max(each.wall_mean_m for each in figures):.1f} | "
+        f"{1000 * max(each.wall_p95_m for each in figures):.0f} | {100 * min(each.recall for each in figures):.1f} % | "
+        f"{100 * min(each.precision for each in figures):.1f} % | {max(each.size_bytes for each in figures)} | "
+        f"{100 * max(each.of_end_points for each in figures):.1f} % | {100 * max(each.of_grid for each in figures):.1f} % | "
         f"{statistics.median(run.step_ms for run in runs):.1f}, {statistics.median(run.step_p95_ms for run in runs):.1f} |"
     )
 

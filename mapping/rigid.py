@@ -28,11 +28,15 @@ class Transform:
         places = np.asarray(points, np.float64)
         cosine, sine = math.cos(self.theta), math.sin(self.theta)
         x, y = places[..., 0], places[..., 1]
-        return np.stack([cosine * x - sine * y + self.x, sine * x + cosine * y + self.y], axis=-1)
+        moved = np.empty(places.shape)
+        moved[..., 0] = cosine * x - sine * y + self.x
+        moved[..., 1] = sine * x + cosine * y + self.y
+        return moved
 
     def __matmul__(self, other: "Transform") -> "Transform":
         """Return the motion that does ``other`` first and then this one."""
-        x, y = self.apply((other.x, other.y)).tolist()
+        cosine, sine = math.cos(self.theta), math.sin(self.theta)
+        x, y = cosine * other.x - sine * other.y + self.x, sine * other.x + cosine * other.y + self.y
         return Transform(x, y, wrapped(self.theta + other.theta))
 
     def inverse(self) -> "Transform":

@@ -33,6 +33,7 @@ VARIANTS: Mapping[str, tuple[str, SplineFilterSettings]] = MappingProxyType({
     "no_corners": ("no cut at corners", _with_splines(SplineSettings(segmentation=SegmentationSettings(corner_angle=NO_CORNER)))),
     "particles_50": ("50 particles", replace(_DEFAULT, particles=50)),
     "particles_1000": ("1000 particles", replace(_DEFAULT, particles=1000)),
+    "wheels_as_told": ("no bias of odometry learned", replace(_DEFAULT, distance_bias=0.0, turn_bias=0.0, bias_wander=0.0)),
     "fixed_knots": ("knots every 0.25 m", _with_splines(SplineSettings(fit=FitSettings(finest_spacing=0.25, is_sparse=False)))),
 })  # fmt: skip
 """Variants by name: about, and settings."""

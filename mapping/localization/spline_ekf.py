@@ -114,7 +114,7 @@ class SplineEkf(SplineTracker):
         sigmas = np.concatenate([observation.features.corner_sigmas, observation.features.peak_sigmas])
         here = Transform(*(float(value) for value in self.pose))
         which, known = match_points(here.apply(seen), self.landmarks, self.tracking.splines.association.point_distance)
-        of_walls = [self._gated(part) for part in (self._lines_measured(matches), self._rays_measured(matches.rays))]
+        of_walls = [self._gated(part) for part in (self._lines_measured(matches), self._rays_measured(matches))]
         measured = [self._gated(self._landmarks_measured(seen[which], known, sigmas[which])), _condensed(_stacked(of_walls))]
         self._update(_stacked(measured))
         self._add_landmarks(matches)
@@ -175,18 +175,14 @@ class SplineEkf(SplineTracker):
         misses = -np.concatenate([asides, np.arctan2(np.sin(turns), np.cos(turns))])
         return _Measured(misses, jacobian, np.concatenate([sigmas, angles]) ** 2)
 
-    def _rays_measured(self, rays: NDArray[np.float64]) -> _Measured:
+    def _rays_measured(self, matches: Matches) -> _Measured:
         """Measure how the ends of rays lie beside the curves."""
-        lever = rays @ _rotation(float(self.pose[2])).T
-        ends = lever + self.pose[:2]
-        pieces, _ = self._lookup.look_up(ends)
-        is_known = pieces >= 0
-        lever, ends, found = lever[is_known], ends[is_known], self._lookup.pieces[pieces[is_known]]
+        lever, found = matches.rays @ _rotation(float(self.pose[2])).T, matches.pieces
         normals = np.stack([-found[:, 3], found[:, 2]], axis=1)
         jacobian = np.empty((len(found), 3))
         jacobian[:, :2] = normals
         jacobian[:, 2] = ((lever @ _TURNED.T) * normals).sum(axis=1)
-        misses = -((ends - found[:, :2]) * normals).sum(axis=1)
+        misses = -((lever + self.pose[:2] - found[:, :2]) * normals).sum(axis=1)
         variance = self.tracking.curve_sigma**2 / self.tracking.ray_share
         return _Measured(misses, jacobian, np.full(len(found), variance))
 

@@ -1,5 +1,8 @@
 """The particle filter on a map of curves: each particle is a pose, weighed by how well features and rays fit the map from there.
 
+A particle also has an opinion of the wheels: by what share they tell ways and turns too long or too short. What fits the walls survives,
+and carries the robot past where walls tell nothing, as along a corridor.
+
 References
 ----------
 Motion by turn, way and turn, and resampling by one comb: Thrun, Burgard, Fox, "Probabilistic robotics", 2005, chapters 4 and 5. Printed
@@ -17,7 +20,6 @@ from lidarium.mapping.localization.spline_matches import Matches
 from lidarium.mapping.localization.spline_tracking import SplineTracker, TrackingSettings, steps_of
 from lidarium.mapping.rigid import Transform
 from lidarium.mapping.scans import ScanGeometry
-from lidarium.mapping.splines.curve_lookup import piece_at, piece_distance
 from lidarium.mapping.splines.features import Observation
 
 _HIT_SHARE = 0.95
@@ -37,6 +39,11 @@ class SplineFilterSettings:
         Number of particles.
     start_distance, start_turn : float
         Standard deviations of the particles around the first pose [m, rad].
+    distance_bias, turn_bias : float
+        By what share odometry may tell ways and turns too long or too short all the time, as a standard deviation: particles try how
+        much, and those that fit the walls teach it.
+    bias_wander : float
+        Standard deviation by which that share is changed whenever particles are drawn anew, so that they go on trying.
     lost_likelihood : float
         Where rays fit worse than this in the mean for ten corrections, some particles are drawn anew; 0 for never.
     recovered_share, recovery_distance, recovery_turn : float
@@ -47,6 +54,9 @@ class SplineFilterSettings:
     particles: int = 200
     start_distance: float = 0.0
     start_turn: float = 0.0
+    distance_bias: float = 0.05
+    turn_bias: float = 0.05
+    bias_wander: float = 0.01
     lost_likelihood: float = 0.3
     recovered_share: float = 0.1
     recovery_distance: float = 0.25
@@ -55,7 +65,17 @@ class SplineFilterSettings:
     def __post_init__(self) -> None:
         if self.particles < 1:
             raise ValueError(f"particles is {self.particles}; want at least 1")
-        for name in ("start_distance", "start_turn", "lost_likelihood", "recovered_share", "recovery_distance", "recovery_turn"):
+        for name in (
+            "start_distance",
+            "start_turn",
+            "distance_bias",
+            "turn_bias",
+            "bias_wander",
+            "lost_likelihood",
+            "recovered_share",
+            "recovery_distance",
+            "recovery_turn",
+        ):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} of the filter is {getattr(self, name)}; want zero or more")
         if self.recovered_share > 1.0:
@@ -76,6 +96,8 @@ class SplineFilter(SplineTracker):
     ----------
     particles : (n, 3) float64
         Poses x, y, theta [m, rad].
+    scales : (n, 2) float64
+        What each takes a way and a turn to be, of what odometry tells.
     weights : (n,) float64
         Their weights, which sum to one.
     resamplings : int
@@ -99,6 +121,9 @@ class SplineFilter(SplineTracker):
         spread = np.array([settings.start_distance, settings.start_distance, settings.start_turn])
         self.particles = pose + spread * self._generator.standard_normal((settings.particles, 3))
         self.weights = np.full(settings.particles, 1.0 / settings.particles)
+        self.scales = 1.0 + np.array([settings.distance_bias, settings.turn_bias]) * self._generator.standard_normal(
+            (settings.particles, 2)
+        )
         self.resamplings, self._lost_steps = 0, 0
         self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
 
@@ -109,9 +134,10 @@ class SplineFilter(SplineTracker):
             return self.pose
         turns = abs(first), abs(second)
         sway = tracking.turn_per_metre * abs(distance)
-        firsts = first + noise[0] * (tracking.turn_per_turn * turns[0] + sway)
-        ways = distance + noise[1] * (tracking.slip_per_metre * abs(distance) + tracking.slip_per_turn * sum(turns))
-        seconds = second + noise[2] * (tracking.turn_per_turn * turns[1] + sway)
+        of_way, of_turn = self.scales.T
+        firsts = first * of_turn + noise[0] * (tracking.turn_per_turn * turns[0] + sway)
+        ways = distance * of_way + noise[1] * (tracking.slip_per_metre * abs(distance) + tracking.slip_per_turn * sum(turns))
+        seconds = second * of_turn + noise[2] * (tracking.turn_per_turn * turns[1] + sway)
         headings = self.particles[:, 2] + firsts
         self.particles[:, 0] += ways * np.cos(headings)
         self.particles[:, 1] += ways * np.sin(headings)
@@ -119,26 +145,20 @@ class SplineFilter(SplineTracker):
         return self._mean()
 
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
-        tracking, lookup = self.tracking, self._lookup
-        numbers = np.array([tracking.feature_sigma, tracking.line_angle_sigma, tracking.ray_share])
-        logarithms, fits = np.empty(len(self.particles)), np.empty(len(self.particles))
-        _weigh(
+        tracking = self.tracking
+        logarithms, fits = np.zeros(len(self.particles)), np.zeros(len(self.particles))
+        _weigh_features(
             self.particles,
             matches.points,
             matches.known_points,
-            matches.point_sigmas,
+            np.maximum(matches.point_sigmas, tracking.feature_sigma),
             matches.lines,
             matches.known_lines,
-            matches.line_sigmas,
-            matches.rays,
-            lookup.pieces,
-            lookup.nearest,
-            lookup.frame,
-            self._ray_table,
-            numbers,
+            np.maximum(matches.line_sigmas, tracking.feature_sigma),
+            tracking.line_angle_sigma,
             logarithms,
-            fits,
         )
+        _weigh_rays(self.particles, matches.rays, matches.pieces, self._ray_table, tracking.ray_share, logarithms, fits)
         weights = self.weights * np.exp(logarithms - logarithms.max())
         self.weights = weights / weights.sum()
         pose = self._mean()
@@ -159,6 +179,7 @@ class SplineFilter(SplineTracker):
         teeth = (self._generator.random() + np.arange(count)) / count
         chosen = np.searchsorted(np.cumsum(self.weights), teeth).clip(max=count - 1)
         self.particles, self.weights = self.particles[chosen], np.full(count, 1.0 / count)
+        self.scales = self.scales[chosen] + self.settings.bias_wander * self._generator.standard_normal((count, 2))
         self.resamplings += 1
 
     def _recover(self, likelihood: float, pose: NDArray[np.float64]) -> None:
@@ -182,7 +203,7 @@ def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:
 
 
 @kernel
-def _weigh(
+def _weigh_features(
     particles: Array,
     points: Array,
     known_points: Array,
@@ -190,43 +211,38 @@ def _weigh(
     lines: Array,
     known_lines: Array,
     line_sigmas: Array,
-    rays: Array,
-    pieces: Array,
-    nearest: Array,
-    frame: Array,
-    ray_table: Array,
-    numbers: Array,
+    angle_sigma: float,
     logarithms: Array,
-    fits: Array,
 ) -> None:
-    """Write the logarithm of each particle's likelihood, and how well rays fit in the mean, 0.05 to 1."""
-    feature_sigma, angle_sigma, ray_share = numbers
+    """Add to each particle's logarithm of the likelihood (particles,) how well features fit."""
+    cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
+    for k in range(points.shape[0]):
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * points[k, 0] - sines[i] * points[k, 1] - known_points[k, 0]
+            dy = particles[i, 1] + sines[i] * points[k, 0] + cosines[i] * points[k, 1] - known_points[k, 1]
+            logarithms[i] -= 0.5 * (dx * dx + dy * dy) / (point_sigmas[k] * point_sigmas[k])
+    for k in range(lines.shape[0]):
+        along_x, along_y = math.cos(known_lines[k, 2]), math.sin(known_lines[k, 2])
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * lines[k, 0] - sines[i] * lines[k, 1] - known_lines[k, 0]
+            dy = particles[i, 1] + sines[i] * lines[k, 0] + cosines[i] * lines[k, 1] - known_lines[k, 1]
+            aside = dy * along_x - dx * along_y
+            turns = (particles[i, 2] + lines[k, 2] - known_lines[k, 2]) / (2.0 * math.pi)
+            turn = (turns - math.floor(turns + 0.5)) * (2.0 * math.pi)
+            logarithms[i] -= 0.5 * ((aside / line_sigmas[k]) ** 2 + (turn / angle_sigma) ** 2)
+
+
+@kernel
+def _weigh_rays(particles: Array, rays: Array, pieces: Array, ray_table: Array, share: float, logarithms: Array, fits: Array) -> None:
+    """Add how far the ends of rays (k, 2) lie beside the pieces (k, 5) that they were matched to; write how well they fit, 0.05 to 1."""
     last_entry = ray_table.shape[0] - 1
-    for i in range(particles.shape[0]):
-        x, y, theta = particles[i]
-        cosine, sine = math.cos(theta), math.sin(theta)
-        total = 0.0
-        for k in range(points.shape[0]):
-            dx = x + cosine * points[k, 0] - sine * points[k, 1] - known_points[k, 0]
-            dy = y + sine * points[k, 0] + cosine * points[k, 1] - known_points[k, 1]
-            sigma = max(feature_sigma, point_sigmas[k])
-            total -= 0.5 * (dx * dx + dy * dy) / (sigma * sigma)
-        for k in range(lines.shape[0]):
-            dx = x + cosine * lines[k, 0] - sine * lines[k, 1] - known_lines[k, 0]
-            dy = y + sine * lines[k, 0] + cosine * lines[k, 1] - known_lines[k, 1]
-            aside = dy * math.cos(known_lines[k, 2]) - dx * math.sin(known_lines[k, 2])
-            turn = theta + lines[k, 2] - known_lines[k, 2]
-            turn = math.atan2(math.sin(turn), math.cos(turn))
-            sigma = max(feature_sigma, line_sigmas[k])
-            total -= 0.5 * ((aside / sigma) ** 2 + (turn / angle_sigma) ** 2)
-        ray_total, fit = 0.0, 0.0
-        for k in range(rays.shape[0]):
-            ray_x, ray_y = x + cosine * rays[k, 0] - sine * rays[k, 1], y + sine * rays[k, 0] + cosine * rays[k, 1]
-            piece = piece_at(nearest, frame, ray_x, ray_y)
-            entry = last_entry
-            if piece >= 0:
-                entry = min(int(piece_distance(pieces, piece, ray_x, ray_y) * _ENTRIES_PER_METRE), last_entry)
-            ray_total += ray_table[entry, 0]
-            fit += ray_table[entry, 1]
-        logarithms[i] = total + ray_share * ray_total
-        fits[i] = fit / max(rays.shape[0], 1)
+    cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
+    for k in range(rays.shape[0]):
+        ray_x, ray_y = rays[k]
+        middle_x, middle_y, along_x, along_y, _ = pieces[k]
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * ray_x - sines[i] * ray_y - middle_x
+            dy = particles[i, 1] + sines[i] * ray_x + cosines[i] * ray_y - middle_y
+            entry = min(int(abs(dy * along_x - dx * along_y) * _ENTRIES_PER_METRE), last_entry)
+            logarithms[i] += share * ray_table[entry, 0]
+            fits[i] += ray_table[entry, 1] / rays.shape[0]

@@ -28,6 +28,8 @@ class Matches:
         Standard deviations of their ranges [m].
     rays : (k, 2) float64
         Ends of some beams that lie near curves of the map [m].
+    pieces : (k, 5) float64
+        The straight piece of a curve that is nearest to each: middle x, y, unit vector along, half length [m].
     """
 
     points: NDArray[np.float64]
@@ -37,6 +39,7 @@ class Matches:
     known_lines: NDArray[np.float64]
     line_sigmas: NDArray[np.float64]
     rays: NDArray[np.float64]
+    pieces: NDArray[np.float64]
 
     @property
     def features(self) -> int:
@@ -82,6 +85,7 @@ def match(
     which_lines, references, known_lines = _matched_lines(seen.lines, spline_map.lines, pose, settings)
     rays = observation.points.points[::stride]
     pieces, _ = lookup.look_up(pose.apply(rays))
+    is_known = pieces >= 0
     own_references = pose.inverse().apply(references)
     return Matches(
         np.concatenate([part[0] for part in matched]),
@@ -90,7 +94,8 @@ def match(
         np.column_stack([own_references, features.lines[which_lines, 2]]),
         known_lines,
         features.line_sigmas[which_lines],
-        np.ascontiguousarray(rays[pieces >= 0]),
+        rays[is_known],
+        lookup.pieces[pieces[is_known]],
     )
 
 

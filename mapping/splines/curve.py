@@ -16,6 +16,9 @@ from lidarium.mapping.splines.settings import FitSettings, MapSettings
 STRAIGHT = 0.02
 """A curve that stays this close to its chord is a line [m]."""
 
+Box = tuple[float, float, float, float]
+"""Least x, y and greatest x, y [m]."""
+
 _END_WEIGHT = 4.0
 
 LEAST_LINE = 0.4
@@ -38,7 +41,7 @@ class Curve:
         The map's update that saw it last.
     way : Way
         Points along it, for comparisons.
-    box : (4,) float64
+    box : (float, float, float, float)
         Least x, y and greatest x, y [m].
     line : (4,) float64 or None
         Middle x, y, direction [rad] and half length [m], where the curve is a line.
@@ -49,7 +52,7 @@ class Curve:
     count: int
     last_seen: int
     way: Way
-    box: NDArray[np.float64]
+    box: Box
     line: NDArray[np.float64] | None
 
 
@@ -66,9 +69,9 @@ def make_curve(spline: Spline, weights: NDArray[np.float64], count: int, last_se
     parameters = spline.sample_parameters(spacing)
     points = spline.evaluate(parameters)
     way = Way(points, np.interp(parameters, control_parameters(spline.knots), weights))
-    box, line = np.empty(4), np.empty(4)
-    is_line = _describe(points, box, line)
-    return Curve(spline, np.asarray(weights, np.float64), count, last_seen, way, box, line if is_line else None)
+    line = np.empty(4)
+    is_line = _find_line(points, line)
+    return Curve(spline, np.asarray(weights, np.float64), count, last_seen, way, box_of(points), line if is_line else None)
 
 
 def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: MapSettings) -> Curve:
@@ -91,6 +94,17 @@ def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: 
     return make_curve(spline, weights, count, last_seen, settings.sample_spacing)
 
 
+def curves_in(curves: list[Curve], box: Box) -> list[int]:
+    """Return the numbers of the curves whose boxes meet a box."""
+    low_x, low_y, high_x, high_y = box
+    # A loop over some tens of curves takes less time than numpy needs to gather their boxes.
+    return [
+        index
+        for index, curve in enumerate(curves)
+        if curve.box[0] <= high_x and curve.box[2] >= low_x and curve.box[1] <= high_y and curve.box[3] >= low_y
+    ]
+
+
 def control_parameters(knots: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return at which parameter each control point acts most: the mean of its three inner knots (Greville), shape (n,) [m]."""
     count = len(knots) - ORDER
@@ -98,16 +112,23 @@ def control_parameters(knots: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @kernel
-def _describe(points: Array, box: Array, line: Array) -> bool:
-    """Write the box around a way, and the line through it; return whether it is long and straight enough to be one."""
+def box_of(points: Array) -> Box:
+    """Return the box around points (n, 2)."""
+    low_x, low_y, high_x, high_y = math.inf, math.inf, -math.inf, -math.inf
+    for k in range(points.shape[0]):
+        low_x, low_y = min(low_x, points[k, 0]), min(low_y, points[k, 1])
+        high_x, high_y = max(high_x, points[k, 0]), max(high_y, points[k, 1])
+    return low_x, low_y, high_x, high_y
+
+
+@kernel
+def _find_line(points: Array, line: Array) -> bool:
+    """Write the line through a way; return whether the way is long and straight enough to be one."""
     last = points.shape[0] - 1
-    box[0], box[1], box[2], box[3] = points[0, 0], points[0, 1], points[0, 0], points[0, 1]
     x, y = points[last, 0] - points[0, 0], points[last, 1] - points[0, 1]
     length = math.sqrt(x * x + y * y)
     lowest, highest, total = 0.0, 0.0, 0.0
     for k in range(last + 1):
-        box[0], box[1] = min(box[0], points[k, 0]), min(box[1], points[k, 1])
-        box[2], box[3] = max(box[2], points[k, 0]), max(box[3], points[k, 1])
         aside = (x * (points[k, 1] - points[0, 1]) - y * (points[k, 0] - points[0, 0])) / length
         lowest, highest, total = min(lowest, aside), max(highest, aside), total + aside
     if not (length >= LEAST_LINE and highest - lowest <= STRAIGHT):

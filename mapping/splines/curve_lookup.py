@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.splines.curve import Curve
+from lidarium.mapping.splines.curve import Curve, curves_in
 
 CELL = 0.05
 """Side of a cell [m]."""
 
-PIECE = 0.1
-"""Curves are looked up as straight pieces of at most about this length [m]."""
+PIECE, STRAIGHT = 0.5, 0.001
+"""Curves are looked up as straight pieces of about this length at most, from which they stray no farther than this [m]."""
 
 
 class CurveLookup:
@@ -53,9 +53,10 @@ class CurveLookup:
         side = self.nearest.shape[0] * CELL
         self._centre = np.array(place, np.float64)
         self.frame[:2] = self._centre - side / 2.0
-        low, high = self.frame[:2], self.frame[:2] + side
-        ways = [curve.spline.sample(PIECE) for curve in curves if (curve.box[:2] <= high).all() and (curve.box[2:] >= low).all()]
-        self.pieces = np.concatenate([np.empty((0, 5)), *(_pieces_of(way) for way in ways)])
+        low_x, low_y = self.frame[:2].tolist()
+        ways = [curves[index].way.points for index in curves_in(curves, (low_x, low_y, low_x + side, low_y + side))]
+        ends = np.cumsum(np.array([len(way) for way in ways], np.int64))
+        self.pieces = _pieces_of(np.concatenate([np.empty((0, 2)), *ways]), ends)
         self.nearest.fill(-1)
         self._gaps.fill(np.inf)
         _stamp(self.pieces, self.frame, self.nearest, self._gaps)
@@ -68,14 +69,38 @@ class CurveLookup:
 
 
 @kernel
-def _pieces_of(way: Array) -> Array:
-    pieces = np.empty((way.shape[0] - 1, 5))
-    for k in range(pieces.shape[0]):
-        x, y = way[k + 1, 0] - way[k, 0], way[k + 1, 1] - way[k, 1]
-        length = max(math.sqrt(x * x + y * y), 1e-9)
-        pieces[k, 0], pieces[k, 1] = way[k, 0] + x / 2.0, way[k, 1] + y / 2.0
-        pieces[k, 2], pieces[k, 3], pieces[k, 4] = x / length, y / length, length / 2.0
-    return pieces
+def _pieces_of(points: Array, ends: Array) -> Array:
+    """Return the straight pieces of ways that lie one after another in ``points``, each up to its number of ``ends``."""
+    pieces = np.empty((points.shape[0], 5))
+    count, first = 0, 0
+    for way in range(ends.shape[0]):
+        last = ends[way] - 1
+        while first < last:
+            end = first + 1
+            while end < last and _is_straight(points, first, end + 1):
+                end += 1
+            x, y = points[end, 0] - points[first, 0], points[end, 1] - points[first, 1]
+            length = max(math.sqrt(x * x + y * y), 1e-9)
+            pieces[count, 0], pieces[count, 1] = points[first, 0] + x / 2.0, points[first, 1] + y / 2.0
+            pieces[count, 2], pieces[count, 3], pieces[count, 4] = x / length, y / length, length / 2.0
+            count += 1
+            first = end
+        first = last + 1
+    return pieces[:count].copy()
+
+
+@kernel
+def _is_straight(points: Array, first: int, last: int) -> bool:
+    """Return whether a way is short and straight enough between two of its points to be one piece."""
+    x, y = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
+    squared = x * x + y * y
+    if squared > PIECE * PIECE:
+        return False
+    for k in range(first + 1, last):
+        aside = x * (points[k, 1] - points[first, 1]) - y * (points[k, 0] - points[first, 0])
+        if aside * aside > STRAIGHT * STRAIGHT * squared:
+            return False
+    return True
 
 
 @kernel(inline=True)

@@ -83,14 +83,21 @@ def split_merge(
     count = _cut(places, noise, numbers, settings.least_points, CORNER_RULES.index(settings.corner_rule), ends, lines, corners, is_corner)
     inner = np.flatnonzero(is_corner[: count + 1])
     cut_at = ends[inner]
-    bounds = np.concatenate([[0], cut_at, [len(places) - 1]])
+    is_corner[0] = is_corner[count] = True
     return Cut(
-        np.stack([bounds[:-1], bounds[1:]], axis=1),
-        np.stack([ends[:count], ends[1 : count + 1]], axis=1),
+        _pairs(ends[: count + 1][is_corner[: count + 1]]),
+        _pairs(ends[: count + 1]),
         lines[:count].copy(),
         corners[inner].copy(),
         cut_at.copy(),
     )
+
+
+def _pairs(ends: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return each of the numbers (n + 1,) but the last with the one after it, shape (n, 2)."""
+    pairs = np.empty((len(ends) - 1, 2), np.int64)
+    pairs[:, 0], pairs[:, 1] = ends[:-1], ends[1:]
+    return pairs
 
 
 @kernel

@@ -10,7 +10,7 @@ from lidarium.mapping.rigid import Transform
 from lidarium.mapping.splines.association import are_near, mark_along
 from lidarium.mapping.splines.basis import ORDER
 from lidarium.mapping.splines.bspline import Spline
-from lidarium.mapping.splines.curve import Curve, fit_curve
+from lidarium.mapping.splines.curve import Curve, box_of, curves_in, fit_curve
 from lidarium.mapping.splines.features import Observation, curves_of, match_points
 from lidarium.mapping.splines.joining import Places, Way, common_places, join
 from lidarium.mapping.splines.segmentation import split_merge
@@ -148,11 +148,10 @@ class SplineMap:
         """Join a seen curve with the map's curves along which it runs, or add it as a new one."""
         settings = self.settings.map
         parameters = spline.sample_parameters(settings.sample_spacing)
-        places = np.linspace(0.0, 1.0, len(sigmas))
-        noise = np.interp((parameters - parameters[0]) / (parameters[-1] - parameters[0]), places, sigmas)
+        places = np.arange(len(parameters)) * ((len(sigmas) - 1) / (len(parameters) - 1))
+        noise = np.interp(places, np.arange(len(sigmas)), sigmas)
         way, count = Way(spline.evaluate(parameters), (0.01 / noise) ** 2), 1
-        control_points = spline.control_points
-        while (best := self._best_match(way, control_points)) is not None:
+        while (best := self._best_match(way, spline.control_points)) is not None:
             known = self.curves.pop(best[0])
             way, extends = join(way, known.way, best[1], settings)
             count += known.count
@@ -164,8 +163,6 @@ class SplineMap:
                     if piece is not longest and self._is_new(piece):
                         self._add(piece, count)
                 return
-            fitted = fit_curve(way, count, self.updates, self.settings.fit, settings)
-            way, control_points = fitted.way, fitted.spline.control_points
         if count > 1 or self._is_new(way):
             self._add(way, count)
 
@@ -187,12 +184,8 @@ class SplineMap:
 
     def _near(self, way: Way, distance: float) -> list[int]:
         """Return the curves whose boxes come within a distance of that of a way [m]."""
-        if not self.curves:
-            return []
-        low, high = way.points.min(axis=0) - distance, way.points.max(axis=0) + distance
-        boxes = np.array([curve.box for curve in self.curves])
-        is_near = (boxes[:, 0] <= high[0]) & (boxes[:, 1] <= high[1]) & (boxes[:, 2] >= low[0]) & (boxes[:, 3] >= low[1])
-        return [int(index) for index in np.flatnonzero(is_near)]
+        low_x, low_y, high_x, high_y = box_of(way.points)
+        return curves_in(self.curves, (low_x - distance, low_y - distance, high_x + distance, high_y + distance))
 
     def _best_match(self, way: Way, control_points: NDArray[np.float64]) -> tuple[int, Places] | None:
         """Return which curve runs along a way the longest, and where."""

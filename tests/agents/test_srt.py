@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.agents.policy import Stop
 from lidarium.agents.srt.policy import SensorBasedRandomTree
+from lidarium.envs.simulation.lidar import Lidar
 from lidarium.evaluation.runner import run_episode
 
 
@@ -89,6 +91,27 @@ def test_every_chain_of_parents_ends_at_the_first_node():
         assert tree.chain(node.number)[-1] == 0
 
 
+def test_no_edge_of_the_tree_crosses_what_stands_there():
+    episode = finished("scene_room", robot="kobuki")
+    env, tree = episode.env, episode.policy.tree
+    belief = env.perception.belief("robot_0")
+    origin = np.array(belief.map_origin) + env.world.poses[0, :2] - belief.pose[:2]
+    raster = env.floor.raster(0.01, 0.3, 0.3)
+    edges = [(tree.nodes[node.parent].place, node.place) for node in tree.nodes if node.parent is not None]
+    assert edges
+    for start, end in edges:
+        points = origin + start + (end - start) * np.linspace(0.0, 1.0, 200)[:, None]
+        columns, rows = np.floor((points - np.array(raster.origin[:2])) / raster.resolution).astype(int).T
+        assert (raster.solid[rows, columns] == 0).all()
+
+
+def test_a_goal_in_sight_of_the_first_node_is_reached_in_one_move():
+    env = lidarium.parallel_env("srt_cluttered", robots=1, robot="pioneer", horizon_s=60.0, stop_coverage=None, map_cells=32)
+    tree = run_episode(SensorBasedRandomTree(), env, 1, {"goal": (0.9, 0.6)}).policy.tree
+    assert env.scorer.ended_because == {"robot_0": "reached"}
+    assert len(tree.nodes) == 1
+
+
 def test_a_team_shares_one_graph_and_all_come_home():
     episode = finished("apartment", robots=2, robot="kobuki")
     env, tree = episode.env, episode.policy.tree
@@ -117,20 +140,30 @@ def test_the_same_seed_gives_the_same_run():
 
 
 class Seen(SensorBasedRandomTree):
-    """A tree whose robots see what a test wants."""
+    """A tree whose robots see what a test makes of their scans."""
 
-    def __init__(self, value):
+    def __init__(self, change):
         super().__init__()
-        self._value = value
+        self._change = change
 
     def act(self, observations):
-        return super().act({agent: {**each, "scan": np.full(727, self._value, np.float32)} for agent, each in observations.items()})
+        return super().act({agent: {**each, "scan": self._change(each["scan"])} for agent, each in observations.items()})
 
 
-@pytest.mark.parametrize("value", [math.nan, 0.0])
+def all_beams(value):
+    return lambda scan: np.full_like(scan, value)
+
+
+def every_third_below_the_minimum(scan):
+    changed = scan.copy()
+    changed[::3] = 0.01
+    return changed
+
+
+@pytest.mark.parametrize("value", [math.nan, 0.0, 0.01])
 def test_a_robot_whose_laser_tells_nothing_ends_as_blind(value):
     env = lidarium.parallel_env("scene_room", robots=1, horizon_s=60.0, stop_coverage=None, map_cells=32)
-    run_episode(Seen(value), env, 1)
+    run_episode(Seen(all_beams(value)), env, 1)
     assert env.scorer.ended_because == {"robot_0": "blind"}
     assert env.world.travelled[0] < 1e-6
 
@@ -138,8 +171,66 @@ def test_a_robot_whose_laser_tells_nothing_ends_as_blind(value):
 @pytest.mark.parametrize("value", [5.6, math.inf])
 def test_scans_without_any_return_are_survived(value):
     env = lidarium.parallel_env("scene_room", robots=1, horizon_s=20.0, stop_coverage=None, map_cells=32)
-    run_episode(Seen(value), env, 1)
+    run_episode(Seen(all_beams(value)), env, 1)
     assert set(env.scorer.ended_because.values()) <= {"horizon", "explored"}
+
+
+def test_ranges_below_the_minimum_do_not_keep_a_robot_from_its_goal():
+    env = lidarium.parallel_env("srt_lab", robots=1, robot="pioneer", horizon_s=200.0, stop_coverage=None, map_cells=32)
+    run_episode(Seen(every_third_below_the_minimum), env, 1)
+    assert env.scorer.ended_because == {"robot_0": "reached"}
+
+
+@pytest.mark.parametrize("mode", ["default", "thesis"])
+def test_a_laser_of_one_beam_is_no_reason_to_fail(mode):
+    one_beam = Lidar(beams=1, field_of_view=0.01, range_max=5.6)
+    env = lidarium.parallel_env("scene_room", robots=1, lidar=one_beam, horizon_s=20.0, stop_coverage=None, map_cells=32)
+    run_episode(SensorBasedRandomTree(mode), env, 1)
+    assert set(env.scorer.ended_because.values()) <= {"horizon", "explored"}
+
+
+class Held(SensorBasedRandomTree):
+    """A tree whose robots something holds."""
+
+    def act(self, observations):
+        wanted = super().act(observations)
+        return {agent: action if isinstance(action, Stop) else np.zeros(2, np.float32) for agent, action in wanted.items()}
+
+
+@pytest.mark.parametrize(("budget", "ending"), [({}, "horizon"), ({"time_s": 30.0}, "budget")])
+def test_a_robot_that_something_holds_ends_with_a_reason(budget, ending):
+    env = lidarium.parallel_env("srt_lab", robots=1, robot="pioneer", horizon_s=90.0, stop_coverage=None, map_cells=32)
+    run_episode(Held(**budget), env, 1)
+    assert env.scorer.ended_because == {"robot_0": ending}
+
+
+def test_a_robot_that_is_pushed_aside_still_reaches_its_goal():
+    env = lidarium.parallel_env("srt_l_room", robots=1, robot="pioneer", horizon_s=200.0, stop_coverage=None, map_cells=32)
+    policy = Pushed(env)
+    run_episode(policy, env, 1)
+    assert policy.was_pushed
+    assert env.scorer.ended_because == {"robot_0": "reached"}
+
+
+class Pushed(SensorBasedRandomTree):
+    """A tree whose robot is pushed aside and turned by somebody after five seconds."""
+
+    def __init__(self, env):
+        super().__init__()
+        self._env, self.was_pushed = env, False
+
+    def act(self, observations):
+        if not self.was_pushed and self._env.scorer.time >= 5.0:
+            self._env.world.poses[0] += (0.2, -0.2, 1.0)
+            self.was_pushed = True
+        return super().act(observations)
+
+
+@pytest.mark.parametrize(("goal", "told"), [((1.5, 0.0), "inside a wall"), ((60.0, 0.0), "outside of the floor")])
+def test_a_goal_in_a_wall_or_outside_is_refused_before_the_run(goal, told):
+    env = lidarium.parallel_env("srt_cluttered", robots=1)
+    with pytest.raises(ValueError, match=told):
+        run_episode(SensorBasedRandomTree(), env, 1, {"goal": goal})
 
 
 def test_a_tree_without_a_scan_is_refused():

@@ -202,6 +202,12 @@ def test_a_start_inside_a_wall_is_refused(floor, tmp_path, capsys):
     refused(["run", "--floor", str(floor), "--robots", "1", "--starts", "2.15,0.4,0"], capsys, tmp_path, "inside a wall")
 
 
+@pytest.mark.parametrize(("start", "told"), [("1.5,0,0", "inside a wall"), ("50,0,0", "start")])
+def test_a_tree_towards_a_goal_does_not_start_in_a_wall_or_outside(start, told, tmp_path, capsys):
+    arguments = ["run", "--floor", "srt_cluttered", "--robots", "1", "--policy", "srt", "--starts", start]
+    refused(arguments, capsys, tmp_path, told)
+
+
 def test_disconnected_starts_are_refused(tmp_path, capsys):
     levels = two_rooms(door=False)
     levels[10, 21] = 255  # too narrow for the robot

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from lidarium.envs.floors.catalogue import set_floors
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.simulation.floor_cache import floor_tables
 from lidarium.evaluation.experiments import EXPERIMENTS, srt
@@ -82,3 +83,10 @@ def test_a_share_asks_for_fewer_floors_and_starts():
     assert len(whole.floors) == 16
     assert len(part.floors) == 4
     assert set(part.seeds) < set(whole.seeds)
+
+
+def test_what_is_measured_had_no_part_in_the_tuning():
+    floors = EXPERIMENTS["srt"].suites(None, 1)[srt.EXPLORATION].floors
+    assert min(srt.SEEDS) > 102
+    assert min(srt.STARTS) >= 100
+    assert set(floors) - set(srt.SCENES) == set(set_floors("validation:10"))

@@ -66,6 +66,22 @@ def test_the_same_seed_gives_the_same_poses_to_the_bit(kind):
     np.testing.assert_array_equal(first, second)
 
 
+@pytest.mark.parametrize("bias", [-0.08, 0.08])
+def test_particles_learn_what_wheels_tell_too_much(bias):
+    localizer = SplineFilter()
+    follow(localizer, biased_odometry(POSES, bias))
+    of_way, _ = localizer.weights @ localizer.scales
+    assert of_way == pytest.approx(1.0 / (1.0 + bias), abs=0.03)
+
+
+def test_what_is_learned_of_the_wheels_carries_a_robot_that_sees_nothing_more():
+    odometry, nothing = biased_odometry(POSES, 0.08), np.full(LASER.beams, np.inf, np.float32)
+    seen = [*SCANS[:60], *[nothing] * 30]
+    untaught = SplineFilterSettings(distance_bias=0.0, turn_bias=0.0, bias_wander=0.0)
+    taught, told = (follow(SplineFilter(settings), odometry, scans=seen)[-1] for settings in (None, untaught))
+    assert gap(taught, POSES[-1])[0] < 0.7 * gap(told, POSES[-1])[0]
+
+
 def test_another_seed_draws_other_particles():
     odometry = biased_odometry(POSES, 0.05)[:10]
     first, second = (follow(SplineFilter(), odometry, seed=seed, scans=SCANS[:10]) for seed in (0, 1))
@@ -148,11 +164,10 @@ def test_what_cannot_be_sensed_is_refused(kind):
         localizer.reset(np.array([0.0, np.inf, 0.0]), 0)
 
 
-def test_particles_that_were_led_astray_find_back():
-    settings = SplineFilterSettings(particles=400)
-    localizer = SplineFilter(settings)
-    follow(localizer, POSES - POSES[0], scans=SCANS[:1])
-    localizer.reset(POSES[0], 0)
+@pytest.mark.parametrize("seed", range(3))
+def test_particles_that_were_led_astray_find_back(seed):
+    localizer = SplineFilter(SplineFilterSettings(particles=400))
+    localizer.reset(POSES[0], seed)
     still = np.zeros(3)
     for k in range(3):
         localizer.localize(Sensing(0.1 * k, still, SCANS[0]))
@@ -162,7 +177,8 @@ def test_particles_that_were_led_astray_find_back():
         turned = POSES[0] + np.array([0.0, 0.0, 0.02 * (k % 2)])
         ranges = scan(WORLD_2, turned, LASER, 0.01, seed=k)
         pose = localizer.localize(Sensing(0.1 * k, np.array([0.0, 0.0, 0.02 * (k % 2)]), ranges))
-    assert gap(pose, turned)[0] < 0.06
+    # As near as the nearest of those that were drawn around the wrong place, 0.21 m away.
+    assert gap(pose, turned)[0] < 0.1
 
 
 def test_backing_up_is_not_two_half_turns():
@@ -181,6 +197,7 @@ def test_backing_up_is_not_two_half_turns():
         lambda: TrackingSettings(slip_per_metre=-1.0),
         lambda: SplineFilterSettings(particles=0),
         lambda: SplineFilterSettings(recovered_share=2.0),
+        lambda: SplineFilterSettings(distance_bias=-0.1),
         lambda: SplineEkfSettings(gate_sigmas=math.nan),
     ],
 )
