@@ -17,7 +17,7 @@ from lidarium.mapping.rigid import composed, relative
 LOG_SETTINGS = SlamSettings(
     matching=MatchingSettings(distance_m=0.02, angle=math.radians(1.0), spacing_m=0.08, points=250, deviation=0.25, unseen=0.5),
     submaps=SubmapSettings(path_m=8.0),
-    graph=GraphSettings(deviation_angle=math.radians(0.3)),
+    graph=GraphSettings(deviation_m=0.01, deviation_per_metre=0.02, deviation_angle=math.radians(0.3)),
 )
 """Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and time is plenty. Lasers of
 logs reach far, so that a local map of a shorter way holds enough, and places are recognised by more of them. Where scans are a metre apart

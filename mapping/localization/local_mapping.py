@@ -67,13 +67,15 @@ class LocalMapper:
     ----------
     usual_score : float
         Agreement of matches of late.
+    contradiction : float
+        Share of the last scan's returns that lay, from where odometry led, in what the local map knows to be free.
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
         self._matching, self._submaps = settings.matching, settings.submaps
         self._uses_odometry, self._geometry = settings.uses_odometry, geometry
         self._active: list[_Active] = []
-        self.usual_score = 0.0
+        self.usual_score, self.contradiction = 0.0, 0.0
 
     @property
     def node(self) -> int:
@@ -98,8 +100,8 @@ class LocalMapper:
         """Return where a scan lies on the older local map; None where it does not match.
 
         Near what odometry says it is searched first, weighing both. Where that does not convince, odometry may be wrong (a wheel slips,
-        the robot was pushed), and the search goes farther, without it; what is found there has to be clearly better. On new ground, and where a
-        scan hardly has a return, nothing but odometry tells where the robot is.
+        the robot was pushed), and the search goes farther, without it; what is found there has to be clearly better. On new ground, and
+        where a scan hardly has a return, nothing but odometry tells where the robot is.
 
         Parameters
         ----------
@@ -117,6 +119,7 @@ class LocalMapper:
         settings = self._matching
         is_blind = not self._uses_odometry or failed >= settings.wide_after
         near = self._match_near(points, predicted, uncertainty) if self._uses_odometry else None
+        self.contradiction = 1.0 if near is None else near.contradiction
         if near is not None and self._is_new_ground(near, len(points)):
             return Match(predicted, near.score, near.overlap, near.contradiction, np.zeros((3, 3)), near.prior)
         if near is not None and self._is_good(near) and near.score >= settings.convincing_share * self.usual_score:

@@ -261,9 +261,9 @@ class GraphSettings:
 
     distance_m: float = 0.5
     angle: float = math.radians(30.0)
-    deviation_m: float = 0.01
-    deviation_per_metre: float = 0.02
-    deviation_angle: float = math.radians(0.1)
+    deviation_m: float = 0.005
+    deviation_per_metre: float = 0.01
+    deviation_angle: float = math.radians(0.05)
     robust_scale: float = 2.0
     correct_beyond_m: float = 0.05
     correct_beyond_angle: float = math.radians(1.0)

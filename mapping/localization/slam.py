@@ -246,7 +246,13 @@ class Slam:
         settings = self._settings.matching
         if self._failed >= settings.lost_after:
             self.counts.restarts += 1
-            self._begin_anew(ranges, np.diag([settings.lost_m**2, settings.lost_m**2, settings.lost_angle**2]))
+            covariance = np.diag([settings.lost_m**2, settings.lost_m**2, settings.lost_angle**2])
+            if self._mapper.contradiction <= settings.most_contradiction:
+                # The map does not know the place well, but nothing says that odometry has led elsewhere.
+                growth = self._spread + turned(self._growth(), float(self._local[2]))
+                covariance = self._motion_covariance(growth, relative(self._at_node, self._local))
+            self._told[:] = 0.0
+            self._begin_anew(ranges, covariance)
 
     def _begin_anew(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]) -> None:
         """Begin new local maps at a new node here."""
