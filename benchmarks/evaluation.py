@@ -173,7 +173,7 @@ def kills(count: int) -> tuple[int, int]:
         folder = Path(name)
         command = [
             sys.executable, "-c", "from lidarium.scripts.main import main; import sys; sys.exit(main())", "evaluate", "--policies",
-            "random_walk", "nearest_frontier", "--floors", "apartment", "--robots", "1", "2", "--seeds", "200", "--horizon-s", "20",
+            "random_walk", "nearest_frontier", "--floors", "apartment", "--robots", "1", "2", "--seeds", "800", "--horizon-s", "20",
             "--map-resolution", "0.05", "--workers", "2", "--out", str(folder),
         ]  # fmt: skip
         before: list[dict[str, Any]] = []
@@ -185,6 +185,8 @@ def kills(count: int) -> tuple[int, int]:
             after = read_episodes(folder / EPISODES_FILE)
             if after[: len(before)] != before:
                 raise RuntimeError(f"episodes were lost or changed by kill {kill + 1}")
+            if process.returncode == 0:
+                raise RuntimeError(f"the evaluation was through before kill {kill + 1}; give it more seeds")
             if len({line["key"] for line in after}) != len(after):
                 raise RuntimeError(f"episodes were doubled by kill {kill + 1}")
             before = after
@@ -215,8 +217,8 @@ def main() -> None:
         "",
         f"CPU time of one process, {TEAM} robots, maps of 2.5 cm, medians over {chosen.rounds} rounds of ratios to the bare episode "
         "(environment and policy alone). *Metrics*: the history that watches, and all figures of the line. *Record*: recording, without "
-        "writing. *Runner*: what the trial of a campaign has beside episode and metrics: settings, starts, the line on the disk. *All*: "
-        "the whole trial, with its record written.",
+        "writing. *All*: the whole trial of a campaign, with its record written. *The runner's own* is what of the whole trial is neither "
+        "environment nor episode, figures or record: settings, starts, the line on the disk; to reach: 3 %.",
         "",
         "## Workers",
         "",
