@@ -4,7 +4,7 @@ With the ideal radio the station knows at any time what is now. With any other i
 has reached it there (`Exchange`); its orders reach a robot as long as the links do.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,16 @@ from lidarium.envs.onboard.exchange import NEVER, Exchange
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.operating import Operating
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.onboard.state import DriveState, OperatingState, Status, Target
+from lidarium.envs.onboard.state import DriveState, Status, Target
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.merging.incremental import GrowingMap
 from lidarium.mapping.occupancy import three_levels
 from lidarium.mapping.rigid import Transform
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Report:
-    """What a robot tells the station. It is of the robot's own belief throughout: positions are in its map frame.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Report(Status):
+    """What a robot tells the station: of itself (`Status`), and its map. It is of the robot's own belief throughout.
 
     Attributes
     ----------
@@ -30,35 +30,14 @@ class Report:
         When it was true [s].
     map : GrowingMap
         Its own map, cut to what is known.
-    pose : Transform
-        Where it believes to be.
-    state : OperatingState
-        Whether it takes part in the work.
-    drive : DriveState
-        What its driving is about.
-    target : Target or None
-        Where it drives to.
-    path_left_m : float
-        What is left of its path, 0 without one [m].
-    travelled_m : float
-        How far it has come by its own odometry [m].
-    energy_left_j : float or None
-        What is left in its battery; None where it has no limit [J].
     start : Transform
-        Where it began.
+        Where it began, in its map frame.
     frame : Transform or None
         How its map frame lies in the floor's; None where it does not know: with unknown starts that are not revealed to the station.
     """
 
     time_s: float
     map: GrowingMap
-    pose: Transform
-    state: OperatingState
-    drive: DriveState
-    target: Target | None
-    path_left_m: float
-    travelled_m: float
-    energy_left_j: float | None
     start: Transform
     frame: Transform | None = None
 
@@ -141,10 +120,8 @@ class Station:
         return True
 
     def _report(self, row: int, time_s: float, known: GrowingMap, status: Status) -> Report:
-        return Report(
-            time_s, known, status.pose, status.state, status.drive, status.target, status.path_left_m, status.travelled_m,
-            status.energy_left_j, self._starts[row], self._frame(row),
-        )  # fmt: skip
+        of_itself = {field.name: getattr(status, field.name) for field in fields(Status)}
+        return Report(**of_itself, time_s=time_s, map=known, start=self._starts[row], frame=self._frame(row))
 
     def _frame(self, row: int) -> Transform | None:
         """Return how a robot's map frame lies in the floor's, where it knows or is told."""

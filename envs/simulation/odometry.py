@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.simulation.noise import gaussian_at, mix, stream_key
+from lidarium.mapping.checks import check_from_zero
 from lidarium.mapping.kernels import Array, kernel
 
 ENCODER_STREAM, DRIVE_STREAM = 0x6F646F6D, 0x64726976
@@ -58,10 +59,7 @@ class OdometrySettings:
     turn_rate_noise: float = 0.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{field.name} of the odometry is {value}; want a number of 0 or more")
+        check_from_zero(self, "the odometry", (field.name for field in fields(self)))
         for name in ("distance_bias", "turn_bias"):
             if getattr(self, name) >= 1.0:
                 raise ValueError(f"{name} of the odometry is {getattr(self, name)}; want a share below 1")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Raster
+from lidarium.mapping.checks import check_from_zero, check_positive
 from lidarium.mapping.kernels import Array, kernel
 
 RADIO_KINDS = ("all", "none", "range", "line_of_sight", "signal")
@@ -71,12 +72,8 @@ class RadioSettings:
     def __post_init__(self) -> None:
         if self.kind not in RADIO_KINDS:
             raise ValueError(f"kind of the radio is {self.kind!r}; want one of {', '.join(RADIO_KINDS)}")
-        for name in ("reach", "reference_distance", "period_s"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} of the radio is {getattr(self, name)}; want a number above 0")
-        for name in ("free_exponent", "wall_exponent", "wall_loss", "shadowing", "latency_s"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} of the radio is {getattr(self, name)}; want a number of 0 or more")
+        check_positive(self, "the radio", ("reach", "reference_distance", "period_s"))
+        check_from_zero(self, "the radio", ("free_exponent", "wall_exponent", "wall_loss", "shadowing", "latency_s"))
         for name in ("power", "threshold", "reference_loss"):
             if not math.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} of the radio is {getattr(self, name)}; want a finite number")

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.checks import check_from_zero, check_positive
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryUncertainty:
@@ -295,9 +297,7 @@ class SlamSettings:
 
 
 def _check_numbers(settings: Any, zero: tuple[str, ...] = ()) -> None:  # noqa: ANN401
-    """Raise ValueError where a number is not finite and positive (or zero, where that has a meaning)."""
-    for entry in fields(settings):
-        value = getattr(settings, entry.name)
-        if not math.isfinite(value) or value < 0.0 or (value == 0.0 and entry.name not in zero):
-            wanted = "zero or a positive number" if entry.name in zero else "a positive number"
-            raise ValueError(f"{entry.name} of {type(settings).__name__} is {value}; want {wanted}")
+    """Check that all numbers are positive, but those that may be zero."""
+    whose = type(settings).__name__
+    check_from_zero(settings, whose, zero)
+    check_positive(settings, whose, (entry.name for entry in fields(settings) if entry.name not in zero))

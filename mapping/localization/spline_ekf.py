@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.checks import check_from_zero
 from lidarium.mapping.localization.spline_matches import Matches
 from lidarium.mapping.localization.spline_tracking import SplineTracker, TrackingSettings, steps_of
 from lidarium.mapping.rigid import Transform, wrapped
@@ -40,10 +41,7 @@ class SplineEkfSettings:
     start_turn: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("gate_sigmas", "start_distance", "start_turn"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} of the filter is {value}; want zero or more")
+        check_from_zero(self, "the filter", ("gate_sigmas", "start_distance", "start_turn"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

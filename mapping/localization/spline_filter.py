@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.checks import check_from_zero
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.localization.spline_matches import Matches
 from lidarium.mapping.localization.spline_tracking import SplineTracker, TrackingSettings, steps_of
@@ -65,19 +66,8 @@ class SplineFilterSettings:
     def __post_init__(self) -> None:
         if self.particles < 1:
             raise ValueError(f"particles is {self.particles}; want at least 1")
-        for name in (
-            "start_distance",
-            "start_turn",
-            "distance_bias",
-            "turn_bias",
-            "bias_wander",
-            "lost_likelihood",
-            "recovered_share",
-            "recovery_distance",
-            "recovery_turn",
-        ):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ValueError(f"{name} of the filter is {getattr(self, name)}; want zero or more")
+        spreads = ("start_distance", "start_turn", "distance_bias", "turn_bias", "bias_wander")
+        check_from_zero(self, "the filter", (*spreads, "lost_likelihood", "recovered_share", "recovery_distance", "recovery_turn"))
         if self.recovered_share > 1.0:
             raise ValueError(f"recovered_share of the filter is {self.recovered_share}; want a share from 0 to 1")
 

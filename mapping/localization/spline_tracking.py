@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.checks import check_from_zero, check_positive
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.spline_matches import Matches, match
 from lidarium.mapping.rigid import Transform, wrapped
@@ -71,10 +72,8 @@ class TrackingSettings:
     def __post_init__(self) -> None:
         positive = ("feature_sigma", "line_angle_sigma", "curve_sigma", "curve_distance", "ray_share", "map_distance", "map_turn")
         from_zero = ("turn_per_turn", "turn_per_metre", "slip_per_metre", "slip_per_turn", "still_distance", "still_turn")
-        for name in (*positive, *from_zero):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and (value > 0.0 if name in positive else value >= 0.0)):
-                raise ValueError(f"{name} of tracking is {value}; want a number {'above 0' if name in positive else 'from 0'}")
+        check_positive(self, "tracking", positive)
+        check_from_zero(self, "tracking", from_zero)
         for name in ("ray_stride", "least_sightings"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} of tracking is {getattr(self, name)}; want at least 1")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.checks import check_from_zero
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
 from lidarium.mapping.occupancy import FREE, UNKNOWN
@@ -94,9 +95,7 @@ class ValidationSettings:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
         least = ("least_overlap_m2", "least_wall_m", "least_evidence_m", "least_across_m")
         lengths = ("hit_distance_m", "miss_distance_m", "most_contradiction_m", "plenty_of_wall_m", "rival_distance_m", "rival_lead")
-        for name in (*least, *lengths):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ValueError(f"{name} of validation is {getattr(self, name)}; want zero or more")
+        check_from_zero(self, "validation", (*least, *lengths))
         if self.disc_radius_cells < 1:
             raise ValueError(f"disc_radius_cells is {self.disc_radius_cells}; want one or more")
 

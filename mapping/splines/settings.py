@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+from lidarium.mapping.checks import check_from_zero, check_positive
+
 MODES = ("default", "thesis")
 BREAKPOINT_TESTS = ("adaptive", "dietmayer", "pedraza")
 CORNER_RULES = ("angle", "slope")
@@ -29,8 +31,8 @@ class PointSettings:
     noise_share: float = 0.01
 
     def __post_init__(self) -> None:
-        _check_from_zero(self, "points", ("beam_interval_s", "noise_share"))
-        _check_positive(self, "points", ("noise_floor",))
+        check_from_zero(self, "points", ("beam_interval_s", "noise_share"))
+        check_positive(self, "points", ("noise_floor",))
         if not math.isfinite(self.laser_x):
             raise ValueError(f"laser_x of points is {self.laser_x} m; want a finite number")
 
@@ -92,8 +94,8 @@ class SegmentationSettings:
         _check_name(self.corner_rule, "rule of corners", CORNER_RULES)
         if not 0.0 < self.incidence < math.pi / 2.0:
             raise ValueError(f"incidence of segmentation is {self.incidence} rad; want more than 0 and less than a right angle")
-        _check_from_zero(self, "segmentation", ("noise_sigmas", "dietmayer_floor", "dietmayer_share", "split_sigmas", "collinear_angle"))
-        _check_positive(self, "segmentation", ("step_ratio", "most_turn", "split_distance", "corner_angle", "corner_reach"))
+        check_from_zero(self, "segmentation", ("noise_sigmas", "dietmayer_floor", "dietmayer_share", "split_sigmas", "collinear_angle"))
+        check_positive(self, "segmentation", ("step_ratio", "most_turn", "split_distance", "corner_angle", "corner_reach"))
         if self.least_points < 4 or self.line_points < 2:
             raise ValueError(
                 f"least_points is {self.least_points} and line_points is {self.line_points}; want at least 4 (a cubic curve) and 2"
@@ -129,8 +131,8 @@ class FitSettings:
     stiffness: float = 1e-6
 
     def __post_init__(self) -> None:
-        _check_positive(self, "the fit", ("spacing", "finest_spacing", "rms"))
-        _check_from_zero(self, "the fit", ("explained", "stiffness"))
+        check_positive(self, "the fit", ("spacing", "finest_spacing", "rms"))
+        check_from_zero(self, "the fit", ("explained", "stiffness"))
         if self.finest_spacing > self.spacing:
             raise ValueError(f"finest_spacing of the fit is {self.finest_spacing} m, above its spacing {self.spacing} m")
 
@@ -168,7 +170,7 @@ class AssociationSettings:
     def __post_init__(self) -> None:
         _check_name(self.line_origin, "line_origin of association", LINE_ORIGINS)
         names = ("control_distance", "mean_distance", "mean_turn", "least_overlap", "point_distance", "line_distance", "line_angle")
-        _check_positive(self, "association", names)
+        check_positive(self, "association", names)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,8 +212,8 @@ class MapSettings:
     trial_updates: int = 20
 
     def __post_init__(self) -> None:
-        _check_positive(self, "the map", ("sample_spacing", "rms", "most_weight", "blend_length"))
-        _check_from_zero(self, "the map", ("least_extension", "least_length", "least_sigmas", "explained_distance", "trusted_length"))
+        check_positive(self, "the map", ("sample_spacing", "rms", "most_weight", "blend_length"))
+        check_from_zero(self, "the map", ("least_extension", "least_length", "least_sigmas", "explained_distance", "trusted_length"))
         if self.trusted_count < 1 or self.trial_updates < 1:
             raise ValueError(f"trusted_count is {self.trusted_count} and trial_updates is {self.trial_updates}; want at least 1 each")
 
@@ -254,17 +256,3 @@ def spline_settings(mode: str = "default") -> SplineSettings:
 def _check_name(name: str, what: str, known: tuple[str, ...]) -> None:
     if name not in known:
         raise ValueError(f"{what} is {name!r}; want one of {', '.join(known)}")
-
-
-def _check_positive(settings: object, whose: str, names: tuple[str, ...]) -> None:
-    for name in names:
-        value = getattr(settings, name)
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} of {whose} is {value}; want a positive number")
-
-
-def _check_from_zero(settings: object, whose: str, names: tuple[str, ...]) -> None:
-    for name in names:
-        value = getattr(settings, name)
-        if not (math.isfinite(value) and value >= 0.0):
-            raise ValueError(f"{name} of {whose} is {value}; want zero or more")
