@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.cell_blocks import update_block
 from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.noisy_returns import settle_returns
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import ScanGeometry, beam_directions
 
@@ -129,6 +130,7 @@ def _integrate_one(
     geometry: tuple[float, float, float, float],
     unit_vectors: Array,
     increments: Array,
+    noise: tuple[float, float],
     window: Array,
 ) -> None:
     """Update a map by one scan at x, y [cells]; ``geometry`` is (increment, range_max [cells], cells per metre, full circle)."""
@@ -142,6 +144,8 @@ def _integrate_one(
         value = float(ranges[beam])
         is_hit[beam] = math.isfinite(value) and value * scale <= reach
         lengths[beam] = 0.0 if math.isnan(value) else min(value * scale, reach)
+    if noise[0] > 0.0 or noise[1] > 0.0:
+        settle_returns(log_odds, x, y, lengths, directions, is_hit, noise[0] * scale, noise[1], increments[0])
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
     margin = int(reach) + 3
     row_offset = int(math.floor(y)) - margin
@@ -210,7 +214,9 @@ class OccupancyGrid:
         self._first_row -= below
         self._first_column -= left
 
-    def integrate(self, pose: ArrayLike, ranges: ArrayLike, geometry: ScanGeometry) -> tuple[int, int, int, int]:
+    def integrate(
+        self, pose: ArrayLike, ranges: ArrayLike, geometry: ScanGeometry, noise: tuple[float, float] = (0.0, 0.0)
+    ) -> tuple[int, int, int, int]:
         """Update the map by one scan.
 
         Parameters
@@ -221,6 +227,9 @@ class OccupancyGrid:
             Ranges [m]; inf for no return, nan for an invalid beam.
         geometry : ScanGeometry
             Which way the beams look.
+        noise : tuple of float
+            Standard deviation of the ranges: the larger of the first [m] and the second, a share of the range. Returns that it may have
+            put behind a wall count as returns of the wall.
 
         Returns
         -------
@@ -230,7 +239,7 @@ class OccupancyGrid:
         Raises
         ------
         ValueError
-            Where the pose is not finite or the number of ranges is not that of the geometry.
+            Where the pose is not finite, the number of ranges is not that of the geometry, or the noise is negative or not finite.
         """
         x, y, theta = np.asarray(pose, np.float64)
         scan = np.asarray(ranges, np.float32)
@@ -238,13 +247,19 @@ class OccupancyGrid:
             raise ValueError(f"pose is ({x}, {y}, {theta}); want finite metres and radians")
         if scan.shape != (geometry.beams,):
             raise ValueError(f"ranges have shape {scan.shape}; want ({geometry.beams},), one per beam")
+        if not all(0.0 <= value < math.inf for value in noise):
+            raise ValueError(f"noise is {noise}; want a deviation [m] and a share of the range, of 0 or more each")
         resolution, reach = self.settings.resolution, geometry.range_max
         margin = 4 * resolution
         self.contain(x - reach - margin, y - reach - margin, x + reach + margin, y + reach + margin)
         window = np.zeros(4, np.int64)
         numbers = (geometry.angle_increment, reach / resolution, 1.0 / resolution, float(geometry.is_full_circle))
         grid_x, grid_y = x / resolution - self._first_column, y / resolution - self._first_row
-        _integrate_one(self.log_odds, grid_x, grid_y, theta, scan, numbers, geometry.unit_vectors, self.settings.increments, window)
+        deviation, share = noise
+        _integrate_one(
+            self.log_odds, grid_x, grid_y, theta, scan, numbers, geometry.unit_vectors, self.settings.increments,
+            (float(deviation), float(share)), window,
+        )  # fmt: skip
         rows, columns = self.log_odds.shape
         low_row, high_row, low_column, high_column = (int(value) for value in window)
         return max(low_row - 1, 0), min(high_row + 1, rows), max(low_column, 0), min(high_column, columns)

@@ -17,6 +17,7 @@ from lidarium.envs.simulation.lidar import cast_scan, cut_by_disc
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
 from lidarium.mapping.map_crops import touched_words
+from lidarium.mapping.noisy_returns import settle_returns
 from lidarium.mapping.occupancy import integrate_scan
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import beam_directions, beams_towards
@@ -229,17 +230,20 @@ def _update_map(
     is_hit = np.empty(beams, np.bool_)
     for beam in range(beams):
         is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
+    log_odds = int8_grid_at(belief[0], belief[1], belief[2])
     row_offset, column_offset = _window_corner(x, y, reach)
     local_x, local_y = x - column_offset, y - row_offset
     if not is_filled:
         for beam in range(beams):
             value = ranges[beam]
             lengths[beam] = min(value * scale, reach) if value == value else 0.0
+        if _is_noisy(sensor):
+            deviation, share = sensor[NOISE_FLOOR] * scale, sensor[NOISE_SHARE]
+            settle_returns(log_odds, x, y, lengths, directions, is_hit, deviation, share, world.increments[0])
         scan_ends(lengths, directions, local_x, local_y, ends)
         box = fill_scan_polygon(lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits)
     if world.flags[row] & (KNOWN_MATES | SOME_MATES):
         _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
-    log_odds = int8_grid_at(belief[0], belief[1], belief[2])
     touched = word_grid_at(belief[3], belief[4], touched_words(belief[2]))
     integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, world.increments, np.zeros_like(bits), touched)
     # A hit may lie one cell beyond the seen area.

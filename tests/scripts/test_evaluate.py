@@ -85,7 +85,13 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
         "2",
     ]
     code = "from lidarium.scripts.main import main; import sys; sys.exit(main())"
-    process = subprocess.Popen([sys.executable, "-c", code, "evaluate", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    # A shell that starts the tests in the background lets their children ignore interrupts.
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "evaluate", *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     ended = time.monotonic() + 60.0
     while time.monotonic() < ended and not ((tmp_path / "episodes.jsonl").exists() and (tmp_path / "episodes.jsonl").stat().st_size):
         time.sleep(0.05)

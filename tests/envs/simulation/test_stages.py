@@ -198,7 +198,7 @@ def test_the_map_is_that_of_the_occupancy_grid_fed_with_the_same_scans(tables):
     grid = OccupancyGrid(OccupancySettings(resolution=0.05))
     for step in range(30):
         one.step(commands_of(generator, 1), moves_bodies=step > 0)
-        grid.integrate(one.poses[0], one.ranges[0], geometry)
+        grid.integrate(one.poses[0], one.ranges[0], geometry, noise=(0.01, 0.01))
     column, row = (round((a - b) / 0.05) for a, b in zip(grid.origin, one.origins[0], strict=True))
     rows, columns = np.nonzero(one.log_odds[0])
     assert (grid.log_odds[rows - row, columns - column] == one.log_odds[0][rows, columns]).mean() > 0.999

@@ -1,0 +1,54 @@
+"""Returns with noise: one that ends just behind a known wall has met that wall.
+
+Noise puts ends of beams behind walls too, into cells that no beam passes through, so that no later scan takes them back: walls grow
+thick from behind for as long as they are looked at. So where a beam ends behind an occupied cell, within what noise explains, its end
+is laid into that cell. What a single hit has marked counts as occupied: beams that pass in front of a wall take a stray hit back.
+"""
+
+import math
+
+from lidarium.mapping.kernels import Array, kernel
+
+DEVIATIONS = 3.0
+"""Noise explains so many of its standard deviations, and one cell."""
+
+STEP = 0.5
+"""Beams are walked back from their ends in steps of this [cells]."""
+
+
+@kernel
+def settle_returns(
+    log_odds: Array, x: float, y: float, lengths: Array, directions: Array, is_hit: Array, deviation: float, share: float, occupied: int
+) -> None:
+    """Shorten the beams that end just behind an occupied cell, so that they end in it.
+
+    Parameters
+    ----------
+    log_odds : (rows, columns) int8
+        The map so far.
+    x, y : float
+        Where the laser is [cells].
+    lengths : (beams,) float64
+        Lengths of the beams [cells]; changed in place.
+    directions : (2 or more, beams) float64
+        Their directions in the map.
+    is_hit : (beams,) bool
+        Which of them something ended; the others keep their lengths.
+    deviation, share : float
+        Standard deviation of the noise: the larger of the first [cells] and this share of the length.
+    occupied : int
+        Log-odds from which on a cell counts as occupied.
+    """
+    rows, columns = log_odds.shape
+    for beam in range(lengths.shape[0]):
+        if not is_hit[beam]:
+            continue
+        end = lengths[beam]
+        nearest = max(end - DEVIATIONS * max(deviation, share * end) - 1.0, 0.0)
+        at = end
+        while at >= nearest:
+            row, column = int(math.floor(y + at * directions[1, beam])), int(math.floor(x + at * directions[0, beam]))
+            if 0 <= row < rows and 0 <= column < columns and log_odds[row, column] >= occupied:
+                lengths[beam] = at
+                break
+            at -= STEP

@@ -1,0 +1,98 @@
+"""Returns with noise: those that end just behind a known wall are the wall's; all others stay what they are."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import lidarium
+from lidarium.envs.settings import make_settings
+from lidarium.evaluation.history import History
+from lidarium.evaluation.result import result_of
+from lidarium.evaluation.runner import run_episode
+from lidarium.evaluation.watching import WatchedExploration
+from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
+from lidarium.mapping.scans import ScanGeometry
+
+FORWARD = ScanGeometry(beams=61, field_of_view=math.radians(60.0), range_min=0.05, range_max=6.0)
+NOISE = (0.03, 0.0)
+WALL = 2.02
+"""A wall across the way ahead: its near side lies in the middle of a cell of 5 cm."""
+
+
+def ranges_to(wall):
+    return (wall / np.cos(FORWARD.angles)).astype(np.float32)
+
+
+def grid_before_wall(scans=3):
+    grid = OccupancyGrid(OccupancySettings(resolution=0.05))
+    for _ in range(scans):
+        grid.integrate((0.0, 0.0, 0.0), ranges_to(WALL), FORWARD, NOISE)
+    return grid
+
+
+def column_of(grid, x):
+    """Return the log-odds of the cells ahead of the laser in a column, within 0.5 m of its axis."""
+    first, (x_low, y_low) = 0.05, grid.origin
+    column = math.floor((x - x_low) / first)
+    rows = [math.floor((y - y_low) / first) for y in np.arange(-0.475, 0.5, 0.05)]
+    return grid.log_odds[rows, column]
+
+
+def test_a_return_just_behind_a_wall_counts_as_one_of_the_wall():
+    grid = grid_before_wall()
+    before = column_of(grid, WALL).copy()
+    grid.integrate((0.0, 0.0, 0.0), ranges_to(WALL + 0.1), FORWARD, NOISE)
+    assert (column_of(grid, WALL + 0.1) == 0).all()
+    assert (column_of(grid, WALL) >= before).all()
+
+
+def test_a_return_far_behind_a_wall_tells_of_another_one():
+    grid = grid_before_wall()
+    grid.integrate((0.0, 0.0, 0.0), ranges_to(WALL + 0.4), FORWARD, NOISE)
+    assert (column_of(grid, WALL + 0.4) > 0).all()
+    assert (column_of(grid, WALL + 0.2) < 0).all()
+
+
+def test_without_noise_returns_are_believed_as_they_are():
+    grid = grid_before_wall()
+    grid.integrate((0.0, 0.0, 0.0), ranges_to(WALL + 0.1), FORWARD)
+    assert (column_of(grid, WALL + 0.1) > 0).all()
+
+
+def test_what_was_marked_before_a_wall_by_chance_is_taken_back():
+    grid = OccupancyGrid(OccupancySettings(resolution=0.05))
+    grid.integrate((0.0, 0.0, 0.0), ranges_to(WALL - 0.1), FORWARD, NOISE)
+    for _ in range(10):
+        grid.integrate((0.0, 0.0, 0.0), ranges_to(WALL + 0.06), FORWARD, NOISE)
+    assert (column_of(grid, WALL - 0.1) < 0).all()
+    assert (column_of(grid, WALL + 0.06) > 0).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.01, 0.05))
+def test_a_wall_stays_thin_however_often_noise_is_drawn(seed, deviation):
+    generator = np.random.default_rng(seed)
+    plain, settled = (OccupancyGrid(OccupancySettings(resolution=0.05)) for _ in range(2))
+    for _ in range(60):
+        ranges = (ranges_to(WALL) + generator.normal(0.0, deviation, FORWARD.beams)).astype(np.float32)
+        plain.integrate((0.0, 0.0, 0.0), ranges, FORWARD)
+        settled.integrate((0.0, 0.0, 0.0), ranges, FORWARD, (deviation, 0.0))
+    assert (settled.log_odds > 0).sum() <= (plain.log_odds > 0).sum()
+    assert (column_of(settled, WALL + 3.0 * deviation + 0.1) == 0).all()
+
+
+@pytest.mark.parametrize("noise", [(-0.01, 0.0), (0.0, math.nan), (math.inf, 0.0)])
+def test_noise_that_makes_no_sense_is_refused(noise):
+    with pytest.raises(ValueError, match="noise is"):
+        OccupancyGrid().integrate((0.0, 0.0, 0.0), ranges_to(WALL), FORWARD, noise)
+
+
+def test_a_noisy_robot_draws_walls_nearly_as_well_as_one_without_noise():
+    history = History()
+    env = WatchedExploration("apartment", make_settings(robots=1, noise="datasheet", resolution=0.05), watchers=[history])
+    episode = run_episode(lidarium.policy("nearest_frontier"), env, seed=0)
+    result = result_of(episode, "nearest_frontier", history)
+    assert result["iou_occupied"] >= 0.88
