@@ -3,6 +3,8 @@
 Noise puts ends of beams behind walls too, into cells that no beam passes through, so that no later scan takes them back: walls grow
 thick from behind for as long as they are looked at. So where a beam ends behind an occupied cell, within what noise explains, its end
 is laid into that cell. What a single hit has marked counts as occupied: beams that pass in front of a wall take a stray hit back.
+
+A cell beside a free one may be the surface of something, such as the next piece of a wall along which a beam grazes: its returns stay.
 """
 
 import math
@@ -14,6 +16,16 @@ DEVIATIONS = 3.0
 
 STEP = 0.5
 """Beams are walked back from their ends in steps of this [cells]."""
+
+
+@kernel(inline=True)
+def _is_beside_free(log_odds: Array, row: int, column: int) -> bool:
+    """Whether one of the four cells beside a cell is free, so that the cell may be a wall's surface."""
+    rows, columns = log_odds.shape
+    if not (0 < row < rows - 1 and 0 < column < columns - 1):
+        return False
+    least = min(log_odds[row - 1, column], log_odds[row + 1, column], log_odds[row, column - 1], log_odds[row, column + 1])
+    return bool(least < 0)
 
 
 @kernel
@@ -44,6 +56,9 @@ def settle_returns(
         if not is_hit[beam]:
             continue
         end = lengths[beam]
+        row, column = int(math.floor(y + end * directions[1, beam])), int(math.floor(x + end * directions[0, beam]))
+        if _is_beside_free(log_odds, row, column):
+            continue
         nearest = max(end - DEVIATIONS * max(deviation, share * end) - 1.0, 0.0)
         at = end
         while at >= nearest:

@@ -71,6 +71,19 @@ def test_what_was_marked_before_a_wall_by_chance_is_taken_back():
     assert (column_of(grid, WALL + 0.06) > 0).all()
 
 
+def test_the_next_piece_of_a_wall_along_which_beams_graze_is_drawn_where_it_is():
+    fine = ScanGeometry(beams=721, field_of_view=math.radians(60.0), range_min=0.05, range_max=6.0)
+    along = 0.52 / np.sin(np.maximum(fine.angles, 0.01))
+    whole = np.where(along <= 3.0, along, np.nan).astype(np.float32)
+    begun = np.where(along <= 2.0, along, np.nan).astype(np.float32)
+    grid = OccupancyGrid(OccupancySettings(resolution=0.05))
+    for ranges in (begun, whole, whole, whole):
+        grid.integrate((0.0, 0.0, 0.0), ranges, fine, NOISE)
+    ends = np.stack([whole * np.cos(fine.angles), whole * np.sin(fine.angles)], axis=1)[whole > 2.0]
+    columns, rows = np.floor((ends - grid.origin) / 0.05).astype(int).T
+    assert (grid.log_odds[rows, columns] > 0).all()
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000), st.floats(0.01, 0.05))
 def test_a_wall_stays_thin_however_often_noise_is_drawn(seed, deviation):
