@@ -64,7 +64,7 @@ class SupervisorSettings:
     merge_period_s: float = 2.0
     searches_per_merge: int = 1
     merge_resolution_m: float = 0.05
-    confirmation_growth_m2: float = 3.0
+    confirmation_growth_m2: float = 2.0
     same_goal_m: float = 1.0
     least_frontier_m: float = 0.5
     least_left_m: float = 0.5

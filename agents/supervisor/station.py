@@ -12,6 +12,7 @@ from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
 from lidarium.envs.onboard.reports import Report
 from lidarium.envs.onboard.state import OperatingState
+from lidarium.envs.wrappers.merged_maps import TEAM_VALIDATION
 from lidarium.mapping.merging.described_map import resampled
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
@@ -19,17 +20,10 @@ from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.merger import Merged, placed
 from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import ValidationSettings
 from lidarium.mapping.occupancy import UNKNOWN
 from lidarium.mapping.rigid import Transform
 
 Pair = tuple[str, str]
-
-STATION_VALIDATION = ValidationSettings(
-    least_evidence_m=6.0, least_across_m=2.5, most_contradiction_m=0.3, plenty_of_wall_m=10.0, contradiction_share=0.1
-)
-"""A station leads robots by what it joins, before their maps have much in common. Two rooms of one plan agree on all of their walls; few
-of these hold the maps in the second direction, and bodies are taken out before maps are compared, so that little has to be excused."""
 
 
 class MergeStation:
@@ -46,7 +40,7 @@ class MergeStation:
     settings : SupervisorSettings
         How maps are joined.
     merge : MergeSettings or None
-        How maps are merged; by default with bounds of a station's own.
+        How maps are merged; by default with the bounds for teams whose robots map each other's bodies.
 
     Attributes
     ----------
@@ -62,7 +56,7 @@ class MergeStation:
         self, agents: list[str], resolution: float, radius: float, settings: SupervisorSettings, merge: MergeSettings | None = None
     ) -> None:
         self.agents, self.resolution, self.settings, self._radius = list(agents), resolution, settings, radius
-        merge = merge or MergeSettings(validation=STATION_VALIDATION)
+        merge = merge or MergeSettings(validation=TEAM_VALIDATION)
         self._merge_resolution = max(resolution, settings.merge_resolution_m)
         self._merger = IncrementalMerger(
             self._merge_resolution,
