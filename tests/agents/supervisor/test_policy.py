@@ -57,7 +57,7 @@ def test_a_team_is_faster_than_robots_alone_and_about_as_fast_as_one_that_is_tol
     alone, together = finished("independent"), finished("supervised")
     told = finished("oracle_starts", reveals_starts=True)
     times = {name: one.env.scorer.times[0.99] for name, one in (("alone", alone), ("together", together), ("told", told))}
-    assert times["together"] < times["alone"]
+    assert times["together"] < 0.7 * times["alone"]
     assert times["together"] <= 1.3 * times["told"]
     assert float(together.env.world.travelled.sum()) < 0.7 * float(alone.env.world.travelled.sum())
 
