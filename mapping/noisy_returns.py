@@ -22,10 +22,13 @@ STEP = 0.5
 def _is_beside_free(log_odds: Array, row: int, column: int) -> bool:
     """Whether one of the four cells beside a cell is free, so that the cell may be a wall's surface."""
     rows, columns = log_odds.shape
-    if not (0 < row < rows - 1 and 0 < column < columns - 1):
-        return False
-    least = min(log_odds[row - 1, column], log_odds[row + 1, column], log_odds[row, column - 1], log_odds[row, column + 1])
-    return bool(least < 0)
+    is_row, is_column = 0 <= row < rows, 0 <= column < columns
+    return bool(
+        (is_column and 0 < row <= rows and log_odds[row - 1, column] < 0)
+        or (is_column and -1 <= row < rows - 1 and log_odds[row + 1, column] < 0)
+        or (is_row and 0 < column <= columns and log_odds[row, column - 1] < 0)
+        or (is_row and -1 <= column < columns - 1 and log_odds[row, column + 1] < 0)
+    )
 
 
 @kernel

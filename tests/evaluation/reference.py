@@ -182,6 +182,27 @@ class Reference:
             cells.add((int(row), int(column)))
         return cells
 
+    def settled(self, believed, pose, ranges):
+        """Ranges of beams that end at most three deviations and a cell behind an occupied cell, and beside no free one, end in it."""
+        lidar, known = self.env.settings.lidar, {tuple(cell): believed[tuple(cell)] for cell in np.argwhere(believed).tolist()}
+        start, settled = (pose[:2] - self.origin) / self.resolution, ranges.astype(float)
+        for beam, angle in enumerate(self.angles):
+            if ranges[beam] > self.reach:
+                continue
+            length = float(ranges[beam]) / self.resolution
+            deviation = max(lidar.noise_floor, lidar.noise_share * ranges[beam]) / self.resolution
+            direction = np.array([math.cos(pose[2] + angle), math.sin(pose[2] + angle)])
+            column, row = (int(value) for value in np.floor(start + length * direction))
+            if any(known.get((row + i, column + j), 0) < 0 for i, j in ((1, 0), (-1, 0), (0, 1), (0, -1))):
+                continue
+            for back in np.arange(0.0, 3.0 * deviation + 1.0 + 1e-12, 0.5):
+                if back <= length:
+                    column, row = (int(value) for value in np.floor(start + (length - back) * direction))
+                    if known.get((row, column), 0) >= HIT:
+                        settled[beam] = (length - back) * self.resolution
+                        break
+        return settled
+
     def look(self):
         """Go through the steps: masks of what each robot saw, maps, coverage over time, and what is seen at once."""
         robots, is_noisy = self.env.settings.robots, self.env.settings.lidar.is_noisy
@@ -198,9 +219,10 @@ class Reference:
                 area = self.area(poses[robot], true)
                 now[robot] = area & self.counted
                 believed = self.maps[robot]
-                lowered = self.area(poses[robot], told[robot]) if is_noisy else area
+                ranges = self.settled(believed, poses[robot], told[robot]) if is_noisy else told[robot]
+                lowered = self.area(poses[robot], ranges) if is_noisy else area
                 raised = np.zeros_like(lowered)
-                for cell in self.hits(robot, poses, told[robot]):
+                for cell in self.hits(robot, poses, ranges):
                     if cell[0] < raised.shape[0] and cell[1] < raised.shape[1] and min(cell) >= 0:
                         raised[cell] = True
                 believed[raised] = np.minimum(believed[raised] + HIT, MOST)

@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import lidarium
 from lidarium.envs.settings import make_settings
@@ -84,17 +82,19 @@ def test_the_next_piece_of_a_wall_along_which_beams_graze_is_drawn_where_it_is()
     assert (grid.log_odds[rows, columns] > 0).all()
 
 
-@settings(max_examples=20, deadline=None)
-@given(st.integers(0, 10_000), st.floats(0.01, 0.05))
+@pytest.mark.parametrize("deviation", [0.02, 0.03, 0.05])
+@pytest.mark.parametrize("seed", range(5))
 def test_a_wall_stays_thin_however_often_noise_is_drawn(seed, deviation):
     generator = np.random.default_rng(seed)
     plain, settled = (OccupancyGrid(OccupancySettings(resolution=0.05)) for _ in range(2))
-    for _ in range(60):
+    for _ in range(100):
         ranges = (ranges_to(WALL) + generator.normal(0.0, deviation, FORWARD.beams)).astype(np.float32)
         plain.integrate((0.0, 0.0, 0.0), ranges, FORWARD)
         settled.integrate((0.0, 0.0, 0.0), ranges, FORWARD, (deviation, 0.0))
-    assert (settled.log_odds > 0).sum() <= (plain.log_odds > 0).sum()
-    assert (column_of(settled, WALL + 3.0 * deviation + 0.1) == 0).all()
+    behind = {name: sum((column_of(grid, WALL + 0.05 * k) > 0).sum() for k in range(1, 6)) for name, grid in (("p", plain), ("s", settled))}
+    assert behind["p"] > 0
+    assert behind["s"] <= 0.7 * behind["p"]
+    assert np.any([column_of(settled, WALL + x) > 0 for x in (-0.05, 0.0, 0.05)], axis=0).mean() >= 0.9
 
 
 @pytest.mark.parametrize("noise", [(-0.01, 0.0), (0.0, math.nan), (math.inf, 0.0)])
