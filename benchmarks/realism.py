@@ -179,7 +179,7 @@ ABOUT = """World of `realism="lab"`: datasheet noise, typical odometry (5 % bias
 robots and seeds, in parentheses the worst. ATE is the root of the mean square over the whole episode, of poses as they were believed at
 the time; frames agree since starts are known, so the first error of a heading counts with all of its lever; *aligned* is that after the
 best rigid motion, as `evo` and others tell it. IoU is of the team's map, as [metrics](../reference/metrics.md) defines it, and *aligned*
-after the best motion of all believed poses onto the true ones; with true poses it is 0.91 in the apartment without noise, 0.90 with it.
+after the best motion of all believed poses onto the true ones; with true poses it is 0.91 in the apartment, without noise and with it.
 
 Wanted are an ATE of at most 0.05 m in an apartment of 65 m2 and 0.15 m in an office of 2,000 m2, IoU of at least 0.85, at most 4 ms for a
 matched scan and 50 ms for a closure, and 600 agent steps a second. In the large office robots start in a hall of which a laser of 5.6 m

@@ -76,10 +76,16 @@ def choose(
             nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, goal))
             return [*_legs(tree, way_to(nearest.number, before)), Choice(goal, None, is_goal=True)]
     others = [tree.nodes[number] for number in sorted(known)]
+
+    def cost_of(candidate: Candidate) -> float:
+        legs = [tree.nodes[number].place for number in way_to(candidate.node, before)]
+        way = lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place)
+        return _weighed(way, legs[0] if legs else candidate.place, candidate.place, settings, senses, limits)
+
     best: Candidate | None = None
     if settings.candidates == "goal" and generator.random() >= settings.random_share:
         found = [candidate for each in reached for candidate in source.of_node(each, memory, others)]
-        best = _cheapest(_left_by(targets, found), tree, lengths, before, settings, senses, limits)
+        best = min(_left_by(targets, found), key=cost_of, default=None)
     else:
         for each in sorted(reached, key=lambda each: lengths[each.number]):
             found = _left_by(targets, source.of_node(each, memory, others))
@@ -87,7 +93,7 @@ def choose(
                 best = found[int(generator.integers(len(found)))]
                 break
     if settings.candidates == "goal":
-        cost = math.inf if best is None else _cost(best, tree, lengths, before, settings, senses, limits)
+        cost = math.inf if best is None else cost_of(best)
         # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
         is_asked = best is None or senses.goal is None
         at_frontier = _to_frontier(node, memory, settings.least_frontier, settings, senses, targets, limits, cost) if is_asked else []
@@ -135,35 +141,6 @@ def _left_by(targets: Sequence[Candidate], found: list[Candidate]) -> list[Candi
             for target in targets
         )
     ]
-
-
-def _cheapest(
-    found: list[Candidate],
-    tree: Tree,
-    lengths: dict[int, float],
-    before: dict[int, int],
-    settings: SrtSettings,
-    senses: Senses,
-    limits: Limits,
-) -> Candidate | None:
-    """Return the candidate of least way, with the turn that begins it, and of least distance to the goal where there is one."""
-    if not found:
-        return None
-    return min(found, key=lambda candidate: _cost(candidate, tree, lengths, before, settings, senses, limits))
-
-
-def _cost(
-    candidate: Candidate,
-    tree: Tree,
-    lengths: dict[int, float],
-    before: dict[int, int],
-    settings: SrtSettings,
-    senses: Senses,
-    limits: Limits,
-) -> float:
-    legs = [tree.nodes[number].place for number in way_to(candidate.node, before)]
-    way = lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place)
-    return _weighed(way, legs[0] if legs else candidate.place, candidate.place, settings, senses, limits)
 
 
 def _weighed(

@@ -25,6 +25,7 @@ from lidarium.mapping.splines.features import Observation
 
 _HIT_SHARE = 0.95
 _RECOVERY_STEPS = 10
+_LEAST_BOX = 0.1
 _ENTRIES_PER_METRE, _FARTHEST = 2000.0, 0.5
 
 
@@ -48,7 +49,8 @@ class SplineFilterSettings:
     lost_likelihood : float
         Where rays fit worse than this in the mean for ten corrections, some particles are drawn anew; 0 for never.
     recovered_share, recovery_distance, recovery_turn : float
-        What share of particles, and half of the box around the pose from which they are drawn [m, rad].
+        What share of particles, and half of the box around the pose from which they are drawn [m, rad]; then from boxes of half the
+        size each, down to a sixteenth.
     """
 
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
@@ -114,7 +116,7 @@ class SplineFilter(SplineTracker):
         self.scales = 1.0 + np.array([settings.distance_bias, settings.turn_bias]) * self._generator.standard_normal(
             (settings.particles, 2)
         )
-        self.resamplings, self._lost_steps = 0, 0
+        self.resamplings, self._lost_steps, self._box = 0, 0, 0.0
         self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
 
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
@@ -173,12 +175,17 @@ class SplineFilter(SplineTracker):
         self.resamplings += 1
 
     def _recover(self, likelihood: float, pose: NDArray[np.float64]) -> None:
-        """Draw some particles around the pose where rays have not fitted for a while."""
+        """Draw some particles around the pose where rays have not fitted for a while, then in ever smaller boxes.
+
+        The nearest of those that were drawn fits well enough to take all, and a robot that stands spreads them no more.
+        """
         settings = self.settings
-        self._lost_steps = self._lost_steps + 1 if likelihood < settings.lost_likelihood else 0
+        is_lost = likelihood < settings.lost_likelihood
+        self._lost_steps = self._lost_steps + 1 if is_lost or self._box > _LEAST_BOX else 0
         drawn = round(settings.recovered_share * len(self.particles))
         if self._lost_steps >= _RECOVERY_STEPS and drawn > 0:
-            box = np.array([settings.recovery_distance, settings.recovery_distance, settings.recovery_turn])
+            self._box = 1.0 if is_lost else 0.5 * self._box
+            box = self._box * np.array([settings.recovery_distance, settings.recovery_distance, settings.recovery_turn])
             which = self._generator.permutation(len(self.particles))[:drawn]
             self.particles[which] = pose + box * self._generator.uniform(-1.0, 1.0, (drawn, 3))
             self._lost_steps = 0
