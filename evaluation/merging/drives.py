@@ -87,7 +87,9 @@ class MapMaker:
         world, scorer = env.world, env.scorer
         x, y, theta = self._waves.at(scorer.time)
         pose = self._start.inverse() @ Transform(*world.poses[0].tolist())
-        self._grid.integrate((pose.x + x, pose.y + y, pose.theta + theta), world.ranges[0], env.settings.lidar)
+        lidar = env.settings.lidar
+        noise = (lidar.noise_floor, lidar.noise_share)
+        self._grid.integrate((pose.x + x, pose.y + y, pose.theta + theta), world.ranges[0], lidar, noise)
         while self._shares and scorer.coverage >= self._shares[0]:
             self._keep(scorer.time, scorer.coverage)
 

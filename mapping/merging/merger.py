@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from lidarium.mapping.merging.described_map import DescribedMap, check_resolution, resampled, three_levels_of
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.pair import PairResult, described, is_contradicted, merge_pair
+from lidarium.mapping.merging.pair import PairResult, described, is_contradicted, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.rigid import Transform
 
@@ -64,6 +64,9 @@ class Merged:
 def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSettings | None = None) -> Merged:
     """Merge maps of robots that know nothing of each other's start.
 
+    Pairs of maps that know most are searched for first, by corners before all rotations and translations are tried. Where two maps are
+    joined through others already, they are laid over each other as these imply, and searched for only where they do not agree so.
+
     Parameters
     ----------
     maps : mapping of str to ((rows, columns) uint8, float)
@@ -87,8 +90,37 @@ def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSetti
         raise ValueError("there are no maps to merge; want at least one")
     levels, resolution = _alike(maps, settings)
     features = {name: described(grid, resolution, settings) for name, grid in levels.items()}
-    pairs = {(a, b): merge_pair(features[a], features[b], settings) for a, b in itertools.combinations(maps, 2)}
+    pairs = _all_pairs(features, settings)
     return Merged(levels, resolution, pairs, joined_tree(features, pairs, settings))
+
+
+def _all_pairs(features: Mapping[str, DescribedMap], settings: MergeSettings) -> dict[tuple[str, str], PairResult]:
+    """Return what comes of each two maps, in their order."""
+    every = list(itertools.combinations(features, 2))
+    by_corners = replace(settings, correlation=replace(settings.correlation, rotations=0))
+    tree: FrameTree[str] = FrameTree(settings.cycle_distance_m, settings.cycle_angle)
+    for name in features:
+        tree.add_map(name)
+    found: dict[tuple[str, str], PairResult] = {}
+    # What corners join spares the search of all rotations and translations.
+    for how in (by_corners, settings) if len(every) > 1 else (settings,):
+        for a, b in sorted(every, key=lambda pair: -min(len(features[name].walls) for name in pair)):
+            if (a, b) in found and found[a, b].is_accepted:
+                continue
+            result = _implied(features[a], features[b], tree.lookup(a, b), settings) or merge_pair(features[a], features[b], how)
+            found[a, b] = result
+            if result.is_accepted and result.a_from_b is not None:
+                tree.add_edge(Edge(a, b, result.a_from_b, result.agreement.evidence_m, result.agreement.centre))
+    return {pair: found[pair] for pair in every}
+
+
+def _implied(a: DescribedMap, b: DescribedMap, a_from_b: Transform | None, settings: MergeSettings) -> PairResult | None:
+    """Return the result of laying maps over each other as others imply, None where these do not say or the maps do not agree so."""
+    # The thesis's test needs inliers, which only a search finds.
+    if a_from_b is None or settings.validation.test == "discs":
+        return None
+    result = verify_pair(a, b, a_from_b, settings)
+    return result if result.is_accepted else None
 
 
 def joined_tree(

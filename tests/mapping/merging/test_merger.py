@@ -11,6 +11,7 @@ from lidarium.envs.settings import make_settings
 from lidarium.evaluation.runner import run_episode
 from lidarium.mapping.map_files import FREE, UNKNOWN
 from lidarium.mapping.merging.merger import merge_maps
+from lidarium.mapping.merging.settings import merge_settings
 from lidarium.mapping.occupancy import three_levels
 from lidarium.mapping.rigid import Transform
 
@@ -42,6 +43,25 @@ def test_many_maps_become_one_in_any_order(order):
     assert np.count_nonzero(fused.levels == FREE) == pytest.approx(np.count_nonzero(apartment() == FREE), rel=0.05)
     with pytest.raises(ValueError, match="not joined"):
         merged.fused([groups[0][0], "elsewhere"])
+
+
+def test_maps_that_others_join_are_verified_instead_of_searched_for():
+    poses = [about_middle(theta, apartment()) for theta in (0.0, 0.9, 2.2, -1.4)]
+    maps = {str(k): (noisy(moved(apartment(), pose), k), RESOLUTION) for k, pose in enumerate(poses)}
+    merged = merge_maps(maps)
+    assert list(merged.pairs) == list(itertools.combinations(maps, 2))
+    assert all(result.is_accepted for result in merged.pairs.values())
+    assert sum(result.found_by != "verification" for result in merged.pairs.values()) == len(maps) - 1
+    for (a, b), result in merged.pairs.items():
+        distance, angle = result.a_from_b.difference(poses[int(a)] @ poses[int(b)].inverse(), (8.0, 8.0))
+        assert distance < 0.1
+        assert angle < math.radians(1.0)
+
+
+def test_the_thesis_mode_searches_for_every_pair():
+    poses = [about_middle(theta, apartment()) for theta in (0.0, 0.9, 2.2)]
+    maps = {str(k): (moved(apartment(), pose), RESOLUTION) for k, pose in enumerate(poses)}
+    assert "verification" not in {result.found_by for result in merge_maps(maps, merge_settings("thesis", RESOLUTION)).pairs.values()}
 
 
 def test_maps_of_different_resolutions_are_brought_to_the_coarsest():
