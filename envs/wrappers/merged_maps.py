@@ -24,7 +24,7 @@ from lidarium.mapping.rigid import Transform
 CanTalk = Callable[[float, NDArray[np.float64]], NDArray[np.bool_]]
 """Takes the time [s] and the true poses (robots, 3); returns which robots reach each other, (robots, robots)."""
 
-TEAM_VALIDATION = ValidationSettings(most_contradiction_m=1.0, plenty_of_wall_m=10.0, contradiction_share=0.1)
+TEAM_VALIDATION = ValidationSettings(most_contradiction_m=1.0, plenty_of_overlap_m2=0.0, plenty_of_wall_m=10.0, contradiction_share=0.1)
 """Robots that do not know where the others are map their bodies as walls, so more may contradict than in maps of robots alone."""
 
 OLDEST_S = 3600.0

@@ -149,7 +149,7 @@ def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings
     best, found_by = _best(judged), "corners"
     if (best is None or best.refusal is not None) and settings.correlation.rotations > 0:
         angles = np.arange(settings.correlation.rotations) * (2.0 * math.pi / settings.correlation.rotations)
-        judged += _by_correlation(a, b, angles, 2 * settings.alignment.candidates, settings)
+        judged += _by_correlation(a, b, angles, 5 * settings.alignment.candidates, settings)
         fallback = _best(judged)
         if fallback is not None and fallback is not best:
             best, found_by = fallback, "correlation"

@@ -53,8 +53,8 @@ class ValidationSettings:
         Least score.
     most_contradiction_m : float
         Length of contradicting walls that is excused [m].
-    plenty_of_wall_m, contradiction_share : float
-        Of the walls in the overlap beyond this length [m], this share may contradict too: maps of whole buildings drift.
+    plenty_of_overlap_m2, plenty_of_wall_m, contradiction_share : float
+        Where both know so much [m2], of the walls beyond this length [m] this share may contradict too: maps of whole buildings drift.
     rival_distance_m, rival_angle : float
         A transform is another one where it differs by more than this [m, rad].
     rival_share : float
@@ -78,6 +78,7 @@ class ValidationSettings:
     hit_rate: float = 0.7
     score: float = 0.9
     most_contradiction_m: float = 0.15
+    plenty_of_overlap_m2: float = 250.0
     plenty_of_wall_m: float = 200.0
     contradiction_share: float = 0.1
     rival_distance_m: float = 0.5
@@ -95,7 +96,7 @@ class ValidationSettings:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
         least = ("least_overlap_m2", "least_wall_m", "least_evidence_m", "least_across_m")
         lengths = ("hit_distance_m", "miss_distance_m", "most_contradiction_m", "plenty_of_wall_m", "rival_distance_m", "rival_lead")
-        check_from_zero(self, "validation", (*least, *lengths))
+        check_from_zero(self, "validation", (*least, *lengths, "plenty_of_overlap_m2"))
         if self.disc_radius_cells < 1:
             raise ValueError(f"disc_radius_cells is {self.disc_radius_cells}; want one or more")
 
@@ -211,6 +212,8 @@ def is_rival(agreement: Agreement, best: Agreement, settings: ValidationSettings
 
 def _excused(agreement: Agreement, settings: ValidationSettings) -> float:
     """Return the length of walls that may contradict [m]."""
+    if agreement.overlap_m2 < settings.plenty_of_overlap_m2:
+        return settings.most_contradiction_m
     return settings.most_contradiction_m + settings.contradiction_share * max(agreement.wall_m - settings.plenty_of_wall_m, 0.0)
 
 

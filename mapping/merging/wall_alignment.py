@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
 from lidarium.mapping.occupancy import FREE, OCCUPIED
 from lidarium.mapping.rigid import Transform
 
@@ -127,12 +127,14 @@ def _gap_to_wall(levels: Array, distance: Array, side: float, x: float, y: float
     nearest = distance[row, column] / side - 1.5
     if nearest > steps:
         return steps + 1.0
+    ahead = FACING_DISTANCE_M / side
     for k in range(max(int(nearest), 0), steps + 1):
         for sign in range(-1 if k > 0 else 1, 2, 2):
             gap = float(sign * k)
             if (
                 levels[int(y + gap * v), int(x + gap * u)] == OCCUPIED
                 and levels[int(y + (gap + 1.0) * v), int(x + (gap + 1.0) * u)] == FREE
+                and not faces_away(levels, x + gap * u, y + gap * v, ahead * u, ahead * v)
             ):
                 return gap
     return steps + 1.0

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from drawn_maps import RESOLUTION, SPREAD, about_middle, apartment, moved
+from drawn_maps import RESOLUTION, SPREAD, about_middle, apartment, blank, kept, moved
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -155,3 +155,26 @@ def test_nothing_matches_where_there_are_no_corners():
         found = match_corners(none.corners, some.corners, none.descriptors, some.descriptors, CorrespondenceSettings(method=method))
         assert len(found) == 0
     assert len(detect_corners(none.levels, RESOLUTION)) == 0
+
+
+def test_the_two_sides_of_a_thin_wall_are_not_laid_on_each_other():
+    """Two robots know a hall, and the room on either side of a wall of 10 cm, whose faces noise has left full of holes."""
+    side, floor = 0.025, blank(140, 200)
+    floor[18:122, 18:182] = 0
+    floor[20:50, 20:180] = 255
+    floor[52:120, 20:98] = 255
+    floor[52:120, 102:180] = 255
+    floor[48:52, 60:64] = 0
+    floor[48:52, 136:140] = 0
+    generator = np.random.default_rng(4)
+    maps = []
+    for known in (slice(0, 100), slice(100, 200)):
+        one = kept(floor, slice(0, 140), known)
+        one[:52] = floor[:52]
+        one[:52, :30] = one[:52, 170:] = 127
+        one[(one == 0) & (generator.random(one.shape) < 0.3)] = 255
+        maps.append(describe_map(one, side))
+    for start in (Transform(), Transform(0.05, 0.0, 0.0), Transform(-0.05, 0.0, 0.0)):
+        distance, angle = refine_on_walls(*maps, start, 0.4, 1600).difference(Transform(), (2.0, 1.5))
+        assert distance < 0.03
+        assert angle < math.radians(1.0)

@@ -183,6 +183,12 @@ def test_what_speaks_against_a_transform_weighs_more_than_what_speaks_for_it():
     assert "contradiction" in str(why_refused(replace(weak, contradicting_m=0.2), settings))
 
 
+def test_what_drift_explains_is_excused_where_both_maps_know_a_building():
+    furnished = Agreement(overlap_m2=150.0, agreeing_m=260.0, wall_m=265.0, across_m=120.0, contradicting_m=1.4, score=0.998)
+    assert "contradiction" in str(why_refused(furnished, ValidationSettings()))
+    assert why_refused(replace(furnished, overlap_m2=300.0), ValidationSettings()) is None
+
+
 def test_rooms_that_look_alike_are_refused_where_the_building_has_changed():
     """Moved by a room, one room lies on another and nothing contradicts; but much more speaks for the place that is contradicted."""
 
