@@ -17,6 +17,10 @@ from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_wal
 from lidarium.mapping.rigid import Transform, halfway
 
 NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))
+THIN_WALL_M = 0.1
+"""How thick the walls are whose two sides may be taken for one [m]."""
+
+_NEARLY = 4
 _QUARTERS = np.arange(4) * (math.pi / 2.0)
 _NONE = np.zeros(0, np.int64)
 
@@ -151,6 +155,9 @@ def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings
         angles = np.arange(settings.correlation.rotations) * (2.0 * math.pi / settings.correlation.rotations)
         judged += _by_correlation(a, b, angles, 5 * settings.alignment.candidates, settings)
         fallback = _best(judged)
+        if fallback is not None and fallback.refusal is not None:
+            judged += _beside(a, b, judged, settings)
+            fallback = _best(judged)
         if fallback is not None and fallback is not best:
             best, found_by = fallback, "correlation"
     if best is None:
@@ -233,6 +240,18 @@ def _by_correlation(a: DescribedMap, b: DescribedMap, angles: NDArray[np.floatin
     reach, samples = settings.alignment.refinement_reach_m, settings.alignment.wall_samples
     refined = (refine_on_walls(a, b, Transform(*transforms[k].tolist()), reach, samples) for k in chosen)
     return [_judged(a, b, Candidate(transform, _NONE), settings) for transform in refined]
+
+
+def _beside(a: DescribedMap, b: DescribedMap, judged: list[_Judged], settings: MergeSettings) -> list[_Judged]:
+    """Judge transforms beside the best refused ones, by a thin wall's thickness: they may have laid its two sides on each other."""
+    found = []
+    for one in sorted(judged, key=lambda one: -one.agreement.evidence_m)[:_NEARLY]:
+        x, y, theta = one.candidate.a_from_b.x, one.candidate.a_from_b.y, one.candidate.a_from_b.theta
+        for quarter in _QUARTERS.tolist():
+            start = Transform(x + THIN_WALL_M * math.cos(quarter), y + THIN_WALL_M * math.sin(quarter), theta)
+            moved = refine_on_walls(a, b, start, THIN_WALL_M, settings.alignment.wall_samples)
+            found.append(_judged(a, b, Candidate(moved, one.candidate.inliers), settings))
+    return found
 
 
 def _judged(a: DescribedMap, b: DescribedMap, candidate: Candidate, settings: MergeSettings) -> _Judged:
