@@ -17,7 +17,7 @@ from lidarium.evaluation import metrics
 from lidarium.evaluation.beliefs import free_as_held, maps_on_floor
 from lidarium.evaluation.events import in_floor_frame, operating_events
 from lidarium.evaluation.history import WHOLE, History
-from lidarium.evaluation.metrics.merges import merge_figures
+from lidarium.evaluation.metrics.merges import Trajectories, merge_figures
 from lidarium.evaluation.runner import Episode
 from lidarium.evaluation.supervision import supervision_figures, tick_percentiles
 from lidarium.evaluation.truth import left_by_failed, truth_of
@@ -80,7 +80,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         **map_figures(env),
         "energy_j": [round(float(used), 6) for used in env.energy_j] if settings.battery.is_limited else None,
         "operating": operating_events(env),
-        "merges": merge_figures(episode.merges, settings.occupancy.resolution),
+        "merges": merge_figures(episode.merges, settings.occupancy.resolution, None if history is None else _trajectories(env, history)),
         "supervisor": supervision_figures(episode.policy),
         "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
         "tick_ms": tick_percentiles(episode.policy),
@@ -138,10 +138,8 @@ def _pose_errors(env: ExplorationEnv, history: History | None) -> dict[str, Any]
     if history is None:
         # The localizer is the truth: no error.
         return {"ate_m": [0.0] * robots, "rpe_m": None, "rpe_rad": None}
-    times, poses = zip(*env.scorer.track, strict=True)
-    # An interrupted step may have left one more of the one than of the other.
-    known = min(len(poses), len(history.believed))
-    true, believed = np.stack(poses[:known]), history.believed[:known]
+    trajectories = _trajectories(env, history)
+    times, true, believed = trajectories.times, trajectories.true, trajectories.believed
     steps = max(round(1.0 / (times[1] - times[0])), 1) if len(times) > 1 else 1
     relative = [metrics.relative_error(believed[:, robot], true[:, robot], steps) for robot in range(robots)]
     return {
@@ -151,6 +149,14 @@ def _pose_errors(env: ExplorationEnv, history: History | None) -> dict[str, Any]
         "rpe_m": [None if error is None else round(error[0], 9) for error in relative],
         "rpe_rad": [None if error is None else round(error[1], 9) for error in relative],
     }
+
+
+def _trajectories(env: ExplorationEnv, history: History) -> Trajectories:
+    """Return where the robots were and believed to be."""
+    times, poses = zip(*env.scorer.track, strict=True)
+    # An interrupted step may have left one more of the one than of the other.
+    known = min(len(poses), len(history.believed))
+    return Trajectories(env.possible_agents, np.array(times[:known], np.float64), np.stack(poses[:known]), history.believed[:known])
 
 
 def map_figures(env: ExplorationEnv) -> dict[str, Any]:

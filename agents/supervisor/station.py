@@ -20,10 +20,14 @@ from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.merger import Merged, placed
 from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.merging.validation import ValidationSettings
 from lidarium.mapping.occupancy import UNKNOWN
 from lidarium.mapping.rigid import Transform
 
 Pair = tuple[str, str]
+
+TEAM_CONFIRMATION = ValidationSettings(most_contradiction_m=0.3, least_across_share=0.15, least_evidence_per_m2=0.3)
+"""When robots are led by a merge: rooms of one plan, corridors and halls agree well enough to be found, but hardly ever so well."""
 
 
 class MergeStation:
@@ -41,6 +45,8 @@ class MergeStation:
         How maps are joined.
     merge : MergeSettings or None
         How maps are merged; by default with the bounds for teams whose robots map each other's bodies.
+    confirmation : ValidationSettings or None
+        What must hold when maps are joined; `TEAM_CONFIRMATION` where neither this nor ``merge`` is given.
 
     Attributes
     ----------
@@ -53,15 +59,23 @@ class MergeStation:
     """
 
     def __init__(
-        self, agents: list[str], resolution: float, radius: float, settings: SupervisorSettings, merge: MergeSettings | None = None
+        self,
+        agents: list[str],
+        resolution: float,
+        radius: float,
+        settings: SupervisorSettings,
+        merge: MergeSettings | None = None,
+        confirmation: ValidationSettings | None = None,
     ) -> None:
         self.agents, self.resolution, self.settings, self._radius = list(agents), resolution, settings, radius
-        merge = merge or MergeSettings(validation=TEAM_VALIDATION)
+        if merge is None:
+            merge, confirmation = MergeSettings(validation=TEAM_VALIDATION), confirmation or TEAM_CONFIRMATION
         self._merge_resolution = max(resolution, settings.merge_resolution_m)
         self._merger = IncrementalMerger(
             self._merge_resolution,
             merge,
             confirmation_growth_m2=settings.confirmation_growth_m2,
+            confirmation=confirmation,
             searches_per_update=settings.searches_per_merge,
         )
         self._merge = merge

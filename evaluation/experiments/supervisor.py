@@ -174,9 +174,8 @@ def _wrong_section(rows: Sequence[Row]) -> list[str]:
     if not wrong:
         return []
     words = (
-        "Runs with a merge that is off by so much, with the error of each robot's own trajectory. Where it is off by less than a "
-        "metre, maps that have drifted apart were joined where their walls agree, and are off at the starts. Where it is off by "
-        "metres, robots in rooms of one plan took them for one room, until what they saw later contradicted it."
+        "Runs with a merge that is wrong: how far off it is where the maps meet, how far by what the starts say, and the error of each "
+        "robot's own trajectory."
     )
     return ["### Wrong merges\n\n" + words + "\n\n" + tables.wrong_table(wrong)]
 
@@ -240,7 +239,9 @@ def _about(alone: Sequence[Row]) -> str:
 def _notes() -> str:
     return (
         "A merge is wrong where the transform that was found is off by more than 0.3 m or 3 degrees at the centroid of what both maps "
-        "know. With SLAM a map drifts by some centimetres, so beside it stands the stricter count of `result.json`, 2 cells and 0.01 rad. "
+        "know, from how the maps truly lie to each other there: a robot's map lies as its pose did when it was nearest to there. Maps "
+        "that SLAM draws drift, and no merger can know by how much, so what the starts say is counted beside it, within the same bounds "
+        "and within those of `result.json`, 2 cells and 0.01 rad. "
         "A tick is a look at the tree every 10 s, with its merge and what robots are told, on one core of a machine that others share."
     )
 

@@ -7,12 +7,14 @@ What is correct: the tolerances of m-explore's own test of its map merging (Hör
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.envs.wrappers.merged_maps import MergeEvent
+from lidarium.mapping.rigid import Transform
 
 ROTATION_TOLERANCE = 1e-2
 """Largest error of the rotation of a correct merge [rad]."""
@@ -21,7 +23,7 @@ TRANSLATION_TOLERANCE = 2.0
 """Largest error of the translation of a correct merge [cells]."""
 
 WRONG_TRANSLATION, WRONG_ROTATION = 0.3, math.radians(3.0)
-"""A merge that errs by more than one of these puts a team's walls where there are none [m, rad]; drift of a map errs by less."""
+"""A merge that errs by more than one of these puts a team's walls where there are none [m, rad]."""
 
 LEAST_OVERLAP = 0.10
 """Share of the area that maps must have in common for a merge to be expected."""
@@ -67,7 +69,54 @@ def is_wrong(translation_error: float, rotation_error: float) -> bool:
     return translation_error > WRONG_TRANSLATION or rotation_error > WRONG_ROTATION
 
 
-def merge_figures(events: Sequence[MergeEvent], resolution: float) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectories:
+    """Where robots were and believed to be.
+
+    Attributes
+    ----------
+    agents : sequence of str
+        The robots.
+    times : (times,) float64
+        When [s], in order.
+    true, believed : (times, robots, 3) float64
+        x, y, theta in the floor's frame, and in that of each robot's own map [m, m, rad].
+    """
+
+    agents: Sequence[str]
+    times: NDArray[np.float64]
+    true: NDArray[np.float64]
+    believed: NDArray[np.float64]
+
+    def floor_from_map(self, agent: str, at: ArrayLike, until_s: float) -> Transform:
+        """Return how a robot's map lies on the floor around a point of it [m]: as its poses did when it was nearest to there."""
+        robot = list(self.agents).index(agent)
+        known = max(int(np.searchsorted(self.times, until_s, side="right")), 1)
+        nearest = int(np.argmin(np.linalg.norm(self.believed[:known, robot, :2] - np.asarray(at, np.float64), axis=1)))
+        true, believed = (Transform(*poses[nearest, robot].tolist()) for poses in (self.true, self.believed))
+        return true @ believed.inverse()
+
+
+def drifted_truth(event: MergeEvent, trajectories: Trajectories) -> tuple[float, float, float]:
+    """Return how two robots' maps truly lie to each other where they overlap, ``a_from_b``.
+
+    Maps drift: what their starts say of each other is not what is true of two maps where they meet. A merger sees the maps alone.
+
+    Parameters
+    ----------
+    event : MergeEvent
+        Who was joined, when, and where the maps overlap.
+    trajectories : Trajectories
+        Of these robots at least.
+    """
+    at_a = Transform(*event.found).apply(event.at)
+    floor_from_a = trajectories.floor_from_map(event.a, at_a, event.time_s)
+    floor_from_b = trajectories.floor_from_map(event.b, event.at, event.time_s)
+    true = floor_from_a.inverse() @ floor_from_b
+    return true.x, true.y, true.theta
+
+
+def merge_figures(events: Sequence[MergeEvent], resolution: float, trajectories: Trajectories | None = None) -> dict[str, Any]:
     """Return the entry ``merges`` of ``result.json``.
 
     Parameters
@@ -76,15 +125,20 @@ def merge_figures(events: Sequence[MergeEvent], resolution: float) -> dict[str, 
         All of an episode.
     resolution : float
         Side of a cell of the maps [m].
+    trajectories : Trajectories or None
+        By which the drift of maps is known; None where they have none.
 
     Returns
     -------
     dict
-        ``accepted``, ``correct``, ``false`` (not correct) and ``wrong`` (`is_wrong`) are numbers of events, ``first_correct_s`` is a time,
-        ``worst_m`` and ``worst_rad`` are the largest errors; these are None where there is nothing to tell.
+        ``accepted``, ``correct`` and ``false`` (not correct) are numbers of events by what the starts say, ``worst_m`` and ``worst_rad``
+        the largest errors so, and ``off`` is how many err by more than ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``. ``wrong``,
+        ``worst_here_m`` and ``worst_here_rad`` are the same by `drifted_truth`. ``first_correct_s`` is a time. None where there is
+        nothing to tell.
     """
     accepted = np.ones(len(events), np.bool_)
     errors = [transform_error(one.found, one.true, one.at) for one in events]
+    here = errors if trajectories is None else [transform_error(one.found, drifted_truth(one, trajectories), one.at) for one in events]
     correct = np.array([is_correct(*error, resolution) for error in errors], np.bool_)
     right = int(np.count_nonzero(correct))
     times = [one.time_s for one in events]
@@ -92,9 +146,12 @@ def merge_figures(events: Sequence[MergeEvent], resolution: float) -> dict[str, 
         "accepted": len(events),
         "correct": right,
         "false": len(events) - right,
-        "wrong": sum(is_wrong(*error) for error in errors),
+        "off": sum(is_wrong(*error) for error in errors),
         "worst_m": max((round(distance, 6) for distance, _ in errors), default=None),
         "worst_rad": max((round(angle, 6) for _, angle in errors), default=None),
+        "wrong": sum(is_wrong(*error) for error in here),
+        "worst_here_m": max((round(distance, 6) for distance, _ in here), default=None),
+        "worst_here_rad": max((round(angle, 6) for _, angle in here), default=None),
         "first_correct_s": first_correct_time(times, accepted, correct),
     }
 

@@ -89,8 +89,13 @@ def median(values: Sequence[float]) -> Interval | None:
 
 
 def has_wrong_merge(row: Row) -> bool:
-    """Whether a run used a merge that is wrong."""
+    """Whether a run used a merge that is wrong where the maps meet."""
     return bool(row["merges"]["wrong"])
+
+
+def has_off_merge(row: Row) -> bool:
+    """Whether a run used a merge that errs by as much from what the starts say, drift included."""
+    return bool(row["merges"]["off"])
 
 
 def has_false_merge(row: Row) -> bool:

@@ -147,13 +147,16 @@ def wrong_table(rows: Sequence[Row]) -> str:
             f"{row['robots']}",
             f"{row['seed']}",
             f"{row['merges']['wrong']} of {row['merges']['accepted']}",
+            f"{row['merges']['worst_here_m']:.2f}",
+            f"{math.degrees(row['merges']['worst_here_rad']):.1f}",
             f"{row['merges']['worst_m']:.2f}",
-            f"{math.degrees(row['merges']['worst_rad']):.1f}",
             ", ".join(f"{error:.2f}" for error in row["ate_m"] or ()),
         )
         for row in rows
     ]
-    return _table(("floor", "policy", "robots", "seed", "merges", "worst [m]", "[deg]", "trajectories of the robots [m]"), lines)
+    return _table(
+        ("floor", "policy", "robots", "seed", "merges", "worst [m]", "[deg]", "by the starts [m]", "trajectories of the robots [m]"), lines
+    )
 
 
 def shown(found: Interval | None, digits: int = 2) -> str:

@@ -38,7 +38,7 @@ class CorrelationSettings:
     """
 
     cell_m: float = 0.15
-    most_cells: int = 256
+    most_cells: int = 200
     rotations: int = 72
     peaks: int = 3
     miss_weight: float = 1.0

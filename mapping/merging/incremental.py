@@ -19,6 +19,7 @@ from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.merger import Merged, joined_tree, placed
 from lidarium.mapping.merging.pair import PairResult, described, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.merging.validation import ValidationSettings, why_refused
 from lidarium.mapping.occupancy import UNKNOWN
 from lidarium.mapping.rigid import Transform
 
@@ -84,6 +85,8 @@ class IncrementalMerger:
         A pair that was refused is searched for again when its maps together know so much more [m2].
     confirmation_growth_m2 : float or None
         A pair that was found joins its maps only when it is found once more, once they know so much more [m2]; at once where None.
+    confirmation : ValidationSettings or None
+        What the maps must say of a pair beside that when it joins them; what its settings ask of every pair where None.
     searches_per_update : int or None
         Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn was longest ago; pairs that
         others join are not searched for then. All where None. Verifying costs little: whatever has news is verified.
@@ -98,6 +101,7 @@ class IncrementalMerger:
     settings: MergeSettings = field(default_factory=MergeSettings)
     search_growth_m2: float = 2.0
     confirmation_growth_m2: float | None = None
+    confirmation: ValidationSettings | None = None
     searches_per_update: int | None = None
     searched: int = 0
     verified: int = 0
@@ -217,7 +221,8 @@ class IncrementalMerger:
         known_m2 = self._known_of(pair)
         if before is not None and before.frames is not None:
             result = verify_pair(a, b, first.inverse() @ before.frames @ second, self.settings)
-            is_due = not before.is_confirmed and known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
+            has_grown = known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
+            is_due = not before.is_confirmed and has_grown and self._convinces(result)
             if result.is_accepted and result.a_from_b is not None and not (is_due and may_search):
                 self.verified += 1
                 refined = first @ result.a_from_b @ second.inverse()
@@ -236,12 +241,16 @@ class IncrementalMerger:
     def _confirms(self, pair: tuple[str, str], before: _Tried | None, frames: Transform | None, result: PairResult) -> bool:
         """Whether what was searched for and found is believed from now on."""
         if self.confirmation_growth_m2 is None:
-            return True
-        if before is None or before.frames is None or frames is None or before.is_confirmed:
+            return self._convinces(result)
+        if before is None or before.frames is None or frames is None or before.is_confirmed or not self._convinces(result):
             return False
         at = placed(self._maps[pair[1]].origin).apply(result.agreement.centre)
         distance, angle = frames.difference(before.frames, at)
         return distance <= CONFIRMED_M and angle <= CONFIRMED_ANGLE
+
+    def _convinces(self, result: PairResult) -> bool:
+        """Whether a pair may be confirmed."""
+        return self.confirmation is None or why_refused(result.agreement, self.confirmation) is None
 
 
 def _is_same(before: GrowingMap | None, now: GrowingMap) -> bool:

@@ -47,6 +47,10 @@ class ValidationSettings:
     least_across_m : float
         Least length of walls that hold the maps in the direction in which they are held least [m]: two straight corridors agree
         wherever they are laid over each other.
+    least_across_share : float
+        The same as a share of the walls that agree, which is at most a half: along a corridor hardly any walls hold.
+    least_evidence_per_m2 : float
+        Least evidence on each square metre that both know [m/m2]: open floor agrees with open floor anywhere.
     hit_rate : float
         Least share of the walls in the overlap that agree.
     score : float
@@ -75,6 +79,8 @@ class ValidationSettings:
     least_wall_m: float = 3.0
     least_evidence_m: float = 3.5
     least_across_m: float = 0.4
+    least_across_share: float = 0.0
+    least_evidence_per_m2: float = 0.0
     hit_rate: float = 0.7
     score: float = 0.9
     most_contradiction_m: float = 0.15
@@ -91,12 +97,12 @@ class ValidationSettings:
     def __post_init__(self) -> None:
         if self.test not in TESTS:
             raise ValueError(f"test of validation is {self.test!r}; want one of {', '.join(TESTS)}")
-        for name in ("hit_rate", "score", "contradiction_share", "rival_share", "disc_agreement"):
+        for name in ("least_across_share", "hit_rate", "score", "contradiction_share", "rival_share", "disc_agreement"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
         least = ("least_overlap_m2", "least_wall_m", "least_evidence_m", "least_across_m")
         lengths = ("hit_distance_m", "miss_distance_m", "most_contradiction_m", "plenty_of_wall_m", "rival_distance_m", "rival_lead")
-        check_from_zero(self, "validation", (*least, *lengths, "plenty_of_overlap_m2"))
+        check_from_zero(self, "validation", (*least, *lengths, "least_evidence_per_m2", "plenty_of_overlap_m2"))
         if self.disc_radius_cells < 1:
             raise ValueError(f"disc_radius_cells is {self.disc_radius_cells}; want one or more")
 
@@ -188,10 +194,12 @@ def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | Non
         return f"contradiction: {share:.0f} % of the walls in the overlap agree, want {wanted:.0f} %"
     if agreement.agreeing_m < settings.least_wall_m:
         return f"small overlap: {agreement.agreeing_m:.1f} m of walls agree, want {settings.least_wall_m:g}"
-    if agreement.evidence_m < settings.least_evidence_m:
-        return f"small overlap: {agreement.evidence_m:.1f} m of walls speak for it, want {settings.least_evidence_m:g}"
-    if agreement.across_m < settings.least_across_m:
-        return f"ambiguous: {agreement.across_m:.1f} m of walls hold the maps in one direction, want {settings.least_across_m:g}"
+    evidence_m = max(settings.least_evidence_m, settings.least_evidence_per_m2 * agreement.overlap_m2)
+    if agreement.evidence_m < evidence_m:
+        return f"small overlap: {agreement.evidence_m:.1f} m of walls speak for it, want {evidence_m:.3g}"
+    across_m = max(settings.least_across_m, settings.least_across_share * agreement.agreeing_m)
+    if agreement.across_m < across_m:
+        return f"ambiguous: {agreement.across_m:.1f} m of walls hold the maps in one direction, want {across_m:.3g}"
     return None
 
 

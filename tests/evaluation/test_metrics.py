@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from lidarium.envs.coverage import pack_bits
+from lidarium.envs.wrappers.merged_maps import MergeEvent
 from lidarium.evaluation import metrics
 from lidarium.evaluation.metrics import merges
 
@@ -263,6 +264,28 @@ def test_the_error_of_a_merge_is_that_where_the_maps_meet():
     near, _ = merges.transform_error(turned, (0.0, 0.0, 0.0), at=(0.0, 20.0))
     assert far == pytest.approx(0.2, abs=1e-4)
     assert near < 0.002
+
+
+def test_a_merge_is_judged_by_how_the_drifted_maps_lie_where_they_meet():
+    """Robot b's map has slipped by 0.5 m in x from 4 s on; a merger that lays it where its walls are is right, though not by the starts."""
+    times = np.arange(0.0, 10.0)
+    true = np.zeros((10, 2, 3))
+    true[:, 0, 0], true[:, 1, 0], true[:, 1, 1] = times, times, 1.0
+    believed = true - (0.0, 0.0, 0.0)
+    believed[4:, 1, 0] -= 0.5
+    trajectories = merges.Trajectories(("a", "b"), times, true, believed)
+    late = MergeEvent(9.0, "a", "b", (0.5, 0.0, 0.0), (0.0, 0.0, 0.0), (7.5, 1.0))
+    early = MergeEvent(9.0, "a", "b", (0.5, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0))
+    assert merges.drifted_truth(late, trajectories) == pytest.approx((0.5, 0.0, 0.0))
+    assert merges.drifted_truth(early, trajectories) == pytest.approx((0.0, 0.0, 0.0))
+    before = MergeEvent(3.0, "a", "b", (0.5, 0.0, 0.0), (0.0, 0.0, 0.0), (7.5, 1.0))
+    assert merges.drifted_truth(before, trajectories) == pytest.approx((0.0, 0.0, 0.0))
+    told = merges.merge_figures([late, early], 0.05, trajectories)
+    assert (told["wrong"], told["off"], told["false"]) == (1, 2, 2)
+    assert (told["worst_here_m"], told["worst_m"]) == pytest.approx((0.5, 0.5))
+    assert merges.merge_figures([late], 0.05, trajectories)["worst_here_m"] == 0.0
+    assert merges.merge_figures([late], 0.05)["wrong"] == 1
+    assert merges.merge_figures([], 0.05, trajectories)["worst_here_m"] is None
 
 
 def test_precision_is_of_the_accepted_and_recall_of_what_could_be_merged():

@@ -8,6 +8,7 @@ from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.pair import described, is_contradicted, verify_pair
 from lidarium.mapping.merging.settings import merge_settings
+from lidarium.mapping.merging.validation import ValidationSettings
 from lidarium.mapping.rigid import Transform
 
 FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
@@ -101,6 +102,22 @@ def test_a_pair_that_wants_confirmation_joins_when_grown_maps_are_found_to_lie_t
     assert (merger.searched, merger.verified) == (0, 1)
     contradicted = merger.update({**maps, "b": GrowingMap(room(blank(320, 320), 20, 20, 90, 130))})
     assert contradicted.groups() == [["a"], ["b"]]
+
+
+def test_a_pair_waits_for_as_long_as_the_maps_do_not_convince():
+    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0, confirmation=ValidationSettings(least_evidence_m=40.0))
+    maps = {"a": GrowingMap(part(slice(0, 120), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    merger.update(maps)
+    waiting = merger.update({**maps, "a": GrowingMap(part(slice(0, 150), FIRST))})
+    assert waiting.pairs["a", "b"].is_accepted
+    assert waiting.pairs["a", "b"].agreement.evidence_m < 40.0
+    assert (merger.searched, merger.verified) == (0, 1)
+    assert waiting.groups() == [["a"], ["b"]]
+    convinced = merger.update({**maps, "a": GrowingMap(part(slice(0, 220), FIRST))})
+    assert convinced.pairs["a", "b"].agreement.evidence_m >= 40.0
+    assert merger.searched == 1
+    assert convinced.groups() == [["a", "b"]]
+    assert is_true(convinced.tree.lookup("a", "b"))
 
 
 def test_a_pair_that_is_found_elsewhere_the_second_time_is_not_confirmed():

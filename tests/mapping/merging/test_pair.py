@@ -183,6 +183,15 @@ def test_what_speaks_against_a_transform_weighs_more_than_what_speaks_for_it():
     assert "contradiction" in str(why_refused(replace(weak, contradicting_m=0.2), settings))
 
 
+def test_corridors_and_halls_can_be_asked_for_more():
+    settings = ValidationSettings(least_across_share=0.15, least_evidence_per_m2=0.3)
+    room_like = Agreement(overlap_m2=20.0, agreeing_m=15.0, wall_m=15.5, across_m=6.0, score=1.0)
+    assert why_refused(room_like, settings) is None
+    assert "in one direction" in str(why_refused(replace(room_like, across_m=1.0), settings))
+    assert "want 15" in str(why_refused(replace(room_like, overlap_m2=50.0), settings))
+    assert why_refused(replace(room_like, across_m=1.0, overlap_m2=50.0), ValidationSettings()) is None
+
+
 def test_what_drift_explains_is_excused_where_both_maps_know_a_building():
     furnished = Agreement(overlap_m2=150.0, agreeing_m=260.0, wall_m=265.0, across_m=120.0, contradicting_m=1.4, score=0.998)
     assert "contradiction" in str(why_refused(furnished, ValidationSettings()))
