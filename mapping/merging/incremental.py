@@ -89,7 +89,7 @@ class IncrementalMerger:
         What the maps must say of a pair beside that when it joins them; what its settings ask of every pair where None.
     searches_per_update : int or None
         Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn was longest ago; pairs that
-        others join are not searched for then. All where None. Verifying costs little: whatever has news is verified.
+        others join are only verified then. All where None. Verifying costs little: whatever has news is verified.
 
     Attributes
     ----------
@@ -187,13 +187,14 @@ class IncrementalMerger:
             return False
         if before is not None and before.frames is not None:
             return True
-        if self.searches_per_update is not None and self._are_joined(pair):
-            return False
+        if self._implied(pair) is not None:
+            return True
         return before is None or self._known_of(pair) >= before.known_m2 + self.search_growth_m2
 
-    def _are_joined(self, pair: tuple[str, str]) -> bool:
+    def _implied(self, pair: tuple[str, str]) -> Transform | None:
+        """Return how the robots' frames lie by what joins them, None where nothing does."""
         tree = self._tree
-        return tree is not None and set(pair) <= set(tree.names) and tree.lookup(*pair) is not None
+        return tree.lookup(*pair) if tree is not None and set(pair) <= set(tree.names) else None
 
     def _known_of(self, pair: tuple[str, str]) -> float:
         return sum(self._known_m2[name] for name in pair)
@@ -230,6 +231,16 @@ class IncrementalMerger:
                 return _Tried(result, refined, before.known_m2, before.is_confirmed, before.at if is_due else self._updates, first)
             if not result.is_accepted and not may_search:
                 return _Tried(result, None, -math.inf, False, before.at, first)
+        elif (implied := self._implied(pair)) is not None:
+            # Others join these maps: where they agree so, they join each other as well, more exactly than a chain of transforms.
+            result = verify_pair(a, b, first.inverse() @ implied @ second, self.settings)
+            if result.is_accepted and result.a_from_b is not None and self._convinces(result):
+                self.verified += 1
+                return _Tried(result, first @ result.a_from_b @ second.inverse(), known_m2, True, self._updates, first)
+            if self.searches_per_update is not None:
+                return None
+            if before is not None and known_m2 < before.known_m2 + self.search_growth_m2:
+                return None
         if not may_search:
             return None
         self.searched += 1

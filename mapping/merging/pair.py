@@ -139,10 +139,19 @@ def verify_pair(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings:
 
 
 def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings) -> bool:
-    """Return whether maps contradict each other where a transform that other maps imply lays them, having settled on their walls."""
-    settled = refine_on_walls(a, b, a_from_b, settings.cycle_distance_m, settings.alignment.wall_samples)
-    agreement = compare(a, b, settled, settings.validation)
-    return agreement.overlap_m2 >= settings.validation.least_overlap_m2 and has_contradiction(agreement, settings.validation)
+    """Return whether maps contradict each other where a transform that other maps imply lays them, and also once they have settled.
+
+    What was implied is a little off after some maps; but where walls hold the maps in one direction alone they may settle far away.
+    """
+    validation = settings.validation
+
+    def contradicts(transform: Transform) -> bool:
+        agreement = compare(a, b, transform, validation)
+        return agreement.overlap_m2 >= validation.least_overlap_m2 and has_contradiction(agreement, validation)
+
+    return contradicts(a_from_b) and contradicts(
+        refine_on_walls(a, b, a_from_b, settings.cycle_distance_m, settings.alignment.wall_samples)
+    )
 
 
 def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> PairResult:

@@ -136,7 +136,8 @@ def test_figures_tell_right_merges_from_wrong_ones():
     ]
     figures = merge_figures(events, 0.05)
     assert figures == {
-        "accepted": 3, "correct": 2, "false": 1, "wrong": 0, "worst_m": 0.2, "worst_rad": 0.0, "first_correct_s": 2.0
+        "accepted": 3, "correct": 2, "false": 1, "off": 0, "worst_m": 0.2, "worst_rad": 0.0, "wrong": 0, "worst_here_m": 0.2,
+        "worst_here_rad": 0.0, "first_correct_s": 2.0,
     }  # fmt: skip
     assert merge_figures([], 0.05)["worst_m"] is None
     far = MergeEvent(1.0, "a", "c", (1.31, 2.0, 0.5), pose, (0.0, 0.0))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
 
+from lidarium.mapping.merging import pair
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.pair import described, is_contradicted, verify_pair
@@ -175,7 +176,7 @@ def test_edges_can_be_replaced_while_the_world_stays():
     assert all(root not in group for group in tree.groups())
 
 
-def test_few_pairs_are_searched_for_in_turn_and_those_that_others_join_are_not():
+def test_few_pairs_are_searched_for_in_turn_and_those_that_others_join_are_verified_alone():
     merger = IncrementalMerger(RESOLUTION, searches_per_update=1)
     maps = {
         "a": GrowingMap(part(slice(0, 150), FIRST)),
@@ -188,7 +189,9 @@ def test_few_pairs_are_searched_for_in_turn_and_those_that_others_join_are_not()
         assert merger.searched <= 1
     assert groups[0] == [["a", "b"], ["c"]]
     assert groups[1] == groups[3] == [["a", "b", "c"]]
-    assert len(merger.update(maps).pairs) == 2
+    last = merger.update(maps)
+    assert len(last.pairs) == 3
+    assert sum(result.found_by == "verification" for result in last.pairs.values()) == 1
 
 
 def test_a_pair_that_is_left_alone_stays_in_place_while_a_map_grows_beyond_its_corner():
@@ -201,3 +204,17 @@ def test_a_pair_that_is_left_alone_stays_in_place_while_a_map_grows_beyond_its_c
     distance, angle = after.tree.lookup("a", "b").difference(before, (8.0, 8.0))
     assert distance < 1e-9
     assert angle < 1e-9
+
+
+def test_maps_that_agree_as_others_imply_are_not_contradicted_wherever_they_would_slide(monkeypatch):
+    """Two parts of a corridor: walls hold it in one direction, so that it may settle where it was not."""
+    levels = room(blank(60, 320), 20, 10, 20, 300)
+    settings = merge_settings()
+    first = described(kept(levels, slice(0, 60), slice(0, 230)), RESOLUTION, settings)
+    second = described(kept(levels, slice(0, 60), slice(90, 320)), RESOLUTION, settings)
+    across = Transform(0.0, 0.4, 0.0)
+    assert is_contradicted(first, second, across, settings)
+    assert not is_contradicted(first, second, Transform(0.0, 0.1, 0.0), settings)
+    monkeypatch.setattr(pair, "refine_on_walls", lambda *_: across)
+    assert not is_contradicted(first, second, Transform(), settings)
+    assert is_contradicted(first, second, across, settings)
