@@ -24,6 +24,8 @@ class SupervisorSettings:
         Maps are compared in cells of this side, or of theirs where that is more [m].
     confirmation_growth_m2 : float
         Two maps are joined only when they were found twice, the second time when they know so much more [m2].
+    confirmation_own_m2 : float
+        When two maps of little overlap are joined, each knows so much more than that [m2].
     same_goal_m : float
         Goals that lie nearer to each other than this are one [m].
     least_frontier_m : float
@@ -65,6 +67,7 @@ class SupervisorSettings:
     searches_per_merge: int = 1
     merge_resolution_m: float = 0.05
     confirmation_growth_m2: float = 2.0
+    confirmation_own_m2: float = 6.0
     same_goal_m: float = 1.0
     least_frontier_m: float = 0.5
     least_left_m: float = 0.5

@@ -76,6 +76,7 @@ class MergeStation:
             merge,
             confirmation_growth_m2=settings.confirmation_growth_m2,
             confirmation=confirmation,
+            confirmation_own_m2=settings.confirmation_own_m2,
             searches_per_update=settings.searches_per_merge,
         )
         self._merge = merge

@@ -39,6 +39,9 @@ class GrowingMap(NamedTuple):
     origin: tuple[float, float] = (0.0, 0.0)
 
 
+PLENTY_M2 = 30.0
+"""From this overlap on, maps need know nothing else [m2]."""
+
 CONFIRMED_M, CONFIRMED_ANGLE = 0.1, math.radians(1.0)
 """By how much two findings of one transform may differ [m, rad]."""
 
@@ -87,6 +90,9 @@ class IncrementalMerger:
         A pair that was found joins its maps only when it is found once more, once they know so much more [m2]; at once where None.
     confirmation : ValidationSettings or None
         What the maps must say of a pair beside that when it joins them; what its settings ask of every pair where None.
+    confirmation_own_m2 : float
+        When two maps are joined, each knows so much that the other one does not [m2], or both know `PLENTY_M2`: of what a map knows
+        beyond the overlap nothing has contradicted, though in rooms that merely look alike something would have.
     searches_per_update : int or None
         Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn was longest ago; pairs that
         others join are only verified then. All where None. Verifying costs little: whatever has news is verified.
@@ -102,6 +108,7 @@ class IncrementalMerger:
     search_growth_m2: float = 2.0
     confirmation_growth_m2: float | None = None
     confirmation: ValidationSettings | None = None
+    confirmation_own_m2: float = 0.0
     searches_per_update: int | None = None
     searched: int = 0
     verified: int = 0
@@ -223,7 +230,7 @@ class IncrementalMerger:
         if before is not None and before.frames is not None:
             result = verify_pair(a, b, first.inverse() @ before.frames @ second, self.settings)
             has_grown = known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
-            is_due = not before.is_confirmed and has_grown and self._convinces(result)
+            is_due = not before.is_confirmed and has_grown and self._convinces(pair, result)
             if result.is_accepted and result.a_from_b is not None and not (is_due and may_search):
                 self.verified += 1
                 refined = first @ result.a_from_b @ second.inverse()
@@ -234,7 +241,7 @@ class IncrementalMerger:
         elif (implied := self._implied(pair)) is not None:
             # Others join these maps: where they agree so, they join each other as well, more exactly than a chain of transforms.
             result = verify_pair(a, b, first.inverse() @ implied @ second, self.settings)
-            if result.is_accepted and result.a_from_b is not None and self._convinces(result):
+            if result.is_accepted and result.a_from_b is not None and self._convinces(pair, result):
                 self.verified += 1
                 return _Tried(result, first @ result.a_from_b @ second.inverse(), known_m2, True, self._updates, first)
             if self.searches_per_update is not None:
@@ -252,15 +259,18 @@ class IncrementalMerger:
     def _confirms(self, pair: tuple[str, str], before: _Tried | None, frames: Transform | None, result: PairResult) -> bool:
         """Whether what was searched for and found is believed from now on."""
         if self.confirmation_growth_m2 is None:
-            return self._convinces(result)
-        if before is None or before.frames is None or frames is None or before.is_confirmed or not self._convinces(result):
+            return self._convinces(pair, result)
+        if before is None or before.frames is None or frames is None or before.is_confirmed or not self._convinces(pair, result):
             return False
         at = placed(self._maps[pair[1]].origin).apply(result.agreement.centre)
         distance, angle = frames.difference(before.frames, at)
         return distance <= CONFIRMED_M and angle <= CONFIRMED_ANGLE
 
-    def _convinces(self, result: PairResult) -> bool:
+    def _convinces(self, pair: tuple[str, str], result: PairResult) -> bool:
         """Whether a pair may be confirmed."""
+        own_m2 = min(self._known_m2[name] for name in pair) - result.agreement.overlap_m2
+        if own_m2 < self.confirmation_own_m2 and result.agreement.overlap_m2 < PLENTY_M2:
+            return False
         return self.confirmation is None or why_refused(result.agreement, self.confirmation) is None
 
 

@@ -121,6 +121,20 @@ def test_a_pair_waits_for_as_long_as_the_maps_do_not_convince():
     assert is_true(convinced.tree.lookup("a", "b"))
 
 
+def test_a_map_that_knows_nothing_of_its_own_joins_none_yet():
+    """The first map knows 24 m2, of which the other one knows all: nothing beyond could have contradicted."""
+    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=0.0, confirmation_own_m2=6.0)
+    maps = {"a": GrowingMap(part(slice(0, 80), FIRST)), "b": GrowingMap(part(slice(0, 120), SECOND, 1))}
+    merger.update(maps)
+    again = merger.update({**maps, "b": GrowingMap(part(slice(0, 121), SECOND, 1))})
+    assert again.pairs["a", "b"].is_accepted
+    assert again.groups() == [["a"], ["b"]]
+    maps = {"a": GrowingMap(part(slice(0, 160), FIRST)), "b": GrowingMap(part(slice(60, 210), SECOND, 1))}
+    other = IncrementalMerger(RESOLUTION, confirmation_growth_m2=0.0, confirmation_own_m2=6.0)
+    other.update(maps)
+    assert other.update({**maps, "b": GrowingMap(part(slice(60, 220), SECOND, 1))}).groups() == [["a", "b"]]
+
+
 def test_a_pair_that_is_found_elsewhere_the_second_time_is_not_confirmed():
     merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0)
     merger.update({"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))})
