@@ -129,7 +129,7 @@ def test_a_map_that_knows_nothing_of_its_own_joins_none_yet():
     again = merger.update({**maps, "b": GrowingMap(part(slice(0, 121), SECOND, 1))})
     assert again.pairs["a", "b"].is_accepted
     assert again.groups() == [["a"], ["b"]]
-    maps = {"a": GrowingMap(part(slice(0, 160), FIRST)), "b": GrowingMap(part(slice(60, 210), SECOND, 1))}
+    maps = {"a": GrowingMap(part(slice(0, 160), FIRST)), "b": GrowingMap(part(slice(60, 180), SECOND, 1))}
     other = IncrementalMerger(RESOLUTION, confirmation_growth_m2=0.0, confirmation_own_m2=6.0)
     other.update(maps)
     assert other.update({**maps, "b": GrowingMap(part(slice(60, 220), SECOND, 1))}).groups() == [["a", "b"]]
