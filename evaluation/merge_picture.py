@@ -54,7 +54,7 @@ def _draw_group(axes: Axes, merged: Merged, group: list[str], fused: FusedMap, c
     x, y = fused.origin
     extent = (x, x + columns * fused.resolution, y, y + rows * fused.resolution)
     axes.imshow(_coloured(fused, [colours[name] for name in group]), origin="lower", extent=extent, interpolation="nearest")
-    lines = 0
+    lines, walls_m = 0, 0.0
     for (a, b), result in merged.pairs.items():
         if result.is_accepted and a in group and b in group:
             first, second = merged.tree.lookup(group[0], a), merged.tree.lookup(group[0], b)
@@ -62,9 +62,11 @@ def _draw_group(axes: Axes, merged: Merged, group: list[str], fused: FusedMap, c
             ends = np.stack([first.apply(result.joined[0]), second.apply(result.joined[1])], axis=1)
             axes.plot(*ends.transpose(2, 1, 0), color="#e11d48", linewidth=1.2, marker="o", markersize=3.5, markerfacecolor="none")
             lines += len(ends)
+            walls_m += result.agreement.agreeing_m
     handles = [Patch(color="#{:02x}{:02x}{:02x}".format(*colours[name]), label=name) for name in group]
     axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=min(len(group), 4), frameon=False, fontsize=8)
-    axes.set_title(f"{' + '.join(group)}: {lines} matched corners" if len(group) <= 4 else f"{len(group)} maps", fontsize=9, color=INK)
+    found = f"{walls_m:.0f} m of walls agree, {lines} matched corners" if len(group) > 1 else "joins none"
+    axes.set_title(f"{' + '.join(group) if len(group) <= 4 else f'{len(group)} maps'}: {found}", fontsize=9, color=INK)
     axes.set_xlabel(f"x in the frame of {group[0]} [m]", fontsize=8)
     axes.tick_params(labelsize=8)
 

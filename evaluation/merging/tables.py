@@ -70,12 +70,18 @@ def reading(tried: dict[str, figures.Tried]) -> str:
     missed = [one for _, one in little if not (one.is_accepted and one.is_exact)]
     poor = sum(one.agreeing_m < POOR_M for one in missed)
     negatives = figures.accepted(default, figures.NEGATIVE)
+    plenty = [one for pair, one in default if figures.is_plenty(pair) and not (one.is_accepted and one.is_exact)]
+    refused = sum(one.is_exact for one in plenty)
+    inexact = sum(one.is_accepted for one in plenty)
     return (
         f"- Without the fallback a pair of 512 x 512 cells takes {without.median:.0f} ms (median, both maps described). The fallback ran "
         f"on {100 * (1 - without.count / max(every.count, 1)):.0f} % of these pairs, most of which are negatives: who is refused has been "
         f"searched for everywhere. Of all pairs 95 % are done in {every.p95:.0f} ms; of those that are joined, half in "
         f"{joined.median:.0f} ms.\n"
         f"- {negatives.hits} of {negatives.total} negatives are accepted, so the rate is below {100 * negatives.high:.2f} % (95 %).\n"
+        f"- Of the {len(plenty)} pairs with 30 % and more that are missed, {refused} were found in the right place and refused, because too "
+        f"little wall speaks for it or more for a place that looks like it, and {inexact} were joined, but less exactly than is counted as "
+        "right.\n"
         f"- Of the {len(missed)} pairs with 15 to 30 % of overlap that are missed, {poor} have less than {POOR_M:g} m of wall in "
         "common under the best transform: what both know is open floor, on which any two rooms agree. Whoever accepts on less accepts "
         "strangers too.\n"
