@@ -48,8 +48,9 @@ def test_a_result_has_the_keys_of_the_design_and_is_json():
     for key, kind in KEYS.items():
         assert isinstance(result[key], kind), key
     assert result["ended_because"] == {"robot_0": "horizon", "robot_1": "horizon"}
-    none = {"accepted": 0, "correct": 0, "false": 0, "wrong": 0, "worst_m": None, "worst_rad": None, "first_correct_s": None}
-    assert result["merges"] == none
+    counts = dict.fromkeys(("accepted", "correct", "false", "off", "wrong"), 0)
+    nothing = dict.fromkeys(("worst_m", "worst_rad", "worst_here_m", "worst_here_rad", "first_correct_s"))
+    assert result["merges"] == {**counts, **nothing}
     assert result["ate_m"] == [0.0, 0.0]
     assert result["realism"] == "ideal"
     assert result["time_s"] == 30.0
