@@ -6,6 +6,7 @@ from typing import Any
 
 from lidarium.evaluation.merging import figures, thesis
 from lidarium.evaluation.merging.bank import Pair
+from lidarium.evaluation.merging.features import BURST, REPEATS
 from lidarium.evaluation.merging.peers import FEATURES
 
 POOR_M = 3.5
@@ -143,7 +144,7 @@ def detectors(rows: list[dict[str, Any]]) -> str:
         ratio = row["time_us"]["goodFeaturesToTrack"] / row["time_us"]["ours"]
         lines.append(f"| {row['image']} {row['shape'][1]} x {row['shape'][0]} | {' | '.join(cells)} | {ratio:.1f} x |")
     return (
-        "Least time of 20 turns of three runs each [us], one thread, and points found.\n\n" + "\n".join(lines) + "\n\n"
+        f"Least time of {REPEATS} turns of {BURST} runs each [us], one thread, and points found.\n\n" + "\n".join(lines) + "\n\n"
         "The thesis, C++ on 2.2 GHz, on maps of 146 x 144, 113 x 113 and 398 x 402 cells [us]: "
         f"{_printed(thesis.DETECTORS_US)}; 2.8 to 3.9 times faster than Shi-Tomasi. Its rows of Harris and Shi-Tomasi are the same in six "
         "of eight columns; one was copied."
@@ -158,7 +159,7 @@ def descriptors(rows: list[dict[str, Any]]) -> str:
         cells = [f"{row['time_us'][one]:.0f} ({row['points'][one]})" for one in names]
         lines.append(f"| {row['image']} | {' | '.join(cells)} |")
     return (
-        "Least time of 20 turns of three runs each [us] and number of descriptors; each for the points of its own detector.\n\n"
+        f"Least time of {REPEATS} turns of {BURST} runs each [us] and number of descriptors; each for the points of its own detector.\n\n"
         + "\n".join(lines)
         + "\n\n"
         f"The thesis on its three maps [us]: {_printed(thesis.DESCRIPTORS_US)}."

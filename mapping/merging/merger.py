@@ -97,13 +97,14 @@ def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSetti
 def _all_pairs(features: Mapping[str, DescribedMap], settings: MergeSettings) -> dict[tuple[str, str], PairResult]:
     """Return what comes of each two maps, in their order."""
     every = list(itertools.combinations(features, 2))
+    # What corners join spares the search of all rotations and translations, where there is one.
     by_corners = replace(settings, correlation=replace(settings.correlation, rotations=0))
+    passes = (by_corners, settings) if len(every) > 1 and settings != by_corners else (settings,)
     tree: FrameTree[str] = FrameTree(settings.cycle_distance_m, settings.cycle_angle)
     for name in features:
         tree.add_map(name)
     found: dict[tuple[str, str], PairResult] = {}
-    # What corners join spares the search of all rotations and translations.
-    for how in (by_corners, settings) if len(every) > 1 else (settings,):
+    for how in passes:
         for a, b in sorted(every, key=lambda pair: -min(len(features[name].walls) for name in pair)):
             if (a, b) in found and found[a, b].is_accepted:
                 continue

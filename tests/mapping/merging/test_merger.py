@@ -10,7 +10,9 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings import make_settings
 from lidarium.evaluation.runner import run_episode
 from lidarium.mapping.map_files import FREE, UNKNOWN
+from lidarium.mapping.merging import merger
 from lidarium.mapping.merging.merger import merge_maps
+from lidarium.mapping.merging.pair import merge_pair
 from lidarium.mapping.merging.settings import merge_settings
 from lidarium.mapping.occupancy import three_levels
 from lidarium.mapping.rigid import Transform
@@ -58,10 +60,19 @@ def test_maps_that_others_join_are_verified_instead_of_searched_for():
         assert angle < math.radians(1.0)
 
 
-def test_the_thesis_mode_searches_for_every_pair():
+def test_the_thesis_mode_searches_for_every_pair_once(monkeypatch):
     poses = [about_middle(theta, apartment()) for theta in (0.0, 0.9, 2.2)]
     maps = {str(k): (moved(apartment(), pose), RESOLUTION) for k, pose in enumerate(poses)}
-    assert "verification" not in {result.found_by for result in merge_maps(maps, merge_settings("thesis", RESOLUTION)).pairs.values()}
+    searched = []
+
+    def noted(*pair_and_settings):
+        searched.append(pair_and_settings[:2])
+        return merge_pair(*pair_and_settings)
+
+    monkeypatch.setattr(merger, "merge_pair", noted)
+    found = merge_maps({**maps, "elsewhere": (room(blank(), 20, 20, 90, 130), RESOLUTION)}, merge_settings("thesis", RESOLUTION))
+    assert "verification" not in {result.found_by for result in found.pairs.values()}
+    assert len(searched) == len(found.pairs) == 6
 
 
 def test_maps_of_different_resolutions_are_brought_to_the_coarsest():
