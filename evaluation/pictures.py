@@ -5,6 +5,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -34,6 +35,8 @@ from lidarium.evaluation.supervision import draw_supervision
 from lidarium.evaluation.truth import occupied_in_truth
 from lidarium.mapping.frontiers import IGNORED
 from lidarium.mapping.grid_planning import centres_of
+from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
+from lidarium.mapping.specks import without_specks
 
 FRONTIER_COLOUR, GIVEN_UP_COLOUR, UNSEEN_COLOUR, UNCOUNTED_COLOUR = "#e11d48", "#7c3aed", "#ffd9a0", "#dfe3ea"
 GOAL_COLOUR = "#d97706"
@@ -133,23 +136,42 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
     solid = occupied_in_truth(env)
     counted = unpack_bits(env.world.counted_masks[0], solid.shape[1])
     rows, columns = np.flatnonzero(solid.any(axis=1))[-1] + 1, np.flatnonzero(solid.any(axis=0))[-1] + 1
-    solid, counted, log_odds = solid[:rows, :columns], counted[:rows, :columns], log_odds[:rows, :columns]
+    levels = without_specks(three_levels(np.sign(log_odds).astype(np.int8)))
+    solid, counted, levels = solid[:rows, :columns], counted[:rows, :columns], levels[:rows, :columns]
     # In the order of what shows where cells are drawn together.
     classes = np.zeros(solid.shape, np.uint8)
     classes[solid] = 1
     classes[counted] = 2
-    classes[log_odds < 0] = 3
-    classes[log_odds > 0] = 4
+    classes[levels == FREE] = 3
+    classes[levels == OCCUPIED] = 4
     palette = np.stack([rgb(colour) for colour in (UNCOUNTED_COLOUR, SOLID, UNSEEN_COLOUR, "#ffffff", INK)])
     box = box_around(~solid, origin, env.settings.occupancy.resolution)
     show_cells(axes, palette[drawn_together(classes[box.rows, box.columns])], box, SOLID)
 
 
 def _draw_frontiers(axes: Axes, episode: Episode) -> tuple[bool, bool]:
-    left, given_up = frontiers_left(episode)
+    left, given_up = (_beside_unknown(points, episode) for points in frontiers_left(episode))
     axes.scatter(left[:, 0], left[:, 1], s=5, color=FRONTIER_COLOUR, linewidths=0, zorder=3)
     axes.scatter(given_up[:, 0], given_up[:, 1], s=5, color=GIVEN_UP_COLOUR, linewidths=0, zorder=3)
     return bool(len(left)), bool(len(given_up))
+
+
+def _beside_unknown(points: NDArray[np.float64], episode: Episode) -> NDArray[np.float64]:
+    """Return the points that on the team's map, as it is drawn, lie within a cell of both what is free and what is unknown.
+
+    What one robot has left on its own map another may have seen.
+    """
+    env = episode.env
+    log_odds, origin = team_log_odds(env)
+    levels = without_specks(three_levels(np.sign(log_odds).astype(np.int8)))
+    near_both = np.ones(levels.shape, bool)
+    for level in (FREE, UNKNOWN):
+        near_both &= cv2.dilate((levels == level).astype(np.uint8), np.ones((3, 3), np.uint8)) != 0
+    columns, rows = np.floor((points - origin) / env.settings.occupancy.resolution).astype(np.int64).T
+    is_inside = (rows >= 0) & (rows < levels.shape[0]) & (columns >= 0) & (columns < levels.shape[1])
+    is_left = np.zeros(len(points), bool)
+    is_left[is_inside] = near_both[rows[is_inside], columns[is_inside]]
+    return points[is_left]
 
 
 def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool, more: list[Line2D]) -> None:

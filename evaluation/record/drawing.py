@@ -45,6 +45,7 @@ from lidarium.evaluation.picture_parts import (
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.video import FRAMES_PER_SECOND, LAST_FRAME_S, check_speed, film_writer
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.specks import without_specks
 
 _PALETTE = np.zeros((256, 3), np.uint8)
 _PALETTE[[OCCUPIED, UNKNOWN, FREE]] = WALL, UNEXPLORED, EXPLORED
@@ -74,7 +75,7 @@ class TrackFrames:
     def draw(self, time_s: float) -> Frame:
         """Return the frame at a time: the team's map, the ways of the last minute, targets as rings, robots with their headings."""
         display, view = self._display, self.view
-        levels = display.map_at(time_s)[view.rows, view.columns]
+        levels = without_specks(display.map_at(time_s))[view.rows, view.columns]
         frame = enlarged(_PALETTE[_blocks(levels, view)], view)
         recent = (display.times >= time_s - RECENT_S) & (display.times <= time_s + 1e-9)
         poses = display.poses_at(time_s)
@@ -129,7 +130,7 @@ def save_track_film(path: Path, record: EpisodeRecord, speed: float = 10.0, size
 def save_track_picture(path: Path, record: EpisodeRecord) -> None:
     """Draw what a record shows at its end: the team's map, all ways, coverage over time, endings (PNG, whole or not at all)."""
     header, display = record.header, record.display
-    levels = display.map_at(math.inf)
+    levels = without_specks(display.map_at(math.inf))
     box = box_around(levels != UNKNOWN, display.origin, display.resolution)
     figure, floor_axes, curve_axes, team_axes = page(box.aspect)
     # In the order of what shows where cells are drawn together.

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.evaluation.record import read_record
 from lidarium.evaluation.report.episodes import Row
+from lidarium.mapping.specks import without_specks
 
 FOLDER = "records"
 
@@ -105,7 +106,7 @@ def record_key(row: Row) -> Key:
 def read_track(entry: Entry) -> Track:
     """Read ways and the last map of a record."""
     display = read_record(entry.path).display
-    levels = display.map_at(float(display.times[-1]))
+    levels = without_specks(display.map_at(float(display.times[-1])))
     return Track(display.times, display.poses, levels, (display.origin[0], display.origin[1]), display.resolution)
 
 
