@@ -20,7 +20,8 @@ STEP = math.pi / 8.0
 
 RULES = ("table", "literal")
 _WORD = 8
-_PRIORITY = {5: 0, 4: 1, 6: 2, 7: 3}
+# By number of occupied neighbours.
+_PRIORITY = np.array([4, 4, 4, 4, 1, 0, 2, 3, 4])
 _DIRECT, _DIAGONAL = 0b01010101, 0b10101010
 
 
@@ -115,10 +116,14 @@ def detect_corners(levels: NDArray[np.uint8], resolution: float, settings: Corne
     # Cells are looked at in words of eight; a border of unknown cells lets every word have neighbours.
     right = -columns % _WORD + _WORD
     padded = cv2.copyMakeBorder(levels, 1, 1, _WORD, right, cv2.BORDER_CONSTANT, value=UNKNOWN)
-    three = padded if _is_three_level(padded) else cv2.LUT(padded, _levels_of_greys(settings.occupied_below, settings.free_above))
+    three = (
+        padded
+        if _is_three_level(padded.view(np.uint64))
+        else cv2.LUT(padded, _levels_of_greys(settings.occupied_below, settings.free_above))
+    )
     table = orientation_table(settings.rule, settings.neighbours)
     found = np.empty((levels.size // 2 + 1, 3), np.int32)
-    count = _find_corners(np.ascontiguousarray(three), three.view(np.uint64), rows, columns, table, found)
+    count = _find_corners(three.view(np.uint64), rows, columns, table, found)
     cells = found[:count, :2].astype(np.int64)
     codes = found[:count, 2]
     points = np.asarray((cells + 0.5) * resolution, np.float64)
@@ -179,46 +184,71 @@ def _levels_of_greys(occupied_below: int, free_above: int) -> NDArray[np.uint8]:
 
 
 @kernel
-def _is_three_level(levels: Array) -> bool:
-    """Return whether a map has the three levels alone."""
-    others = 0
-    for row in range(levels.shape[0]):
-        for column in range(levels.shape[1]):
-            level = levels[row, column]
-            others += int((level != OCCUPIED) & (level != UNKNOWN) & (level != FREE))
-    return others == 0
+def _is_three_level(words: Array) -> bool:
+    """Return whether the bytes of words are the three levels alone, 0x00, 0x7f and 0xff.
+
+    These are the bytes whose seven low bits are the same, but for 0x80.
+    """
+    same, ones = np.uint64(0x3F3F3F3F3F3F3F3F), np.uint64(0x0101010101010101)
+    others = np.uint64(0)
+    for row in range(words.shape[0]):
+        for column in range(words.shape[1]):
+            word = words[row, column]
+            others |= ((word ^ (word >> np.uint64(1))) & same) | ((word >> np.uint64(7)) & ~word & ones)
+    return bool(others == np.uint64(0))
+
+
+@kernel(inline=True)
+def _gathered(word: np.uint64) -> np.int64:
+    """Return the lowest bits of the eight bytes of a word as one byte, the first cell's lowest."""
+    return np.int64(((word & np.uint64(0x0101010101010101)) * np.uint64(0x0102040810204080)) >> np.uint64(56))
+
+
+@kernel(inline=True)
+def _occupied_around(words: Array, row: int, word: int) -> np.int64:
+    """Return which cells of a word are occupied, the last of the word before it in bit 0 and the first of the word after it in bit 9."""
+    before, after = words[row, word - 1] >> np.uint64(56), words[row, word + 1]
+    here = _gathered(~words[row, word])
+    around: np.int64 = np.int64(~before & np.uint64(1)) | here << 1 | np.int64(~after & np.uint64(1)) << 9
+    return around
 
 
 @kernel
-def _find_corners(levels: Array, words: Array, rows: int, columns: int, table: Array, found: Array) -> int:
+def _find_corners(words: Array, rows: int, columns: int, table: Array, found: Array) -> int:
     """Write column, row and code of each corner to ``found`` and return their number.
 
-    ``levels`` is the map with a border of one row and one word of columns, ``words`` the same memory in words of eight cells. A corner has
-    four occupied neighbours or more, of which at most three lie in the next word: where a word and those above and below have none, no
-    cell of it is a corner.
+    ``words`` is the map in words of eight cells, with a border of one row and one word of columns. Of a cell's byte the lowest bit tells
+    whether it is occupied (0), the highest whether it is free (1). A corner has four occupied neighbours or more, of which at most three
+    lie in the next word: where a word and those above and below have none, no cell of it is a corner.
     """
-    ones, highs = np.uint64(0x0101010101010101), np.uint64(0x8080808080808080)
+    ones = np.uint64(0x0101010101010101)
     count, limit = 0, found.shape[0]
     for row in range(2, rows):
         for word in range(1, words.shape[1] - 1):
-            below, here, above = words[row - 1, word], words[row, word], words[row + 1, word]
-            # The high bit of a byte is set where that byte is zero (or lies above one that is).
-            zeros = ((below - ones) & ~below) | ((here - ones) & ~here) | ((above - ones) & ~above)
-            if zeros & highs == np.uint64(0):
+            if ~(words[row - 1, word] & words[row, word] & words[row + 1, word]) & ones == np.uint64(0):
                 continue
+            is_free = _gathered(words[row, word] >> np.uint64(7))
+            if is_free == 0:
+                continue
+            below, here, above = (
+                _occupied_around(words, row - 1, word),
+                _occupied_around(words, row, word),
+                _occupied_around(words, row + 1, word),
+            )
             for place in range(_WORD):
                 column = word * _WORD + place
-                if levels[row, column] != FREE or column == _WORD or column >= columns + _WORD - 1:
+                if not is_free >> place & 1 or column == _WORD or column >= columns + _WORD - 1:
                     continue
+                under, beside, over = below >> place & 7, here >> place & 7, above >> place & 7
                 code = (
-                    np.int64(levels[row, column + 1] == OCCUPIED)
-                    | np.int64(levels[row + 1, column + 1] == OCCUPIED) << 1
-                    | np.int64(levels[row + 1, column] == OCCUPIED) << 2
-                    | np.int64(levels[row + 1, column - 1] == OCCUPIED) << 3
-                    | np.int64(levels[row, column - 1] == OCCUPIED) << 4
-                    | np.int64(levels[row - 1, column - 1] == OCCUPIED) << 5
-                    | np.int64(levels[row - 1, column] == OCCUPIED) << 6
-                    | np.int64(levels[row - 1, column + 1] == OCCUPIED) << 7
+                    beside >> 2
+                    | (over >> 2) << 1
+                    | (over >> 1 & 1) << 2
+                    | (over & 1) << 3
+                    | (beside & 1) << 4
+                    | (under & 1) << 5
+                    | (under >> 1 & 1) << 6
+                    | (under >> 2) << 7
                 )
                 if table[code] != 0 and count < limit:
                     found[count, 0], found[count, 1], found[count, 2] = column - _WORD, row - 1, code
@@ -230,7 +260,7 @@ def _separated(corners: Corners, separation: float) -> Corners:
     """Keep of corners that lie close together the best."""
     if separation <= 0.0 or len(corners) < 2:
         return corners
-    order = np.argsort([_PRIORITY[int(r)] for r in corners.neighbours], kind="stable")
+    order = np.argsort(_PRIORITY[corners.neighbours], kind="stable")
     is_kept = np.zeros(len(corners), np.bool_)
     _keep_apart(corners.points[order], separation**2, order, is_kept)
     return corners.take(np.flatnonzero(is_kept))
@@ -258,7 +288,7 @@ def _limited(corners: Corners, limit: int) -> Corners:
     """Keep at most so many: corners by their rank, and from the last rank that fits in part every so many-th."""
     if limit == 0 or len(corners) <= limit:
         return corners
-    ranks = np.array([_PRIORITY[int(r)] for r in corners.neighbours])
+    ranks = _PRIORITY[corners.neighbours]
     kept = np.zeros(0, np.int64)
     for rank in range(4):
         members = np.flatnonzero(ranks == rank)

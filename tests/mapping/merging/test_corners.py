@@ -141,3 +141,12 @@ def test_tiny_maps_have_no_corners(size):
 def test_bad_settings_are_named(options, message):
     with pytest.raises(ValueError, match=message):
         CornerSettings(**options)
+
+
+@pytest.mark.parametrize("grey", range(256))
+def test_every_grey_counts_as_the_level_it_is_nearest_to_wherever_it_stands(grey):
+    room = np.full((24, 24), FREE, np.uint8)
+    room[[4, -5], 4:-4] = room[4:-4, [4, -5]] = OCCUPIED
+    levels = np.where(room == OCCUPIED, np.uint8(grey), room)
+    expected = 4 if grey < CornerSettings().occupied_below else 0
+    assert len(detect_corners(levels, 0.1, CornerSettings(separation_m=0.0, neighbours=(5,)))) == expected
