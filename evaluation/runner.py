@@ -174,7 +174,7 @@ def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
     truth = true_frames(env)
     poses = [(join, join.found, truth[join.a, join.b]) for join in used]
     return [
-        MergeEvent(join.time_s, join.a, join.b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), join.at)
+        MergeEvent(join.time_s, join.a, join.b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), join.at, join.is_direct)
         for join, found, true in poses
     ]
 

@@ -111,6 +111,8 @@ class Join:
         Where errors are taken, the middle of what both maps know, in b's frame [m].
     is_used : bool
         Whether decisions were built on it; otherwise it waited to be confirmed.
+    is_direct : bool
+        Whether these two maps were laid on each other; otherwise those of others lie between them.
     """
 
     time_s: float
@@ -119,6 +121,7 @@ class Join:
     found: Transform
     at: tuple[float, float]
     is_used: bool
+    is_direct: bool = True
 
 
 def _inputs(inputs: RobotInputs) -> dict[str, Any]:

@@ -29,10 +29,13 @@ class Joined(NamedTuple):
         Maps points of the second robot's map frame into the first's.
     at : (x, y)
         Middle of what both maps know, or where the second robot is if their maps have nothing in common, in its frame [m].
+    is_direct : bool
+        Whether these two maps were laid on each other; otherwise those of others lie between them.
     """
 
     a_from_b: Transform
     at: tuple[float, float]
+    is_direct: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +119,7 @@ class TeamMapping:
             joined = self._merged(maps, places, pairs)
         else:
             joined = {(a, b): Joined(frames[a, b], places[b]) for a, b in pairs}
-        for (a, b), (a_from_b, _) in joined.items():
+        for (a, b), (a_from_b, *_) in joined.items():
             self.news[a, b] = News(maps[b], poses[b], a_from_b, time_s)
             self.news[b, a] = News(maps[a], poses[a], a_from_b.inverse(), time_s)
         self.fused = {agent: self._fused(agent, maps[agent]) for agent in agents}
@@ -127,13 +130,14 @@ class TeamMapping:
     ) -> dict[tuple[str, str], Joined]:
         merged = self._merger.update(maps, frozenset(pairs))
         joined = {}
+        edges = {frozenset((edge.a, edge.b)) for edge in merged.tree.edges}
         for a, b in pairs:
             transform = merged.tree.lookup(a, b)
             if transform is not None:
                 result = merged.pairs.get((a, b))
-                is_direct = result is not None and result.is_accepted
-                centre = placed(maps[b].origin).apply(result.agreement.centre).tolist() if is_direct and result is not None else places[b]
-                joined[a, b] = Joined(transform, (float(centre[0]), float(centre[1])))
+                overlaps = result is not None and result.is_accepted
+                centre = placed(maps[b].origin).apply(result.agreement.centre).tolist() if overlaps and result is not None else places[b]
+                joined[a, b] = Joined(transform, (float(centre[0]), float(centre[1])), frozenset((a, b)) in edges)
         return joined
 
     def _fused(self, agent: str, own: GrowingMap) -> FusedMap:

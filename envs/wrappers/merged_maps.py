@@ -68,6 +68,8 @@ class MergeEvent:
         Of b's map frame in that of a [m, rad].
     at : (x, y)
         Where errors are taken, the middle of what both maps know, in b's frame [m].
+    is_direct : bool
+        Whether these two maps were laid on each other; otherwise those of others lie between them.
     """
 
     time_s: float
@@ -76,6 +78,7 @@ class MergeEvent:
     found: tuple[float, float, float]
     true: tuple[float, float, float]
     at: tuple[float, float]
+    is_direct: bool = True
 
 
 class MergedMaps(ParallelEnv[str, Observation, Any]):
@@ -202,11 +205,11 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         time_s = self._base.scorer.time
         truth = true_frames(self._base)
         joined = self.team.exchange(self._clusters(time_s), time_s, truth if self.merging.known_starts else None)
-        for (a, b), (found, at) in joined.items():
+        for (a, b), (found, at, is_direct) in joined.items():
             if (a, b) in self._joined:
                 continue
             true = truth[a, b]
-            event = MergeEvent(time_s, a, b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), at)
+            event = MergeEvent(time_s, a, b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), at, is_direct)
             self.events.append(event)
             for agent, other in ((a, b), (b, a)):
                 if agent in infos:

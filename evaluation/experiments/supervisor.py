@@ -240,8 +240,9 @@ def _notes() -> str:
     return (
         "A merge is wrong where the transform that was found is off by more than 0.3 m or 3 degrees at the centroid of what both maps "
         "know, from how the maps truly lie to each other there: a robot's map lies as its pose did when it was nearest to there. Maps "
-        "that SLAM draws drift, and no merger can know by how much, so what the starts say is counted beside it, within the same bounds "
-        "and within those of `result.json`, 2 cells and 0.01 rad. "
+        "that SLAM draws drift, and no merger can know by how much. Where a third robot's map lies between two, its drift and the lever "
+        "of small angles come to what is between them, and the merges that join them are judged themselves. So what the starts say of all "
+        "joined robots is counted beside it, within the same bounds and within those of `result.json`, 2 cells and 0.01 rad. "
         "A tick is a look at the tree every 10 s, with its merge and what robots are told, on one core of a machine that others share."
     )
 

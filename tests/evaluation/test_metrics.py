@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -286,6 +288,17 @@ def test_a_merge_is_judged_by_how_the_drifted_maps_lie_where_they_meet():
     assert merges.merge_figures([late], 0.05, trajectories)["worst_here_m"] == 0.0
     assert merges.merge_figures([late], 0.05)["wrong"] == 1
     assert merges.merge_figures([], 0.05, trajectories)["worst_here_m"] is None
+
+
+def test_robots_that_others_join_are_judged_by_the_merges_that_join_them():
+    """Robot c lies right on b, and b on a; what b's map has drifted in between puts c off a, and is nobody's wrong merge."""
+    nowhere = (0.0, 0.0, 0.0)
+    over = MergeEvent(9.0, "a", "c", (0.5, 0.0, 0.0), nowhere, (0.0, 0.0), is_direct=False)
+    told = merges.merge_figures([MergeEvent(5.0, "a", "b", nowhere, nowhere, (0.0, 0.0)), over], 0.05)
+    assert (told["accepted"], told["wrong"], told["worst_here_m"], told["off"], told["false"]) == (2, 0, 0.0, 1, 1)
+    assert merges.merge_figures([over], 0.05)["worst_here_m"] is None
+    laid = dataclasses.replace(over, is_direct=True)
+    assert merges.merge_figures([laid], 0.05)["wrong"] == 1
 
 
 def test_precision_is_of_the_accepted_and_recall_of_what_could_be_merged():
