@@ -67,9 +67,15 @@ class CandidateSource:
         Radius of the robot with its margin [m].
     generator : numpy.random.Generator
         Where all draws come from.
+
+    Attributes
+    ----------
+    latest : (2,) float64 or None
+        What the robot went for last [m].
     """
 
     def __init__(self, settings: SrtSettings, body: float, generator: np.random.Generator) -> None:
+        self.latest: NDArray[np.float64] | None = None
         self._settings, self._least, self._generator = settings, least_opening(body), generator
         self._tried: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
         self._attempts = Counter[tuple[int, int]]()

@@ -1,6 +1,5 @@
 """Which way a robot takes: to the goal where it is in sight of a node, through the cheapest opening, or home."""
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,17 +9,12 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
 from lidarium.agents.srt.drive import Limits
+from lidarium.agents.srt.frontier_tour import MATE_SAME, first_on_tour
 from lidarium.agents.srt.memory import Memory
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node, Tree, way_to
 from lidarium.mapping.rigid import wrapped
-
-MATE_SPREAD = 5.0
-"""Openings nearer than this to what a teammate goes for cost so much more as they are nearer [m]."""
-
-MATE_SAME = 1.0
-"""What lies this near to what a teammate goes for is the teammate's [m]."""
 
 LAST_FRONTIER = 0.3
 """Frontiers of the map of at least this length are gone to when nothing else is left [m]."""
@@ -75,6 +69,10 @@ def choose(
         if in_sight:
             nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, goal))
             return [*_legs(tree, way_to(nearest.number, before)), Choice(goal, None, is_goal=True)]
+    if goal is None and settings.candidates == "goal":
+        way = tour_way(node, source, memory, settings, senses, targets, limits)
+        if way:
+            return way
     others = [tree.nodes[number] for number in sorted(known)]
 
     def cost_of(candidate: Candidate) -> float:
@@ -92,20 +90,36 @@ def choose(
             if found:
                 best = found[int(generator.integers(len(found)))]
                 break
-    if settings.candidates == "goal":
-        cost = math.inf if best is None else cost_of(best)
+    if best is None:
         # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
-        is_asked = best is None or senses.goal is None
-        at_frontier = _to_frontier(node, memory, settings.least_frontier, settings, senses, targets, limits, cost) if is_asked else []
-        if best is None and not at_frontier:
-            at_frontier = _across(others, source, memory, senses, targets)
-        if best is None and not at_frontier:
-            at_frontier = _to_frontier(node, memory, LAST_FRONTIER, settings, senses, targets, limits, cost)
-        if at_frontier or best is None:
-            return at_frontier
-    elif best is None:
-        return []
+        return (
+            []
+            if settings.candidates != "goal"
+            else (
+                _to_frontier(node, memory, settings.least_frontier, senses, targets)
+                or _across(others, source, memory, senses, targets)
+                or _to_frontier(node, memory, LAST_FRONTIER, senses, targets)
+            )
+        )
     return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
+
+
+def tour_way(
+    node: Node,
+    source: CandidateSource,
+    memory: Memory,
+    settings: SrtSettings,
+    senses: Senses,
+    targets: Sequence[Candidate],
+    limits: Limits,
+) -> list[Choice]:
+    """Return the way to the first frontier of the shortest tour past those of the map, none where there is none."""
+    of_mates = [target.focus for target in targets]
+    for least in (settings.least_frontier, LAST_FRONTIER):
+        begun = first_on_tour(memory, senses, limits, least, source.latest, of_mates)
+        if begun is not None:
+            return _to_focus(node, *begun)
+    return []
 
 
 def _across(nodes: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
@@ -153,24 +167,17 @@ def _weighed(
     return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(last, senses.goal))
 
 
-def _to_frontier(
-    node: Node,
-    memory: Memory,
-    least: float,
-    settings: SrtSettings,
-    senses: Senses,
-    targets: Sequence[Candidate],
-    limits: Limits,
-    most: float,
-) -> list[Choice]:
-    """Return the way to the map's nearest frontier of at least a length [m], where it costs less than ``most`` and is no teammate's."""
+def _to_frontier(node: Node, memory: Memory, least: float, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
+    """Return the way to the map's nearest frontier of at least a length [m], where it is no teammate's."""
     found = memory.frontier(senses.pose[:2], least)
     if found is None:
         return []
-    legs, focus = found
+    way = _to_focus(node, *found)
+    candidate = way[-1].candidate
+    return way if candidate is not None and _left_by(targets, [candidate]) else []
+
+
+def _to_focus(node: Node, legs: list[NDArray[np.float64]], focus: NDArray[np.float64]) -> list[Choice]:
+    """Return a way across the map to where a frontier is looked at."""
     candidate = Candidate(node.number, legs[-1], None, focus, is_frontier=True)
-    ends = [senses.pose[:2], *legs]
-    way = sum(math.dist(start, end) for start, end in itertools.pairwise(ends))
-    if not _left_by(targets, [candidate]) or _weighed(way, legs[0], legs[-1], settings, senses, limits) >= most:
-        return []
     return [*(Choice(place, None) for place in legs[:-1]), Choice(legs[-1], None, candidate)]

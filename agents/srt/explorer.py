@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
-from lidarium.agents.srt.choice import Choice, choose, home_way
+from lidarium.agents.srt.choice import Choice, choose, home_way, tour_way
 from lidarium.agents.srt.drive import Drive, Phase, driven, free_way, limits_of
 from lidarium.agents.srt.frontier_arcs import Opening, openings_of
 from lidarium.agents.srt.memory import Memory
@@ -42,6 +42,9 @@ REVIEW_S = 0.5
 
 GOT_ON = 0.8
 """A robot on its way along free rays goes on for this long before it asks whether they were seen through [m]."""
+
+GOT_ON_ANEW = 0.5
+"""A robot without a goal plans its tour anew whenever it has got on for this long [m]."""
 
 NEAR_NODE = 0.5
 """A robot that gets no nearer to a node than this takes itself to be there [m]."""
@@ -94,6 +97,7 @@ class Explorer:
         self._own_nodes = 0
         self._route: list[Choice] = []
         self._drive: Drive | None = None
+        self._chose_at = np.zeros(2)
         self._looks: list[float] = []
         self._looked_at: NDArray[np.float64] | None = None
         self._backs_until = self._blind_since = -math.inf
@@ -126,7 +130,7 @@ class Explorer:
             if turn is not None:
                 return turn
         if self._route and senses.time_s - self._reviewed_at >= REVIEW_S:
-            self._review(senses, memory)
+            self._review(senses, memory, targets)
         if not self._route and not (self.is_home and senses.time_s - self._reviewed_at < REVIEW_S):
             self._decide(senses, memory, targets)
         if self._looks:
@@ -190,7 +194,7 @@ class Explorer:
         self._stand(senses)
         return REST if self._looks else None
 
-    def _review(self, senses: Senses, memory: Memory) -> None:
+    def _review(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
         """Drop a target that was seen through on the way, make a node after a while, and turn to the goal once it is in sight."""
         self._reviewed_at = senses.time_s
         candidate, last = self._route[-1].candidate, self._route[-1]
@@ -204,11 +208,16 @@ class Explorer:
         may_drop = departed >= (GOT_ON if is_along_rays else self._settings.least_step)
         has_passed = departed >= self._settings.passing_distance
         is_dropped = may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)
-        # Without a goal what was seen since may make another way the better one; towards a goal it seldom does.
-        if in_sight or is_dropped or (has_passed and senses.goal is None):
+        if in_sight or is_dropped:
             self._pause(senses, memory)
-        elif is_direct and has_passed:
+            return
+        if has_passed and (is_direct or candidate.is_frontier):
             self._add_node(senses, self._node, senses.pose, memory)
+        # Without a goal what was seen since may make another way the better one; towards a goal it seldom does.
+        if senses.goal is None and senses.distance_to(self._chose_at) >= GOT_ON_ANEW:
+            way = tour_way(self._tree.nodes[self._node], self._source, memory, self._settings, senses, targets, self._limits)
+            if way:
+                self._set_out(way, senses)
 
     def _pause(self, senses: Senses, memory: Memory) -> None:
         """Drop the way, with a node where the robot is, so that all ways begin at nodes."""
@@ -254,7 +263,8 @@ class Explorer:
 
     def _set_out(self, way: list[Choice], senses: Senses) -> None:
         self._route, self._drive = way, None
-        self._tree.nodes[self._node].tried += 1
+        self._source.latest = None if self.target is None else self.target.focus
+        self._chose_at = senses.pose[:2]
         self._stand(senses)
 
     def _follow(self, senses: Senses, memory: Memory) -> Command:

@@ -1,7 +1,8 @@
 """What tells which space was seen and where a straight way is clear: the robot's map, or the regions of the tree's nodes alone."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.team_driver import footprint_of
-from lidarium.mapping.frontier_approach import default_reach, nearest_frontier
+from lidarium.mapping.frontier_approach import approach, default_reach, nearest_frontier
 from lidarium.mapping.frontiers import FRONTIER
-from lidarium.mapping.grid_planning import centres_of, plan
+from lidarium.mapping.grid_planning import centres_of, plan, search
 
 CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
@@ -21,8 +22,42 @@ CLEAR_MARGIN = 0.02
 WALL = 0.08
 """What is unknown this near to something occupied may well be its inside [m]."""
 
+AHEAD = 0.5
+"""Which way a way leads is told by the place this far along it [m]."""
+
 Place = NDArray[np.float64]
 Legs = list[Place]
+
+
+@dataclass(frozen=True, slots=True)
+class Frontiers:
+    """Frontiers that a robot can come to.
+
+    Attributes
+    ----------
+    focuses : (n, 2) float64
+        A place on each that is in sight from where the robot would stand [m].
+    cells : list of (m, 2) float64
+        The cells of each [m].
+    sizes : (n,) float64
+        Their lengths [m].
+    costs : (n,) float64
+        What the way to each costs [m], ascending.
+    ahead : (n, 2) float64
+        A place at the beginning of the way to each [m].
+    between : (n, n) float64
+        What the ways from place to place cost [m].
+    legs : callable
+        Takes the number of one, and returns the ends of the straight legs of the way to it.
+    """
+
+    focuses: NDArray[np.float64]
+    cells: list[NDArray[np.float64]]
+    sizes: NDArray[np.float64]
+    costs: NDArray[np.float64]
+    ahead: NDArray[np.float64]
+    between: NDArray[np.float64]
+    legs: Callable[[int], Legs]
 
 
 class Memory(Protocol):
@@ -42,6 +77,10 @@ class Memory(Protocol):
 
     def frontier(self, start: Place, least: float) -> tuple[Legs, Place] | None:
         """Return the way to the nearest frontier of at least that length [m], and what to look at there; None where there is none."""
+        ...
+
+    def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
+        """Return the nearest frontiers of at least a length [m], so many at most; None where there is none."""
         ...
 
     def is_frontier(self, focus: Place) -> bool:
@@ -104,6 +143,40 @@ class MapMemory:
             return None
         places = self._centres(found.path)
         return self._legs(start, places[1:] or places), self._centres(np.array([found.frontier_cell]))[0]
+
+    def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
+        """Return the frontiers that cost least to come to, and the ways between where the robot would stand."""
+        rows, columns, is_inside = self._cells(start[None])
+        at_least = max(math.ceil(least / self._map.resolution - 1e-9), 1)
+        clusters = self._map.frontiers.clusters(minimum_cells=at_least)
+        if not (is_inside.all() and len(clusters)):
+            return None
+        footprint, field = footprint_of(self._body), self._map.clearance
+        found = search(self._map.space, self._map.log_odds, field, (int(rows[0]), int(columns[0])), footprint)
+        near = approach(clusters, found, self._map.log_odds, default_reach(footprint, self._map.resolution))
+        reached = np.flatnonzero(near.reachable)
+        if not len(reached):
+            return None
+        chosen = reached[np.argsort(near.costs[reached], kind="stable")][:most]
+        stands = [(int(row), int(column)) for row, column in near.cells[chosen]]
+        ways = [self._centres(found.path(stand)) for stand in stands]
+        ahead = round(AHEAD / self._map.resolution)
+        between = np.zeros((len(chosen), len(chosen)))
+        for k, stand in enumerate(stands[:-1]):
+            others = search(self._map.space, self._map.log_odds, field, stand, footprint)
+            for other in range(k + 1, len(stands)):
+                # There is always the way past where the robot is.
+                past = near.costs[chosen[k]] + near.costs[chosen[other]]
+                between[k, other] = between[other, k] = min(others.cost(stands[other]), past)
+        return Frontiers(
+            focuses=np.array(self._centres(near.frontier_cells[chosen])),
+            cells=[np.array(self._centres(clusters.of(int(k)))) for k in chosen],
+            sizes=clusters.sizes[chosen],
+            costs=near.costs[chosen],
+            ahead=np.array([way[min(ahead, len(way) - 1)] for way in ways]),
+            between=between,
+            legs=lambda k: self._legs(start, ways[k][1:] or ways[k]),
+        )
 
     def is_frontier(self, focus: Place) -> bool:
         """Whether the cell is a frontier of the map."""
@@ -173,6 +246,10 @@ class RegionMemory:
         return None
 
     def frontier(self, start: Place, least: float) -> tuple[Legs, Place] | None:
+        """Return None: regions have openings alone."""
+        return None
+
+    def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
         """Return None: regions have openings alone."""
         return None
 

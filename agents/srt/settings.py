@@ -52,8 +52,8 @@ class SrtSettings:
     least_step : float
         Candidates lie farther than this from their node [m].
     least_frontier : float
-        With ``candidates`` ``goal`` and ``memory`` ``map``, frontiers of the map of at least this length are gone to, where they
-        cost less than all openings; shorter ones when nothing else is left [m].
+        With ``candidates`` ``goal`` and ``memory`` ``map``, frontiers of the map of at least this length are gone to; shorter ones when
+        nothing else is left [m].
     tries : int
         How many candidates are drawn at a node.
     nodes : int
@@ -67,7 +67,7 @@ class SrtSettings:
     turn_room : float
         A laser region with a return nearer than the robot's radius, the margin and this is not safe [m]; 0 for off.
     passing_distance : float
-        On its way a robot adds a node after this distance and, where there is no goal, chooses anew [m].
+        On its way a robot adds a node after this distance [m].
     looks_around : bool
         Whether a robot turns to see what lies behind it, at its first node and at nodes that are left without openings.
     turning_starts, turning_ends : float
@@ -92,7 +92,7 @@ class SrtSettings:
     random_share: float = 0.0
     way_weight: float = 0.7
     least_step: float = 0.3
-    least_frontier: float = 0.6
+    least_frontier: float = 0.8
     tries: int = 20
     nodes: int = 500
     time_s: float = math.inf

@@ -38,8 +38,6 @@ class Node:
         The node from which the robot came; None for a robot's first one.
     neighbours : dict of int to float
         Nodes to which a straight way leads, with its length [m]: parent, children and bridges.
-    tried : int
-        How often a robot set out from it.
     has_looked : bool
         Whether a robot turned there to see what lay behind it.
     view : (directions,) float64
@@ -55,7 +53,6 @@ class Node:
     parent: int | None
     view: NDArray[np.float64]
     neighbours: dict[int, float] = field(default_factory=dict)
-    tried: int = 0
     has_looked: bool = False
 
     @property

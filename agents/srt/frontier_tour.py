@@ -1,0 +1,79 @@
+"""Where to go without a goal: to the first frontier of the shortest tour past all that are left."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.drive import Limits
+from lidarium.agents.srt.memory import Legs, Memory, Place
+from lidarium.agents.srt.senses import Senses
+from lidarium.agents.srt.tour import shortest_tour
+from lidarium.mapping.rigid import wrapped
+
+MOST = 14
+"""Tours go past so many frontiers at most, the nearest ones."""
+
+WAY_OF_SIZE = 1.0
+"""For a metre of a frontier's length a robot drives so much farther to begin with it [m]: behind long ones more is to be seen."""
+
+KEPT = 1.0
+"""What a robot went for until now is left only for a tour that is shorter by this [m]."""
+
+KEPT_NEAR = 0.5
+"""A frontier of which a cell lies this near to what a robot went for is still the same [m]."""
+
+MATE_SPREAD = 5.0
+"""Frontiers nearer than this to what a teammate goes for cost so much more as they are nearer [m]."""
+
+MATE_SAME = 1.0
+"""What lies this near to what a teammate goes for is the teammate's [m]."""
+
+
+def first_on_tour(
+    memory: Memory, senses: Senses, limits: Limits, least: float, latest: Place | None, of_mates: Sequence[Place]
+) -> tuple[Legs, Place] | None:
+    """Return the way to the frontier that the shortest tour begins with, and what to look at there.
+
+    A robot turns on the spot before it sets out, so the turn counts, too, as the way that it could have driven in the time.
+
+    Parameters
+    ----------
+    memory : Memory
+        What the robot remembers.
+    senses, limits : Senses, Limits
+        Where it is, and how fast it drives and turns.
+    least : float
+        Frontiers shorter than this are left out [m].
+    latest : (2,) float64 or None
+        What it went for last [m].
+    of_mates : sequence of (2,) float64
+        What teammates go for [m].
+
+    Returns
+    -------
+    tuple or None
+        The ends of the legs, and a place on the frontier; None where there is none in reach that is no teammate's.
+    """
+    frontiers = memory.frontiers(senses.pose[:2], least, MOST)
+    if frontiers is None:
+        return None
+    to_mates = np.array([[math.dist(focus, mate) for mate in of_mates] for focus in frontiers.focuses]).min(axis=1, initial=math.inf)
+    is_left = to_mates >= MATE_SAME
+    if not is_left.any():
+        return None
+    gap = frontiers.ahead - senses.pose[:2]
+    turns = np.abs([wrapped(float(angle)) for angle in np.arctan2(gap[:, 1], gap[:, 0]) - float(senses.pose[2])])
+    first = frontiers.costs + turns * limits.speed / limits.turn_rate + np.maximum(MATE_SPREAD - to_mates, 0.0)
+    first -= WAY_OF_SIZE * frontiers.sizes
+    if latest is not None:
+        first -= KEPT * _are_near(frontiers.cells, latest)
+    left = np.flatnonzero(is_left)
+    tour = shortest_tour(first[left], np.ascontiguousarray(frontiers.between[np.ix_(left, left)]))
+    begin = int(left[tour[0]])
+    return frontiers.legs(begin), frontiers.focuses[begin]
+
+
+def _are_near(cells: Sequence[NDArray[np.float64]], latest: Place) -> NDArray[np.bool_]:
+    return np.array([float(np.hypot(*(each - latest).T).min()) < KEPT_NEAR for each in cells])
