@@ -1,0 +1,120 @@
+"""Without a goal the tree goes to the first frontier of the shortest tour past all."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lidarium.agents.srt.drive import Limits
+from lidarium.agents.srt.frontier_tour import KEPT, first_on_tour
+from lidarium.agents.srt.memory import MapMemory, RegionMemory
+from lidarium.agents.srt.senses import Senses
+from lidarium.agents.srt.tour import shortest_tour
+from lidarium.envs.onboard.navigation import NavigationMap
+
+RADIUS, RESOLUTION = 0.2, 0.05
+LIMITS = Limits(speed=0.5, turn_rate=1.5, deceleration=0.5, radius=RADIUS)
+
+
+def costs_of(places):
+    """Return what ways from the origin and between places cost."""
+    return np.hypot(*places.T), np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+
+
+def length_of(tour, first, between):
+    return first[tour[0]] + sum(between[a, b] for a, b in itertools.pairwise(tour))
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 7))
+def test_a_tour_visits_all_places_and_is_hardly_longer_than_the_shortest(seed, count):
+    first, between = costs_of(np.random.default_rng(seed).uniform(-10.0, 10.0, (count, 2)))
+    tour = shortest_tour(first, between)
+    assert sorted(tour) == list(range(count))
+    shortest = min(length_of(each, first, between) for each in itertools.permutations(range(count)))
+    assert length_of(tour, first, between) <= 1.1 * shortest + 1e-9
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.integers(8, 20))
+def test_a_tour_is_never_longer_than_that_of_the_nearest_place_again_and_again(seed, count):
+    first, between = costs_of(np.random.default_rng(seed).uniform(-10.0, 10.0, (count, 2)))
+    nearest = [int(np.argmin(first))]
+    while len(nearest) < count:
+        nearest.append(min(set(range(count)) - set(nearest), key=lambda place: between[nearest[-1], place]))
+    assert length_of(shortest_tour(first, between), first, between) <= length_of(nearest, first, between) + 1e-9
+
+
+def test_what_lies_on_the_shorter_side_is_visited_first_though_another_place_is_nearer():
+    # Places lie on a line: what is left of the robot goes on to -6 m, so those on its right come first.
+    first, between = costs_of(np.array([[-1.0, 0.0], [1.1, 0.0], [1.6, 0.0], [-6.0, 0.0]]))
+    tour = shortest_tour(first, between).tolist()
+    assert (set(tour[:2]), tour[2:]) == ({1, 2}, [0, 3])
+
+
+def hall(openings):
+    """Return the map of a hall of 12 x 4 m whose walls were seen, but for stretches (x from, x to) of the upper one."""
+    log_odds = np.zeros((120, 320), np.int8)
+    log_odds[20:100, 20:260] = -40
+    log_odds[19], log_odds[:, 19], log_odds[:, 260], log_odds[100] = 40, 40, 40, 40
+    for low, high in openings:
+        log_odds[100, 20 + round(low / RESOLUTION) : 20 + round(high / RESOLUTION)] = 0
+    navigation = NavigationMap(log_odds, RESOLUTION)
+    navigation.changed((0, 120, 0, 320))
+    return MapMemory(navigation, RADIUS)
+
+
+def senses_at(x, y, theta=0.0):
+    """Return what a robot at a place of the hall [m] tells, its lower left corner at (1, 1)."""
+    return Senses(0.0, np.array([x + 1.0, y + 1.0, theta]), np.full(3, np.inf, np.float32), False, None, [])
+
+
+def x_of(found):
+    return float(found[1][0]) - 1.0
+
+
+def test_a_robot_begins_with_the_end_from_which_it_need_not_come_back():
+    memory = hall([(1.0, 2.0), (5.0, 6.0), (10.0, 11.0)])
+    found = first_on_tour(memory, senses_at(3.8, 2.0, math.pi / 2), LIMITS, 0.8, None, ())
+    assert 1.0 <= x_of(found) <= 2.0
+    legs, focus = found
+    assert math.dist(legs[-1], focus) < RADIUS + 4.0 * RESOLUTION
+
+
+def test_what_it_went_for_is_left_only_for_a_gain():
+    memory = hall([(3.0, 4.0), (7.9, 8.9)])
+    there = senses_at(5.95, 2.0, math.pi / 2)
+    left, right = (first_on_tour(memory, there, LIMITS, 0.8, np.array([x + 1.0, 5.0]), ()) for x in (3.5, 8.4))
+    assert x_of(left) < 5.0 < x_of(right)
+    assert KEPT > 0.0
+
+
+def test_a_long_frontier_makes_up_for_a_longer_way():
+    there = senses_at(6.0, 2.0, math.pi / 2)
+    assert x_of(first_on_tour(hall([(2.8, 3.8), (8.1, 9.1)]), there, LIMITS, 0.8, None, ())) > 6.0
+    assert x_of(first_on_tour(hall([(0.8, 3.8), (8.1, 9.1)]), there, LIMITS, 0.8, None, ())) < 6.0
+
+
+def test_what_a_teammate_goes_for_is_left_to_it_and_frontiers_near_by_cost_more():
+    memory, there = hall([(3.0, 4.0), (8.0, 9.0)]), senses_at(5.0, 2.0, math.pi / 2)
+    assert x_of(first_on_tour(memory, there, LIMITS, 0.8, None, ())) < 5.0
+    assert x_of(first_on_tour(memory, there, LIMITS, 0.8, None, [np.array([4.5, 5.0])])) > 5.0
+    both = [np.array([4.5, 5.0]), np.array([9.5, 5.0])]
+    assert first_on_tour(hall([(3.4, 4.2), (8.0, 9.0)]), there, LIMITS, 0.8, None, both) is None
+
+
+@pytest.mark.parametrize("memory", [hall([]), hall([(3.0, 3.5)]), RegionMemory([])])
+def test_there_is_no_tour_without_frontiers_of_that_length(memory):
+    assert first_on_tour(memory, senses_at(5.0, 2.0), LIMITS, 0.8, None, ()) is None
+
+
+def test_ways_between_frontiers_are_no_longer_than_past_the_robot():
+    frontiers = hall([(1.0, 2.0), (5.0, 6.0), (10.0, 11.0)]).frontiers(np.array([5.0, 3.0]), 0.8, 14)
+    assert len(frontiers.sizes) == 3
+    assert (np.diff(frontiers.costs) >= 0.0).all()
+    assert (frontiers.between <= frontiers.costs[:, None] + frontiers.costs[None] + 1e-9).all()
+    np.testing.assert_array_equal(frontiers.between, frontiers.between.T)
+    assert len(hall([(1.0, 2.0), (5.0, 6.0), (10.0, 11.0)]).frontiers(np.array([5.0, 3.0]), 0.8, 2).sizes) == 2
