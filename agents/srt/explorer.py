@@ -37,6 +37,9 @@ MATE_NEAR = 1.5
 ASIDES = 6
 """How often a robot steps aside for teammates on its way before it gives its target up."""
 
+FINAL = ("budget", "goal_missed", "blocked")
+"""Endings after which a robot looks for nothing any more."""
+
 REVIEW_S = 0.5
 """Time between looks at whether a target still stands [s]."""
 
@@ -231,8 +234,8 @@ class Explorer:
             memory.give_up(self._looked_at)
             self._looked_at = None
         self._reviewed_at = senses.time_s
-        if self.ending in ("budget", "goal_missed") or self._is_spent(senses):
-            self._go_home(self.ending if self.ending == "goal_missed" else "budget", senses, memory)
+        if self.ending in FINAL or self._is_spent(senses):
+            self._go_home(self.ending if self.ending in FINAL else "budget", senses, memory)
             return
         node = self._tree.nodes[self._node]
         way = choose(node, self._tree, self.known, self._source, memory, self._settings, self._generator, senses, targets, self._limits)
@@ -344,6 +347,11 @@ class Explorer:
         has_mate = any(senses.distance_to(mate) < MATE_NEAR for mate in senses.mates)
         departed = self._node
         self._pause(senses, memory)
+        if leg.is_goal and self._failures > ASIDES:
+            # What stands there, such as teammates who have come to the same goal, does not go away.
+            self._failures = 0
+            self._go_home("blocked", senses, memory)
+            return
         if has_mate and self._asides < ASIDES:
             self._asides += 1
             self._step_aside(senses)

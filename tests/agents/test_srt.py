@@ -139,6 +139,13 @@ def test_the_same_seed_gives_the_same_run():
     assert [node.pose.tolist() for node in first.policy.tree.nodes] == [node.pose.tolist() for node in second.policy.tree.nodes]
 
 
+def test_a_robot_that_teammates_keep_from_their_goal_ends_as_blocked_and_makes_room():
+    env = lidarium.parallel_env("srt_lab", robots=3, localization="splines", horizon_s=400.0, stop_coverage=None)
+    run_episode(SensorBasedRandomTree(), env, 0)
+    assert sorted(env.scorer.ended_because.values()) == ["blocked", "reached", "reached"]
+    assert env.scorer.time < 200.0
+
+
 class Seen(SensorBasedRandomTree):
     """A tree whose robots see what a test makes of their scans."""
 
