@@ -1,4 +1,4 @@
-"""Which way a robot takes: to the goal where it is in sight of a node, through the cheapest opening, or home."""
+"""Which way a robot takes: to a goal in sight of a node, to the first frontier of a tour, through the cheapest opening, or home."""
 
 import math
 from collections.abc import Sequence
