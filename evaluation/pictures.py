@@ -136,7 +136,7 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
     solid = occupied_in_truth(env)
     counted = unpack_bits(env.world.counted_masks[0], solid.shape[1])
     rows, columns = np.flatnonzero(solid.any(axis=1))[-1] + 1, np.flatnonzero(solid.any(axis=0))[-1] + 1
-    levels = without_specks(three_levels(np.sign(log_odds).astype(np.int8)))
+    levels = without_specks(three_levels(log_odds))
     solid, counted, levels = solid[:rows, :columns], counted[:rows, :columns], levels[:rows, :columns]
     # In the order of what shows where cells are drawn together.
     classes = np.zeros(solid.shape, np.uint8)
@@ -150,28 +150,32 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
 
 
 def _draw_frontiers(axes: Axes, episode: Episode) -> tuple[bool, bool]:
-    left, given_up = (_beside_unknown(points, episode) for points in frontiers_left(episode))
+    is_border, origin = _border_of_team_map(episode)
+    resolution = episode.env.settings.occupancy.resolution
+    left, given_up = (_within(points, is_border, origin, resolution) for points in frontiers_left(episode))
     axes.scatter(left[:, 0], left[:, 1], s=5, color=FRONTIER_COLOUR, linewidths=0, zorder=3)
     axes.scatter(given_up[:, 0], given_up[:, 1], s=5, color=GIVEN_UP_COLOUR, linewidths=0, zorder=3)
     return bool(len(left)), bool(len(given_up))
 
 
-def _beside_unknown(points: NDArray[np.float64], episode: Episode) -> NDArray[np.float64]:
-    """Return the points that on the team's map, as it is drawn, lie within a cell of both what is free and what is unknown.
+def _border_of_team_map(episode: Episode) -> tuple[NDArray[np.bool_], tuple[float, float]]:
+    """Return which cells of the team's map, as it is drawn, lie within a cell of both what is free and what is unknown, and its origin.
 
     What one robot has left on its own map another may have seen.
     """
-    env = episode.env
-    log_odds, origin = team_log_odds(env)
-    levels = without_specks(three_levels(np.sign(log_odds).astype(np.int8)))
-    near_both = np.ones(levels.shape, bool)
-    for level in (FREE, UNKNOWN):
-        near_both &= cv2.dilate((levels == level).astype(np.uint8), np.ones((3, 3), np.uint8)) != 0
-    columns, rows = np.floor((points - origin) / env.settings.occupancy.resolution).astype(np.int64).T
-    is_inside = (rows >= 0) & (rows < levels.shape[0]) & (columns >= 0) & (columns < levels.shape[1])
-    is_left = np.zeros(len(points), bool)
-    is_left[is_inside] = near_both[rows[is_inside], columns[is_inside]]
-    return points[is_left]
+    log_odds, origin = team_log_odds(episode.env)
+    levels = without_specks(three_levels(log_odds))
+    square = np.ones((3, 3), np.uint8)
+    free, unknown = (cv2.dilate((levels == level).astype(np.uint8), square) != 0 for level in (FREE, UNKNOWN))
+    return np.asarray(free & unknown), origin
+
+
+def _within(points: NDArray[np.float64], mask: NDArray[np.bool_], origin: tuple[float, float], resolution: float) -> NDArray[np.float64]:
+    """Return the points (n, 2) that lie in cells of a mask."""
+    columns, rows = np.floor((points - origin) / resolution).astype(np.int64).T
+    is_inside = (rows >= 0) & (rows < mask.shape[0]) & (columns >= 0) & (columns < mask.shape[1])
+    inside = points[is_inside]
+    return np.asarray(inside[mask[rows[is_inside], columns[is_inside]]])
 
 
 def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool, more: list[Line2D]) -> None:

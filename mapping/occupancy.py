@@ -8,6 +8,7 @@ which a beam ended more likely occupied, each once per scan; all others keep the
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -273,7 +274,7 @@ class OccupancyGrid:
         return np.asarray(1.0 / (1.0 + np.exp(-LOG_ODDS_UNIT * self.log_odds.astype(np.float32))), np.float32)
 
 
-def three_levels(log_odds: NDArray[np.int8]) -> NDArray[np.uint8]:
+def three_levels(log_odds: NDArray[np.signedinteger[Any]]) -> NDArray[np.uint8]:
     """Return 0 where occupied, 127 where unknown, 255 where free."""
     levels = np.full(log_odds.shape, UNKNOWN, np.uint8)
     levels[log_odds > 0] = OCCUPIED

@@ -193,8 +193,6 @@ def _folder(command: Run, floor: str) -> Path:
 
 def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, recorder: "Recorder | None") -> list[str]:
     """Write the figures first, then the record, the map and the picture; return the files' names."""
-    import numpy as np
-
     from lidarium.evaluation.beliefs import team_log_odds
     from lidarium.evaluation.output import write_json, write_text
     from lidarium.evaluation.pictures import save_run_picture
@@ -208,7 +206,7 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
 
         write_record(folder / "episode.npz", recorder.finish(is_interrupted=episode.is_interrupted))
     log_odds, (x, y) = team_log_odds(episode.env)
-    write_ros_map(folder, "map", three_levels(np.sign(log_odds).astype(np.int8)), (x, y, 0.0), command.map_resolution)
+    write_ros_map(folder, "map", three_levels(log_odds), (x, y, 0.0), command.map_resolution)
     save_run_picture(folder / "run.png", episode, command.chosen_policy)
     if is_supervised(episode.policy):
         write_text(folder / "decisions.jsonl", decision_lines(episode.policy))

@@ -69,10 +69,10 @@ def choose(
         if in_sight:
             nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, goal))
             return [*_legs(tree, way_to(nearest.number, before)), Choice(goal, None, is_goal=True)]
-    if goal is None and settings.candidates == "goal":
-        way = tour_way(node, source, memory, settings, senses, targets, limits)
-        if way:
-            return way
+    is_drawn = settings.candidates != "goal" or generator.random() < settings.random_share
+    tour = [] if is_drawn else tour_way(node, source, memory, settings, senses, targets, limits)
+    if tour:
+        return tour
     others = [tree.nodes[number] for number in sorted(known)]
 
     def cost_of(candidate: Candidate) -> float:
@@ -81,7 +81,7 @@ def choose(
         return _weighed(way, legs[0] if legs else candidate.place, candidate.place, settings, senses, limits)
 
     best: Candidate | None = None
-    if settings.candidates == "goal" and generator.random() >= settings.random_share:
+    if not is_drawn:
         found = [candidate for each in reached for candidate in source.of_node(each, memory, others)]
         best = min(_left_by(targets, found), key=cost_of, default=None)
     else:
@@ -90,18 +90,16 @@ def choose(
             if found:
                 best = found[int(generator.integers(len(found)))]
                 break
-    if best is None:
-        # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
-        return (
-            []
-            if settings.candidates != "goal"
-            else (
-                _to_frontier(node, memory, settings.least_frontier, senses, targets)
-                or _across(others, source, memory, senses, targets)
-                or _to_frontier(node, memory, LAST_FRONTIER, senses, targets)
-            )
-        )
-    return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
+    if best is not None:
+        return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
+    if settings.candidates != "goal":
+        return []
+    # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
+    return (
+        _to_frontier(node, memory, settings.least_frontier, senses, targets)
+        or _across(others, source, memory, senses, targets)
+        or _to_frontier(node, memory, LAST_FRONTIER, senses, targets)
+    )
 
 
 def tour_way(
@@ -113,7 +111,12 @@ def tour_way(
     targets: Sequence[Candidate],
     limits: Limits,
 ) -> list[Choice]:
-    """Return the way to the first frontier of the shortest tour past those of the map, none where there is none."""
+    """Return the way to the first frontier of the shortest tour past those of the map, none where there is none.
+
+    Only explorers plan tours: robots without a goal that go where what was seen is open, at the least cost.
+    """
+    if senses.goal is not None or settings.candidates != "goal" or settings.algorithm != "integrated":
+        return []
     of_mates = [target.focus for target in targets]
     for least in (settings.least_frontier, LAST_FRONTIER):
         begun = first_on_tour(memory, senses, limits, least, source.latest, of_mates)

@@ -217,7 +217,8 @@ class Explorer:
         if has_passed and (is_direct or candidate.is_frontier):
             self._add_node(senses, self._node, senses.pose, memory)
         # Without a goal what was seen since may make another way the better one; towards a goal it seldom does.
-        if senses.goal is None and senses.distance_to(self._chose_at) >= GOT_ON_ANEW:
+        was_drawn = self._settings.random_share > 0.0 and not candidate.is_frontier
+        if not was_drawn and senses.distance_to(self._chose_at) >= GOT_ON_ANEW:
             way = tour_way(self._tree.nodes[self._node], self._source, memory, self._settings, senses, targets, self._limits)
             if way:
                 self._set_out(way, senses)

@@ -222,11 +222,10 @@ class MergeStation:
         for a, b in sorted(self._joined - set(joined)):
             why = "a robot has failed" if not (a in used and b in used) else "the maps contradict it by now"
             self._note(time_s, "dropped", (a, b), why)
-        edges = {frozenset((edge.a, edge.b)) for edge in self._tree.edges}
         for (a, b), frame in joined.items():
             if (a, b) not in self._joined:
                 middle = self._middles.get((a, b), self._place(b))
-                self.joins.append(Join(time_s, a, b, frame, middle, True, frozenset((a, b)) in edges))
+                self.joins.append(Join(time_s, a, b, frame, middle, True, self._tree.has_edge(a, b)))
                 self._note(time_s, "joined", (a, b), f"x {frame.x:.2f} m, y {frame.y:.2f} m, theta {frame.theta:.3f} rad")
         self._joined = set(joined)
 

@@ -130,14 +130,13 @@ class TeamMapping:
     ) -> dict[tuple[str, str], Joined]:
         merged = self._merger.update(maps, frozenset(pairs))
         joined = {}
-        edges = {frozenset((edge.a, edge.b)) for edge in merged.tree.edges}
         for a, b in pairs:
             transform = merged.tree.lookup(a, b)
             if transform is not None:
                 result = merged.pairs.get((a, b))
                 overlaps = result is not None and result.is_accepted
                 centre = placed(maps[b].origin).apply(result.agreement.centre).tolist() if overlaps and result is not None else places[b]
-                joined[a, b] = Joined(transform, (float(centre[0]), float(centre[1])), frozenset((a, b)) in edges)
+                joined[a, b] = Joined(transform, (float(centre[0]), float(centre[1])), merged.tree.has_edge(a, b))
         return joined
 
     def _fused(self, agent: str, own: GrowingMap) -> FusedMap:

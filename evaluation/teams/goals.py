@@ -76,7 +76,8 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
     for robots in (2, 3):
         points = overlap_points(chosen(teams, SUPERVISED, robots), told)
         goals.append(_at_most(f"overlap at the end with {robots} robots, less that of `{TOLD}` [points]", points, 8.0, robots, digits=1))
-    led = [row for name in rows for row in rows[name] if row["supervisor"] is not None and row["robots"] > 1 and row["policy"] != TOLD]
+    every = [*(row for name in rows for row in rows[name]), *failing]
+    led = [row for row in every if row["supervisor"] is not None and row["robots"] > 1 and row["policy"] != TOLD]
     goals.append(_share("runs in which a wrong merge was used", led, has_wrong_merge, 0.0))
     goals.append(_share("runs with a merge that errs as much by the starts, drift included", led, has_off_merge, None))
     goals.append(_share("runs with a merge that is not correct by `result.json`", led, has_false_merge, None))

@@ -72,6 +72,11 @@ class FrameTree(Generic[Name]):
         """Edges that contradict none, whether or not the forest needs them."""
         return [edge for edge in self._edges.values() if edge not in self._dropped]
 
+    def has_edge(self, a: Name, b: Name) -> bool:
+        """Return whether an edge that contradicts none joins two maps, so that no others need lie between them."""
+        edge = self._edges.get(frozenset((a, b)))
+        return edge is not None and edge not in self._dropped
+
     def add_map(self, name: Name) -> None:
         """Add a map that is not joined with any yet."""
         if name not in self._tree:

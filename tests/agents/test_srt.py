@@ -139,6 +139,15 @@ def test_the_same_seed_gives_the_same_run():
     assert [node.pose.tolist() for node in first.policy.tree.nodes] == [node.pose.tolist() for node in second.policy.tree.nodes]
 
 
+@pytest.mark.parametrize("chosen", [{}, {"candidates": "random"}, {"candidates": "farthest"}, {"algorithm": "base"}, {"random_share": 1.0}])
+def test_only_explorers_that_choose_the_least_cost_plan_tours(chosen, monkeypatch):
+    planned = []
+    monkeypatch.setattr("lidarium.agents.srt.choice.first_on_tour", lambda *_: planned.append(1))
+    env = lidarium.parallel_env("apartment", robots=1, robot="pioneer", horizon_s=30.0)
+    run_episode(SensorBasedRandomTree(**chosen), env, 0)
+    assert bool(planned) == (not chosen)
+
+
 def test_a_robot_that_teammates_keep_from_their_goal_ends_as_blocked_and_makes_room():
     env = lidarium.parallel_env("srt_lab", robots=3, localization="splines", horizon_s=400.0, stop_coverage=None)
     run_episode(SensorBasedRandomTree(), env, 0)

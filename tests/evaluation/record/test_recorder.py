@@ -33,7 +33,7 @@ class MapLog:
             self.look(env)
 
     def look(self, env):
-        self.maps[env.scorer.time] = three_levels(np.sign(team_log_odds(env)[0]).astype(np.int8))
+        self.maps[env.scorer.time] = three_levels(team_log_odds(env)[0])
 
 
 class Sends:

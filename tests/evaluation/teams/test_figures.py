@@ -5,6 +5,7 @@ import math
 import pytest
 
 from lidarium.evaluation.teams.figures import chosen, overlap_points, path_shares, time_ratios, time_shares
+from lidarium.evaluation.teams.goals import goals_of
 
 A, B = [1.0, 2.0, 0.0], [3.0, 4.0, 0.0]
 
@@ -42,3 +43,22 @@ def test_runs_are_chosen_by_policy_size_and_floor():
     rows = [row("supervised", [A]), row("supervised", [A, B]), row("independent", [A, B])]
     assert chosen(rows, "supervised", 2) == rows[1:2]
     assert chosen(rows, "supervised", is_floor=lambda floor: floor != "floor") == []
+
+
+def test_a_wrong_merge_counts_in_whichever_suite_it_was_used():
+    def led(policy, has_wrong):
+        merges = {"wrong": int(has_wrong), "off": 0, "false": 0}
+        more = {"supervisor": {}, "merges": merges, "tick_ms": {"p50": None, "p95": None}, "c_others_final": 1.0, "coverage_final": 1.0}
+        return row(policy, [A, B]) | more
+
+    suites = dict.fromkeys(("teams", "one", "pairs", "three", "alone", "five"), ())
+
+    def wrong_runs(rows, failing):
+        (goal,) = [each for each in goals_of(rows, failing) if each.title.startswith("runs in which a wrong merge")]
+        return goal
+
+    right, wrong = led("supervised", False), led("supervised", True)
+    assert wrong_runs(suites | {"teams": [right]}, [right]).is_reached
+    for found in (wrong_runs(suites | {"teams": [wrong]}, [right]), wrong_runs(suites | {"teams": [right]}, [wrong])):
+        assert (found.found.estimate, found.found.size, found.is_reached) == (50.0, 2, False)
+    assert wrong_runs(suites | {"teams": [right, led("oracle_starts", True)]}, ()).is_reached

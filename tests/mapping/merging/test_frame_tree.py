@@ -39,6 +39,9 @@ def test_a_cycle_that_does_not_close_loses_its_weakest_edge():
         tree = chain(*order)
         assert [edge.weight for edge in tree.dropped] == [3.0]
         assert near(tree.lookup("a", "c"), A_FROM_B @ B_FROM_C)
+        assert tree.has_edge("b", "a")
+        assert tree.has_edge("b", "c")
+        assert not tree.has_edge("a", "c")
 
 
 def test_a_cycle_that_closes_keeps_all_edges():
