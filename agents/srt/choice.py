@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
 from lidarium.agents.srt.drive import Limits
-from lidarium.agents.srt.frontier_tour import MATE_SAME, first_on_tour
+from lidarium.agents.srt.frontier_tour import MATE_SAME, MOST, first_on_tour
 from lidarium.agents.srt.memory import Memory
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
@@ -96,9 +96,9 @@ def choose(
         return []
     # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
     return (
-        _to_frontier(node, memory, settings.least_frontier, senses, targets)
+        _to_frontier(node, memory, settings.least_frontier, settings, senses, targets, limits)
         or _across(others, source, memory, senses, targets)
-        or _to_frontier(node, memory, LAST_FRONTIER, senses, targets)
+        or _to_frontier(node, memory, LAST_FRONTIER, settings, senses, targets, limits)
     )
 
 
@@ -170,14 +170,23 @@ def _weighed(
     return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(last, senses.goal))
 
 
-def _to_frontier(node: Node, memory: Memory, least: float, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
-    """Return the way to the map's nearest frontier of at least a length [m], where it is no teammate's."""
-    found = memory.frontier(senses.pose[:2], least)
+def _to_frontier(
+    node: Node, memory: Memory, least: float, settings: SrtSettings, senses: Senses, targets: Sequence[Candidate], limits: Limits
+) -> list[Choice]:
+    """Return the way to the map's frontier of at least a length [m] that costs least, where it is no teammate's."""
+    found = memory.frontiers(senses.pose[:2], least, MOST)
     if found is None:
         return []
-    way = _to_focus(node, *found)
-    candidate = way[-1].candidate
-    return way if candidate is not None and _left_by(targets, [candidate]) else []
+    ways = [_to_focus(node, found.legs(k), focus) for k, focus in enumerate(found.focuses)]
+    costs = [
+        _weighed(float(found.costs[k]), way[0].place, focus, settings, senses, limits)
+        for k, (way, focus) in enumerate(zip(ways, found.focuses, strict=True))
+    ]
+    for k in np.argsort(costs, kind="stable"):
+        candidate = ways[k][-1].candidate
+        if candidate is not None and _left_by(targets, [candidate]):
+            return ways[k]
+    return []
 
 
 def _to_focus(node: Node, legs: list[NDArray[np.float64]], focus: NDArray[np.float64]) -> list[Choice]:

@@ -70,7 +70,7 @@ def first_on_tour(
     if latest is not None:
         first -= KEPT * _are_near(frontiers.cells, latest)
     left = np.flatnonzero(is_left)
-    tour = shortest_tour(first[left], np.ascontiguousarray(frontiers.between[np.ix_(left, left)]))
+    tour = shortest_tour(first[left], frontiers.between(left))
     begin = int(left[tour[0]])
     return frontiers.legs(begin), frontiers.focuses[begin]
 

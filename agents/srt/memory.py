@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.team_driver import footprint_of
-from lidarium.mapping.frontier_approach import approach, default_reach, nearest_frontier
+from lidarium.mapping.frontier_approach import approach, default_reach
 from lidarium.mapping.frontiers import FRONTIER
 from lidarium.mapping.grid_planning import centres_of, plan, search
 
@@ -45,8 +45,8 @@ class Frontiers:
         What the way to each costs [m], ascending.
     ahead : (n, 2) float64
         A place at the beginning of the way to each [m].
-    between : (n, n) float64
-        What the ways from place to place cost [m].
+    between : callable
+        Takes the numbers of some, shape (m,), and returns what the ways from place to place cost, shape (m, m) [m].
     legs : callable
         Takes the number of one, and returns the ends of the straight legs of the way to it.
     """
@@ -56,7 +56,7 @@ class Frontiers:
     sizes: NDArray[np.float64]
     costs: NDArray[np.float64]
     ahead: NDArray[np.float64]
-    between: NDArray[np.float64]
+    between: Callable[[NDArray[np.int64]], NDArray[np.float64]]
     legs: Callable[[int], Legs]
 
 
@@ -73,10 +73,6 @@ class Memory(Protocol):
 
     def way(self, start: Place, end: Place) -> Legs | None:
         """Return the ends of the straight legs of a way across space that was seen, the last one ``end``; None where there is none."""
-        ...
-
-    def frontier(self, start: Place, least: float) -> tuple[Legs, Place] | None:
-        """Return the way to the nearest frontier of at least that length [m], and what to look at there; None where there is none."""
         ...
 
     def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
@@ -131,19 +127,6 @@ class MapMemory:
         found = plan(self._map.space, self._map.log_odds, self._map.clearance, cells[0], cells[1], footprint_of(self._radius))
         return None if found is None else self._legs(start, [*self._centres(found[1])[1:-1], end])
 
-    def frontier(self, start: Place, least: float) -> tuple[Legs, Place] | None:
-        """Return the way that costs least to where the robot sees a frontier, its legs as long as they are clear."""
-        rows, columns, is_inside = self._cells(start[None])
-        frontiers = self._map.long_frontiers(least)
-        if not (is_inside.all() and len(frontiers)):
-            return None
-        cell, footprint = (int(rows[0]), int(columns[0])), footprint_of(self._body)
-        found = nearest_frontier(frontiers, self._map.space, self._map.log_odds, self._map.clearance, cell, footprint)
-        if found is None:
-            return None
-        places = self._centres(found.path)
-        return self._legs(start, places[1:] or places), self._centres(np.array([found.frontier_cell]))[0]
-
     def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
         """Return the frontiers that cost least to come to, and the ways between where the robot would stand."""
         rows, columns, is_inside = self._cells(start[None])
@@ -161,18 +144,24 @@ class MapMemory:
         stands = [(int(row), int(column)) for row, column in near.cells[chosen]]
         ways = [self._centres(found.path(stand)) for stand in stands]
         ahead = round(AHEAD / self._map.resolution)
-        between = np.zeros((len(chosen), len(chosen)))
-        for k, stand in enumerate(stands[:-1]):
-            others = search(self._map.space, self._map.log_odds, field, stand, footprint)
-            for other in range(k + 1, len(stands)):
-                # There is always the way past where the robot is.
-                past = near.costs[chosen[k]] + near.costs[chosen[other]]
-                between[k, other] = between[other, k] = min(others.cost(stands[other]), past)
+        costs = near.costs[chosen]
+
+        def between(numbers: NDArray[np.int64]) -> NDArray[np.float64]:
+            table = np.zeros((len(numbers), len(numbers)))
+            for row, k in enumerate(numbers[:-1]):
+                # There is always the way past where the robot is: nothing beyond it needs to be looked at.
+                reach = float(costs[k] + costs[numbers].max())
+                others = search(self._map.space, self._map.log_odds, field, stands[k], footprint, maximum_cost=reach)
+                for column in range(row + 1, len(numbers)):
+                    other = numbers[column]
+                    table[row, column] = table[column, row] = min(others.cost(stands[other]), costs[k] + costs[other])
+            return table
+
         return Frontiers(
             focuses=np.array(self._centres(near.frontier_cells[chosen])),
             cells=[np.array(self._centres(clusters.of(int(k)))) for k in chosen],
             sizes=clusters.sizes[chosen],
-            costs=near.costs[chosen],
+            costs=costs,
             ahead=np.array([way[min(ahead, len(way) - 1)] for way in ways]),
             between=between,
             legs=lambda k: self._legs(start, ways[k][1:] or ways[k]),
@@ -243,10 +232,6 @@ class RegionMemory:
 
     def way(self, start: Place, end: Place) -> Legs | None:
         """Return None: regions know no way but the tree's."""
-        return None
-
-    def frontier(self, start: Place, least: float) -> tuple[Legs, Place] | None:
-        """Return None: regions have openings alone."""
         return None
 
     def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
