@@ -19,6 +19,12 @@ GAP = 0.03
 SIDE = 0.01
 """What lies within the robot's radius and this beside its way is ahead [m]."""
 
+ALONG = 0.001
+"""To what lies nearer beside the body than that, the robot may come this much nearer on its way [m]."""
+
+NEAR, STRAIGHT = 0.5, math.radians(2.0)
+"""Where the way ahead is free for less than this [m], the robot turns until its heading is off by less than that [rad]."""
+
 TURN_GAIN = 2.0
 """Turn rate for each radian that the heading is off [1/s]."""
 
@@ -95,7 +101,8 @@ def free_way(scan: NDArray[np.float32], geometry: ScanGeometry, radius: float, h
     is_hit = (ranges >= geometry.range_min) & (ranges < no_return(geometry))
     angles = geometry.angles[is_hit] - heading
     along, across = ranges[is_hit] * np.cos(angles), ranges[is_hit] * np.sin(angles)
-    half = radius + SIDE
+    # Past what a robot stands beside already it gets as near: along a wall it must not take the wall for an end of its way.
+    half = min(radius + SIDE, max(radius, float(ranges[is_hit].min(initial=math.inf)) - ALONG))
     is_ahead = (along > 0.0) & (np.abs(across) < half)
     reach = along[is_ahead] - np.sqrt(half * half - across[is_ahead] ** 2)
     return max(float(reach.min(initial=geometry.range_max)), 0.0)
@@ -134,7 +141,9 @@ def driven(
     if settings.drive == "controls":
         speed, turn_rate = best_control(pose, drive.target, fastest, limits)
         return replace(drive, phase=Phase.ADVANCE if speed > 0.0 else Phase.TURN), speed, turn_rate
-    limit = settings.turning_ends if drive.phase is Phase.TURN else settings.turning_starts
+    # Past something near by a robot has to go straight: it would drift towards it while it turns the rest.
+    ends = min(settings.turning_ends, STRAIGHT) if free < min(distance, NEAR) else settings.turning_ends
+    limit = ends if drive.phase is Phase.TURN else settings.turning_starts
     turn_rate = max(-limits.turn_rate, min(limits.turn_rate, TURN_GAIN * error))
     if abs(error) > limit:
         return replace(drive, phase=Phase.TURN), 0.0, turn_rate

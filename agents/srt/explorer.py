@@ -11,6 +11,7 @@ from lidarium.agents.srt.choice import Choice, choose, home_way, tour_way
 from lidarium.agents.srt.drive import Drive, Phase, driven, free_way, limits_of
 from lidarium.agents.srt.frontier_arcs import Opening, openings_of
 from lidarium.agents.srt.memory import Memory
+from lidarium.agents.srt.progress import Progress
 from lidarium.agents.srt.safe_region import SafeRegion, joined_views, safe_region, seen_region, view_of
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
@@ -19,14 +20,8 @@ from lidarium.envs.simulation.lidar import Lidar
 from lidarium.envs.simulation.robots import Robot
 from lidarium.mapping.rigid import wrapped
 
-PATIENCE_S = 3.0
-"""A robot that has neither moved nor turned for this long while it drives is blocked [s]."""
-
 BLIND_S = 10.0
 """A robot whose laser tells nothing for this long gives up [s]."""
-
-MOVED, TURNED = 0.05, 0.1
-"""What counts as having moved [m] and turned [rad]."""
 
 BACKING_S, BACKING_SPEED = 1.5, 0.12
 """How long and how fast a blocked robot backs out [s, m/s]."""
@@ -54,6 +49,9 @@ NEAR_NODE = 0.5
 
 NEW_NODE = 0.05
 """A robot nearer than this to its last node makes no new one [m]."""
+
+EXACTLY = 0.03
+"""Distance at which a robot is at its goal [m]."""
 
 Command = tuple[float, float]
 REST: Command = (0.0, 0.0)
@@ -104,8 +102,9 @@ class Explorer:
         self._looks: list[float] = []
         self._looked_at: NDArray[np.float64] | None = None
         self._backs_until = self._blind_since = -math.inf
-        self._stood_since, self._stood_at = 0.0, np.zeros(3)
+        self._progress = Progress()
         self._reviewed_at, self._asides, self._failures = -math.inf, 0, 0
+        self._is_aside = False
 
     @property
     def target(self) -> Candidate | None:
@@ -124,7 +123,7 @@ class Explorer:
         self._blind_since = -math.inf
         if self._root < 0:
             self._root = self._add_node(senses, None, senses.pose, memory)
-            self._stand(senses)
+            self._progress.stand(senses)
             self._begin_looks(senses)
         if senses.time_s < self._backs_until:
             return -BACKING_SPEED, 0.0
@@ -145,7 +144,7 @@ class Explorer:
             self._blind_since = senses.time_s
         if senses.time_s - self._blind_since >= BLIND_S:
             self.ending, self.is_home = "blind", True
-        self._stand(senses)
+        self._progress.stand(senses)
         return REST
 
     def _add_node(self, senses: Senses, parent: int | None, pose: NDArray[np.float64], memory: Memory) -> int:
@@ -187,14 +186,14 @@ class Explorer:
     def _look(self, senses: Senses, memory: Memory) -> Command | None:
         """Turn to the next heading to look at; None when all were seen, which the node then knows."""
         error = wrapped(self._looks[0] - float(senses.pose[2]))
-        if abs(error) > self._settings.turning_ends and not self._is_stuck(senses):
+        if abs(error) > self._settings.turning_ends and not self._progress.is_stuck(senses):
             return 0.0, max(-self._limits.turn_rate, min(self._limits.turn_rate, 2.0 * error))
         node = self._tree.nodes[self._node]
         view = joined_views(node.view, view_of(senses.scan, self._lidar, float(senses.pose[2])))
         node.view = view
         node.safe, node.seen, node.openings = self._regions(node.pose, view)
         self._looks.pop(0)
-        self._stand(senses)
+        self._progress.stand(senses)
         return REST if self._looks else None
 
     def _review(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
@@ -262,28 +261,27 @@ class Explorer:
         self.ending = ending
         self._route = home_way(self._tree, self._node, self._root, self.known, senses, memory)
         self._drive = None
-        self._stand(senses)
+        self._progress.stand(senses)
         self.is_home = not self._route
 
     def _set_out(self, way: list[Choice], senses: Senses) -> None:
-        self._route, self._drive = way, None
+        self._route, self._drive, self._is_aside = way, None, False
         self._source.latest = None if self.target is None else self.target.focus
         self._chose_at = senses.pose[:2]
-        self._stand(senses)
+        self._progress.stand(senses)
 
     def _follow(self, senses: Senses, memory: Memory) -> Command:
         """Drive along the way, cutting corners where the map says that there is room."""
         if self._drive is None:
             self._cut_corner(senses, memory)
             self._drive = Drive(self._route[0].place)
-        if self._is_stuck(senses):
+        if self._progress.is_stuck(senses):
             self._settle_block(senses, memory)
             return REST
         leg = self._route[0]
         free = free_way(senses.scan, self._lidar, self._limits.radius)
-        self._drive, speed, turn_rate = driven(
-            self._drive, senses.pose, free, self._limits, self._settings, 0.03 if leg.is_goal else self._settings.arrived
-        )
+        arrived = EXACTLY if leg.is_goal else self._settings.arrived
+        self._drive, speed, turn_rate = driven(self._drive, senses.pose, free, self._limits, self._settings, arrived)
         if self._drive.phase is Phase.DONE:
             self._arrive(leg, senses, memory)
             return REST
@@ -299,7 +297,8 @@ class Explorer:
 
     def _arrive(self, leg: Choice, senses: Senses, memory: Memory) -> None:
         """Take note of where the robot has come."""
-        self._route, self._drive, self._failures = self._route[1:], None, 0
+        self._route, self._drive = self._route[1:], None
+        self._failures = self._failures if self._is_aside else 0
         if leg.node is not None:
             self._return_to(leg.node, senses, memory)
         elif leg.is_goal:
@@ -327,25 +326,16 @@ class Explorer:
         if self._settings.repeats_nodes and not self._route and self.ending is None:
             self._add_node(senses, node.parent, np.array([*node.place, senses.pose[2]]), memory)
 
-    def _stand(self, senses: Senses) -> None:
-        self._stood_since, self._stood_at = senses.time_s, senses.pose
-
-    def _is_stuck(self, senses: Senses) -> bool:
-        """Whether the robot has not got on for a while."""
-        gap = senses.pose - self._stood_at
-        if math.hypot(gap[0], gap[1]) > MOVED or abs(wrapped(float(gap[2]))) > TURNED:
-            self._stand(senses)
-        return senses.time_s - self._stood_since > PATIENCE_S
-
     def _settle_block(self, senses: Senses, memory: Memory) -> None:
-        """Step aside for a teammate, or give the target up and back out."""
-        leg, target = self._route[0], self.target
-        self._stand(senses)
+        """Back out, step aside, or give the target up: what stops a robot far from its target seldom has to do with it."""
+        leg, target, is_there = self._route[0], self.target, len(self._route) == 1
+        blocks = 1 if self._is_aside else self._progress.note_block(senses)
+        self._progress.stand(senses)
         if leg.node is not None and senses.distance_to(leg.place) < NEAR_NODE:
             self._arrive(leg, senses, memory)
             return
         self._failures += 1
-        has_mate = any(senses.distance_to(mate) < MATE_NEAR for mate in senses.mates)
+        steps_aside = blocks % 3 == 2 or any(senses.distance_to(mate) < MATE_NEAR for mate in senses.mates)
         departed = self._node
         self._pause(senses, memory)
         if leg.is_goal and self._failures > ASIDES:
@@ -353,7 +343,7 @@ class Explorer:
             self._failures = 0
             self._go_home("blocked", senses, memory)
             return
-        if has_mate and self._asides < ASIDES:
+        if steps_aside and self._asides < ASIDES:
             self._asides += 1
             self._step_aside(senses)
             return
@@ -361,7 +351,7 @@ class Explorer:
         if leg.node is not None:
             self._tree.disconnect(departed, leg.node)
             self._tree.disconnect(self._node, leg.node)
-        elif target is not None:
+        elif target is not None and (is_there or blocks % 3 == 0):
             self._source.note_tried(target)
             if target.is_frontier:
                 memory.give_up(target.focus)
@@ -381,4 +371,5 @@ class Explorer:
             if region.radius_at(angle) >= distance:
                 place = region.place + distance * np.array([math.cos(angle), math.sin(angle)])
                 self._set_out([Choice(place, None, Candidate(node.number, place, None, place))], senses)
+                self._is_aside = True
                 return

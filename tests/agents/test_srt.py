@@ -8,6 +8,8 @@ import pytest
 
 import lidarium
 from lidarium.agents.policy import Stop
+from lidarium.agents.srt.explorer import Explorer
+from lidarium.agents.srt.memory import MapMemory
 from lidarium.agents.srt.policy import SensorBasedRandomTree
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.evaluation.runner import run_episode
@@ -213,11 +215,48 @@ class Held(SensorBasedRandomTree):
         return {agent: action if isinstance(action, Stop) else np.zeros(2, np.float32) for agent, action in wanted.items()}
 
 
+class HeldFarAway(Held):
+    """A tree whose robot something holds once it is on a way of several legs, after a minute."""
+
+    is_held = False
+
+    def act(self, observations):
+        legs = self._explorers["robot_0"]._route
+        self.is_held = self.is_held or (self._team.time_s >= 60.0 and len(legs) > 1)
+        act = Held.act if self.is_held else SensorBasedRandomTree.act
+        return act(self, observations)
+
+
 @pytest.mark.parametrize(("budget", "ending"), [({}, "horizon"), ({"time_s": 30.0}, "budget")])
 def test_a_robot_that_something_holds_ends_with_a_reason(budget, ending):
     env = lidarium.parallel_env("srt_lab", robots=1, robot="pioneer", horizon_s=90.0, stop_coverage=None, map_cells=32)
     run_episode(Held(**budget), env, 1)
     assert env.scorer.ended_because == {"robot_0": ending}
+
+
+def test_what_stops_a_robot_on_its_way_is_not_held_against_a_target_far_away_at_once(monkeypatch):
+    blocks, given_up_at, settle, give_up = [], [], Explorer._settle_block, MapMemory.give_up
+
+    def noted(self, senses, memory):
+        legs, before = len(self._route), len(given_up_at)
+        settle(self, senses, memory)
+        blocks.append((senses.time_s, legs, len(given_up_at) - before))
+
+    def counted(self, focus):
+        given_up_at.append(focus)
+        give_up(self, focus)
+
+    monkeypatch.setattr(Explorer, "_settle_block", noted)
+    monkeypatch.setattr(MapMemory, "give_up", counted)
+    env = lidarium.parallel_env("office:44", robots=1, robot="pioneer", horizon_s=150.0, stop_coverage=None)
+    run_episode(HeldFarAway(), env, 1)
+    held = np.array([[legs, given_up] for time_s, legs, given_up in blocks if time_s > 60.0])
+    legs, given_up = held.T
+    assert len(held) >= 15
+    assert legs[0] > 1
+    # It backs out, steps aside, and only then gives a target up that it is not at.
+    assert given_up[:3].sum() == 0
+    assert 0 < given_up.sum() <= len(held) // 3
 
 
 def test_a_robot_that_is_pushed_aside_still_reaches_its_goal():

@@ -11,7 +11,9 @@ from lidarium.agents.srt.candidates import CandidateSource
 from lidarium.agents.srt.drive import Drive, Limits, Phase, driven, free_way
 from lidarium.agents.srt.frontier_arcs import openings_of
 from lidarium.agents.srt.memory import RegionMemory
+from lidarium.agents.srt.progress import Progress
 from lidarium.agents.srt.safe_region import ANGLES, DIRECTIONS, STEP, UNIT, joined_views, region_of, safe_region, seen_region, view_of
+from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SHAPES, SrtSettings, make_srt_settings
 from lidarium.agents.srt.tree import Node, Tree, way_to
 from lidarium.mapping.scans import ScanGeometry
@@ -203,6 +205,38 @@ def test_a_drive_turns_advances_and_is_done(kind, target):
     assert phases[-1] is Phase.DONE
     assert Phase.ADVANCE in phases
     assert math.dist(pose[:2], target) <= 0.1
+
+
+def test_a_robot_turns_to_where_its_way_leads_exactly_where_something_is_near():
+    aside = np.array([2.0 * math.cos(0.2), 2.0 * math.sin(0.2)])
+    for free, phase in ((3.0, Phase.ADVANCE), (0.3, Phase.TURN)):
+        drive, speed, _ = driven(Drive(aside), np.zeros(3), free, LIMITS, SrtSettings(), 0.1)
+        assert drive.phase is phase
+        assert (speed > 0.0) == (phase is Phase.ADVANCE)
+    drive, speed, _ = driven(Drive(aside), np.array([0.0, 0.0, 0.19]), 0.3, LIMITS, SrtSettings(), 0.1)
+    assert speed > 0.0
+
+
+def test_blocks_at_one_place_are_counted_in_a_row():
+    def there(x, time_s):
+        return Senses(time_s, np.array([x, 0.0, 0.0]), np.empty(0, np.float32), False, None, [])
+
+    progress = Progress()
+    assert [progress.note_block(there(x, 0.0)) for x in (1.0, 1.3, 1.1, 3.0, 3.2, 1.0)] == [1, 2, 3, 1, 2, 1]
+    progress.stand(there(1.0, 10.0))
+    assert not progress.is_stuck(there(1.01, 12.9))
+    assert progress.is_stuck(there(1.01, 13.2))
+    assert not progress.is_stuck(there(1.2, 13.3))
+
+
+@pytest.mark.parametrize("beside", [0.182, 0.189, 0.195])
+def test_a_wall_beside_the_robot_is_no_end_of_a_way_along_it(beside):
+    scan = np.full(727, 5.6, np.float32)
+    left = np.flatnonzero(URG.angles > math.radians(10.0))
+    scan[left] = np.minimum(beside / np.sin(np.minimum(URG.angles[left], math.pi / 2)), 5.6)
+    assert free_way(scan, URG, 0.18) == pytest.approx(5.6)
+    # Towards the wall the way ends where the body would touch it.
+    assert free_way(scan, URG, 0.18, heading=math.radians(30.0)) < 0.05
 
 
 def test_a_drive_stops_before_what_the_laser_sees_ahead():

@@ -1,0 +1,42 @@
+"""Whether a robot gets on, and how often in a row something stopped it at one place."""
+
+import math
+
+import numpy as np
+
+from lidarium.agents.srt.senses import Senses
+from lidarium.mapping.rigid import wrapped
+
+PATIENCE_S = 3.0
+"""A robot that has neither moved nor turned for this long while it drives is blocked [s]."""
+
+MOVED, TURNED = 0.05, 0.1
+"""What counts as having moved [m] and turned [rad]."""
+
+SAME_PLACE = 0.5
+"""Blocks nearer to each other than this are at one place [m]."""
+
+
+class Progress:
+    """What a robot remembers of how it got on."""
+
+    def __init__(self) -> None:
+        self._since, self._at = 0.0, np.zeros(3)
+        self._blocked_at, self._blocks = np.full(2, math.inf), 0
+
+    def stand(self, senses: Senses) -> None:
+        """Count from now on: the robot is not expected to have moved before."""
+        self._since, self._at = senses.time_s, senses.pose
+
+    def is_stuck(self, senses: Senses) -> bool:
+        """Whether the robot has not got on for a while."""
+        gap = senses.pose - self._at
+        if math.hypot(gap[0], gap[1]) > MOVED or abs(wrapped(float(gap[2]))) > TURNED:
+            self.stand(senses)
+        return senses.time_s - self._since > PATIENCE_S
+
+    def note_block(self, senses: Senses) -> int:
+        """Note that the robot is blocked where it is; returns how often in a row it was blocked there, 1 the first time."""
+        self._blocks = self._blocks + 1 if senses.distance_to(self._blocked_at) < SAME_PLACE else 1
+        self._blocked_at = senses.pose[:2]
+        return self._blocks
