@@ -1,6 +1,7 @@
 """What a search looks for: cells of a mask, each within a disc around where the body stands."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -37,6 +38,15 @@ class Targets:
         rows, columns = (np.arange(0, side, size) for side in cells.shape)
         counts = np.add.reduceat(np.add.reduceat((cells == 1).astype(np.int32), rows, axis=0), columns, axis=1)
         return cls(cells, near_tiles(counts, reach), disc_spans(reach))
+
+    @classmethod
+    def at(cls, cells: Iterable[tuple[int, int]], shape: tuple[int, ...]) -> "Targets":
+        """Look for some cells (row, column) of a grid, from these cells themselves."""
+        size = 1 << TILE_SHIFT
+        mask, near = np.zeros(shape, np.uint8), np.zeros([-(-side // size) for side in shape], np.uint8)
+        for row, column in cells:
+            mask[row, column] = near[row >> TILE_SHIFT, column >> TILE_SHIFT] = 1
+        return cls(mask, near, disc_spans(0.0))
 
 
 @lru_cache(maxsize=64)

@@ -3,7 +3,12 @@
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
+
+# The first example may have to wait until kernels are compiled.
+hypothesis.settings.register_profile("lidarium", parent=hypothesis.settings(), deadline=None)
+hypothesis.settings.load_profile("lidarium")
 
 # Tests neither read nor fill the user's store of floors; those of the store name one of their own.
 os.environ["LIDARIUM_FLOOR_STORE"] = "off"

@@ -13,7 +13,8 @@ from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.team_driver import footprint_of
 from lidarium.mapping.frontier_approach import approach, default_reach
 from lidarium.mapping.frontiers import FRONTIER
-from lidarium.mapping.grid_planning import centres_of, plan, search
+from lidarium.mapping.grid_planning import Cell, centres_of, plan, search
+from lidarium.mapping.search_targets import Targets
 
 CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
@@ -134,8 +135,8 @@ class MapMemory:
         clusters = self._map.frontiers.clusters(minimum_cells=at_least)
         if not (is_inside.all() and len(clusters)):
             return None
-        footprint, field = footprint_of(self._body), self._map.clearance
-        found = search(self._map.space, self._map.log_odds, field, (int(rows[0]), int(columns[0])), footprint)
+        footprint = footprint_of(self._body)
+        found = search(self._map.space, self._map.log_odds, self._map.clearance, (int(rows[0]), int(columns[0])), footprint)
         near = approach(clusters, found, self._map.log_odds, default_reach(footprint, self._map.resolution))
         reached = np.flatnonzero(near.reachable)
         if not len(reached):
@@ -145,27 +146,31 @@ class MapMemory:
         ways = [self._centres(found.path(stand)) for stand in stands]
         ahead = round(AHEAD / self._map.resolution)
         costs = near.costs[chosen]
-
-        def between(numbers: NDArray[np.int64]) -> NDArray[np.float64]:
-            table = np.zeros((len(numbers), len(numbers)))
-            for row, k in enumerate(numbers[:-1]):
-                # There is always the way past where the robot is: nothing beyond it needs to be looked at.
-                reach = float(costs[k] + costs[numbers].max())
-                others = search(self._map.space, self._map.log_odds, field, stands[k], footprint, maximum_cost=reach)
-                for column in range(row + 1, len(numbers)):
-                    other = numbers[column]
-                    table[row, column] = table[column, row] = min(others.cost(stands[other]), costs[k] + costs[other])
-            return table
-
         return Frontiers(
             focuses=np.array(self._centres(near.frontier_cells[chosen])),
             cells=[np.array(self._centres(clusters.of(int(k)))) for k in chosen],
             sizes=clusters.sizes[chosen],
             costs=costs,
             ahead=np.array([way[min(ahead, len(way) - 1)] for way in ways]),
-            between=between,
+            between=lambda numbers: self._between([stands[k] for k in numbers], costs[numbers]),
             legs=lambda k: self._legs(start, ways[k][1:] or ways[k]),
         )
+
+    def _between(self, stands: list[Cell], costs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what the ways between cells (n) cost, shape (n, n) [m], of which those from the robot to each are known."""
+        footprint = footprint_of(self._body)
+        table = np.zeros((len(stands), len(stands)))
+        targets = Targets.at(stands, self._map.log_odds.shape)
+        for k, stand in enumerate(stands[:-1]):
+            targets.mask[stand] = 0
+            # There is always the way past where the robot is: nothing beyond it needs to be looked at.
+            found = search(
+                self._map.space, self._map.log_odds, self._map.clearance, stand, footprint,
+                targets=targets, count=len(set(stands[k + 1 :]) - {stand}), maximum_cost=float(costs[k] + costs.max()),
+            )  # fmt: skip
+            for other in range(k + 1, len(stands)):
+                table[k, other] = table[other, k] = min(found.cost(stands[other]), costs[k] + costs[other])
+        return table
 
     def is_frontier(self, focus: Place) -> bool:
         """Whether the cell is a frontier of the map."""

@@ -64,7 +64,7 @@ def test_the_five_laser_regions_go_from_right_to_left():
     assert region_of(np.radians(degrees)).tolist() == [0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4, 5, 6]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2**31), st.floats(-3.0, 3.0))
 def test_a_ball_lies_within_the_star_and_the_star_within_the_radial_region(seed, heading):
     generator = np.random.default_rng(seed)
@@ -76,7 +76,7 @@ def test_a_ball_lies_within_the_star_and_the_star_within_the_radial_region(seed,
     assert (radial[np.isnan(view)] == 0.0).all()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**31))
 def test_no_end_of_a_ray_comes_within_the_body_on_the_way_through_a_region(seed):
     generator = np.random.default_rng(seed)

@@ -52,7 +52,7 @@ def starts_on(tables, count, generator, apart=0.6):
 
 
 @given(rows=st.integers(1, 9), columns=st.integers(1, 200), seed=st.integers(0, 99))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_packing_and_unpacking_bits_is_lossless(rows, columns, seed):
     cells = np.random.default_rng(seed).random((rows, columns)) < 0.5
     bits = pack_bits(cells)
@@ -114,7 +114,7 @@ def test_credits_are_equal_shares_of_what_is_new_to_the_team(robots):
 
 
 @given(seed=st.integers(0, 2**32 - 1), robots=st.integers(1, 6))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_sharing_news_equals_a_slow_count_cell_by_cell(seed, robots):
     generator = np.random.default_rng(seed)
     rows, columns = 12, 192

@@ -20,7 +20,7 @@ def by_brute_force(occupied, resolution, maximum):
     return nearest
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 10**6),
     rows=st.integers(1, 50),
@@ -35,7 +35,7 @@ def test_clearance_is_the_distance_to_the_nearest_occupied_square(seed, rows, co
     np.testing.assert_allclose(found, by_brute_force(occupied, RESOLUTION, maximum), atol=1e-6)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10**6), edits=st.integers(1, 8))
 def test_updates_of_windows_agree_with_a_field_made_anew(seed, edits):
     random = np.random.default_rng(seed)

@@ -46,7 +46,7 @@ def made(belief):
     return field, frontiers
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=SEEDS, edits=st.integers(0, 6))
 def test_flags_kept_up_to_date_by_windows_are_those_of_the_whole_map(seed, edits):
     random = np.random.default_rng(seed)
@@ -65,7 +65,7 @@ def test_flags_kept_up_to_date_by_windows_are_those_of_the_whole_map(seed, edits
     assert len(frontiers) == expected.sum()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=SEEDS, minimum=st.integers(1, 6))
 def test_clusters_are_the_8_connected_components(seed, minimum):
     belief = random_belief(seed)
@@ -114,7 +114,7 @@ def line_is_open(belief, tail, head):
     return not (belief[cells[:, 0], cells[:, 1]] > 0)[~own].any()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=SEEDS)
 def test_a_cell_is_visible_where_no_occupied_cell_lies_on_the_line(seed):
     random = np.random.default_rng(seed)
@@ -146,7 +146,7 @@ def by_full_search(belief, found, cluster, reach):
     return best, best_seen
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=SEEDS, radius=st.sampled_from([0.03, 0.1]))
 def test_approaches_are_the_cheapest_cells_in_reach_and_sight_and_the_nearest_is_their_least(seed, radius):
     belief = random_belief(seed)

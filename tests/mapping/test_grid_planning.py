@@ -79,7 +79,7 @@ def open_start(belief, footprint, seed):
     return None if len(cells) == 0 else tuple(int(i) for i in np.random.default_rng(seed).choice(cells))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=SEEDS, radius=st.sampled_from([0.0, 0.03, 0.05, 0.0625]), penalty=st.sampled_from([0.0, 3.0, 40.0]))
 def test_costs_are_those_of_dijkstra_over_the_explicit_graph(seed, radius, penalty):
     footprint = Footprint(radius, radius + 0.1, penalty)
@@ -95,7 +95,7 @@ def test_costs_are_those_of_dijkstra_over_the_explicit_graph(seed, radius, penal
     np.testing.assert_allclose(found[reached], expected[reached], rtol=3e-4)  # whole units of cost
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=SEEDS, penalty=st.sampled_from([0.0, 3.0, 40.0]))
 def test_a_star_and_the_search_for_a_goal_cost_what_the_full_search_does(seed, penalty):
     footprint = Footprint(0.05, 0.15, penalty)
@@ -111,7 +111,7 @@ def test_a_star_and_the_search_for_a_goal_cost_what_the_full_search_does(seed, p
     assert (math.inf if guided is None else guided[0]) == full
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=SEEDS)
 def test_a_path_costs_what_was_said_and_a_disc_driven_along_it_touches_nothing(seed):
     footprint = Footprint(0.0625, 0.15, 3.0)
@@ -152,7 +152,7 @@ def touches_nothing(line, belief, radius):
     return True
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=SEEDS, count=st.integers(1, 5), reach=st.sampled_from([0.0, 2.5, 9.0]))
 def test_the_first_targets_are_the_cheapest_of_the_full_search(seed, count, reach):
     footprint = Footprint(0.03, 0.1, 3.0)
@@ -173,6 +173,23 @@ def test_the_first_targets_are_the_cheapest_of_the_full_search(seed, count, reac
     if reach == 0.0:
         full = search(space, belief, field, start, footprint).costs()
         assert len(hits) == np.isfinite(full[mask]).sum()
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, count=st.integers(1, 6))
+def test_a_search_for_some_cells_ends_when_all_of_them_have_their_costs(seed, count):
+    footprint = Footprint(0.03, 0.1, 3.0)
+    belief = random_belief(seed, shape=(50, 60), walls=10)
+    start = open_start(belief, footprint, seed)
+    if start is None:
+        return
+    space, field = made(belief)
+    full = search(space, belief, field, start, footprint).costs()
+    reached = np.argwhere(np.isfinite(full))
+    cells = {tuple(map(int, cell)) for cell in np.random.default_rng(seed).choice(reached, count)}
+    found = search(space, belief, field, start, footprint, targets=Targets.at(cells, belief.shape), count=len(cells))
+    assert {cell: found.cost(cell) for cell in cells} == {cell: full[cell] for cell in cells}
+    assert {tuple(cell) for cell in found.hits.tolist()} == cells
 
 
 def test_searches_do_not_see_what_earlier_searches_left():

@@ -24,7 +24,7 @@ def levels_of_sum(total):
     return np.where(total < 0, 255, np.where(total > 0, 0, 127)).astype(np.uint8)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32), st.integers(1, 6), st.integers(1, 9), st.integers(1, 4), st.floats(0.0, 1.0))
 def test_changes_lead_from_map_to_map(seed, robots, rows, words, share):
     generator = np.random.default_rng(seed)
@@ -70,7 +70,7 @@ def test_robots_beyond_the_map_are_no_harm():
         )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32), st.integers(1, 3))
 def test_turned_maps_are_laid_over_the_lattice_where_they_changed(seed, robots):
     generator = np.random.default_rng(seed)

@@ -69,7 +69,7 @@ def crop(log_odds, row, column, heading, scales, cells):
 
 
 @given(seed=st.integers(0, 10**6), scale=st.integers(2, 17), changes=st.integers(1, 6))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_pooled_map_kept_up_to_date_is_the_one_made_anew(seed, scale, changes):
     generator = np.random.default_rng(seed)
     log_odds = np.zeros((37, 192), np.int8)
@@ -86,7 +86,7 @@ def test_a_pooled_map_kept_up_to_date_is_the_one_made_anew(seed, scale, changes)
 
 
 @given(row=st.integers(-40, 80), column=st.integers(-40, 170), half=st.integers(1, 32), seed=st.integers(0, 99))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_a_crop_is_what_numpy_cuts_out_unknown_outside(row, column, half, seed):
     log_odds = np.random.default_rng(seed).integers(-3, 4, (40, 128)).astype(np.int8)
     cut = np.full((2 * half, 2 * half), 99, np.uint8)
@@ -104,7 +104,7 @@ def test_a_crop_is_what_numpy_cuts_out_unknown_outside(row, column, half, seed):
     half=st.integers(1, 40),
     seed=st.integers(0, 99),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_a_turned_crop_is_what_numpy_pools_and_looks_up(row, column, heading, scales, half, seed):
     log_odds = random_map(seed)
     crops = crop(log_odds, row, column, heading, scales, 2 * half)
@@ -129,7 +129,7 @@ def test_a_turned_crop_is_right_all_around_within_a_large_map(heading, cells, sc
     half=st.integers(1, 33),
     seed=st.integers(0, 99),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_along_the_axes_a_crop_is_the_cells_around_the_corner_turned_by_quarters(row, column, quarters, scale, half, seed):
     log_odds = random_map(seed)
     crops = crop(log_odds, row, column, quarters * math.pi / 2.0, [scale], 2 * half)

@@ -18,7 +18,7 @@ def write(folder, pixels, **changes):
     return folder / "map.yaml"
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(arrays(np.uint8, array_shapes(min_dims=2, max_dims=2, max_side=20), elements=st.sampled_from([0, 127, 255])))
 def test_a_map_written_reads_back_the_same(tmp_path_factory, levels):
     folder = tmp_path_factory.mktemp("maps")

@@ -90,7 +90,7 @@ def test_a_closed_room_is_seen_whole_and_nothing_beyond_its_walls():
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_each_cell_changes_at_most_once_a_scan_by_hit_or_miss_within_the_bounds(seed):
     generator = np.random.default_rng(seed)
     settings_ = OccupancySettings(resolution=RESOLUTION)
@@ -199,7 +199,7 @@ def test_a_grid_that_grew_in_steps_equals_one_made_large_at_once():
 
 
 @given(x=st.floats(-30.0, 30.0), y=st.floats(-30.0, 30.0), first=st.floats(-3.0, 3.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_growth_keeps_origins_on_the_lattice_and_every_known_cell_in_its_place(x, y, first):
     grid = OccupancyGrid(OccupancySettings(resolution=RESOLUTION), (first, first, first + 1.0, first + 1.0))
     origin = grid.origin

@@ -35,7 +35,7 @@ def memory_for(clearance, cells=64 * 64):
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_path_is_that_of_the_search_of_all_and_the_memory_is_blank_again(seed):
     log_odds, clearance = belief(seed)
     passage, memory = memory_for(clearance)

@@ -69,7 +69,7 @@ CASES = [(727, math.radians(240.0), 112.0), (180, 2.0 * math.pi, 60.0), (40, mat
 
 @pytest.mark.parametrize(("beams", "view", "reach"), CASES)
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_seen_area_is_the_polygon_of_its_definition_cell_by_cell(beams, view, reach, seed):
     generator = np.random.default_rng(seed)
     geometry = ScanGeometry(beams=beams, field_of_view=view, range_max=reach)
@@ -83,7 +83,7 @@ def test_the_seen_area_is_the_polygon_of_its_definition_cell_by_cell(beams, view
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_rows_told_hold_all_bits(seed):
     generator = np.random.default_rng(seed)
     geometry = ScanGeometry(beams=120, field_of_view=generator.choice([1.0, 4.0, 2.0 * math.pi]), range_max=30.0)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 FLOORS = ("apartment", "clinic", "scene_room", "scene_corridor", "building:3", "building:5", "building:8", "apartment:2", "office:6")
 
 
-@settings(max_examples=12, deadline=None, derandomize=True, database=None)
+@settings(max_examples=12, derandomize=True, database=None)
 @given(
     floors=st.lists(st.sampled_from(FLOORS), min_size=1, max_size=6),
     robots=st.integers(1, 4),

@@ -36,7 +36,7 @@ def test_a_robot_of_radius_30_cm_reaches_everything(kind, resolution, height):
         assert parts(generate_building(seed, BuildingSettings(kind=kind)), resolution, height) == 1, f"seed {seed}"
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     seed=st.integers(0, 2**63),
     kind=st.sampled_from(KINDS),

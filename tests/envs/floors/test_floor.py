@@ -42,7 +42,7 @@ def test_rasters_are_padded_to_eight_with_a_solid_ring_and_an_origin_on_the_latt
     np.testing.assert_array_equal(raster.solid == 0, inside)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.tuples(st.floats(0.3, 2.7), st.floats(0.3, 2.7)), min_size=3, max_size=9),
     st.sampled_from([0.02, 0.025, 0.05]),
@@ -76,7 +76,7 @@ def test_neighbours_that_share_an_edge_leave_no_cell_between_them():
     assert raster.solid.all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(0.0, math.pi), st.floats(0.001, 0.08), st.sampled_from([0.02, 0.025, 0.05]))
 def test_no_ray_slips_through_a_thin_wall_however_it_is_turned(turn, thickness, resolution):
     direction = np.array([math.cos(turn), math.sin(turn)])

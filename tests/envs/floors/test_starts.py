@@ -26,7 +26,7 @@ def random_raster(seed, share):
     return Raster(solid, (0.0, 0.0), 0.05)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 1000), st.floats(0.0, 0.2), st.sampled_from([0.0, 0.01, 0.05, 0.1, 0.12, 0.18, 0.2]))
 def test_the_configuration_space_keeps_the_radius_from_every_solid_square(seed, share, radius):
     raster = random_raster(seed, share)
@@ -38,7 +38,7 @@ def test_the_configuration_space_keeps_the_radius_from_every_solid_square(seed, 
     np.testing.assert_array_equal(configuration_space(raster, radius), (distance >= radius - 1e-9) & (raster.solid == 0))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 1000), st.sampled_from([0.0, 0.05, 0.1, 0.12]))
 def test_the_swept_space_is_what_discs_cover_from_the_start(seed, radius):
     raster = random_raster(seed, 0.05)
@@ -70,7 +70,7 @@ def test_both_rooms_are_swept_if_robots_start_in_both():
     assert swept.sum() * 0.025**2 > 23.0
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000), st.integers(1, 8))
 def test_drawn_starts_fit_keep_their_distance_and_share_the_largest_room(seed, count):
     raster = two_rooms()

@@ -39,7 +39,7 @@ def gap_to(cell, path):
 
 
 @given(x=st.floats(0.0, 4.0), y=st.floats(0.0, 4.0), distance=st.floats(0.1, 1.0))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_a_body_obstructs_a_path_within_the_distance(x, y, distance):
     path = np.array([[0.5, 0.5], [3.0, 0.5], [3.0, 3.5]])
     dense = np.concatenate([np.linspace(path[k], path[k + 1], 2000) for k in range(2)])

@@ -170,7 +170,7 @@ def test_both_casters_agree_with_the_slow_traversal_to_a_tenth_of_a_millimetre(k
     beams=st.sampled_from([1, 31, 64, 200]),
     view=st.sampled_from([0.3, math.radians(240.0), 2.0 * math.pi]),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_random_floor_and_pose_tells_the_casters_from_the_reference(seed, beams, view):
     generator = np.random.default_rng(seed)
     solid = speckled(generator, 40, 50)
@@ -232,7 +232,7 @@ def test_rays_through_lattice_corners_end_and_never_leak_through_a_wall_of_cells
 @given(
     x=st.integers(2, 58), y=st.integers(2, 38), dx=st.integers(-12, 12), dy=st.integers(-12, 12), seed=st.integers(0, 50),
 )  # fmt: skip
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_rays_from_lattice_points_through_lattice_points_never_hang_or_leak(x, y, dx, dy, seed):
     if dx == 0 and dy == 0:
         return
@@ -318,7 +318,7 @@ def disc_ranges(directions, offset, radius, reach):
     angle=st.floats(-math.pi, math.pi), distance=st.floats(0.5, 60.0), radius=st.floats(0.1, 12.0), heading=st.floats(-7.0, 7.0),
     beams=st.sampled_from([1, 2, 37, 360]), view=st.sampled_from([math.radians(90.0), math.radians(240.0), 2.0 * math.pi]),
 )  # fmt: skip
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_a_disc_cuts_exactly_the_beams_that_meet_it(angle, distance, radius, heading, beams, view):
     if distance <= radius * 1.001:
         return

@@ -89,7 +89,7 @@ def test_a_free_arc_in_pieces_near_a_wall_is_the_same_arc():
     seed=st.integers(0, 2**32 - 1), robots=st.integers(1, 5), density=st.sampled_from([0.0, 0.002, 0.01]),
     kind=st.sampled_from(["kobuki", "pioneer", "point", "fast"]),
 )  # fmt: skip
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_robot_ever_is_inside_a_wall_or_another_robot(seed, robots, density, kind):
     generator = np.random.default_rng(seed)
     robot = UNLIMITED if kind == "fast" else ROBOTS[kind]
@@ -167,7 +167,7 @@ def test_bumpers_are_released_when_the_robot_drives_away():
 
 
 @given(commands=st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-9.0, 9.0)), min_size=1, max_size=25))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_limits_of_speed_and_acceleration_hold(commands):
     bodies = Bodies(hall(), [2.5, 2.0, 0.0], KOBUKI)
     for command in commands:
@@ -217,7 +217,7 @@ def test_a_contact_that_lasts_counts_once_and_a_new_one_again():
 
 
 @given(x=st.floats(0.2, 4.8), y=st.floats(0.2, 3.8), seed=st.integers(0, 1000))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_deepest_wall_is_the_nearest_square(x, y, seed):
     generator = np.random.default_rng(seed)
     solid = hall() | (generator.random((160, 200)) < 0.01).astype(np.uint8)
@@ -233,7 +233,7 @@ def test_the_deepest_wall_is_the_nearest_square(x, y, seed):
 
 
 @given(seed=st.integers(0, 1000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_distance_bound_never_promises_more_room_than_there_is(seed):
     generator = np.random.default_rng(seed)
     solid = hall(40, 50) | (generator.random((40, 50)) < 0.01).astype(np.uint8)

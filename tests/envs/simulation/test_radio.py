@@ -28,7 +28,7 @@ def sampled_length(solid, x, y, to_x, to_y, samples=40_000):
 PLACE = st.tuples(st.floats(-3.0, 53.0), st.floats(-3.0, 43.0))
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, database=None)
+@settings(max_examples=60, derandomize=True, database=None)
 @given(one=PLACE, other=PLACE, seed=st.integers(0, 1000))
 def test_the_way_through_walls_is_that_of_many_samples_and_the_same_both_ways(one, other, seed):
     solid = raster(np.random.default_rng(seed)).solid

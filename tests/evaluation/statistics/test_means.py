@@ -93,7 +93,7 @@ def test_a_paired_ratio_is_the_geometric_mean_of_ratios():
     assert turned.estimate == pytest.approx(0.5)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=30), st.floats(-50.0, 50.0), st.floats(0.1, 10.0))
 def test_intervals_move_and_stretch_with_the_values(values, shift, scale):
     sample = np.round(values, 3)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -51,7 +51,6 @@ def test_without_censoring_the_interval_is_that_of_the_mean():
     assert (found.estimate, found.low, found.high) == pytest.approx((plain.estimate, plain.low, plain.high))
 
 
-@settings(deadline=None)
 @given(censored_rows, st.integers(1, 12))
 def test_the_estimate_is_the_area_below_scipys_curve(rows, horizon):
     times, seen = np.array([time for time, _ in rows], float), np.array([seen for _, seen in rows])

@@ -35,7 +35,7 @@ def drive(calibration, errors, steps=400, seed=0, told=SURE):
 shares = st.floats(-0.12, 0.12)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(along=shares, turn=shares, drift=st.floats(-0.06, 0.06))
 def test_errors_of_wheels_are_learned_from_matches(along, turn, drift):
     errors = np.array([along, turn, drift])

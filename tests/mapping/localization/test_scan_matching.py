@@ -37,7 +37,7 @@ offsets = st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(-0.25,
 errors = st.tuples(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.15, 0.15))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(offset=offsets, error=errors)
 def test_a_scan_is_laid_where_it_was_taken_from_anywhere_within_the_window(submap, offset, error):
     true = np.array(offset)
@@ -51,7 +51,7 @@ def test_a_scan_is_laid_where_it_was_taken_from_anywhere_within_the_window(subma
     assert match.contradiction < 0.02
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(offset=offsets, error=st.tuples(st.floats(-1.5, 1.5), st.floats(-1.0, 1.0), st.floats(-0.5, 0.5)))
 def test_branch_and_bound_finds_it_within_a_wide_window(submap, offset, error):
     true = np.array(offset)

@@ -69,7 +69,7 @@ def test_half_way_lies_between(a, b):
     assert middle.difference(a, (1.0, 1.0))[0] == pytest.approx(middle.difference(b, (1.0, 1.0))[0], abs=1e-9)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(POSES)
 def test_every_exact_match_proposes_the_true_transform(pose):
     first, second = seen_from(*scattered(8), pose)

@@ -25,7 +25,7 @@ def test_free_needs_a_majority_over_occupied(votes, level):
     assert (fused.levels == level).all()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.floats(-3, 3), st.floats(-5, 5), st.floats(-5, 5))
 def test_a_fused_map_lies_where_the_transform_puts_it(theta, x, y):
     pose = Transform(x, y, theta)

@@ -26,7 +26,7 @@ def is_right(result, truth, at, distance=0.1, degrees=1.0):
     return error <= distance and angle <= math.radians(degrees)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.floats(-math.pi, math.pi), st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), st.integers(0, 99))
 def test_a_turned_shifted_and_noisy_map_is_joined_where_it_belongs(theta, shift, seed):
     truth = about_middle(theta, apartment(), shift=shift)
@@ -35,7 +35,7 @@ def test_a_turned_shifted_and_noisy_map_is_joined_where_it_belongs(theta, shift,
     assert is_right(result, truth, (5.0, 4.0))
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(st.integers(0, 40), st.integers(0, 40))
 def test_margins_of_unknown_cells_change_nothing_but_the_translation(rows, columns):
     plain = merged(moved(apartment(), about_middle(0.6, apartment())), apartment())

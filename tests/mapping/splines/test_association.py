@@ -42,7 +42,7 @@ def test_the_overlap_is_bounded_by_whichever_curve_ends_first(seen, seen_part, k
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-math.pi, math.pi))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_the_overlap_does_not_depend_on_where_both_curves_are(x, y, theta):
     move = Transform(x, y, theta)
     seen, known = along(-1.0, 2.0, 0.04), along(0.0, 4.0)

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
@@ -37,7 +37,6 @@ SHARES = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20)
 
 
 @given(splines(), SHARES)
-@settings(deadline=None)
 def test_curve_and_derivatives_are_those_of_scipy(spline, shares):
     at = np.append(within(spline, shares), spline.knots[3:-3])
     reference = BSpline(spline.knots, spline.control_points, 3)
@@ -48,7 +47,6 @@ def test_curve_and_derivatives_are_those_of_scipy(spline, shares):
 
 
 @given(splines(), SHARES)
-@settings(deadline=None)
 def test_basis_sums_to_one_and_is_local(spline, shares):
     at = np.append(within(spline, shares), spline.knots[3:-3])
     matrix = basis_matrix(spline.knots, at)
@@ -66,7 +64,6 @@ def test_derivatives_are_limits_of_differences():
 
 
 @given(splines(most=8), st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0)))
-@settings(deadline=None)
 def test_no_sample_is_nearer_than_the_closest_point(spline, point):
     parameters, distances = spline.closest([point])
     samples = spline.evaluate(np.linspace(*spline.domain, 2000))
@@ -89,7 +86,6 @@ def test_parameters_beyond_the_ends_give_the_ends():
 
 
 @given(splines(most=8), st.floats(-math.pi, math.pi))
-@settings(deadline=None)
 def test_a_ray_meets_the_curve_where_it_first_crosses_it(spline, direction):
     origin = np.array([0.3, -7.0])
     distance = spline.ray(origin, direction)

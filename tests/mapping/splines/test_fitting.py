@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import make_lsq_spline
 
@@ -45,7 +45,6 @@ def test_a_bend_at_the_end_of_a_long_wall_is_not_cut_short():
 
 
 @given(st.integers(8, 40), st.integers(0, 1000))
-@settings(deadline=None)
 def test_the_fit_is_that_of_scipy_where_nothing_stiffens_it(points, seed):
     generator = np.random.default_rng(seed)
     way = np.cumsum(np.stack([generator.uniform(0.1, 0.3, points), generator.uniform(-0.1, 0.1, points)], axis=1), axis=0)
