@@ -17,7 +17,7 @@ from lidarium.evaluation.suite import Suite, Trial
 from lidarium.evaluation.supervision import decision_lines
 from lidarium.evaluation.teams import tables
 from lidarium.evaluation.teams.figures import Row, chosen, floor_of, has_wrong_merge, time_of, time_shares
-from lidarium.evaluation.teams.goals import SUPERVISED, Goal, goals_of
+from lidarium.evaluation.teams.goals import SUPERVISED, Goal, goals_of, is_covered
 from lidarium.evaluation.teams.suites import (
     FEWEST_SEEDS,
     MARGIN,
@@ -31,7 +31,7 @@ from lidarium.evaluation.teams.suites import (
 
 __all__ = ["page", "suites", "work"]
 
-FAILING, LOGS_FILE = "failing", "logs.json"
+FAILING, LOGS_FILE, ASKED_FILE = "failing", "logs.json", "asked.json"
 EXTENSION_SUITES = ("extensions", "radio", "energy", "together")
 LINES_SHOWN = 12
 """Lines of a log on the page."""
@@ -55,13 +55,17 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Iterator[
         if campaign.failures:
             trial, error = campaign.failures[0]
             raise ValueError(f"{len(campaign.failures)} runs came to no end, the first is {trial.key}: {error}")
-    kept = _kept_logs(folder)
-    typical = typical_runs(rows, goals_of(rows, _read(folder / FAILING)))
+    asked = {name: {trial.key: (suite, trial) for trial in suite.trials()} for name, suite in plan.items()}
+    asked[FAILING] = {} if failing is None else {trial.key: (failing, trial) for trial in trials}
+    write_json(folder / ASKED_FILE, {name: sorted(of_suite) for name, of_suite in asked.items()})
+    kept = _of_file(folder / LOGS_FILE)
+    typical = typical_runs(rows, goals_of(rows, _rows(folder, FAILING)))
     logs: dict[str, Any] = {}
     for name, row in typical.items():
-        before = kept.get(name, {})
-        suite = plan["five" if row["robots"] == max(plan["five"].robots) else "teams"]
-        logs[name] = before if before.get(KEY) == row[KEY] else {KEY: row[KEY], "lines": _log_of(suite, str(row[KEY]))}
+        before, key = kept.get(name, {}), str(row[KEY])
+        if before.get(KEY) != key:
+            before = {KEY: key, "lines": _log_of(*next(of_suite[key] for of_suite in asked.values() if key in of_suite))}
+        logs[name] = before
         yield "logs", len(logs), len(typical)
     write_json(folder / LOGS_FILE, logs)
 
@@ -92,7 +96,11 @@ def failing_suite(rows: Sequence[Row], teams: Suite) -> tuple[Suite | None, list
 
 
 def typical_runs(rows: Mapping[str, Sequence[Row]], goals: Sequence[Goal]) -> dict[str, Row]:
-    """Return a supervised run for each size of teams that missed something: the one whose share of one robot's time is the median."""
+    """Return runs of what was missed, by what that is.
+
+    For each size of teams that missed something, the supervised run whose share of one robot's time is the median; where runs are counted,
+    the middle one of those that did not do as is wanted.
+    """
     found: dict[str, Row] = {}
     for robots in sorted({goal.robots for goal in goals if goal.robots is not None and goal.found is not None and not goal.is_reached}):
         runs = chosen([*rows["teams"], *rows["five"]], SUPERVISED, robots)
@@ -100,13 +108,13 @@ def typical_runs(rows: Mapping[str, Sequence[Row]], goals: Sequence[Goal]) -> di
         ranked = sorted((shares[0], str(row[KEY]), row) for row in runs if (shares := time_shares([row], rows["one"])))
         if ranked:
             found[f"{robots} robots"] = ranked[len(ranked) // 2][2]
-    return found
+    return found | {goal.title.removesuffix(" [%]"): goal.missed_by[len(goal.missed_by) // 2] for goal in goals if goal.missed_by}
 
 
 def page(folder: Path, command: str) -> str:
     """Return the results as markdown."""
-    rows = {name: _read(folder / name) for name in suites(None)}
-    failing = _read(folder / FAILING)
+    rows = {name: _rows(folder, name) for name in suites(None)}
+    failing = _rows(folder, FAILING)
     goals = goals_of(rows, failing)
     every = [*(row for group in rows.values() for row in group), *failing]
     hours = sum(float(row["wall_s"]) for row in every) / SECONDS_PER_HOUR
@@ -119,7 +127,7 @@ def page(folder: Path, command: str) -> str:
         "## What was to be reached\n\n" + tables.goals_table(goals),
         _notes(),
         *_wrong_section(every),
-        *_logs_section(_kept_logs(folder)),
+        *_logs_section(_of_file(folder / LOGS_FILE)),
         "## Test 1: each robot alone\n\n" + tables.alone_table(rows["alone"]),
         *(
             f"## Test 2: pairs, {floor}\n\nJade with Luna (starts A and B), and with Mars (A and C).\n\n"
@@ -137,6 +145,7 @@ def page(folder: Path, command: str) -> str:
     parts += [
         "## Five robots\n\n" + tables.five_table(rows["five"], alone),
         "## A robot fails\n\n" + _about_failing() + "\n\n" + tables.failing_table(failing),
+        *_left_section(failing),
         "## Extensions\n\n" + _about_extensions(),
         *(tables.extension_table(rows[name]) for name in EXTENSION_SUITES if rows[name]),
     ]
@@ -147,20 +156,24 @@ def _read(folder: Path) -> list[Row]:
     return list(read_episodes(folder / EPISODES_FILE))
 
 
+def _rows(folder: Path, name: str) -> list[Row]:
+    """Return the runs of a suite that were asked for last; the folder may hold more, of a call for a larger share."""
+    keys = _of_file(folder / ASKED_FILE).get(name)
+    return [row for row in _read(folder / name) if keys is None or row[KEY] in keys]
+
+
 def _of_suite(rows: Sequence[Row], suite: Suite) -> list[Row]:
     """Return the runs that a suite asks for."""
     keys = {trial.key for trial in suite.trials()}
     return [row for row in rows if row[KEY] in keys]
 
 
-def _kept_logs(folder: Path) -> dict[str, Any]:
-    path = folder / LOGS_FILE
+def _of_file(path: Path) -> dict[str, Any]:
     return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
 
 
-def _log_of(suite: Suite, key: str) -> list[str]:
+def _log_of(suite: Suite, trial: Trial) -> list[str]:
     """Run a trial once more and return the lines of its log."""
-    trial = next(one for one in suite.trials() if one.key == key)
     settings = suite.settings(trial.variant, trial.robots)
     starts = suite.starts_of(trial) or drawn_starts(trial.floor, settings, trial.seed)
     env = ExplorationEnv(trial.floor, settings)
@@ -180,13 +193,20 @@ def _wrong_section(rows: Sequence[Row]) -> list[str]:
     return ["### Wrong merges\n\n" + words + "\n\n" + tables.wrong_table(wrong)]
 
 
+def _left_section(failing: Sequence[Row]) -> list[str]:
+    """Return the runs in which the others did not cover what a dead robot leaves, beside those of the other policies."""
+    words = "Runs in which a supervised team covered less than 99 % of that, and what the others covered of it at the same death."
+    is_left = not all(is_covered(row) for row in chosen(failing, SUPERVISED))
+    return ["### Runs that left more\n\n" + words + "\n\n" + tables.left_table(failing)] if is_left else []
+
+
 def _logs_section(logs: Mapping[str, Any]) -> list[str]:
     """Return the logs of typical runs where something was missed."""
     if not logs:
         return []
     parts = [
-        "### Typical runs\n\nWhere a figure was missed, what the station noted and ordered in the run whose share of one robot's "
-        "time is the median."
+        "### Typical runs\n\nWhere a figure was missed, what the station noted and ordered: for a size of teams in the run whose share "
+        "of one robot's time is the median, where runs are counted in the middle one of those that missed it."
     ]
     for name, log in logs.items():
         told = [line for entry in log["lines"] if (line := _told(json.loads(entry)))]

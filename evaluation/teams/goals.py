@@ -39,6 +39,8 @@ class Goal:
         Behind the point, for people.
     robots : int or None
         Size of the teams that it is about; None where it is about others, too.
+    missed_by : tuple of dict
+        Where runs are counted that do something, those that do not do as is wanted.
     """
 
     title: str
@@ -47,6 +49,7 @@ class Goal:
     is_reached: bool
     digits: int = 2
     robots: int | None = None
+    missed_by: tuple[Row, ...] = ()
 
 
 def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[Goal]:
@@ -90,10 +93,15 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
     return goals
 
 
-def is_covered(row: Row) -> bool:
-    """Whether the robots that have not failed covered 99 % of what the others' bodies leave in reach."""
+def covered_by_others(row: Row) -> float:
+    """Return the share that the robots that have not failed covered of what the others' bodies leave in reach."""
     covered = row["c_others_final"]
-    return float(row["coverage_final"] if covered is None else covered) >= 0.99
+    return float(row["coverage_final"] if covered is None else covered)
+
+
+def is_covered(row: Row) -> bool:
+    """Whether that is 99 %."""
+    return covered_by_others(row) >= 0.99
 
 
 def _at_most(title: str, values: Sequence[float], wanted: float, robots: int, more: str = "", digits: int = 2) -> Goal:
@@ -102,9 +110,12 @@ def _at_most(title: str, values: Sequence[float], wanted: float, robots: int, mo
 
 
 def _share(title: str, rows: Sequence[Row], holds: Callable[[Row], bool], wanted: float | None) -> Goal:
-    """Return a share of runs [%]; without one that is wanted it is beside the others."""
+    """Return a share of runs [%], of which all or none are wanted; without one that is wanted it is beside the others."""
     if not rows:
         return Goal(title, "-" if wanted is None else f"{100.0 * wanted:.0f} %", None, False)
     share = share_interval(sum(holds(row) for row in rows), len(rows))
     found = Interval(100.0 * share.estimate, 100.0 * share.low, 100.0 * share.high, share.confidence, share.size)
-    return Goal(f"{title} [%]", "-" if wanted is None else f"{100.0 * wanted:.0f}", found, wanted in (None, share.estimate), 1)
+    if wanted is None:
+        return Goal(f"{title} [%]", "-", found, True, 1)
+    missed_by = tuple(row for row in rows if holds(row) != bool(wanted))
+    return Goal(f"{title} [%]", f"{100.0 * wanted:.0f}", found, not missed_by, 1, missed_by=missed_by)

@@ -22,7 +22,7 @@ from lidarium.evaluation.teams.figures import (
     time_ratios,
     time_shares,
 )
-from lidarium.evaluation.teams.goals import Goal, is_covered
+from lidarium.evaluation.teams.goals import SUPERVISED, Goal, covered_by_others, is_covered
 from lidarium.evaluation.teams.suites import ALONE, POLICIES
 
 TOLD = "oracle_starts"
@@ -115,6 +115,21 @@ def failing_table(rows: Sequence[Row]) -> str:
                 least = f"{min(covered):.1f}" if covered else "-"
                 lines.append((str(robots), f"`{policy}`", f"{count} of {len(runs)}", shown(median(covered), 1), least, ends))
     return _table(("robots", "policy", "runs with 99 %", "covered by the others [%]", "least", "end [s]"), lines)
+
+
+def left_table(rows: Sequence[Row]) -> str:
+    """Return the runs in which a supervised team did not cover what a dead robot leaves, beside the other policies' of the same death."""
+    lines = []
+    for row in chosen(rows, SUPERVISED):
+        if not is_covered(row):
+            death = (str(row["variant"]), floor_of(row), int(row["robots"]), int(row["seed"]))
+            same = [one for one in rows if (str(one["variant"]), floor_of(one), int(one["robots"]), int(one["seed"])) == death]
+            covered = {str(one["policy"]): f"{100.0 * covered_by_others(one):.1f}" for one in same}
+            ends = ", ".join(sorted({str(why) for robot, why in row["ended_because"].items() if robot != "robot_0"}))
+            floor, robots, seed = f"`{Path(death[1]).name}`", str(death[2]), str(death[3])
+            lines.append((floor, robots, seed, *(covered.get(policy, "-") for policy in POLICIES), ends, f"{row['time_s']:.0f}"))
+    head = ("floor", "robots", "seed", *(f"`{policy}` [%]" for policy in POLICIES), "others ended because", "end [s]")
+    return _table(head, lines)
 
 
 def extension_table(rows: Sequence[Row]) -> str:

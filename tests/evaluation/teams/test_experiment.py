@@ -11,7 +11,7 @@ from lidarium.evaluation.experiments.supervisor import failing_suite, typical_ru
 from lidarium.evaluation.statistics import Interval
 from lidarium.evaluation.teams import suites as plan
 from lidarium.evaluation.teams.goals import Goal
-from lidarium.evaluation.teams.tables import failing_table
+from lidarium.evaluation.teams.tables import failing_table, left_table
 
 SMALL = {**plan.SETTINGS, "localization": "truth", "odometry": "ideal", "horizon_s": 6.0}
 
@@ -89,6 +89,31 @@ def test_the_typical_run_is_the_middle_one_of_a_team_that_missed_something():
     missed, reached = (Goal("time", "<= 0.62", Interval(0.7, 0.6, 0.8, 0.95, 3), is_reached, robots=2) for is_reached in (False, True))
     assert typical_runs(rows, [missed])["2 robots"]["seed"] == 0
     assert typical_runs(rows, [reached]) == {}
+
+
+def test_where_runs_are_counted_the_typical_one_is_one_of_those_that_missed():
+    missing = [row("supervised", 3, seed, 50.0) for seed in (4, 5, 6)]
+    goal = Goal("runs in which a wrong merge was used [%]", "0", Interval(1.0, 0.1, 2.0, 0.95, 300), False, missed_by=tuple(missing))
+    assert typical_runs({"teams": [], "five": [], "one": []}, [goal]) == {"runs in which a wrong merge was used": missing[1]}
+
+
+def test_runs_that_left_something_are_listed_beside_those_of_the_other_policies():
+    def death(policy, seed, covered):
+        return row(policy, 2, seed, 50.0, c_others_final=covered, coverage_final=1.0, time_s=80.0, ended_because={
+            "robot_0": "failed", "robot_1": "no_frontier"})  # fmt: skip
+
+    runs = [death("supervised", 0, 0.976), death("independent", 0, 0.995), death("supervised", 1, 0.999), death("independent", 1, 0.5)]
+    assert left_table(runs).splitlines()[2:] == ["| `f` | 2 | 0 | 97.6 | 99.5 | - | no_frontier | 80 |"]
+
+
+def test_the_page_is_of_what_was_asked_for_though_the_folder_holds_more(tiny, tmp_path):
+    experiment = EXPERIMENTS["supervisor"]
+    for every in (5, 10):
+        for name, suite in experiment.suites(None, every).items():
+            list(Campaign(suite, tmp_path / name, records=False).run())
+    asked = sum(1 for suite in experiment.suites(None, 10).values() for _ in suite.trials())
+    assert not any(step[0] != "logs" for step in experiment.work(tmp_path, None, 10, 1))
+    assert f"; {asked} runs," in experiment.page(tmp_path, "lidarium reproduce supervisor --every 10")
 
 
 def test_a_robot_dies_at_half_of_what_its_own_team_took():
