@@ -124,7 +124,7 @@ def left_table(rows: Sequence[Row]) -> str:
         if not is_covered(row):
             death = (str(row["variant"]), floor_of(row), int(row["robots"]), int(row["seed"]))
             same = [one for one in rows if (str(one["variant"]), floor_of(one), int(one["robots"]), int(one["seed"])) == death]
-            covered = {str(one["policy"]): f"{100.0 * covered_by_others(one):.1f}" for one in same}
+            covered = {str(one["policy"]): f"{100.0 * covered_by_others(one):.2f}" for one in same}
             ends = ", ".join(sorted({str(why) for robot, why in row["ended_because"].items() if robot != "robot_0"}))
             floor, robots, seed = f"`{Path(death[1]).name}`", str(death[2]), str(death[3])
             lines.append((floor, robots, seed, *(covered.get(policy, "-") for policy in POLICIES), ends, f"{row['time_s']:.0f}"))

@@ -103,7 +103,7 @@ def test_runs_that_left_something_are_listed_beside_those_of_the_other_policies(
             "robot_0": "failed", "robot_1": "no_frontier"})  # fmt: skip
 
     runs = [death("supervised", 0, 0.976), death("independent", 0, 0.995), death("supervised", 1, 0.999), death("independent", 1, 0.5)]
-    assert left_table(runs).splitlines()[2:] == ["| `f` | 2 | 0 | 97.6 | 99.5 | - | no_frontier | 80 |"]
+    assert left_table(runs).splitlines()[2:] == ["| `f` | 2 | 0 | 97.60 | 99.50 | - | no_frontier | 80 |"]
 
 
 def test_the_page_is_of_what_was_asked_for_though_the_folder_holds_more(tiny, tmp_path):
