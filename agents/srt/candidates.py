@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.frontier_arcs import Opening, least_opening
+from lidarium.agents.srt.intent import Intent
 from lidarium.agents.srt.memory import Memory
 from lidarium.agents.srt.safe_region import DIRECTIONS, UNIT
 from lidarium.agents.srt.settings import SrtSettings
@@ -70,12 +71,12 @@ class CandidateSource:
 
     Attributes
     ----------
-    latest : (2,) float64 or None
-        What the robot went for last [m].
+    intent : Intent
+        What the robot went for last.
     """
 
     def __init__(self, settings: SrtSettings, body: float, generator: np.random.Generator) -> None:
-        self.latest: NDArray[np.float64] | None = None
+        self.intent = Intent()
         self._settings, self._least, self._generator = settings, least_opening(body), generator
         self._tried: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
         self._attempts = Counter[tuple[int, int]]()

@@ -119,7 +119,7 @@ def tour_way(
         return []
     of_mates = [target.focus for target in targets]
     for least in (settings.least_frontier, LAST_FRONTIER):
-        begun = first_on_tour(memory, senses, limits, least, source.latest, of_mates)
+        begun = first_on_tour(memory, senses, limits, least, source.intent, of_mates)
         if begun is not None:
             return _to_focus(node, *begun)
     return []

@@ -211,6 +211,7 @@ class Explorer:
         has_passed = departed >= self._settings.passing_distance
         is_dropped = may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)
         if in_sight or is_dropped:
+            self._source.intent.settle()
             self._pause(senses, memory)
             return
         if has_passed and (is_direct or candidate.is_frontier):
@@ -266,7 +267,7 @@ class Explorer:
 
     def _set_out(self, way: list[Choice], senses: Senses) -> None:
         self._route, self._drive, self._is_aside = way, None, False
-        self._source.latest = None if self.target is None else self.target.focus
+        self._source.intent.go_for(None if self.target is None else self.target.focus)
         self._chose_at = senses.pose[:2]
         self._progress.stand(senses)
 
@@ -309,6 +310,7 @@ class Explorer:
             self._add_node(senses, self._node, np.array([*place, senses.pose[2]]), memory)
             if leg.candidate is not None:
                 self._source.note_tried(leg.candidate)
+                self._source.intent.settle()
                 if leg.candidate.is_frontier and memory.is_frontier(leg.candidate.focus):
                     self._look_at(leg.candidate.focus, senses)
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.drive import Limits
+from lidarium.agents.srt.intent import KEPT_NEAR, Intent
 from lidarium.agents.srt.memory import Legs, Memory, Place
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.tour import shortest_tour
@@ -18,12 +19,6 @@ MOST = 14
 WAY_OF_SIZE = 1.0
 """For a metre of a frontier's length a robot drives so much farther to begin with it [m]: behind long ones more is to be seen."""
 
-KEPT = 1.0
-"""What a robot went for until now is left only for a tour that is shorter by this [m]."""
-
-KEPT_NEAR = 0.5
-"""A frontier of which a cell lies this near to what a robot went for is still the same [m]."""
-
 MATE_SPREAD = 5.0
 """Frontiers nearer than this to what a teammate goes for cost so much more as they are nearer [m]."""
 
@@ -32,7 +27,7 @@ MATE_SAME = 1.0
 
 
 def first_on_tour(
-    memory: Memory, senses: Senses, limits: Limits, least: float, latest: Place | None, of_mates: Sequence[Place]
+    memory: Memory, senses: Senses, limits: Limits, least: float, intent: Intent, of_mates: Sequence[Place]
 ) -> tuple[Legs, Place] | None:
     """Return the way to the frontier that the shortest tour begins with, and what to look at there.
 
@@ -46,8 +41,8 @@ def first_on_tour(
         Where it is, and how fast it drives and turns.
     least : float
         Frontiers shorter than this are left out [m].
-    latest : (2,) float64 or None
-        What it went for last [m].
+    intent : Intent
+        What it went for last.
     of_mates : sequence of (2,) float64
         What teammates go for [m].
 
@@ -67,8 +62,8 @@ def first_on_tour(
     turns = np.abs([wrapped(float(angle)) for angle in np.arctan2(gap[:, 1], gap[:, 0]) - float(senses.pose[2])])
     first = frontiers.costs + turns * limits.speed / limits.turn_rate + np.maximum(MATE_SPREAD - to_mates, 0.0)
     first -= WAY_OF_SIZE * frontiers.sizes
-    if latest is not None:
-        first -= KEPT * _are_near(frontiers.cells, latest)
+    if intent.latest is not None:
+        first -= intent.kept * _are_near(frontiers.cells, intent.latest)
     left = np.flatnonzero(is_left)
     tour = shortest_tour(first[left], frontiers.between(left))
     begin = int(left[tour[0]])
