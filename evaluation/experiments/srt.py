@@ -104,7 +104,8 @@ def page(folder: Path, command: str) -> str:
         "One robot with perfect poses explores until 99 % is covered, maps of 2.5 cm, starts drawn by the seed, the same for every policy. "
         "The six scenes had a part in the choices, with other starts; the generated floors, ten of the validation set, had none, but "
         "that two faults showed on them and were mended: robots that stood still beside a wall (`office:2000006`), and one that turned "
-        "between two targets for ever (`office:2000009`). Means over the starts; the last columns are our mean over that of the better of the others.",
+        "between two targets for ever (`office:2000009`). Means over the starts; the last columns are our mean over that of the better of "
+        "the others.",
         tables.exploration(episodes, POLICIES),
         "## What parts are worth",
         f"The ways of the default mode, {len(FOLLOWED)} a world at most, followed by the particle filter with one part changed. Means over "
