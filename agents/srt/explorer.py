@@ -205,9 +205,9 @@ class Explorer:
         is_direct = len(self._route) == 1
         departed = senses.distance_to(self._tree.nodes[self._node].place)
         in_sight = senses.goal is not None and memory.way(senses.pose[:2], senses.goal) is not None
-        # Every step sees a little more beyond free rays: a target there stands until the robot has got on.
+        # Every step sees a little more beyond free rays: a target there stands until the robot has got on; so does one towards a goal.
         is_along_rays = candidate.opening is not None and not candidate.opening.is_gap
-        may_drop = departed >= (GOT_ON if is_along_rays else self._settings.least_step)
+        may_drop = departed >= (GOT_ON if is_along_rays or senses.goal is not None else self._settings.least_step)
         has_passed = departed >= self._settings.passing_distance
         is_dropped = may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)
         if in_sight or is_dropped:
