@@ -177,16 +177,13 @@ def _to_frontier(
     found = memory.frontiers(senses.pose[:2], least, MOST)
     if found is None:
         return []
-    ways = [_to_focus(node, found.legs(k), focus) for k, focus in enumerate(found.focuses)]
-    costs = [
-        _weighed(float(found.costs[k]), way[0].place, focus, settings, senses, limits)
-        for k, (way, focus) in enumerate(zip(ways, found.focuses, strict=True))
-    ]
-    for k in np.argsort(costs, kind="stable"):
-        candidate = ways[k][-1].candidate
-        if candidate is not None and _left_by(targets, [candidate]):
-            return ways[k]
-    return []
+
+    def cost_of(k: int) -> float:
+        return _weighed(float(found.costs[k]), found.legs(k)[0], found.focuses[k], settings, senses, limits)
+
+    left = [k for k, focus in enumerate(found.focuses) if all(math.dist(focus, target.focus) >= MATE_SAME for target in targets)]
+    best = min(left, key=cost_of, default=None)
+    return [] if best is None else _to_focus(node, found.legs(best), found.focuses[best])
 
 
 def _to_focus(node: Node, legs: list[NDArray[np.float64]], focus: NDArray[np.float64]) -> list[Choice]:

@@ -30,7 +30,7 @@ MATE_NEAR = 1.5
 """A teammate within this distance may be what blocks a robot [m]."""
 
 ASIDES = 6
-"""How often a robot steps aside for teammates on its way before it gives its target up."""
+"""How often in a row a robot steps aside on its way before it gives its target up."""
 
 FINAL = ("budget", "goal_missed", "blocked")
 """Endings after which a robot looks for nothing any more."""
@@ -261,7 +261,7 @@ class Explorer:
         """Set out for the first node; there, or without a way, the robot is at its end."""
         self.ending = ending
         self._route = home_way(self._tree, self._node, self._root, self.known, senses, memory)
-        self._drive = None
+        self._drive, self._is_aside = None, False
         self._progress.stand(senses)
         self.is_home = not self._route
 

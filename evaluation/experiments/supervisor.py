@@ -45,8 +45,8 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Iterator[
     Yields what is being done, how much of it is, and of how much; what the folder has is not done again.
     """
     plan = suites(data, every)
-    # The folder may hold more, of a call for a larger share.
-    rows = {name: _of_suite(_read(folder / name), suite) for name, suite in plan.items()}
+    asked = {name: {trial.key: (suite, trial) for trial in suite.trials()} for name, suite in plan.items()}
+    rows = {name: [row for row in _read(folder / name) if row[KEY] in of_suite] for name, of_suite in asked.items()}
     failing, trials = failing_suite(rows["teams"], plan["teams"])
     if failing is not None:
         campaign = Campaign(failing, folder / FAILING, workers, records=False, trials=trials)
@@ -55,7 +55,6 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Iterator[
         if campaign.failures:
             trial, error = campaign.failures[0]
             raise ValueError(f"{len(campaign.failures)} runs came to no end, the first is {trial.key}: {error}")
-    asked = {name: {trial.key: (suite, trial) for trial in suite.trials()} for name, suite in plan.items()}
     asked[FAILING] = {} if failing is None else {trial.key: (failing, trial) for trial in trials}
     write_json(folder / ASKED_FILE, {name: sorted(of_suite) for name, of_suite in asked.items()})
     kept = _of_file(folder / LOGS_FILE)
@@ -160,12 +159,6 @@ def _rows(folder: Path, name: str) -> list[Row]:
     """Return the runs of a suite that were asked for last; the folder may hold more, of a call for a larger share."""
     keys = _of_file(folder / ASKED_FILE).get(name)
     return [row for row in _read(folder / name) if keys is None or row[KEY] in keys]
-
-
-def _of_suite(rows: Sequence[Row], suite: Suite) -> list[Row]:
-    """Return the runs that a suite asks for."""
-    keys = {trial.key for trial in suite.trials()}
-    return [row for row in rows if row[KEY] in keys]
 
 
 def _of_file(path: Path) -> dict[str, Any]:

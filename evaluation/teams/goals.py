@@ -100,7 +100,7 @@ def covered_by_others(row: Row) -> float:
 
 
 def is_covered(row: Row) -> bool:
-    """Whether that is 99 %."""
+    """Whether the robots that have not failed covered 99 % of what the others' bodies leave in reach."""
     return covered_by_others(row) >= 0.99
 
 

@@ -16,6 +16,7 @@ from lidarium.evaluation.teams.figures import (
     has_wrong_merge,
     median,
     overlap_points,
+    partners,
     path_of,
     path_shares,
     time_of,
@@ -122,12 +123,11 @@ def left_table(rows: Sequence[Row]) -> str:
     lines = []
     for row in chosen(rows, SUPERVISED):
         if not is_covered(row):
-            death = (str(row["variant"]), floor_of(row), int(row["robots"]), int(row["seed"]))
-            same = [one for one in rows if (str(one["variant"]), floor_of(one), int(one["robots"]), int(one["seed"])) == death]
-            covered = {str(one["policy"]): f"{100.0 * covered_by_others(one):.2f}" for one in same}
+            same = [one for policy in POLICIES for _, one in partners([row], chosen(rows, policy))]
+            covered = {one["policy"]: f"{100.0 * covered_by_others(one):.2f}" for one in same}
             ends = ", ".join(sorted({str(why) for robot, why in row["ended_because"].items() if robot != "robot_0"}))
-            floor, robots, seed = f"`{Path(death[1]).name}`", str(death[2]), str(death[3])
-            lines.append((floor, robots, seed, *(covered.get(policy, "-") for policy in POLICIES), ends, f"{row['time_s']:.0f}"))
+            case = f"`{Path(floor_of(row)).name}`", str(row["robots"]), str(row["seed"])
+            lines.append((*case, *(covered.get(policy, "-") for policy in POLICIES), ends, f"{row['time_s']:.0f}"))
     head = ("floor", "robots", "seed", *(f"`{policy}` [%]" for policy in POLICIES), "others ended because", "end [s]")
     return _table(head, lines)
 
