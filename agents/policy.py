@@ -71,6 +71,13 @@ class Team(Protocol):
         """
         ...
 
+    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
+        """Tell an agent where another robot drove, (N, 2) in its map frame [m]; return whether that reached it.
+
+        The walls that it has drawn there may be that robot: it forgets them, and sees for itself. What is at the trail's end stays.
+        """
+        ...
+
 
 class Policy(Protocol):
     """Drives a team: one object for all of its robots.
@@ -242,3 +249,6 @@ class _Alone:
 
     def tell(self, agent: str, others: FusedMap | None) -> bool:
         raise ValueError(f"{self._agent} would tell {agent} what others know; a decentralised policy has no station")
+
+    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
+        raise ValueError(f"{self._agent} would tell {agent} where others drove; a decentralised policy has no station")

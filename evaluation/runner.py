@@ -98,6 +98,10 @@ class RunningTeam:
         """Tell an agent that does not know its start what others know, in its map frame; return whether that reached it."""
         return self._env.station.tell(self._env.possible_agents.index(agent), others)
 
+    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
+        """Tell an agent where another robot drove, in its map frame; return whether that reached it."""
+        return self._env.station.forget_walls(self._env.possible_agents.index(agent), trail)
+
 
 def run_episode(
     policy: Policy,

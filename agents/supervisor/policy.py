@@ -197,8 +197,12 @@ class Supervised:
                 self._given_up[agent] = np.array(places, np.float64).reshape(-1, 2)
 
     def _tell(self) -> None:
-        """Tell each robot what the others of its group know; take it back from one that is joined no more."""
+        """Tell each robot what the others of its group know; take it back from one that is joined no more.
+
+        Of one that has failed they learn where it drove: its images in their maps bar ways that are free, and hide frontiers.
+        """
         station = self._supervisor.station
+        station.left_behind = [(agent, trail) for agent, trail in station.left_behind if not self._team.forget_walls(agent, trail)]
         for group in station.groups():
             for agent in group:
                 others = [mate for mate in group if mate != agent]
@@ -293,6 +297,9 @@ class _Led:
 
     def tell(self, agent: str, others: FusedMap | None) -> bool:
         return self._team.tell(agent, others)
+
+    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
+        return self._team.forget_walls(agent, trail)
 
 
 def supervised(**options: Any) -> Supervised:  # noqa: ANN401

@@ -56,6 +56,8 @@ class MergeStation:
         All transforms that were found, in their order in time.
     events : list of StationEvent
         What happened.
+    left_behind : list of (str, (N, 2) float64)
+        Who is to be told where a robot drove that has failed, and that trail in its map frame [m].
     """
 
     def __init__(
@@ -89,6 +91,7 @@ class MergeStation:
         self.reports: dict[str, Report] = {}
         self.joins: list[Join] = []
         self.events: list[StationEvent] = []
+        self.left_behind: list[tuple[str, NDArray[np.float64]]] = []
 
     def receive(self, agent: str, report: Report | None, time_s: float) -> None:
         """Take a report in; one that is older than the last one is dropped, and None is none."""
@@ -98,10 +101,15 @@ class MergeStation:
         if before is not None and report.time_s < before.time_s:
             self._note(time_s, "late", (agent,), f"of {report.time_s:.1f} s, there is one of {before.time_s:.1f} s")
             return
-        if report.state is OperatingState.FAILED and (before is None or before.state is not OperatingState.FAILED):
-            self._note(time_s, "excluded", (agent,), "it has failed; its map is not used any more")
+        has_failed = report.state is OperatingState.FAILED and (before is None or before.state is not OperatingState.FAILED)
         self.reports[agent] = report
         self._trails[agent].append((report.pose.x, report.pose.y))
+        if has_failed:
+            self._note(time_s, "excluded", (agent,), "it has failed; its map is not used any more")
+            # With its map goes what showed the others that their images of it, in doorways say, are no walls.
+            mates = [mate for mate in self.agents if mate != agent and self._is_used(mate)]
+            frames = {mate: frame for mate in mates if (frame := self.lookup(mate, agent)) is not None}
+            self.left_behind += [(mate, frame.apply(self._trail(agent))) for mate, frame in frames.items()]
         track = self._tracks[agent]
         track.append((report.travelled_m, self.known_m2(agent)))
         while len(track) > 1 and track[1][0] <= report.travelled_m - self.settings.enclosed_way_m:

@@ -6,18 +6,12 @@ floor on which the other one drove, and on a merged map they bar the way.
 
 from collections.abc import Iterable
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.merging.incremental import GrowingMap
 from lidarium.mapping.occupancy import OCCUPIED, UNKNOWN
-
-MARGIN_M = 0.15
-"""How much further than the body what others draw of it may lie [m]."""
-
-_SUBCELL = 4
-_CELL = 1 << _SUBCELL
+from lidarium.mapping.swept import swept
 
 
 def without_own_trail(one: GrowingMap, trail: NDArray[np.float64], radius: float, resolution: float) -> GrowingMap:
@@ -33,7 +27,7 @@ def without_own_trail(one: GrowingMap, trail: NDArray[np.float64], radius: float
         Of its body, and side of a cell [m].
     """
     levels = one.levels.copy()
-    levels[_swept(one, trail, radius, resolution)] = UNKNOWN
+    levels[swept(one.levels.shape, one.origin, trail, radius, resolution)] = UNKNOWN
     return GrowingMap(levels, one.origin)
 
 
@@ -51,16 +45,5 @@ def without_bodies(one: GrowingMap, trails: Iterable[NDArray[np.float64]], radiu
     """
     levels = one.levels.copy()
     for trail in trails:
-        levels[_swept(one, trail, radius, resolution) & (levels == OCCUPIED)] = UNKNOWN
+        levels[swept(one.levels.shape, one.origin, trail, radius, resolution) & (levels == OCCUPIED)] = UNKNOWN
     return GrowingMap(levels, one.origin)
-
-
-def _swept(one: GrowingMap, trail: NDArray[np.float64], radius: float, resolution: float) -> NDArray[np.bool_]:
-    """Return the cells (rows, columns) of a map in which others may have drawn a body of a radius [m] that was on a trail."""
-    swept = np.zeros(one.levels.shape, np.uint8)
-    if len(trail):
-        # Pixels are addressed by their centres, in parts of a cell.
-        points = np.rint(((trail - one.origin) / resolution - 0.5) * _CELL).astype(np.int32)
-        thickness = max(round(2.0 * (radius + MARGIN_M) / resolution), 1)
-        cv2.polylines(swept, [points.reshape(-1, 1, 2)], False, 1, thickness, cv2.LINE_8, _SUBCELL)
-    return np.asarray(swept != 0)

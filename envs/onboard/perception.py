@@ -37,6 +37,7 @@ from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.localization.localizer import Localizer
 from lidarium.mapping.merging.fusion import FusedMap, lay_over
 from lidarium.mapping.path_search import SearchMemory
+from lidarium.mapping.swept import MARGIN_M, passed
 
 
 class Perception:
@@ -89,6 +90,7 @@ class Perception:
         self._heard: list[NavigationMap | None] = [None] * rows
         self._heard_records = np.zeros((rows, RECORD), np.int64)
         self._told: list[NDArray[np.int8] | None] = [None] * rows
+        self._trails: list[list[NDArray[np.float64]]] = [[] for _ in range(rows)]
         # Whether robots plan on sums of their own map and of what came from others.
         self._adds_up = self.hears
 
@@ -102,6 +104,7 @@ class Perception:
         self._own[first:last], self._shared[episode] = [None] * self._robots, None
         self._heard[first:last], self._heard_records[first:last] = [None] * self._robots, 0
         self._told[first:last] = [None] * self._robots
+        self._trails[first:last] = [[] for _ in range(self._robots)]
         self._adds_up = self.hears or any(told is not None for told in self._told)
         self._own_records[first:last], self._shared_records[episode] = 0, 0
         self._known[first:last] = [(rows, 0, columns, 0) for rows, columns in self.world.belief_rows[first:last, 1:3]]
@@ -212,6 +215,36 @@ class Perception:
         rows, columns = np.flatnonzero(is_other.any(axis=1)), np.flatnonzero(is_other.any(axis=0))
         if self._heard[row] is not None and len(rows):
             self._sum_heard(row, np.array([rows[0], rows[-1] + 1, columns[0], columns[-1] + 1]))
+
+    def forget_walls(self, row: int, trail: NDArray[np.float64]) -> None:
+        """Let a robot forget the walls along a trail: they may be images of the robot that drove there. It sees for itself.
+
+        Parameters
+        ----------
+        row : int
+            Which robot.
+        trail : (N, 2) float64
+            Where the other one was, in the map frame of this [m]; what may show it where it stands at the end is kept.
+        """
+        self._trails[row].append(trail)
+        self._forget(row, trail)
+
+    def forget_again(self, row: int) -> None:
+        """Forget the walls once more along all trails that a robot was told, after its map was rendered anew."""
+        for trail in self._trails[row]:
+            self._forget(row, trail)
+
+    def _forget(self, row: int, trail: NDArray[np.float64]) -> None:
+        resolution, radius = self.settings.occupancy.resolution, float(self.world.bodies[:, 0].max())
+        origin, whole = np.array(self.origin_in_frame(row)), self.world.log_odds[row]
+        reach = radius + MARGIN_M + resolution
+        low = np.clip(np.floor((trail.min(axis=0) - reach - origin) / resolution).astype(np.int64), 0, whole.shape[::-1])
+        high = np.clip(np.ceil((trail.max(axis=0) + reach - origin) / resolution).astype(np.int64), low, whole.shape[::-1])
+        (left, bottom), (right, top) = low.tolist(), high.tolist()
+        part = whole[bottom:top, left:right]
+        x, y = (origin + low * resolution).tolist()
+        self.world.forget(row, passed(part.shape, (x, y), trail, radius, resolution) & (part > 0), (bottom, left))
+        self._fresh_at[self.episode_of(row)] = -2
 
     def _heard_map(self, row: int) -> NavigationMap:
         """Return the sum of a robot's own map and of what came to it from others, up to date."""

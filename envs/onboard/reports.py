@@ -119,6 +119,13 @@ class Station:
         self._perception.tell(row, others)
         return True
 
+    def forget_walls(self, row: int, trail: NDArray[np.float64]) -> bool:
+        """Tell a robot where another one drove (`Perception.forget_walls`), if the links to it stand; return whether they do."""
+        if self._order_delay(row) is None:
+            return False
+        self._perception.forget_walls(row, trail)
+        return True
+
     def _report(self, row: int, time_s: float, known: GrowingMap, status: Status) -> Report:
         of_itself = {field.name: getattr(status, field.name) for field in fields(Status)}
         return Report(**of_itself, time_s=time_s, map=known, start=self._starts[row], frame=self._frame(row))

@@ -82,6 +82,7 @@ class Software:
             correction = localizer.take_correction()
             if correction is not None:
                 world.render_anew(row, correction.poses, correction.ranges)
+                self._perception.forget_again(row)
 
     def _exchange(self, episode: int) -> None:
         """Let the robots of an episode talk, and tell the kernels whom each has heard of lately."""

@@ -52,3 +52,22 @@ def wipe(log_odds: NDArray[np.int8], touched: NDArray[np.uint64], window: NDArra
         touched[low:high, word // WORD] |= np.uint64(1 << word % WORD)
     window[0], window[1] = min(window[0], low), max(window[1], high)
     window[2], window[3] = min(window[2], WORD * words[0]), max(window[3], WORD * (words[-1] + 1))
+
+
+def blank(
+    log_odds: NDArray[np.int8],
+    where: NDArray[np.bool_],
+    corner: tuple[int, int],
+    touched: NDArray[np.uint64],
+    window: NDArray[np.int64],
+) -> None:
+    """Make the cells of a mask unknown, whose first one lies at ``corner`` (row, column), and note that as `wipe` does."""
+    rows, columns = (np.flatnonzero(where.any(axis=axis)) + first for axis, first in zip((1, 0), corner, strict=True))
+    if not rows.size:
+        return
+    log_odds[corner[0] : corner[0] + where.shape[0], corner[1] : corner[1] + where.shape[1]][where] = 0
+    low, high = int(rows[0]), int(rows[-1]) + 1
+    for word in range(int(columns[0]) // WORD, int(columns[-1]) // WORD + 1) if touched.size else []:
+        touched[low:high, word // WORD] |= np.uint64(1 << word % WORD)
+    window[0], window[1] = min(window[0], low), max(window[1], high)
+    window[2], window[3] = min(window[2], int(columns[0])), max(window[3], int(columns[-1]) + 1)

@@ -16,7 +16,7 @@ from scipy import ndimage
 from lidarium.envs.coverage import pack_bits
 from lidarium.envs.floors.starts import swept_free_space
 from lidarium.envs.simulation.arrays import DEAD_RECKONING, KNOWN_MATES, OWN_FRAME, SOME_MATES, TRUE_POSE, WorldArrays, table_of
-from lidarium.envs.simulation.belief_maps import blank_map, map_around_start, map_with_margin, wipe
+from lidarium.envs.simulation.belief_maps import blank, blank_map, map_around_start, map_with_margin, wipe
 from lidarium.envs.simulation.faults import FAULT_NUMBERS, NO_FAULTS, FaultSettings, plan_faults
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.lidar import Lidar
@@ -314,6 +314,10 @@ class KinematicWorld:
         wipe(self.log_odds[row], self._touched[row], self.windows[row])
         render_row(self._table, row, self.robots, np.ascontiguousarray(poses), np.ascontiguousarray(ranges))
         self.renderings[row] += 1
+
+    def forget(self, row: int, where: NDArray[np.bool_], corner: tuple[int, int]) -> None:
+        """Make cells of a robot's map unknown: those of a mask (rows, columns) whose first cell is that of ``corner`` (row, column)."""
+        blank(self.log_odds[row], where, corner, self._touched[row], self.windows[row])
 
     def forget_changes(self, first: int, last: int) -> None:
         """Start anew to note what part of the maps changes, for rows ``first`` to ``last``."""

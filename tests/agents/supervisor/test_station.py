@@ -10,6 +10,7 @@ from reported_halls import RADIUS, hall, report
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
+from lidarium.envs.onboard.state import OperatingState
 from lidarium.mapping.merging.incremental import GrowingMap
 
 FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
@@ -89,3 +90,22 @@ def test_a_robot_claims_nothing_of_where_it_has_been():
     levels = without_own_trail(hall(), trail, RADIUS, RESOLUTION).levels
     assert (levels[20:30, 20:100] == 127).all()
     assert np.count_nonzero(levels == 127) == pytest.approx((4.0 + 0.66) * 0.66 / RESOLUTION**2, rel=0.15)
+
+
+def test_mates_of_a_robot_that_fails_learn_once_where_it_drove(station):
+    trail = [(8.0, 8.0)] * 3 + [(9.0, 8.0)]
+    for time_s in (8.0, 10.0):
+        station.receive(
+            "b", report(part(slice(60, 220), SECOND, 1), 9.0, 8.0, time_s=time_s, frame=None, state=OperatingState.FAILED), time_s
+        )
+        station.merge(time_s)
+    [(agent, told)] = station.left_behind
+    assert agent == "a"
+    assert np.allclose(told, (FIRST @ SECOND.inverse()).apply(np.array(trail)), atol=0.1)
+
+
+def test_of_a_robot_that_fails_before_it_is_joined_nobody_learns_where_it_drove():
+    alone = MergeStation(["a", "b"], RESOLUTION, RADIUS, SupervisorSettings())
+    for agent, state in (("a", OperatingState.OPERATING), ("b", OperatingState.FAILED)):
+        alone.receive(agent, report(hall(), 2.0, 2.0, frame=None, state=state), 2.0)
+    assert alone.left_behind == []
