@@ -12,7 +12,12 @@ _CELL = 1 << _SUBCELL
 
 
 def swept(
-    shape: tuple[int, int], origin: tuple[float, float], trail: NDArray[np.float64], radius: float, resolution: float
+    shape: tuple[int, int],
+    origin: tuple[float, float],
+    trail: NDArray[np.float64],
+    radius: float,
+    resolution: float,
+    margin_m: float = MARGIN_M,
 ) -> NDArray[np.bool_]:
     """Return the cells of a grid in which others may have drawn a body that drove along a trail.
 
@@ -25,13 +30,15 @@ def swept(
     trail : (N, 2) float64
         Where the body was [m].
     radius : float
-        Of the body [m]; `MARGIN_M` comes to it.
+        Of the body [m].
     resolution : float
         Side of a cell [m].
+    margin_m : float
+        How much further than the body what counts as its image may lie [m].
     """
     covered = np.zeros(shape, np.uint8)
     if len(trail):
-        thickness = max(round(2.0 * (radius + MARGIN_M) / resolution), 1)
+        thickness = max(round(2.0 * (radius + margin_m) / resolution), 1)
         cv2.polylines(covered, [_pixels(trail, origin, resolution).reshape(-1, 1, 2)], False, 1, thickness, cv2.LINE_8, _SUBCELL)
     return np.asarray(covered != 0)
 
@@ -39,8 +46,11 @@ def swept(
 def passed(
     shape: tuple[int, int], origin: tuple[float, float], trail: NDArray[np.float64], radius: float, resolution: float
 ) -> NDArray[np.bool_]:
-    """Return what is `swept` without what lies so near to the end of the trail that it may show the body that stands there."""
-    covered = swept(shape, origin, trail, radius, resolution).astype(np.uint8)
+    """Return the cells where the body itself has been, without what lies so near to the end of the trail that it may show it as it stands.
+
+    No wall is where a body was, but beside it there may be one.
+    """
+    covered = swept(shape, origin, trail, radius, resolution, 0.0).astype(np.uint8)
     if len(trail):
         stand = _pixels(trail[-1:], origin, resolution)[0].tolist()
         cv2.circle(covered, stand, round((radius + MARGIN_M) / resolution * _CELL), 0, cv2.FILLED, cv2.LINE_8, _SUBCELL)

@@ -30,7 +30,7 @@ def test_walls_along_the_trail_become_unknown_and_nothing_else_changes(env):
     trail = middle + np.array([(-0.4, 0.0), (0.4, 0.0), (0.4, 3.0)])
     env.perception.forget_walls(0, trail)
     after = belief.map.log_odds
-    where = swept(before.shape, belief.map_origin, trail, belief.radius, RESOLUTION) & (before > 0)
+    where = swept(before.shape, belief.map_origin, trail, belief.radius, RESOLUTION, 0.0) & (before > 0)
     assert where[tuple(walls[len(walls) // 2])]
     assert (after[where] == 0).all()
     assert (after[~where] == before[~where]).all()
@@ -92,13 +92,28 @@ def test_a_trail_beyond_the_map_or_of_one_place_changes_nothing(env):
     assert (belief.map.log_odds == before).all()
 
 
-def test_a_body_sweeps_a_band_as_wide_as_it_is_and_its_stand_is_left_out():
-    trail = np.array([[1.0, 2.0], [4.0, 2.0]])
-    reach = 0.2 + MARGIN_M
-    rows, columns = np.nonzero(swept((80, 120), (0.0, 0.0), trail, 0.2, RESOLUTION))
+def test_a_wall_beside_the_trail_stays(env):
+    belief = env.perception.belief("robot_0")
+    before = belief.map.log_odds.copy()
+    walls = centres(belief, np.argwhere(before > 0))
+    corner = walls[np.argmin(walls.sum(axis=1))]
+    beside = corner - (0.0, belief.radius + RESOLUTION)
+    assert (np.hypot(*(walls - beside).T) > belief.radius).all()
+    env.perception.forget_walls(0, beside + np.array([(0.0, 0.0), (0.0, -5.0)]))
+    assert (belief.map.log_odds == before).all()
+
+
+@pytest.mark.parametrize("margin", [0.0, MARGIN_M])
+def test_a_body_sweeps_a_band_as_wide_as_it_is_and_its_margin(margin):
+    rows, columns = np.nonzero(swept((80, 120), (0.0, 0.0), np.array([[1.0, 2.0], [4.0, 2.0]]), 0.2, RESOLUTION, margin))
+    reach = 0.2 + margin
     assert (rows.min() + 0.5) * RESOLUTION == pytest.approx(2.0 - reach, abs=RESOLUTION)
     assert (rows.max() + 0.5) * RESOLUTION == pytest.approx(2.0 + reach, abs=RESOLUTION)
-    without = passed((80, 120), (0.0, 0.0), trail, 0.2, RESOLUTION)
-    places = (np.argwhere(without)[:, ::-1] + 0.5) * RESOLUTION
-    assert np.hypot(*(places - trail[-1]).T).min() > reach - RESOLUTION
     assert (columns.max() + 0.5) * RESOLUTION == pytest.approx(4.0 + reach, abs=RESOLUTION)
+
+
+def test_where_a_body_has_passed_is_no_place_near_its_stand():
+    trail = np.array([[1.0, 2.0], [4.0, 2.0]])
+    places = (np.argwhere(passed((80, 120), (0.0, 0.0), trail, 0.2, RESOLUTION))[:, ::-1] + 0.5) * RESOLUTION
+    assert np.hypot(*(places - trail[-1]).T).min() > 0.2 + MARGIN_M - RESOLUTION
+    assert np.abs(places[:, 1] - 2.0).max() < 0.2 + RESOLUTION
