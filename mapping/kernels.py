@@ -66,6 +66,12 @@ _FOLDER = None if _CHOSEN_BY_USER else _cache_folder()
 _CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
 
 
+def is_cache_empty() -> bool:
+    """Whether no kernel has been compiled into the cache yet, so that this start compiles; False where nothing can be kept."""
+    folder = os.environ.get("NUMBA_CACHE_DIR") or _FOLDER
+    return folder is not None and next(Path(folder).rglob("*.nbi"), None) is None
+
+
 def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False, inline: bool = False, spliced: bool = False) -> Any:  # noqa: ANN401
     """Compile a function of arrays with numba: nopython, exact floating point, no GIL, cached.
 

@@ -103,6 +103,14 @@ def tell(message: str) -> None:
     print(message, file=sys.stderr, flush=True)
 
 
+def tell_of_compiling() -> None:
+    """Tell, at the first start, why nothing happens for a while."""
+    from lidarium.mapping.kernels import is_cache_empty
+
+    if is_cache_empty():
+        tell("compiling the kernels, a minute or two; later starts find them")
+
+
 def table(rows: Iterable[Sequence[object]], header: Sequence[str] = (), indent: str = "  ") -> str:
     """Return lines of aligned columns; columns of numbers to the right."""
     lines = [[str(cell) for cell in row] for row in ([header, *rows] if header else rows)]
@@ -139,6 +147,7 @@ def counted(items: Iterable[T], total: int, what: str, is_quiet: bool, clock: Ca
     clock : callable
         Wall time [s].
     """
+    tell_of_compiling()
     if not is_quiet and sys.stderr.isatty():
         from tqdm import tqdm
 
@@ -164,6 +173,7 @@ class Progress:
     """
 
     def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:
+        tell_of_compiling()
         self._clock, self._last = clock, -math.inf
         self._bar: Any = None
         if not is_quiet and sys.stderr.isatty():

@@ -114,6 +114,17 @@ def test_the_cache_key_changes_with_any_kernel_source_and_only_then(tmp_path, mo
     assert kernels._sources_hash() != first
 
 
+def test_a_start_tells_a_first_one_from_later_ones_by_the_cache(tmp_path, monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(kernels, "_FOLDER", tmp_path)
+    assert kernels.is_cache_empty()
+    (tmp_path / "parallel" / "mapping").mkdir(parents=True)
+    (tmp_path / "parallel" / "mapping" / "one.nbi").touch()
+    assert not kernels.is_cache_empty()
+    monkeypatch.setattr(kernels, "_FOLDER", None)
+    assert not kernels.is_cache_empty()
+
+
 def test_every_file_whose_constants_or_kernels_a_kernel_uses_is_in_the_cache_key():
     """Numba bakes globals into compiled code: a constant of a file without kernels could change unseen."""
     with_kernels = {path for path, text in SOURCES.items() if "@kernel" in text}
