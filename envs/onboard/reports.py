@@ -4,7 +4,10 @@ With the ideal radio the station knows at any time what is now. With any other i
 has reached it there (`Exchange`); its orders reach a robot as long as the links do.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
+from weakref import WeakMethod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,14 +80,15 @@ class Station:
 
     def __init__(self, perception: Perception, meters: Meters) -> None:
         self._perception, self._meters = perception, meters
-        self.operating = Operating(perception, perception.settings, self._order_delay)
+        # Nothing that these hold leads back here: else the maps of an environment that is dropped stay until the garbage is collected.
+        self.operating = Operating(perception, perception.settings, partial(_order_delay, perception))
         if self._exchange is not None:
-            self._exchange.tells = self._status
+            self._exchange.tells = partial(_call, WeakMethod(self._status))
         self.start()
 
     @property
     def _exchange(self) -> Exchange | None:
-        return self._perception.exchanges[0] if self._perception.exchanges else None
+        return _exchange_of(self._perception)
 
     def start(self) -> None:
         """Begin an episode, after its robots were placed: nobody has reported."""
@@ -114,14 +118,14 @@ class Station:
 
         It takes effect at once, however long the radio takes: what a station knows changes slowly.
         """
-        if self._order_delay(row) is None:
+        if _order_delay(self._perception, row) is None:
             return False
         self._perception.tell(row, others)
         return True
 
     def forget_walls(self, row: int, trail: NDArray[np.float64]) -> bool:
         """Tell a robot where another one drove (`Perception.forget_walls`), if the links to it stand; return whether they do."""
-        if self._order_delay(row) is None:
+        if _order_delay(self._perception, row) is None:
             return False
         self._perception.forget_walls(row, trail)
         return True
@@ -155,6 +159,19 @@ class Station:
     def _pose(self, row: int) -> Transform:
         return Transform(*self._perception.pose_in_frame(row, row).tolist())
 
-    def _order_delay(self, row: int) -> int | None:
-        """Return after how many steps an order reaches a robot, None where it does not."""
-        return 0 if self._exchange is None else self._exchange.order_delay(row)
+
+def _exchange_of(perception: Perception) -> Exchange | None:
+    return perception.exchanges[0] if perception.exchanges else None
+
+
+def _order_delay(perception: Perception, row: int) -> int | None:
+    """Return after how many steps an order reaches a robot, None where it does not."""
+    exchange = _exchange_of(perception)
+    return 0 if exchange is None else exchange.order_delay(row)
+
+
+def _call(method: WeakMethod[Callable[[int], Status]], row: int) -> Status:
+    """Call a method of an object that is there as long as what calls it."""
+    called = method()
+    assert called is not None
+    return called(row)
