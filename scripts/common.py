@@ -147,7 +147,6 @@ def counted(items: Iterable[T], total: int, what: str, is_quiet: bool, clock: Ca
     clock : callable
         Wall time [s].
     """
-    tell_of_compiling()
     if not is_quiet and sys.stderr.isatty():
         from tqdm import tqdm
 
@@ -173,7 +172,6 @@ class Progress:
     """
 
     def __init__(self, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:
-        tell_of_compiling()
         self._clock, self._last = clock, -math.inf
         self._bar: Any = None
         if not is_quiet and sys.stderr.isatty():

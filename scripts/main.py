@@ -10,7 +10,7 @@ from tyro.conf import subcommand
 
 from lidarium.scripts import bench, evaluate, floors, merge, replay, report, reproduce, run, show, slam
 from lidarium.scripts.bench import Bench
-from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell
+from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell, tell_of_compiling
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
 from lidarium.scripts.merge import Merge
@@ -50,6 +50,9 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Bench: bench.execute,
     Show: show.execute,
 }
+
+
+_WITH_KERNELS = (Run, Evaluate, Reproduce, Merge, Slam, floors.Prepare, Bench)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -101,6 +104,8 @@ def _command(arguments: Sequence[str] | None) -> Command:
 def _answered(command: Command) -> int:
     from lidarium.evaluation.output import as_json
 
+    if isinstance(command, _WITH_KERNELS):
+        tell_of_compiling()
     answer = _EXECUTE[type(command)](command)
     text = as_json(answer.result) if command.json else answer.text + "\n"
     if answer.result:

@@ -1,4 +1,4 @@
-"""What is dropped is gone at once: maps are large, and Python collects rings of objects that hold each other by their number, not their size."""
+"""What is dropped is gone at once: of objects that hold each other, Python collects many small ones sooner than few large maps."""
 
 import gc
 import weakref
