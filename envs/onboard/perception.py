@@ -225,7 +225,14 @@ class Perception:
             Which robot.
         trail : (N, 2) float64
             Where the other one was, in the map frame of this [m]; what may show it where it stands at the end is kept.
+
+        Raises
+        ------
+        ValueError
+            Where the trail is not that of a robot: of another shape, without a place, or not finite.
         """
+        if trail.ndim != 2 or trail.shape[1] != 2 or not len(trail) or not np.isfinite(trail).all():
+            raise ValueError(f"the trail has shape {trail.shape} and may not be finite; want places (N, 2) in metres, at least one")
         self._trails[row].append(trail)
         self._forget(row, trail)
 

@@ -92,6 +92,12 @@ def test_a_trail_beyond_the_map_or_of_one_place_changes_nothing(env):
     assert (belief.map.log_odds == before).all()
 
 
+@pytest.mark.parametrize("trail", [np.zeros((0, 2)), np.zeros(2), np.zeros((3, 3)), np.array([[0.0, np.nan]])])
+def test_what_is_no_trail_is_refused(env, trail):
+    with pytest.raises(ValueError, match="want places"):
+        env.perception.forget_walls(0, trail)
+
+
 def test_a_wall_beside_the_trail_stays(env):
     belief = env.perception.belief("robot_0")
     before = belief.map.log_odds.copy()
