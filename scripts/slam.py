@@ -74,7 +74,6 @@ def execute(command: Slam) -> Answer:
     ValueError, FileNotFoundError, OSError
         Where the log, the reference, the relations or ``--out`` is no good; nothing is written then.
     """
-    from lidarium.evaluation.metrics.relations import read_relations
     from lidarium.evaluation.output import check_writable
     from lidarium.mapping.localization.following import follow
     from lidarium.mapping.trajectories import read_tum
@@ -83,7 +82,7 @@ def execute(command: Slam) -> Answer:
     check_writable(out)
     log = _log(command)
     reference = None if command.reference is None else read_tum(command.reference)
-    relations = None if command.relations is None else read_relations(command.relations)
+    relations = None if command.relations is None else _relations(command, log)
 
     def watch(scans: Iterable[int]) -> Iterator[int]:
         return counted(scans, len(log.stamps), "scans", command.json)
@@ -177,6 +176,21 @@ def _against_reference(
         "rpe_m": None if relative is None else round(relative[0], 6),
         "rpe_rad": None if relative is None else round(relative[1], 8),
     }
+
+
+def _relations(command: Slam, log: "LaserLog") -> "Relations":
+    """Read the relations of times of which the log tells, and tell how many others there are."""
+    from lidarium.evaluation.metrics.relations import covered, read_relations
+
+    assert command.relations is not None
+    every = read_relations(command.relations)
+    try:
+        found = covered(every, log.stamps + command.clock_shift)
+    except ValueError as error:
+        raise ValueError(f"{command.relations}: {error} with --clock-shift, which is {command.clock_shift}") from error
+    if len(found.begin) < len(every.begin):
+        tell(f"{command.relations}: left out: {len(every.begin) - len(found.begin)} of times beyond the log")
+    return found
 
 
 def _against_relations(command: Slam, log: "LaserLog", poses: "NDArray[np.float64]", relations: "Relations") -> dict[str, float]:

@@ -18,6 +18,9 @@ from lidarium.mapping.trajectories import at_readings, interpolated, last_before
 
 Which = Literal["between", "before"]
 
+BEYOND_S = 1.0
+"""How far the times of relations may lie beyond a log: stamps are rounded, and not always those of scans [s]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Relations:
@@ -81,6 +84,31 @@ def read_relations(path: Path) -> Relations:
     return Relations(table[:, 0].copy(), table[:, 1].copy(), table[:, [2, 3, 7]])
 
 
+def covered(relations: Relations, stamps: NDArray[np.float64]) -> Relations:
+    """Return the relations of times of which a log tells.
+
+    Parameters
+    ----------
+    relations : Relations
+        All of them.
+    stamps : (scans,) float64
+        Times of the log's scans, growing, on the clock of the relations [s].
+
+    Raises
+    ------
+    ValueError
+        Where it tells of none, as with clocks that differ.
+    """
+    first, last = np.minimum(relations.begin, relations.end), np.maximum(relations.begin, relations.end)
+    is_inside = (first >= stamps[0] - BEYOND_S) & (last <= stamps[-1] + BEYOND_S)
+    if not is_inside.any():
+        raise ValueError(
+            f"the relations are of {first.min():.3f} to {last.max():.3f} s, the log of {stamps[0]:.3f} to {stamps[-1]:.3f} s; "
+            "want what they have in common: shift the log's clock"
+        )
+    return Relations(relations.begin[is_inside], relations.end[is_inside], relations.motions[is_inside])
+
+
 def relation_errors(begin: NDArray[np.float64], end: NDArray[np.float64], relations: Relations) -> RelationErrors:
     """Return by how much poses miss relations: the motion between the poses of each, as seen from the true one.
 
@@ -101,7 +129,7 @@ def relation_errors(begin: NDArray[np.float64], end: NDArray[np.float64], relati
 def log_relation_errors(
     log: LaserLog, poses: NDArray[np.float64], relations: Relations, clock_shift: float = 0.0, which: Which = "between"
 ) -> RelationErrors:
-    """Return by how much the poses found for a log's scans miss relations.
+    """Return by how much the poses found for a log's scans miss relations; those of times beyond the log are left out.
 
     Parameters
     ----------
@@ -116,8 +144,14 @@ def log_relation_errors(
     which : str
         Pose at a relation's time: ``between`` those of the scans around it at constant speed, or ``before``, the last one before,
         for logs whose scans carry the stamp of the odometry before them; the log's odometry then tells the way between scans.
+
+    Raises
+    ------
+    ValueError
+        Where the log tells of none of their times.
     """
     stamps = log.stamps + clock_shift
+    relations = covered(relations, stamps)
     if which == "between":
         return relation_errors(interpolated(stamps, poses, relations.begin), interpolated(stamps, poses, relations.end), relations)
     if len(log.reading_of_scan):

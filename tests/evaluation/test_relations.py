@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lidarium.evaluation.metrics.poses import absolute_error
-from lidarium.evaluation.metrics.relations import Relations, read_relations, relation_errors
+from lidarium.evaluation.metrics.relations import BEYOND_S, Relations, covered, read_relations, relation_errors
 from lidarium.mapping.rigid import composed, relative
 from lidarium.mapping.trajectories import write_tum
 
@@ -50,6 +50,20 @@ def test_relations_are_read(tmp_path, name):
     assert relations.begin.tolist() == [1.5, 3.5]
     assert relations.end.tolist() == [2.5, 2.5]
     assert relations.motions.tolist() == [[0.1, 0.2, 0.3], [1.0, 2.0, -0.3]]
+
+
+def test_relations_of_times_beyond_the_log_are_left_out():
+    begin, end = np.array([0.0, 9.0, 4.0 - BEYOND_S, 6.0]), np.array([5.0, 6.0, 6.0, 4.0 - 2.0 * BEYOND_S])
+    found = covered(Relations(begin, end, np.arange(12.0).reshape(4, 3)), np.array([4.0, 5.0, 8.5]))
+    assert found.begin.tolist() == [9.0, 3.0]
+    assert found.end.tolist() == [6.0, 6.0]
+    assert found.motions.tolist() == [[3.0, 4.0, 5.0], [6.0, 7.0, 8.0]]
+
+
+def test_relations_on_another_clock_are_refused_with_both_spans():
+    relations = Relations(np.array([1000.5]), np.array([1001.0]), np.zeros((1, 3)))
+    with pytest.raises(ValueError, match=r"1000\.500 to 1001\.000 s, the log of 0\.000 to 20\.000 s"):
+        covered(relations, np.array([0.0, 20.0]))
 
 
 @pytest.mark.parametrize("content", ["", "1 2 3\n", "a b c d e f g h\n"])

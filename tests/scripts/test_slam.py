@@ -129,10 +129,12 @@ def test_logs_without_anything_to_map_are_refused(content, word, tmp_path, capsy
         (["--reference", "gone.tum"], "no file gone.tum"),
         (["--relations", "gone.relations"], "no file gone.relations"),
         (["--clock-shift", "1e6", "--reference", "TRUE"], "want times in common"),
+        (["--clock-shift", "1e6", "--relations", "RELATIONS"], "with --clock-shift, which is 1000000.0"),
     ],
 )
 def test_bad_options_are_named(log, arguments, word, tmp_path, capsys):
-    arguments = [str(log.parent / "true.tum") if word_of == "TRUE" else word_of for word_of in arguments]
+    files = {"TRUE": log.parent / "true.tum", "RELATIONS": log.parent / "true.relations"}
+    arguments = [str(files.get(argument, argument)) for argument in arguments]
     assert main(["slam", str(log), *arguments, "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr()
     assert word in told.err
