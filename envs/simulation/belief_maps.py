@@ -2,6 +2,7 @@
 
 import math
 import mmap
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,12 +47,8 @@ def wipe(log_odds: NDArray[np.int8], touched: NDArray[np.uint64], window: NDArra
     lines, words = np.flatnonzero(used.any(axis=1)), np.flatnonzero(used.any(axis=0))
     if not lines.size:
         return
-    low, high = int(lines[0]), int(lines[-1]) + 1
-    log_odds[low:high] = 0
-    for word in words.tolist() if touched.size else []:
-        touched[low:high, word // WORD] |= np.uint64(1 << word % WORD)
-    window[0], window[1] = min(window[0], low), max(window[1], high)
-    window[2], window[3] = min(window[2], WORD * words[0]), max(window[3], WORD * (words[-1] + 1))
+    log_odds[lines[0] : lines[-1] + 1] = 0
+    _note(touched, window, (int(lines[0]), int(lines[-1]) + 1), words.tolist(), (WORD * int(words[0]), WORD * (int(words[-1]) + 1)))
 
 
 def blank(
@@ -66,8 +63,15 @@ def blank(
     if not rows.size:
         return
     log_odds[corner[0] : corner[0] + where.shape[0], corner[1] : corner[1] + where.shape[1]][where] = 0
-    low, high = int(rows[0]), int(rows[-1]) + 1
-    for word in range(int(columns[0]) // WORD, int(columns[-1]) // WORD + 1) if touched.size else []:
-        touched[low:high, word // WORD] |= np.uint64(1 << word % WORD)
-    window[0], window[1] = min(window[0], low), max(window[1], high)
-    window[2], window[3] = min(window[2], int(columns[0])), max(window[3], int(columns[-1]) + 1)
+    words = range(int(columns[0]) // WORD, int(columns[-1]) // WORD + 1)
+    _note(touched, window, (int(rows[0]), int(rows[-1]) + 1), words, (int(columns[0]), int(columns[-1]) + 1))
+
+
+def _note(
+    touched: NDArray[np.uint64], window: NDArray[np.int64], rows: tuple[int, int], words: Iterable[int], columns: tuple[int, int]
+) -> None:
+    """Note that a map has changed in rows and columns (low, high), and in which words of 64 cells of these rows."""
+    for word in words if touched.size else ():
+        touched[rows[0] : rows[1], word // WORD] |= np.uint64(1 << word % WORD)
+    window[0], window[1] = min(window[0], rows[0]), max(window[1], rows[1])
+    window[2], window[3] = min(window[2], columns[0]), max(window[3], columns[1])
