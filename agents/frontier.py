@@ -8,11 +8,12 @@ and gives way; all stop together when none has work, each with its reason.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.frontier_reach import Choice, Reach, reach_of
 from lidarium.agents.policy import Action, GivenUp, Stop, Team
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.navigation import NavigationMap
@@ -29,16 +30,11 @@ PATIENCE_S = 20.0
 MOST_UTILITY_LOST = 2.0
 """A frontier whose way costs more utility than this above the cheapest one's is not considered."""
 
+FIRST_SLACK = 4.0
+"""How far beyond the cheapest frontier others are looked for at first [m]; further where that does not settle the choice."""
+
 MOVED = 0.15
 """What counts as having moved [m]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """Where a robot goes: the cell to stand in, and the frontier cell to look at."""
-
-    cell: Cell
-    frontier_cell: Cell
 
 
 @dataclass(slots=True)
@@ -230,33 +226,6 @@ class NearestFrontier(FrontierExplorer):
         return None
 
 
-def _reaches(
-    explorer: FrontierExplorer, agent: str, clusters: Clusters, navigation: NavigationMap, minimum_size: float, slack: float
-) -> tuple[NDArray[np.float64], list[Choice | None]]:
-    """Return what each cluster costs an agent to come near, and where it would stand.
-
-    Clusters that cost more than ``slack`` [m] above the cheapest one of at least ``minimum_size`` (of any size, where there
-    is none) count as out of reach, so that the search need not spread over the whole floor; inf where out of reach.
-    """
-    start = explorer.start_cell(agent)
-    least = math.inf
-    for frontiers in (navigation.long_frontiers(minimum_size), navigation.frontiers):
-        cheapest = nearest_frontier(frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, explorer.footprint)
-        if cheapest is not None:
-            least = cheapest.cost
-            break
-    if math.isinf(least):
-        return np.full(len(clusters), math.inf), [None] * len(clusters)
-    found = search(navigation.space, navigation.log_odds, navigation.clearance, start, explorer.footprint, maximum_cost=least + slack)
-    near = approach(clusters, found, navigation.log_odds, default_reach(explorer.footprint, navigation.resolution))
-    costs = np.where(near.reachable, near.costs, math.inf)
-    choices = [
-        Choice((int(cell[0]), int(cell[1])), (int(seen[0]), int(seen[1]))) if ok else None
-        for cell, seen, ok in zip(near.cells, near.frontier_cells, near.reachable, strict=True)
-    ]
-    return costs, choices
-
-
 class ExploreLite(FrontierExplorer):
     """Each robot drives to the frontier of least cost: distance less size, as explore_lite weighs them, both in metres.
 
@@ -308,12 +277,12 @@ class ExploreLite(FrontierExplorer):
             return None
         # Beyond this no frontier can make up for the way by its size.
         slack = self._gain_scale * float(clusters.sizes.max()) / self._potential_scale + 0.1
-        distances, choices = _reaches(self, agent, clusters, navigation, self._minimum_size, slack)
-        costs = self._potential_scale * distances - self._gain_scale * clusters.sizes
+        reach = reach_of(clusters, navigation, self.start_cell(agent), self.footprint, self._minimum_size, slack)
+        costs = self._potential_scale * reach.costs - self._gain_scale * clusters.sizes
         long_enough = np.where(clusters.sizes >= self._minimum_size, costs, math.inf)
         ranked = long_enough if np.isfinite(long_enough).any() else costs
         best = int(np.argmin(ranked))
-        return choices[best] if math.isfinite(ranked[best]) else None
+        return reach.choices[best] if math.isfinite(ranked[best]) else None
 
 
 class UtilityFrontier(FrontierExplorer):
@@ -355,23 +324,43 @@ class UtilityFrontier(FrontierExplorer):
         chosen: dict[str, Choice | None] = dict.fromkeys(agents)
         if not len(clusters):
             return chosen
-        slack = MOST_UTILITY_LOST / self._cost_weight
-        reaches = {agent: _reaches(self, agent, clusters, navigation, self._minimum_size, slack) for agent in agents}
+        most = MOST_UTILITY_LOST / self._cost_weight
+        slacks = dict.fromkeys(agents, min(FIRST_SLACK, most))
+        reaches: dict[str, Reach] = {}
+        unsure = list(agents)
+        while unsure:
+            for agent in unsure:
+                start = self.start_cell(agent)
+                reach = reach_of(clusters, navigation, start, self.footprint, self._minimum_size, slacks[agent])
+                reaches[agent] = replace(reach, beyond=math.inf) if slacks[agent] >= most else reach
+                slacks[agent] = min(2.0 * slacks[agent], most)
+            chosen, unsure = self._share_out(agents, reaches, clusters, navigation)
+        return chosen
+
+    def _share_out(
+        self, agents: list[str], reaches: Mapping[str, Reach], clusters: Clusters, navigation: NavigationMap
+    ) -> tuple[dict[str, Choice | None], list[str]]:
+        """Share the frontiers out, and name the agents that might do better with one beyond their reach."""
         utility = np.where(clusters.sizes >= self._minimum_size, 1.0, 0.25)
+        chosen: dict[str, Choice | None] = dict.fromkeys(agents)
         waiting = list(agents)
         while waiting:
-            values = {agent: utility - self._cost_weight * reaches[agent][0] for agent in waiting}
+            values = {agent: utility - self._cost_weight * reaches[agent].costs for agent in waiting}
             agent = max(waiting, key=lambda name: (float(values[name].max()), -waiting.index(name)))
             best = int(np.argmax(values[agent]))
+            value = float(values[agent][best])
+            unsure = [name for name in waiting if reaches[name].may_hold(utility, self._cost_weight, value)]
+            if unsure:
+                return chosen, unsure
             waiting.remove(agent)
-            if not math.isfinite(values[agent][best]):
+            if not math.isfinite(value):
                 continue
-            choice = reaches[agent][1][best]
+            choice = reaches[agent].choices[best]
             chosen[agent] = choice
             if choice is not None:
                 utility = utility - self._seen_share(clusters, clusters.representatives[best], navigation)
                 utility[best] = min(utility[best], -1.0)
-        return chosen
+        return chosen, []
 
     def _seen_share(self, clusters: Clusters, target: NDArray[np.int64], navigation: NavigationMap) -> NDArray[np.float64]:
         """Return by how much each cluster's utility falls when a robot goes to a target."""

@@ -228,6 +228,7 @@ def search(
     goal: Cell | None = None,
     targets: Targets | None = None,
     count: int = 1,
+    beyond: float = 0.0,
     maximum_cost: float = math.inf,
     blocked: Iterable[Disc] = (),
 ) -> Search:
@@ -252,6 +253,8 @@ def search(
         Stop when ``count`` cells are settled from which a target is in reach and sight.
     count : int
         How many.
+    beyond : float
+        With the targets found, go on until all costs up to the dearest one's and this above it are final [m].
     maximum_cost : float
         Stop at this cost [m].
     blocked : iterable of (row, column, radius)
@@ -275,7 +278,8 @@ def search(
     goal_row, goal_column = (-1, -1) if goal is None else (int(goal[0]), int(goal[1]))
     discs = _discs_array(blocked)
     space.forget()
-    task = np.array([*start, goal_row, goal_column, budget, 0, 0 if targets is None else count], np.int64)
+    further = int(budget_of(float(beyond), space.resolution)) if beyond > 0.0 else 0
+    task = np.array([*start, goal_row, goal_column, budget, 0, 0 if targets is None else count, further], np.int64)
     mask, near = (_NO_MASK, _NO_MASK) if targets is None else (targets.mask, targets.near)
     lookout = Lookout(mask, near, np.zeros(1, np.int64) if targets is None else targets.spans.copy(), space.hits)
     space.touched_count, hit_count, settled = search_at(

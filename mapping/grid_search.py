@@ -316,12 +316,13 @@ def spread(
     near: NDArray[np.uint8],
     spans: NDArray[np.int64],
     wanted: int,
+    beyond: int,
     hits: NDArray[np.int32],
 ) -> tuple[int, int, int, NDArray[np.int32]]:
     """Spread costs from the start until the goal, the wanted number of targets, the budget or all is reached (kernel).
 
-    Returns the number of touched cells, of targets hit, the last band of costs that is final, and the buckets (grown
-    where they were too small).
+    With the targets found it goes on to costs of ``beyond`` above theirs. Returns the number of touched cells, of targets
+    hit, the last band of costs that is final, and the buckets (grown where they were too small).
     """
     sizes = np.zeros(buckets.shape[0], np.int64)
     start_is_open = log_odds[start_row, start_column] < 0 and half_costs[0, closeness[start_row, start_column]] > 0
@@ -330,6 +331,7 @@ def spread(
     parent[start_row, start_column] = 0 if start_is_open else LEAVING
     touched[touched_count] = (start_row << 16) | start_column
     current = _estimate(start_row, start_column, goal_row, goal_column) >> BUCKET_SHIFT if guided else 0
+    last = LARGEST_BUDGET
     slot = current & (buckets.shape[0] - 1)
     buckets[slot, 0] = (start_row << 16) | start_column
     sizes[slot] = 1
@@ -355,6 +357,9 @@ def spread(
         if goal_row >= 0 and (budget - remaining[goal_row, goal_column]) >> BUCKET_SHIFT <= current:
             break
         if 0 < wanted <= counts[1]:
+            last = current + 1 + (beyond >> BUCKET_SHIFT) if beyond > 0 else current
+            wanted = 0
+        if current >= last:
             break
         current += 1
     return counts[0], counts[1], current, buckets

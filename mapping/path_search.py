@@ -139,9 +139,9 @@ def search_in(
         A row of ``SearchMemory.table``.
     discs : (K, 3) float64
         Discs (row, column, radius) [cells] that the body's centre may not enter.
-    task : (7,) int64
-        Row and column of the start and of the goal (-1 for none), the budget, 1 to be guided to the goal, and how many targets
-        are wanted.
+    task : (8,) int64
+        Row and column of the start and of the goal (-1 for none), the budget, 1 to be guided to the goal, how many targets are
+        wanted, and how far to go on beyond them.
     targets : Lookout
         What to look for.
 
@@ -160,11 +160,11 @@ def search_in(
     buckets = int32_table_at(memory[BUCKETS], memory[SLOTS], memory[WIDTH])
     count = close_discs(remaining, touched, discs)
     start_row, start_column, goal_row, goal_column = task[0], task[1], task[2], task[3]
-    budget, guided, wanted = task[4], task[5], task[6]
+    budget, guided, wanted, beyond = task[4], task[5], task[6], task[7]
     count, hit_count, band, _ = spread(
         log_odds, closeness, passage.limit, passage.half_costs, passage.roomy, passage.radius, discs, remaining, parent, touched, count,
         buckets, start_row, start_column, budget, goal_row, goal_column, guided != 0, targets.mask, targets.near, targets.spans, wanted,
-        targets.hits,
+        beyond, targets.hits,
     )  # fmt: skip
     return remaining, parent, count, hit_count, ((band + 1) << BUCKET_SHIFT) - 1
 
@@ -206,7 +206,7 @@ def search_all(
     least : int
         What remains at least in cells whose costs are final.
     """
-    task = np.array([start_row, start_column, -1, -1, LARGEST_BUDGET, 0, 0])
+    task = np.array([start_row, start_column, -1, -1, LARGEST_BUDGET, 0, 0, 0])
     remaining, parent, count, _, settled = search_in(log_odds, closeness, passage, memory, np.empty((0, 3)), task, _nothing())
     return remaining, parent, count, LARGEST_BUDGET - settled
 
@@ -262,7 +262,7 @@ def find_path(
     for k in range(len(discs)):
         if not is_there and (goal_row - discs[k, 0]) ** 2 + (goal_column - discs[k, 1]) ** 2 < discs[k, 2] ** 2:
             return -1, nothing  # a body stands there
-    task = np.array([start_row, start_column, goal_row, goal_column, budget, 1, 0])
+    task = np.array([start_row, start_column, goal_row, goal_column, budget, 1, 0, 0])
     remaining, parent, count, _, settled = search_in(log_odds, closeness, passage, memory, discs, task, _nothing())
     left = remaining[goal_row, goal_column]
     cost = 0 if is_there else budget - left

@@ -176,6 +176,26 @@ def test_the_first_targets_are_the_cheapest_of_the_full_search(seed, count, reac
 
 
 @settings(max_examples=30)
+@given(seed=SEEDS, beyond=st.sampled_from([0.05, 0.3, 1.0, 1e9]))
+def test_beyond_the_first_target_costs_are_those_of_the_full_search(seed, beyond):
+    footprint = Footprint(0.03, 0.1, 3.0)
+    belief = random_belief(seed, shape=(50, 60), walls=10)
+    start = open_start(belief, footprint, seed)
+    if start is None:
+        return
+    space, field = made(belief)
+    targets = Targets.of(np.random.default_rng(seed).random(belief.shape) < 0.003, 2.5)
+    full = search(space, belief, field, start, footprint).costs()
+    first = search(space, belief, field, start, footprint, targets=targets).hits
+    found = search(space, belief, field, start, footprint, targets=targets, beyond=beyond)
+    np.testing.assert_array_equal(found.hits, first)
+    most = found.cost(tuple(found.hits[0])) + beyond if len(found.hits) else np.inf
+    np.testing.assert_array_equal(np.where(full <= most, found.costs(), np.inf), np.where(full <= most, full, np.inf))
+    further = found.costs()[np.isfinite(found.costs())].max()
+    assert further <= most + 3 * 4096 * found.unit
+
+
+@settings(max_examples=30)
 @given(seed=SEEDS, count=st.integers(1, 6))
 def test_a_search_for_some_cells_ends_when_all_of_them_have_their_costs(seed, count):
     footprint = Footprint(0.03, 0.1, 3.0)
