@@ -64,9 +64,10 @@ class TimedLocalizer:
 
     def take_correction(self) -> KeyScans | None:
         """Note whether the scan before corrected the past."""
+        began = time.perf_counter()
         correction = self._localizer.take_correction()
         if correction is not None:
-            self._seconds[-1] = (self._seconds[-1][0], True)
+            self._seconds[-1] = (self._seconds[-1][0] + time.perf_counter() - began, True)
         return correction
 
 
@@ -91,6 +92,14 @@ class Watch:
         self.true: list[NDArray[np.float64]] = []
         localizers = env.perception.localizers
         localizers[:] = [None if localizer is None else TimedLocalizer(localizer, self.seconds) for localizer in localizers]
+        render = env.world.render_anew
+
+        def render_timed(row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+            began = time.perf_counter()
+            render(row, poses, ranges)
+            self.seconds[-1] = (self.seconds[-1][0] + time.perf_counter() - began, True)
+
+        env.world.render_anew = render_timed  # type: ignore[method-assign]
 
     def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
         """Note how far dead reckoning is off, and where robots are and believe to be."""
