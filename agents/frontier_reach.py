@@ -65,6 +65,11 @@ def reach_of(clusters: Clusters, navigation: NavigationMap, start: Cell, footpri
         Its body.
     minimum_size, slack : float
         See above [m].
+
+    Returns
+    -------
+    Reach
+        What they cost; its ``beyond`` is inf where the robot can reach nothing that costs more.
     """
     distance = default_reach(footprint, navigation.resolution)
     for frontiers in (navigation.long_frontiers(minimum_size), navigation.frontiers):

@@ -268,10 +268,12 @@ def search(
     Raises
     ------
     ValueError
-        If shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, or the footprint needs more clearance than
-        the field knows.
+        If shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, ``beyond`` is negative, or the footprint
+        needs more clearance than the field knows.
     """
     _check_search(space, log_odds, clearance, start, goal)
+    if not beyond >= 0.0:
+        raise ValueError(f"beyond is {beyond} m; want 0 or more")
     passage = passage_of(footprint, space.resolution, clearance.limit)
     space.provide(passage.slots)
     budget = int(budget_of(float(maximum_cost), space.resolution))

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
@@ -77,6 +77,14 @@ def open_start(belief, footprint, seed):
     room = clearance(belief > 0, RESOLUTION, 0.6)
     cells = np.argwhere((belief < 0) & (room >= footprint.radius + 1e-6))
     return None if len(cells) == 0 else tuple(int(i) for i in np.random.default_rng(seed).choice(cells))
+
+
+def beginning(seed):
+    """A body, a belief with many walls, where the body stands in it, and what searches want."""
+    footprint, belief = Footprint(0.03, 0.1, 3.0), random_belief(seed, shape=(50, 60), walls=10)
+    start = open_start(belief, footprint, seed)
+    assume(start is not None)
+    return footprint, belief, start, *made(belief)
 
 
 @settings(max_examples=40)
@@ -155,13 +163,8 @@ def touches_nothing(line, belief, radius):
 @settings(max_examples=30)
 @given(seed=SEEDS, count=st.integers(1, 5), reach=st.sampled_from([0.0, 2.5, 9.0]))
 def test_the_first_targets_are_the_cheapest_of_the_full_search(seed, count, reach):
-    footprint = Footprint(0.03, 0.1, 3.0)
-    belief = random_belief(seed, shape=(50, 60), walls=10)
-    start = open_start(belief, footprint, seed)
-    if start is None:
-        return
+    footprint, belief, start, space, field = beginning(seed)
     mask = np.random.default_rng(seed).random(belief.shape) < 0.003
-    space, field = made(belief)
     targets = Targets.of(mask, reach)
     everything = search(space, belief, field, start, footprint, targets=targets, count=10**9)
     hits = everything.hits
@@ -178,12 +181,7 @@ def test_the_first_targets_are_the_cheapest_of_the_full_search(seed, count, reac
 @settings(max_examples=30)
 @given(seed=SEEDS, beyond=st.sampled_from([0.05, 0.3, 1.0, 1e9]))
 def test_beyond_the_first_target_costs_are_those_of_the_full_search(seed, beyond):
-    footprint = Footprint(0.03, 0.1, 3.0)
-    belief = random_belief(seed, shape=(50, 60), walls=10)
-    start = open_start(belief, footprint, seed)
-    if start is None:
-        return
-    space, field = made(belief)
+    footprint, belief, start, space, field = beginning(seed)
     targets = Targets.of(np.random.default_rng(seed).random(belief.shape) < 0.003, 2.5)
     full = search(space, belief, field, start, footprint).costs()
     first = search(space, belief, field, start, footprint, targets=targets).hits
@@ -198,12 +196,7 @@ def test_beyond_the_first_target_costs_are_those_of_the_full_search(seed, beyond
 @settings(max_examples=30)
 @given(seed=SEEDS, count=st.integers(1, 6))
 def test_a_search_for_some_cells_ends_when_all_of_them_have_their_costs(seed, count):
-    footprint = Footprint(0.03, 0.1, 3.0)
-    belief = random_belief(seed, shape=(50, 60), walls=10)
-    start = open_start(belief, footprint, seed)
-    if start is None:
-        return
-    space, field = made(belief)
+    footprint, belief, start, space, field = beginning(seed)
     full = search(space, belief, field, start, footprint).costs()
     reached = np.argwhere(np.isfinite(full))
     cells = {tuple(map(int, cell)) for cell in np.random.default_rng(seed).choice(reached, count)}
@@ -352,6 +345,9 @@ def test_bad_input_is_named():
         plan(space, belief, field, (0, 0), (0, -1), Footprint())
     with pytest.raises(ValueError, match="log_odds has shape"):
         search(space, np.zeros((5, 5), np.int8), field, (0, 0), Footprint())
+    for beyond in (-1.0, math.nan):
+        with pytest.raises(ValueError, match="beyond is"):
+            search(space, belief, field, (0, 0), Footprint(), beyond=beyond)
     with pytest.raises(ValueError, match="preferred"):
         search(space, belief, field, (0, 0), Footprint(0.2, 0.7))
     with pytest.raises(ValueError, match="radius is"):
