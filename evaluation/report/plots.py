@@ -19,6 +19,9 @@ from lidarium.evaluation.report.style import band, colours, dash, dress, legend,
 from lidarium.evaluation.statistics import median_bands, ratio_profile, score_profile
 
 CURVE_POINTS = 181
+COVERAGE_STEPS = 200
+"""Thresholds of coverage lie so many to the whole, so that those at which episodes end (90, 95, 99 %) are among them."""
+
 FACTORS = np.geomspace(1.0, 4.0, 121)
 BOXED = ("path_m", "overlap_percent")
 _FEWEST_FOR_BOX = 5
@@ -114,7 +117,7 @@ def profiles(group: Group) -> dict[str, Any]:
             shares = ratio_profile(costs, FACTORS)
             factor[key] = {"runs": len(costs), "factors": FACTORS.tolist(), "shares": dict(zip(group.runs, shares.tolist(), strict=True))}
     lowest = min(row["coverage_final"] for rows in group.runs.values() for row in rows)
-    thresholds = np.linspace(min(np.floor(20.0 * lowest) / 20.0, 0.95), 1.0, 101)
+    thresholds = np.arange(10 * min(int(20.0 * lowest), 19), COVERAGE_STEPS + 1) / COVERAGE_STEPS
     scores = {policy: score_profile([row["coverage_final"] for row in rows], thresholds).tolist() for policy, rows in group.runs.items()}
     return {"within_factor": factor, "coverage_at_least": {"thresholds": thresholds.tolist(), "share_low_high": scores}}
 

@@ -3,6 +3,7 @@ import pytest
 
 from lidarium.evaluation.report.figures import compared, further_figure, further_keys, time_figure
 from lidarium.evaluation.report.groups import floor_set_of, grouped, paired, repeats, times_to
+from lidarium.evaluation.report.plots import profiles
 
 ENDED = {"robot_0": "no_frontier"}
 CUT = {"robot_0": "horizon"}
@@ -98,3 +99,14 @@ def test_of_a_policy_that_never_gets_there_the_horizon_counts(row):
     assert by_key["t90_s"].difference.estimate == pytest.approx(34.5 - 100.0)
     assert by_key["t99_s"].difference is None
     assert by_key["t99_s"].wilcoxon.ties == 10
+
+
+@pytest.mark.parametrize("lowest", [0.137, 0.42, 0.9, 0.98])
+def test_a_profile_of_coverage_turns_where_episodes_end(row, lowest):
+    (group,) = grouped([row(coverage_final=0.99), row(seed=1, coverage_final=0.9903), row(seed=2, coverage_final=lowest)])
+    found = profiles(group)["coverage_at_least"]
+    share = dict(zip(found["thresholds"], found["share_low_high"]["a"][0], strict=True))
+    assert found["thresholds"][0] <= lowest
+    assert share[0.99] == pytest.approx(2 / 3)
+    assert share[0.995] == 0.0
+    assert share[1.0] == 0.0
