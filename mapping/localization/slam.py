@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.growing import GrowingArray
 from lidarium.mapping.localization.calibration import OdometryCalibration
 from lidarium.mapping.localization.closures import Closure, ClosureFinder
 from lidarium.mapping.localization.local_mapping import Finished, LocalMapper, turned, way
@@ -70,8 +71,9 @@ class Slam:
         self._edges: list[tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]] = []
         self._due: list[tuple[float, Closure]] = []
         self._waiting = 0
-        self._key_places: list[tuple[int, NDArray[np.float64]]] = []
-        self._key_ranges: list[NDArray[np.float32]] = []
+        # Of each scan that was matched: the node before, the pose in its frame, and the ranges.
+        self._key_nodes, self._key_poses = GrowingArray((), np.int64), GrowingArray((3,), np.float64)
+        self._key_ranges = GrowingArray((self._geometry.beams,), np.float32)
         self._has_begun = False
         self._last: Sensing | None = None
         # Poses in the frame of the older local map: now, at the last match, at the last node.
@@ -152,11 +154,7 @@ class Slam:
     @property
     def key_scans(self) -> KeyScans:
         """All matched scans at the poses where they are now believed to have been taken."""
-        if not self._key_ranges:
-            return KeyScans(np.zeros((0, 3)), np.zeros((0, self._geometry.beams), np.float32))
-        numbers = np.array([node for node, _ in self._key_places])
-        poses = composed(self._nodes[numbers], np.stack([pose for _, pose in self._key_places]))
-        return KeyScans(poses, np.stack(self._key_ranges))
+        return KeyScans(composed(self._nodes[self._key_nodes.rows], self._key_poses.rows), self._key_ranges.rows)
 
     @property
     def map(self) -> OccupancyGrid:
@@ -164,8 +162,9 @@ class Slam:
         settings = OccupancySettings(resolution=self._settings.submaps.resolution)
         if self._mapped == 0:
             self._map = OccupancyGrid(settings)
-        for (node, pose), ranges in zip(self._key_places[self._mapped :], self._key_ranges[self._mapped :], strict=True):
-            self._map.integrate(composed(self._nodes[node], pose), ranges, self._geometry)
+        scans = self.key_scans
+        for pose, ranges in zip(scans.poses[self._mapped :], scans.ranges[self._mapped :], strict=True):
+            self._map.integrate(pose, ranges, self._geometry)
         self._mapped = len(self._key_ranges)
         return self._map
 
@@ -273,7 +272,9 @@ class Slam:
         self._spread = np.zeros((3, 3))
 
     def _note_key(self, ranges: NDArray[np.float32]) -> None:
-        self._key_places.append(self.place)
+        node, pose = self.place
+        self._key_nodes.append(node)
+        self._key_poses.append(pose)
         self._key_ranges.append(ranges)
 
     def _finder_takes(self, ended: list[Finished]) -> None:

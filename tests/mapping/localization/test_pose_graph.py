@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.optimize
 
 from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
 from lidarium.mapping.rigid import composed, relative
@@ -78,3 +79,24 @@ def test_residuals_turn_the_short_way():
     poses = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])
     rest = residuals(poses, edges_of([(0, 1)], [np.array([0.0, 0.0, 2 * math.pi - 6.0 - 0.1])], [False]))
     assert rest[0, 2] == pytest.approx(0.1)
+
+
+def test_the_optimum_is_that_of_dense_least_squares():
+    truth, generator = square(), np.random.default_rng(3)
+    pairs = [(k, k + 1) for k in range(len(truth) - 1)] + [(0, 40), (3, 38), (38, 3), (10, 31), (15, 26)]
+    measured = [relative(truth[a], truth[b]) + generator.normal(scale=[0.02, 0.02, 0.01]) for a, b in pairs]
+    edges = edges_of(pairs, measured, [False] * len(pairs))
+    corners = generator.normal(size=(len(pairs), 3, 3))
+    edges = edges._replace(information=edges.information + 1e3 * corners @ corners.swapaxes(1, 2))
+    roots = np.linalg.cholesky(edges.information).swapaxes(1, 2)
+
+    def weighted(free):
+        poses = np.vstack([truth[:1], free.reshape(-1, 3)])
+        return (roots @ residuals(poses, edges)[:, :, None]).ravel()
+
+    oracle = scipy.optimize.least_squares(weighted, truth[1:].ravel(), xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    poses = truth
+    for _ in range(5):
+        poses, covariance = optimised(poses, edges, 2.0, 20, 0)
+    assert np.abs(relative(poses[1:], oracle.x.reshape(-1, 3))).max() < 1e-6
+    assert np.allclose(covariance, np.linalg.inv(oracle.jac.T @ oracle.jac)[-3:, -3:], rtol=1e-4)
