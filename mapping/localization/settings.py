@@ -277,6 +277,35 @@ class GraphSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CompassSettings:
+    """How walls, which in most buildings run in two directions, keep headings from drifting.
+
+    Attributes
+    ----------
+    deviation_m : float
+        Standard deviation of a range [m].
+    deviation_angle : float
+        Standard deviation of the direction of a building's walls from place to place [rad].
+    drift : float
+        How much headings drift from node to node, as a share of the standard deviation of their matches: neighbouring scans are matched
+        with one local map, and do not err each on its own.
+    deviations : float
+        A direction that contradicts the heading by more standard deviations does not count: not all walls run that way.
+    most_deviation : float
+        Headings that are known less well than this are left alone: they may be off by more than walls can tell [rad].
+    """
+
+    deviation_m: float = 0.02
+    deviation_angle: float = math.radians(0.1)
+    drift: float = 0.4
+    deviations: float = 3.0
+    most_deviation: float = math.radians(3.0)
+
+    def __post_init__(self) -> None:
+        _check_numbers(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SlamSettings:
     """How a robot finds its pose and map at the same time.
 
@@ -284,16 +313,20 @@ class SlamSettings:
     ----------
     uses_odometry : bool
         False where there is none: motion is then predicted to go on as before.
-    odometry, matching, submaps, closures, graph
+    uses_walls : bool
+        Whether the directions of walls keep headings from drifting.
+    odometry, matching, submaps, closures, graph, compass
         Settings of each stage.
     """
 
     uses_odometry: bool = True
+    uses_walls: bool = True
     odometry: OdometryUncertainty = field(default_factory=OdometryUncertainty)
     matching: MatchingSettings = field(default_factory=MatchingSettings)
     submaps: SubmapSettings = field(default_factory=SubmapSettings)
     closures: ClosureSettings = field(default_factory=ClosureSettings)
     graph: GraphSettings = field(default_factory=GraphSettings)
+    compass: CompassSettings = field(default_factory=CompassSettings)
 
 
 def _check_numbers(settings: Any, zero: tuple[str, ...] = ()) -> None:  # noqa: ANN401

@@ -18,10 +18,11 @@ from lidarium.mapping.localization.calibration import OdometryCalibration
 from lidarium.mapping.localization.closures import Closure, ClosureFinder
 from lidarium.mapping.localization.local_mapping import Finished, LocalMapper, turned, way
 from lidarium.mapping.localization.localizer import KeyScans, Sensing
+from lidarium.mapping.localization.node_graph import NodeGraph
 from lidarium.mapping.localization.odometry import compounded
-from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
 from lidarium.mapping.localization.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.settings import SlamSettings
+from lidarium.mapping.localization.wall_compass import WallCompass
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.rigid import composed, relative
 from lidarium.mapping.scans import ScanGeometry
@@ -66,11 +67,9 @@ class Slam:
         self._mapper = LocalMapper(settings, self._geometry)
         self._finder = ClosureFinder(settings.closures, settings.matching)
         self.counts = SlamCounts()
-        self._nodes = np.array(pose, np.float64)[None]
-        self._node_covariance = np.zeros((3, 3))
-        self._edges: list[tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]] = []
+        self._compass = WallCompass(settings.compass) if settings.uses_walls else None
+        self._graph = NodeGraph(settings.graph, self._compass, pose)
         self._due: list[tuple[float, Closure]] = []
-        self._waiting = 0
         # Of each scan that was matched: the node before, the pose in its frame, and the ranges.
         self._key_nodes, self._key_poses = GrowingArray((), np.int64), GrowingArray((3,), np.float64)
         self._key_ranges = GrowingArray((self._geometry.beams,), np.float32)
@@ -115,20 +114,24 @@ class Slam:
         return self.pose
 
     @property
+    def _last_node(self) -> int:
+        return len(self._graph.nodes) - 1
+
+    @property
     def pose(self) -> NDArray[np.float64]:
         """x, y, theta of the robot, shape (3,) [m, rad]."""
         node, pose = self.place
-        return composed(self._nodes[node], pose)
+        return composed(self._graph.nodes[node], pose)
 
     @property
     def place(self) -> tuple[int, NDArray[np.float64]]:
         """The last node, and x, y, theta (3,) of the robot in its frame: later corrections of the node are the robot's as well."""
-        return len(self._nodes) - 1, relative(self._at_node, self._local)
+        return self._last_node, relative(self._at_node, self._local)
 
     @property
     def nodes(self) -> NDArray[np.float64]:
         """Poses of all nodes as they are now believed, shape (nodes, 3) [m, rad]."""
-        return self._nodes.copy()
+        return self._graph.nodes.copy()
 
     @property
     def pending(self) -> int:
@@ -142,7 +145,7 @@ class Slam:
         growth = turned(self._growth(), float(moved[2])) if self._told.any() else np.zeros((3, 3))
         spread = compounded(np.zeros(3), self._spread, moved, growth)
         node, pose = self.place
-        return compounded(self._nodes[node], self._node_covariance, pose, spread)
+        return compounded(self._graph.nodes[node], self._graph.covariance, pose, spread)
 
     def take_correction(self) -> KeyScans | None:
         """Return all scans at their poses, once after each time the past was corrected; else None."""
@@ -154,7 +157,7 @@ class Slam:
     @property
     def key_scans(self) -> KeyScans:
         """All matched scans at the poses where they are now believed to have been taken."""
-        return KeyScans(composed(self._nodes[self._key_nodes.rows], self._key_poses.rows), self._key_ranges.rows)
+        return KeyScans(composed(self._graph.nodes[self._key_nodes.rows], self._key_poses.rows), self._key_ranges.rows)
 
     @property
     def map(self) -> OccupancyGrid:
@@ -193,9 +196,10 @@ class Slam:
         """Match a scan and take it into the maps."""
         if not self._has_begun:
             self._has_begun = True
-            self._finder_takes(self._mapper.begin(len(self._nodes) - 1, ranges))
+            self._finder_takes(self._mapper.begin(self._last_node, ranges))
             self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
             self._note_key(ranges)
+            self._look_at_walls(points)
             return
         match = self._mapper.match(points, self._local, moved, self._growth(), self._failed)
         if match is None:
@@ -215,13 +219,14 @@ class Slam:
         if not self._mapper.insert(match.pose, way(driven), ranges):
             self._begin_anew(ranges, self._motion_covariance(match.covariance, relative(self._at_node, self._local)))
             return
+        self._look_at_walls(points)
         since = relative(self._at_node, self._local)
         graph = self._settings.graph
         wants_another = self._mapper.wants_another
         if wants_another or np.hypot(since[0], since[1]) >= graph.distance_m or abs(since[2]) >= graph.angle:
             self._add_node(since, self._motion_covariance(match.covariance, since))
             if wants_another:
-                self._mapper.add(len(self._nodes) - 1, self._local, ranges)
+                self._mapper.add(self._last_node, self._local, ranges)
             self._look_for_closures(points, time_s)
         self._note_key(ranges)
         poses, ended = self._mapper.hand_over(np.stack([self._local, self._matched, self._at_node]))
@@ -256,20 +261,23 @@ class Slam:
     def _begin_anew(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]) -> None:
         """Begin new local maps at a new node here."""
         self._failed = 0
+        if self._compass is not None:
+            self._compass.forget()
         self._add_node(relative(self._at_node, self._local), covariance)
-        self._finder_takes(self._mapper.begin(len(self._nodes) - 1, ranges))
+        self._finder_takes(self._mapper.begin(self._last_node, ranges))
         self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
         self._spread = np.zeros((3, 3))
         self._note_key(ranges)
 
     def _add_node(self, since: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
         """Set a node where the robot is, so far from the last one."""
-        last = self._nodes[-1]
-        self._node_covariance = compounded(last, self._node_covariance, since, covariance)
-        self._edges.append((len(self._nodes) - 1, len(self._nodes), since, _inverse(covariance), False))
-        self._nodes = np.vstack([self._nodes, composed(last, since)])
+        self._graph.add(since, covariance)
         self._at_node = self._local.copy()
         self._spread = np.zeros((3, 3))
+
+    def _look_at_walls(self, points: NDArray[np.float64]) -> None:
+        if self._compass is not None:
+            self._compass.look(points, float(self._local[2] - self._at_node[2]))
 
     def _note_key(self, ranges: NDArray[np.float32]) -> None:
         node, pose = self.place
@@ -279,36 +287,21 @@ class Slam:
 
     def _finder_takes(self, ended: list[Finished]) -> None:
         for finished in ended:
-            self._finder.remember(finished, len(self._nodes) - 1, self._path)
+            self._finder.remember(finished, self._last_node, self._path)
 
     def _look_for_closures(self, points: NDArray[np.float64], time_s: float) -> None:
-        for closure in self._finder.find(self._nodes, points, self._node_covariance, self._path, self._mapper.usual_score):
+        for closure in self._finder.find(self._graph.nodes, points, self._graph.covariance, self._path, self._mapper.usual_score):
             self._due.append((time_s + self._settings.closures.delay_s, closure))
 
     def _correct(self, time_s: float) -> None:
         """Let closures act whose time has come."""
         acting = [closure for due, closure in self._due if due <= time_s]
-        if not acting and not (time_s == np.inf and self._waiting):
+        if not acting and not (time_s == np.inf and self._graph.has_waiting):
             return
         self._due = [(due, closure) for due, closure in self._due if due > time_s]
-        for closure in acting:
-            self._edges.append((closure.old, closure.new, closure.measured, _inverse(closure.covariance), True))
         self.counts.closures += len(acting)
-        self._waiting += len(acting)
-        graph = self._settings.graph
-        edges = self._edge_arrays()
-        rest = residuals(self._nodes, edges)[-len(acting) :] if acting else np.zeros((1, 3))
-        is_wrong = (np.hypot(rest[:, 0], rest[:, 1]) > graph.correct_beyond_m).any() or (abs(rest[:, 2]) > graph.correct_beyond_angle).any()
-        if not (is_wrong or self._waiting >= graph.waiting or time_s == np.inf):
-            return
-        self._nodes, self._node_covariance = optimised(self._nodes, edges, graph.robust_scale, graph.iterations, len(acting))
-        self.counts.corrections += 1
-        self._waiting, self._mapped, self._is_corrected = 0, 0, True
-
-    def _edge_arrays(self) -> Edges:
-        a, b, measured, information, is_robust = zip(*self._edges, strict=True)
-        return Edges(np.array(a), np.array(b), np.stack(measured), np.stack(information), np.array(is_robust))
-
-
-def _inverse(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.linalg.inv(covariance), np.float64)
+        is_due = self._graph.close(acting) if acting else True
+        if is_due or time_s == np.inf:
+            self._graph.settle(len(acting))
+            self.counts.corrections += 1
+            self._mapped, self._is_corrected = 0, True

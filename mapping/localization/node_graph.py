@@ -1,0 +1,87 @@
+"""Nodes along the way of a robot, what was measured between them, and where they are believed to be."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.localization.closures import Closure
+from lidarium.mapping.localization.odometry import compounded
+from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
+from lidarium.mapping.localization.settings import GraphSettings
+from lidarium.mapping.localization.wall_compass import WallCompass
+from lidarium.mapping.rigid import composed, wrapped
+
+Edge = tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]
+"""Nodes a and b, b as seen from a, its information, and whether that may be wrong."""
+
+
+class NodeGraph:
+    """The way so far, to which nodes and closures come.
+
+    Parameters
+    ----------
+    settings : GraphSettings
+        How.
+    compass : WallCompass, optional
+        Turns new nodes, and has its say with the closures.
+    pose : (3,) float64
+        The first node: x, y, theta [m, rad].
+
+    Attributes
+    ----------
+    nodes : (nodes, 3) float64
+        Where they are now believed to be [m, rad].
+    covariance : (3, 3) float64
+        That of the last node against the first [m^2, m rad, rad^2].
+    """
+
+    def __init__(self, settings: GraphSettings, compass: WallCompass | None, pose: NDArray[np.float64]) -> None:
+        self._settings, self._compass = settings, compass
+        self.nodes = np.array(pose, np.float64)[None]
+        self.covariance = np.zeros((3, 3))
+        self._edges: list[Edge] = []
+        self._waiting = 0
+
+    def add(self, since: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
+        """Set a node so far (3,) from the last one [m, rad], in its frame, and so well known (3, 3)."""
+        last, number = self.nodes[-1], len(self.nodes)
+        self._edges.append((number - 1, number, since, _inverse(covariance), False))
+        self.covariance = compounded(last, self.covariance, since, covariance)
+        pose = composed(last, since)
+        if self._compass is not None:
+            turn, variance = self._compass.turn(number, float(since[2]), float(covariance[2, 2]), float(pose[2]))
+            pose[2] = wrapped(pose[2] + turn)
+            share = np.array([1.0, 1.0, np.sqrt(min(variance / self.covariance[2, 2], 1.0))])
+            self.covariance *= share[:, None] * share
+        self.nodes = np.vstack([self.nodes, pose])
+
+    def close(self, closures: list[Closure]) -> bool:
+        """Take in closures, at least one; return whether poses are to be settled: they contradict some, or enough of them wait."""
+        self._edges += [(closure.old, closure.new, closure.measured, _inverse(closure.covariance), True) for closure in closures]
+        self._waiting += len(closures)
+        rest = np.abs(residuals(self.nodes, _arrays(self._edges[-len(closures) :])))
+        settings = self._settings
+        is_far = np.hypot(rest[:, 0], rest[:, 1]) > settings.correct_beyond_m
+        return bool(is_far.any() or (rest[:, 2] > settings.correct_beyond_angle).any()) or self._waiting >= settings.waiting
+
+    @property
+    def has_waiting(self) -> bool:
+        """Whether closures came of which the poses do not know yet."""
+        return self._waiting > 0
+
+    def settle(self, newest: int) -> None:
+        """Bring all poses to agree; the last so many closures have not had their say yet."""
+        walls = self._compass.edges(self.nodes) if self._compass is not None else []
+        edges = _arrays([*walls, *self._edges])
+        self.nodes, self.covariance = optimised(self.nodes, edges, self._settings.robust_scale, self._settings.iterations, newest)
+        if self._compass is not None:
+            self._compass.relieve(float(self.covariance[2, 2]))
+        self._waiting = 0
+
+
+def _arrays(edges: list[Edge]) -> Edges:
+    a, b, measured, information, is_robust = zip(*edges, strict=True)
+    return Edges(np.array(a), np.array(b), np.stack(measured), np.stack(information), np.array(is_robust))
+
+
+def _inverse(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.inv(covariance), np.float64)

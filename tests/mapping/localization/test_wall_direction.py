@@ -1,0 +1,44 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from seen_rooms import BEAMS, room_seen
+
+from lidarium.mapping.localization.wall_direction import wall_direction, within_quarter
+
+
+@given(st.floats(1.0, 5.0), st.floats(1.0, 3.0), st.floats(-math.pi, math.pi), st.integers(0, 1000))
+def test_walls_are_seen_turned_back_by_the_heading(x, y, heading, seed):
+    direction, information = wall_direction(room_seen(x, y, heading, 0.02, seed), 0.02)
+    assert -math.pi / 4 <= direction < math.pi / 4
+    assert abs(within_quarter(direction + heading)) < 5.0 / math.sqrt(information)
+    assert abs(within_quarter(direction + heading)) < math.radians(1.5)
+
+
+def test_the_information_is_that_of_the_errors():
+    found = np.array([wall_direction(room_seen(2.0, 1.5, 0.3, 0.02, seed), 0.02) for seed in range(300)])
+    errors = np.array([within_quarter(direction + 0.3) for direction, _ in found])
+    assert np.sqrt(np.mean(errors**2 * found[:, 1])) == pytest.approx(1.0, abs=0.3)
+
+
+def test_one_slanting_wall_hardly_turns_the_others():
+    slanting = np.stack([np.linspace(0.0, 1.0, 20), np.linspace(-3.0, -2.8, 20)], axis=1)
+    points = np.concatenate([room_seen(2.0, 1.5, 0.0, 0.0, 0), slanting])
+    assert abs(wall_direction(points, 0.02)[0]) < math.radians(0.1)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.zeros((0, 2)),
+        np.array([[1.0, 0.0], [1.0, 1.0]]),
+        3.0 * np.stack([np.cos(BEAMS), np.sin(BEAMS)], axis=1),
+        np.random.default_rng(1).uniform(-4.0, 4.0, (200, 2)),
+        np.array([[1.0, 2.0]] * 50),
+    ],
+    ids=["nothing", "two points", "round", "scattered", "one place"],
+)
+def test_what_has_no_walls_tells_nothing(points):
+    assert wall_direction(points, 0.02) == (0.0, 0.0)
