@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.splines.basis import ORDER, point_at
 
-_NEWTON_STEPS = 8
+_NEWTON_STEPS = 20
 _PIECES = 8
 """Into so many pieces a span is cut where a curve is searched."""
+_FINE_PIECES = 32
+"""The same where its nearest point is searched: a curve may turn back on itself within a piece, and only one of its ways is found then."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,43 +144,49 @@ def curve_length(knots: Array, control_points: Array) -> float:
 
 @kernel
 def _closest(knots: Array, control_points: Array, points: Array, parameters: Array, distances: Array) -> None:
-    """Newton's method from every sample that is nearer than its neighbours and not hopelessly far."""
+    """Newton's method in each piece that may hold the nearest point: none is longer than its control points' differences allow."""
     count = control_points.shape[0]
-    places = np.empty((count - ORDER + 1) * _PIECES + 1)
-    used = 0
+    most = (count - ORDER + 1) * _FINE_PIECES
+    places, widths, reaches, used = np.empty(most + 1), np.empty(most), np.empty(most), 0
     for span in range(ORDER - 1, count):
-        width = knots[span + 1] - knots[span]
+        width = (knots[span + 1] - knots[span]) / _FINE_PIECES
         if width > 0.0:
-            for i in range(_PIECES):
-                places[used] = knots[span] + width * i / _PIECES
+            fastest = 0.0
+            for k in range(span - ORDER + 2, span + 1):
+                gap = math.hypot(control_points[k, 0] - control_points[k - 1, 0], control_points[k, 1] - control_points[k - 1, 1])
+                fastest = max(fastest, (ORDER - 1) * gap / (knots[k + ORDER - 1] - knots[k]))
+            for i in range(_FINE_PIECES):
+                places[used], widths[used], reaches[used] = knots[span] + width * i, width, 0.5 * fastest * width
                 used += 1
     places[used] = knots[count]
-    used += 1
-    samples, values, squares = np.empty((used, 2)), np.empty(ORDER), np.empty(used)
-    for i in range(used):
+    samples, values, apart = np.empty((used + 1, 2)), np.empty(ORDER), np.empty(used + 1)
+    for i in range(used + 1):
         samples[i, 0], samples[i, 1] = point_at(knots, control_points, places[i], 0, values)
     for k in range(points.shape[0]):
         px, py = points[k, 0], points[k, 1]
+        for i in range(used + 1):
+            apart[i] = math.hypot(samples[i, 0] - px, samples[i, 1] - py)
+        nearest, chosen = apart.min(), places[apart.argmin()]
         for i in range(used):
-            squares[i] = (samples[i, 0] - px) ** 2 + (samples[i, 1] - py) ** 2
-        nearest, chosen = math.inf, places[0]
-        for i in range(used):
-            before, after = squares[max(i - 1, 0)], squares[min(i + 1, used - 1)]
-            if squares[i] <= before and squares[i] <= after:
-                parameter, squared = _descend(
-                    knots, control_points, px, py, places[max(i - 1, 0)], places[i], places[min(i + 1, used - 1)], squares[i], values
-                )
-                if squared < nearest:
-                    nearest, chosen = squared, parameter
-        parameters[k], distances[k] = chosen, math.sqrt(nearest)
+            if min(apart[i], apart[i + 1]) - reaches[i] <= nearest:
+                middle = places[i] + 0.5 * widths[i]
+                parameter, squared = _descend(knots, control_points, px, py, places[i], middle, places[i + 1], values)
+                if math.sqrt(squared) < nearest:
+                    nearest, chosen = math.sqrt(squared), parameter
+        parameters[k], distances[k] = chosen, nearest
 
 
 @kernel
 def _descend(
-    knots: Array, control_points: Array, px: float, py: float, low: float, begin: float, high: float, squared: float, values: Array
+    knots: Array, control_points: Array, px: float, py: float, low: float, begin: float, high: float, values: Array
 ) -> tuple[float, float]:
-    """Return the parameter between two others at which the curve is nearest to a point, and the squared distance."""
+    """Return the parameter near a given one, between two others, at which the curve is nearest to a point, and the squared distance.
+
+    Newton's method; where a step leads farther away, as it does beside cusps, half of it is tried.
+    """
     parameter = begin
+    x, y = point_at(knots, control_points, parameter, 0, values)
+    squared = (x - px) ** 2 + (y - py) ** 2
     for _ in range(_NEWTON_STEPS):
         x, y = point_at(knots, control_points, parameter, 0, values)
         dx, dy = point_at(knots, control_points, parameter, 1, values)
@@ -189,16 +197,21 @@ def _descend(
             bend = dx * dx + dy * dy
         if bend == 0.0:
             break
-        moved = min(max(parameter - slope / bend, low), high)
+        step = slope / bend
+        is_nearer = False
+        while not is_nearer and abs(step) >= 1e-12:
+            moved = min(max(parameter - step, low), high)
+            x, y = point_at(knots, control_points, moved, 0, values)
+            reached = (x - px) ** 2 + (y - py) ** 2
+            is_nearer = reached < squared
+            step *= 0.5
+        if not is_nearer:
+            break
         is_still = abs(moved - parameter) < 1e-10
-        parameter = moved
+        parameter, squared = moved, reached
         if is_still:
             break
-    x, y = point_at(knots, control_points, parameter, 0, values)
-    reached = (x - px) ** 2 + (y - py) ** 2
-    if reached > squared:
-        return begin, squared
-    return parameter, reached
+    return parameter, squared
 
 
 @kernel

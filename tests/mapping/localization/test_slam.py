@@ -117,6 +117,20 @@ def test_a_copy_goes_on_by_itself(ring_run, ring_followed, twin_of):
     assert (follow(slam, ring_run.sensings[150:300])[0] == told[150:300]).all()
 
 
+def test_walls_keep_headings_from_drifting():
+    errors_of = {}
+    for uses_walls in (True, False):
+        found = []
+        for seed in range(2):
+            run = driven(ring(), RING_ROUND, seed, noise=0.05, drift=(-0.05, -0.05))
+            slam = Slam(SlamSettings(uses_walls=uses_walls, closures=ClosureSettings(delay_s=1e6)), GEOMETRY)
+            told, _ = follow(slam, run.sensings)
+            found.append(relative(run.truth, told)[:, 2])
+        errors_of[uses_walls] = np.degrees(np.sqrt(np.mean(np.square(found))))
+    assert errors_of[True] < 0.5
+    assert errors_of[True] < 0.5 * errors_of[False]
+
+
 def test_the_frame_is_that_of_the_first_pose():
     run = driven(odd_room(), ROOM_ROUND)
     start = np.array([3.0, -2.0, 2.0])

@@ -71,6 +71,15 @@ def test_no_sample_is_nearer_than_the_closest_point(spline, point):
     assert np.linalg.norm(spline.evaluate(parameters)[0] - point) == pytest.approx(distances[0], abs=1e-9)
 
 
+@pytest.mark.parametrize("share", np.linspace(0.0, 1.0, 41))
+def test_points_beside_a_cusp_are_found(share):
+    # The last three control points are one: the curve comes to rest there, and Newton's steps beside it lead too far.
+    points = np.array([(3, -2), (0, -2), (5, -2), (0, 0), (0, 0), (0, 0.0)])
+    spline = Spline(np.array([0, 0, 0, 0, 1, 1.25, 2.25, 2.25, 2.25, 2.25]), points)
+    place = spline.evaluate(within(spline, [share]))
+    assert spline.closest(place)[1][0] < 1e-6
+
+
 def test_length_and_curvature_of_an_arc():
     quarter = Spline(
         np.array([0, 0, 0, 0, 1, 1, 1, 1.0]),
