@@ -26,7 +26,7 @@ from lidarium.mapping.rigid import Transform
 
 Pair = tuple[str, str]
 
-TEAM_CONFIRMATION = ValidationSettings(most_contradiction_m=0.3, least_across_share=0.15, least_evidence_per_m2=0.3)
+TEAM_CONFIRMATION = ValidationSettings(most_contradiction_m=0.3, least_across_share=0.2, least_evidence_per_m2=0.3)
 """When robots are led by a merge: rooms of one plan, corridors and halls agree well enough to be found, but hardly ever so well."""
 
 

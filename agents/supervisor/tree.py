@@ -175,7 +175,8 @@ def decide(tree: Node, case: Case) -> tuple[Leaf, list[tuple[str, bool]]]:
     answers: list[tuple[str, bool]] = []
     place: Node | Leaf = tree
     while isinstance(place, Node):
-        is_so = place.question.holds(case)
+        # What arrays answered is no bool that JSON can hold.
+        is_so = bool(place.question.holds(case))
         answers.append((place.question.name, is_so))
         place = place.yes if is_so else place.no
     return place, answers

@@ -1,8 +1,10 @@
 """The decision tree: every combination of states, the rules one by one, and the run whose report contradicts rule 3."""
 
+import json
 from dataclasses import replace
 from itertools import product
 
+import numpy as np
 import pytest
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
@@ -74,6 +76,13 @@ def test_a_robot_that_knows_less_is_sent_where_there_is_more_to_map():
     assert outcome(Case(robot(), is_behind=True, has_richer_goal=True)) == (4, OrderKind.GO_TO, RICH)
     assert outcome(Case(robot(), is_behind=True)) == (0, None, "")
     assert outcome(Case(robot(), has_richer_goal=True)) == (0, None, "")
+
+
+def test_answers_can_be_written_whatever_answered():
+    case = Case(robot(), is_behind=np.bool_(True), has_richer_goal=np.float64(3.0) > np.float64(2.0))
+    _, answers = decide(TREE, case)
+    assert True in dict(answers).values()
+    assert json.loads(json.dumps(dict(answers))) == dict(answers)
 
 
 def test_an_enclosed_robot_is_redirected_where_it_can_be_and_stopped_where_not():
