@@ -198,7 +198,7 @@ def _descend(
         if bend == 0.0:
             break
         step = slope / bend
-        is_nearer = False
+        moved, reached, is_nearer = parameter, squared, False
         while not is_nearer and abs(step) >= 1e-12:
             moved = min(max(parameter - step, low), high)
             x, y = point_at(knots, control_points, moved, 0, values)
