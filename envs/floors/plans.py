@@ -157,7 +157,8 @@ def choose_doors(labels: Labels, door_width: float, loops: float, generator: np.
 
 def _door(boundary: Boundary, width: float, generator: np.random.Generator) -> Door:
     """Make a door near one end of the wall, as most are, or anywhere in it."""
-    slack = boundary.length - width - 2 * JAMB
+    # A wall that is just long enough may be shorter by a rounding.
+    slack = max(boundary.length - width - 2 * JAMB, 0.0)
     near_end = min(slack, 0.1 * int(generator.integers(0, 4)))
     offset = (near_end, slack - near_end, 0.05 * int(generator.uniform(0.0, slack) / 0.05))[int(generator.choice(3, p=(0.4, 0.4, 0.2)))]
     start = round(boundary.start + JAMB + offset, 6)

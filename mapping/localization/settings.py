@@ -88,8 +88,8 @@ class MatchingSettings:
         What the search reaches where there is no odometry, or odometry leads nowhere [m, rad].
     evaluations : int
         At most so many placements, and blocks of them, are looked at in such a search.
-    independent_points : float
-        As how many independent measurements all returns of a scan count at most, each as one at most: neighbouring ones err together.
+    independent_points, independent_share : float
+        As how many independent measurements the returns of a scan count, all of them at most and each: neighbouring ones err together.
     deviation : float
         Standard deviation of how far a return is from full agreement with the map, which is 1.
     unseen : float
@@ -126,6 +126,7 @@ class MatchingSettings:
     blind_angle: float = math.radians(50.0)
     evaluations: int = 100_000
     independent_points: float = 50.0
+    independent_share: float = 0.15
     deviation: float = 0.2
     unseen: float = 0.3
     least_score: float = 0.15
@@ -144,7 +145,7 @@ class MatchingSettings:
 
     def weight(self, points: int) -> float:
         """Return how much full disagreement of all of so many points counts."""
-        return min(self.independent_points, points) / self.deviation**2
+        return min(self.independent_points, self.independent_share * points) / self.deviation**2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

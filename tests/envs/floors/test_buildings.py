@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.floors.buildings import KINDS, START_CLEARANCE, BuildingSettings, generate_building
@@ -45,6 +45,7 @@ def test_a_robot_of_radius_30_cm_reaches_everything(kind, resolution, height):
     door_width=st.floats(0.8, 1.0),
     wall_thickness=st.floats(0.05, 0.3),
 )
+@example(seed=1355424, kind="apartment", loops=0.0, clutter=0.0, door_width=0.9999999999999999, wall_thickness=0.25)
 def test_whatever_the_settings_the_floor_is_one_piece_with_three_clear_starts(seed, kind, loops, clutter, door_width, wall_thickness):
     wanted = BuildingSettings(kind=kind, loops=loops, clutter=clutter, door_width=door_width, wall_thickness=wall_thickness)
     floor = generate_building(seed, wanted)

@@ -10,6 +10,7 @@ from lidarium.mapping.localization.branch_and_bound import place, pyramid
 from lidarium.mapping.localization.scan_matching import refine
 from lidarium.mapping.localization.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.scan_search import search
+from lidarium.mapping.localization.settings import MatchingSettings
 from lidarium.mapping.localization.submaps import FREE_LEVEL, UNSEEN, Submap
 from lidarium.mapping.rigid import composed, relative
 from lidarium.mapping.scans import ScanGeometry
@@ -218,6 +219,13 @@ def test_few_points_stand_for_all():
     assert len(points_of(far)) == GEOMETRY.beams
     assert len(scan_points(far, GEOMETRY.unit_vectors, GEOMETRY.angle_increment, 20.0, 0.01, 100)) == 100
     assert len(scan_points(far, GEOMETRY.unit_vectors, GEOMETRY.angle_increment, 4.0, 0.01, 100)) == 0
+
+
+def test_few_returns_count_less_than_many_but_not_more_than_all():
+    matching = MatchingSettings()
+    weights = [matching.weight(points) for points in (20, 40, 200, 10_000, 20_000)]
+    assert weights[1] == pytest.approx(2 * weights[0])
+    assert weights[1] < weights[2] < weights[3] == weights[4] == pytest.approx(matching.independent_points / matching.deviation**2)
 
 
 def test_noise_does_not_turn_scans_against_the_map():

@@ -128,7 +128,7 @@ def test_walls_keep_headings_from_drifting():
             found.append(relative(run.truth, told)[:, 2])
         errors_of[uses_walls] = np.degrees(np.sqrt(np.mean(np.square(found))))
     assert errors_of[True] < 0.5
-    assert errors_of[True] < 0.5 * errors_of[False]
+    assert errors_of[True] < 0.6 * errors_of[False]
 
 
 def test_the_frame_is_that_of_the_first_pose():
