@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.localization.branch_and_bound import Pyramid, place, pyramid
 from lidarium.mapping.localization.local_mapping import Finished
-from lidarium.mapping.localization.scan_matching import refine
+from lidarium.mapping.localization.scan_matching import Match, refine
 from lidarium.mapping.localization.settings import ClosureSettings, MatchingSettings
 from lidarium.mapping.rigid import composed, relative, wrapped
 
@@ -117,8 +117,10 @@ class ClosureFinder:
         best, _ = place(old.coarse, points, around, reach, least, settings.evaluations)
         if best is None:
             return None
-        matching = self._matching
-        match = refine(old.coarse.grid, points, best.pose, best.pose, np.zeros((3, 3)), matching.weight(len(points)), matching.unseen)
+        match, here = self._laid(old, points, best.pose), self._laid(old, points, around)
+        if here.contradiction <= settings.most_contradiction and here.score >= settings.as_good * match.score:
+            # What the map knows agrees with where the robot believes to be; what lies beyond it may be the other side of a wall.
+            match = here
         if match.score < least_score or match.overlap < settings.least_overlap or match.contradiction > settings.most_contradiction:
             return None
         if reach[0] > settings.apart_m:
@@ -128,6 +130,10 @@ class ClosureFinder:
                 return None
         floor = np.diag([settings.least_deviation_m**2, settings.least_deviation_m**2, settings.least_deviation_angle**2])
         return Closure(old.node, len(poses) - 1, match.pose, match.covariance + floor, match.score)
+
+    def _laid(self, old: _Remembered, points: NDArray[np.float64], start: NDArray[np.float64]) -> Match:
+        matching = self._matching
+        return refine(old.coarse.grid, points, start, start, np.zeros((3, 3)), matching.weight(len(points)), matching.unseen)
 
     def _confirmed(self, closure: Closure, poses: NDArray[np.float64]) -> list[Closure]:
         """Return the closure, and those that waited for it; nothing where it has to wait for others itself."""

@@ -172,6 +172,13 @@ class LocalMapper:
             return None
         return refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), settings.weight(len(points)), settings.unseen)
 
+    def laid_again(self, points: NDArray[np.float64]) -> Match | None:
+        """Return where the points (n, 2) [m] of the older local map's first scan lie on what it has become; None if they do not match."""
+        settings, nowhere = self._matching, np.zeros(3)
+        grid = self._active[0].submap.grid
+        match = refine(grid, points, nowhere, nowhere, np.zeros((3, 3)), settings.weight(len(points)), settings.unseen)
+        return match if self._is_good(match) and not self._is_new_ground(match, len(points)) else None
+
     def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:
         """Take in a scan at x, y, theta (3,) in the older local map's frame, so much way [m] after the last one.
 

@@ -8,7 +8,7 @@ from lidarium.mapping.localization.odometry import compounded
 from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
 from lidarium.mapping.localization.settings import GraphSettings
 from lidarium.mapping.localization.wall_compass import WallCompass
-from lidarium.mapping.rigid import composed, wrapped
+from lidarium.mapping.rigid import composed, relative, wrapped
 
 Edge = tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]
 """Nodes a and b, b as seen from a, its information, and whether that may be wrong."""
@@ -53,6 +53,15 @@ class NodeGraph:
             share = np.array([1.0, 1.0, np.sqrt(min(variance / self.covariance[2, 2], 1.0))])
             self.covariance *= share[:, None] * share
         self.nodes = np.vstack([self.nodes, pose])
+
+    def begin_at(self, since: NDArray[np.float64]) -> None:
+        """Move all nodes after the first, so that the second lies at x, y, theta (3,) in its frame [m, rad]."""
+        first, second, _, information, is_robust = self._edges[0]
+        self._edges[0] = (first, second, since, information, is_robust)
+        before, begin = self.nodes[1], composed(self.nodes[0], since)
+        self.nodes = np.vstack([self.nodes[:1], composed(begin, relative(before, self.nodes[1:]))])
+        if self._compass is not None:
+            self._compass.begin_at(float(begin[2] - before[2]))
 
     def close(self, closures: list[Closure]) -> bool:
         """Take in closures, at least one; return whether poses are to be settled: they contradict some, or enough of them wait."""

@@ -198,6 +198,8 @@ class ClosureSettings:
         Agreement of a closure as a share of what matches with growing local maps have had of late.
     most_contradiction : float
         Share of returns that may lie in free space of the local map.
+    as_good : float
+        Where the robot believes to be is where it is, if the scan agrees there by this share of what it does in the best place.
     ambiguity : float
         A second place that agrees as well as this share of the best refutes a closure.
     apart_m, apart_angle : float
@@ -224,8 +226,9 @@ class ClosureSettings:
     evaluations: int = 60_000
     least_score: float = 0.3
     least_share: float = 0.85
-    least_overlap: float = 0.6
+    least_overlap: float = 0.75
     most_contradiction: float = 0.12
+    as_good: float = 0.8
     ambiguity: float = 0.9
     apart_m: float = 0.5
     apart_angle: float = math.radians(15.0)
@@ -246,6 +249,8 @@ class GraphSettings:
 
     Attributes
     ----------
+    start_path_m : float
+        Way driven, turns counted with a metre a radian, after which the first scan is laid on the map that has grown since [m].
     distance_m, angle : float
         Way and turn between nodes [m, rad].
     deviation_m, deviation_per_metre : float
@@ -262,6 +267,7 @@ class GraphSettings:
         At most so many steps of Gauss and Newton.
     """
 
+    start_path_m: float = 7.0
     distance_m: float = 0.5
     angle: float = math.radians(30.0)
     deviation_m: float = 0.005
@@ -290,6 +296,8 @@ class CompassSettings:
     drift : float
         How much headings drift from node to node, as a share of the standard deviation of their matches: neighbouring scans are matched
         with one local map, and do not err each on its own.
+    first_drift : float
+        Share of that drift while scans are matched with the first local map, which shows how it was begun.
     deviations : float
         A direction that contradicts the heading by more standard deviations does not count: not all walls run that way.
     most_deviation : float
@@ -299,6 +307,7 @@ class CompassSettings:
     deviation_m: float = 0.02
     deviation_angle: float = math.radians(0.1)
     drift: float = 0.4
+    first_drift: float = 0.1
     deviations: float = 3.0
     most_deviation: float = math.radians(3.0)
 

@@ -74,6 +74,8 @@ class Slam:
         self._key_nodes, self._key_poses = GrowingArray((), np.int64), GrowingArray((3,), np.float64)
         self._key_ranges = GrowingArray((self._geometry.beams,), np.float32)
         self._has_begun = False
+        # The first scan's points and pose, until the map tells how well it lies on them.
+        self._first: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._last: Sensing | None = None
         # Poses in the frame of the older local map: now, at the last match, at the last node.
         self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -195,11 +197,7 @@ class Slam:
     def _take(self, ranges: NDArray[np.float32], points: NDArray[np.float64], moved: NDArray[np.float64], time_s: float) -> None:
         """Match a scan and take it into the maps."""
         if not self._has_begun:
-            self._has_begun = True
-            self._finder_takes(self._mapper.begin(self._last_node, ranges))
-            self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
-            self._note_key(ranges)
-            self._look_at_walls(points)
+            self._begin(ranges, points)
             return
         match = self._mapper.match(points, self._local, moved, self._growth(), self._failed)
         if match is None:
@@ -220,8 +218,10 @@ class Slam:
             self._begin_anew(ranges, self._motion_covariance(match.covariance, relative(self._at_node, self._local)))
             return
         self._look_at_walls(points)
-        since = relative(self._at_node, self._local)
         graph = self._settings.graph
+        if self._first is not None and self._path >= graph.start_path_m:
+            self._find_start(*self._first)
+        since = relative(self._at_node, self._local)
         wants_another = self._mapper.wants_another
         if wants_another or np.hypot(since[0], since[1]) >= graph.distance_m or abs(since[2]) >= graph.angle:
             self._add_node(since, self._motion_covariance(match.covariance, since))
@@ -232,6 +232,26 @@ class Slam:
         poses, ended = self._mapper.hand_over(np.stack([self._local, self._matched, self._at_node]))
         self._local, self._matched, self._at_node = poses[0], poses[1], poses[2]
         self._finder_takes(ended)
+        if ended and self._compass is not None:
+            self._compass.leave_first_map()
+
+    def _begin(self, ranges: NDArray[np.float32], points: NDArray[np.float64]) -> None:
+        """Begin the first map, at a node of its own: where the robot began lies in it as well as one scan could tell."""
+        self._has_begun = True
+        self._note_key(ranges)
+        self._first = points, self._local.copy()
+        growth = turned(self._growth(), float(self._local[2])) if self._told.any() else np.zeros((3, 3))
+        self._told[:] = 0.0
+        self._begin_maps(ranges, self._motion_covariance(growth, self._local))
+        self._look_at_walls(points)
+
+    def _find_start(self, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
+        """Lay the first scan on the map: it was begun by few scans, and lies by their errors beside where the robot began."""
+        self._first = None
+        match = self._mapper.laid_again(points) if self._mapper.node == 1 else None
+        if match is not None:
+            self._graph.begin_at(composed(pose, relative(match.pose, np.zeros(3))))
+            self._note_correction()
 
     def _motion_covariance(self, matched: NDArray[np.float64], since: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how well the motion between two nodes is known, both by matches."""
@@ -260,14 +280,18 @@ class Slam:
 
     def _begin_anew(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]) -> None:
         """Begin new local maps at a new node here."""
-        self._failed = 0
+        self._failed, self._first = 0, None
         if self._compass is not None:
             self._compass.forget()
+            self._compass.leave_first_map()
+        self._begin_maps(ranges, covariance)
+        self._note_key(ranges)
+
+    def _begin_maps(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]) -> None:
+        """Begin new local maps by a scan, at a new node where the robot is, its motion since the last node so well known."""
         self._add_node(relative(self._at_node, self._local), covariance)
         self._finder_takes(self._mapper.begin(self._last_node, ranges))
         self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
-        self._spread = np.zeros((3, 3))
-        self._note_key(ranges)
 
     def _add_node(self, since: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
         """Set a node where the robot is, so far from the last one."""
@@ -303,5 +327,8 @@ class Slam:
         is_due = self._graph.close(acting) if acting else True
         if is_due or time_s == np.inf:
             self._graph.settle(len(acting))
-            self.counts.corrections += 1
-            self._mapped, self._is_corrected = 0, True
+            self._note_correction()
+
+    def _note_correction(self) -> None:
+        self.counts.corrections += 1
+        self._mapped, self._is_corrected = 0, True

@@ -48,6 +48,8 @@ class WallCompass:
     def __init__(self, settings: CompassSettings) -> None:
         self._settings = settings
         self.bearings: list[Bearing] = []
+        # Share of the variances that are told by which headings drift.
+        self._drift = settings.first_drift * settings.drift**2
         # Of scans since the last node, in its frame.
         self._seen, self._seen_information = 0.0, 0.0
         # Where walls run, and the variances of the last node's heading, of that direction, and of both together.
@@ -65,6 +67,10 @@ class WallCompass:
     def forget(self) -> None:
         """Forget what was seen since the last node."""
         self._seen, self._seen_information = 0.0, 0.0
+
+    def leave_first_map(self) -> None:
+        """Take note that scans are matched with another local map from now on, and headings drift more."""
+        self._drift = self._settings.drift**2
 
     def turn(self, node: int, since: float, variance: float, heading: float) -> tuple[float, float]:
         """Set a new node; return by how much its heading is to be turned [rad], and its variance then [rad^2].
@@ -88,6 +94,11 @@ class WallCompass:
         turn = self._turn(node, since, variance, heading)
         return turn, self._heading_variance / self._settings.drift**2
 
+    def begin_at(self, turn: float) -> None:
+        """Take note that all headings so far were turned [rad]."""
+        if self._walls is not None:
+            self._walls += turn
+
     def relieve(self, variance: float) -> None:
         """Take note that the last heading is known so well, in the same measure [rad^2]."""
         known = self._settings.drift**2 * variance
@@ -102,7 +113,7 @@ class WallCompass:
         settings = self._settings
         seen, information = self._seen - since, self._seen_information
         self.forget()
-        self._heading_variance += settings.drift**2 * variance
+        self._heading_variance += self._drift * variance
         if information == 0.0 or self._heading_variance > settings.most_deviation**2:
             return 0.0
         noise = 1.0 / information + settings.deviation_angle**2

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 import scipy.optimize
 
+from lidarium.mapping.localization.node_graph import NodeGraph
 from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
+from lidarium.mapping.localization.settings import GraphSettings
 from lidarium.mapping.rigid import composed, relative
 
 SIDE = 10
@@ -100,3 +102,18 @@ def test_the_optimum_is_that_of_dense_least_squares():
         poses, covariance = optimised(poses, edges, 2.0, 20, 0)
     assert np.abs(relative(poses[1:], oracle.x.reshape(-1, 3))).max() < 1e-6
     assert np.allclose(covariance, np.linalg.inv(oracle.jac.T @ oracle.jac)[-3:, -3:], rtol=1e-4)
+
+
+def test_all_but_the_first_node_move_together_to_where_the_first_map_begins():
+    graph = NodeGraph(GraphSettings(), None, np.array([1.0, 2.0, 0.5]))
+    covariance = np.diag([0.01, 0.01, 0.001]) ** 2
+    for motion in np.random.default_rng(0).normal(0.0, 0.5, (6, 3)):
+        graph.add(motion, covariance)
+    before, since = graph.nodes.copy(), np.array([0.02, -0.01, 0.03])
+    graph.begin_at(since)
+    assert (graph.nodes[0] == before[0]).all()
+    assert graph.nodes[1] == pytest.approx(composed(before[0], since))
+    assert relative(graph.nodes[1], graph.nodes[2:]) == pytest.approx(relative(before[1], before[2:]))
+    moved = graph.nodes.copy()
+    graph.settle(0)
+    assert graph.nodes == pytest.approx(moved, abs=1e-9)

@@ -131,6 +131,20 @@ def test_walls_keep_headings_from_drifting():
     assert errors_of[True] < 0.6 * errors_of[False]
 
 
+def test_the_first_scan_is_laid_on_the_map_that_it_began():
+    turned = {}
+    for start_path_m in (7.0, 1e6):
+        found = []
+        for seed in range(8):
+            run = driven(odd_room(), ROOM_ROUND, seed, noise=0.02)
+            slam = Slam(SlamSettings(uses_walls=False, graph=GraphSettings(start_path_m=start_path_m)), GEOMETRY)
+            told, _ = follow(slam, run.sensings)
+            found.append(np.mean(relative(run.truth, told)[len(told) // 2 :, 2]))
+            assert (slam.key_scans.poses[0] == 0.0).all()
+        turned[start_path_m] = np.sqrt(np.mean(np.square(found)))
+    assert turned[7.0] < 0.6 * turned[1e6]
+
+
 def test_the_frame_is_that_of_the_first_pose():
     run = driven(odd_room(), ROOM_ROUND)
     start = np.array([3.0, -2.0, 2.0])
@@ -164,7 +178,8 @@ def test_covariance_grows_with_the_way_and_shrinks_with_closures(ring_run):
         slam.localize(sensing)
         variances.append(np.trace(slam.covariance[:2, :2]))
         assert (np.linalg.eigvalsh(slam.covariance) >= -1e-12).all()
-    assert variances[0] == 0.0
+    # The first local map lies where the first scan was taken, as well as any scan lies on a map.
+    assert variances[0] == pytest.approx(2.0 * GraphSettings().deviation_m ** 2)
     assert variances[-1] < 0.5 * max(variances)
 
 
