@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.laser_logs import LaserLog
 from lidarium.mapping.localization.localizer import Sensing
-from lidarium.mapping.localization.settings import CompassSettings, GraphSettings, MatchingSettings, SlamSettings, SubmapSettings
+from lidarium.mapping.localization.settings import ClosureSettings, CompassSettings, GraphSettings, MatchingSettings, SlamSettings, SubmapSettings
 from lidarium.mapping.localization.slam import Slam
 from lidarium.mapping.rigid import composed, relative
 
@@ -19,6 +19,7 @@ LOG_SETTINGS = SlamSettings(
         distance_m=0.02, angle=math.radians(1.0), spacing_m=0.08, points=250, independent_share=1.0, deviation=0.25, unseen=0.5
     ),
     submaps=SubmapSettings(path_m=8.0),
+    closures=ClosureSettings(least_overlap=0.6),
     graph=GraphSettings(deviation_m=0.01, deviation_per_metre=0.02, deviation_angle=math.radians(0.3)),
     compass=CompassSettings(deviation_angle=math.radians(0.3), drift=0.2),
 )
