@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.laser_logs import LaserLog
 from lidarium.mapping.localization.localizer import Sensing
-from lidarium.mapping.localization.settings import ClosureSettings, CompassSettings, GraphSettings, MatchingSettings, SlamSettings, SubmapSettings
+from lidarium.mapping.localization.settings import (
+    ClosureSettings,
+    CompassSettings,
+    GraphSettings,
+    MatchingSettings,
+    SlamSettings,
+    SubmapSettings,
+)
 from lidarium.mapping.localization.slam import Slam
 from lidarium.mapping.rigid import composed, relative
 
