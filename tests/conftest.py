@@ -6,8 +6,10 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-# The first example may have to wait until kernels are compiled.
-hypothesis.settings.register_profile("lidarium", parent=hypothesis.settings(), deadline=None)
+# The first example may have to wait until kernels are compiled. The same tests draw the same examples, so that a run of the suite can be
+# repeated; `pytest --hypothesis-profile=search` draws others each time.
+hypothesis.settings.register_profile("lidarium", deadline=None, derandomize=True)
+hypothesis.settings.register_profile("search", deadline=None)
 hypothesis.settings.load_profile("lidarium")
 
 # Tests neither read nor fill the user's store of floors; those of the store name one of their own.
