@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,7 @@ from lidarium.envs.wrappers.frontiers import FrontierExploration
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings, true_frames
 from lidarium.envs.wrappers.waypoints import WaypointExploration
 from lidarium.evaluation.events import merge_event
+from lidarium.evaluation.interrupts import PatientInterrupt
 from lidarium.evaluation.watching import WatchedExploration
 from lidarium.mapping.merging.fusion import FusedMap
 
@@ -127,7 +129,8 @@ def run_episode(
     on_decision : callable or None
         Called with the environment after the reset and after every decision, for progress, pictures and records.
     raise_interrupt : bool
-        Whether ``KeyboardInterrupt`` is passed on; otherwise the episode so far is returned.
+        Whether ``KeyboardInterrupt`` is passed on. Otherwise a first Ctrl-C ends the episode after the step at hand, and the episode so
+        far is returned; a second one, and one before the first step, is passed on all the same.
     merging : MergingSettings or None
         How the robots merge their maps (`MergedMaps`); they do not where None.
 
@@ -141,26 +144,28 @@ def run_episode(
     world = level if merging is None else MergedMaps(level, merging)
     episode = Episode(env, policy, seed)
     began = time.perf_counter()
-    try:
-        observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))
-        policy.reset(RunningTeam(env, driver if isinstance(driver, WaypointExploration) else None), seed)
-        if on_decision is not None:
-            on_decision(env)
-        while env.agents:
-            decided = time.perf_counter()
-            actions = decide(policy, world, observations)
-            episode.decision_seconds.append(time.perf_counter() - decided)
-            observations = world.step(actions)[0]
-            observations = {agent: observations[agent] for agent in env.agents}
-            if isinstance(env, WatchedExploration):
-                orders = driver.driver.orders() if isinstance(driver, WaypointExploration) else None
-                env.decided(orders, getattr(policy, "given_up", ()))
+    observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))
+    policy.reset(RunningTeam(env, driver if isinstance(driver, WaypointExploration) else None), seed)
+    with nullcontext() if raise_interrupt else PatientInterrupt() as interrupt:
+        try:
             if on_decision is not None:
                 on_decision(env)
-    except KeyboardInterrupt:
-        if raise_interrupt:
-            raise
-        episode.is_interrupted = True
+            while env.agents and not (interrupt and interrupt.is_asked):
+                decided = time.perf_counter()
+                actions = decide(policy, world, observations)
+                episode.decision_seconds.append(time.perf_counter() - decided)
+                observations = world.step(actions)[0]
+                observations = {agent: observations[agent] for agent in env.agents}
+                if isinstance(env, WatchedExploration):
+                    orders = driver.driver.orders() if isinstance(driver, WaypointExploration) else None
+                    env.decided(orders, getattr(policy, "given_up", ()))
+                if on_decision is not None:
+                    on_decision(env)
+        except KeyboardInterrupt:
+            if interrupt is None or interrupt.is_asked:
+                raise
+            episode.is_interrupted = True
+        episode.is_interrupted |= interrupt is not None and interrupt.is_asked and bool(env.agents)
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(getattr(policy, "given_up", []))
     episode.merges = world.events if isinstance(world, MergedMaps) else merges_of(policy, env)

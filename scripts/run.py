@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name, table, tell
+from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -83,9 +83,7 @@ def execute(command: Run) -> Answer:
     env, history = _environment(command, recorder)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
     episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
-    if env.floor is None or not env.scorer.track:
-        tell("interrupted before the run began; nothing was written")
-        return Answer({}, "", INTERRUPTED)
+    assert env.floor is not None
     folder = _folder(command, env.floor.name)
     from lidarium.evaluation.result import result_of
 

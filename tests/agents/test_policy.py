@@ -1,5 +1,6 @@
 """The contract of policies: registered by name, one object a team or one a robot, and every robot says why it ended."""
 
+import signal
 from functools import lru_cache
 
 import numpy as np
@@ -179,6 +180,45 @@ class Interrupts(Recorder):
         if self.team.time_s > 2.0:
             raise KeyboardInterrupt
         return super().act(observations)
+
+
+class PressesControlC(Recorder):
+    """Sends its own process the signal of Ctrl-C, some times within one decision."""
+
+    def __init__(self, times):
+        super().__init__()
+        self.times = times
+        self.went_on = False
+
+    def act(self, observations):
+        if self.team.time_s > 2.0:
+            for _ in range(self.times):
+                signal.raise_signal(signal.SIGINT)
+            self.went_on = True
+        return super().act(observations)
+
+
+def test_a_first_interrupt_waits_for_the_end_of_the_step_and_a_second_does_not():
+    env = lidarium.parallel_env("scene_room", robots=1, stop_coverage=None, map_cells=32)
+    policy = PressesControlC(1)
+    episode = run_episode(policy, env, 1, raise_interrupt=False)
+    assert episode.is_interrupted
+    assert policy.went_on
+    with pytest.raises(KeyboardInterrupt):
+        run_episode(PressesControlC(2), env, 1, raise_interrupt=False)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_application_that_handles_interrupts_keeps_doing_so():
+    noted = []
+    before = signal.signal(signal.SIGINT, lambda number, _: noted.append(number))
+    try:
+        env = lidarium.parallel_env("scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32)
+        episode = run_episode(PressesControlC(1), env, 1, raise_interrupt=False)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert noted
+    assert not episode.is_interrupted
 
 
 def test_an_interrupted_episode_is_passed_on_or_kept_as_far_as_it_came():
