@@ -67,12 +67,28 @@ def _update_block(typing_context: Any, address: Any, seen: Any, hits: Any, hit: 
         raised = _call(builder, "smin", raised, _splat(builder, greatest, _BYTES))
         missed = builder.select(builder.bitcast(seen_bits, _MASK), lowered, old)
         new = builder.select(builder.bitcast(hit_bits, _MASK), raised, missed)
-        _store(builder, new, place)
+        # Most cells are as sure as they may be: a line that is not written need not go back to memory.
+        is_new = builder.bitcast(builder.icmp_signed("!=", new, old), _INT64)
+        with builder.if_then(builder.icmp_unsigned("!=", is_new, ir.Constant(_INT64, 0))):
+            _store(builder, new, place)
         is_other = [builder.xor(builder.icmp_signed(sign, old, _NO_BYTES), builder.icmp_signed(sign, new, _NO_BYTES)) for sign in "<>"]
         return builder.bitcast(builder.or_(*is_other), _INT64)
 
     steps = (types.int64,) * 4
     return types.uint64(types.int64, types.uint64, types.uint64, *steps), generate
+
+
+def _fetch(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
+    """Begin to load a line of memory."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        insert: Any = cgutils.get_or_insert_function
+        pointer, number = builder.inttoptr(arguments[0], ir.IntType(8).as_pointer()), ir.IntType(32)
+        function = insert(builder.module, ir.FunctionType(ir.VoidType(), [pointer.type, number, number, number]), "llvm.prefetch.p0")
+        for_writing, near, data = (ir.Constant(number, value) for value in (1, 3, 1))
+        builder.call(function, [pointer, for_writing, near, data])
+
+    return types.void(types.int64), generate
 
 
 def _sum_blocks(typing_context: Any, first: Any, second: Any, result: Any) -> Any:  # noqa: ANN401
@@ -86,25 +102,24 @@ def _sum_blocks(typing_context: Any, first: Any, second: Any, result: Any) -> An
     return types.void(*(types.int64,) * 3), generate
 
 
-def _greater_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: ANN401
-    """Raise a block of log-odds to those of another where these are greater."""
+def _greatest_of_groups(typing_context: Any, rows: Any, stride: Any, count: Any, least: Any, halvings: Any, result: Any) -> Any:  # noqa: ANN401
+    """Write the greatest of the blocks of some rows, and of neighbours in it, halved and halved again."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        _store(builder, _call(builder, "smax", *(_load(builder, address, _BYTES) for address in arguments)), arguments[0])
-
-    return types.void(types.int64, types.int64), generate
-
-
-def _greater_neighbours(typing_context: Any, block: Any) -> Any:  # noqa: ANN401
-    """Write the greater of every two neighbours of a block into its first half."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        old = _load(builder, arguments[0], _BYTES)
-        half, nothing = BLOCK // 2, ir.Constant(_BYTES, ir.Undefined)
+        rows_at, stride, count, least, halvings, result_at = arguments
+        none, one, nothing = ir.Constant(_INT64, 0), ir.Constant(_INT64, 1), ir.Constant(_BYTES, ir.Undefined)
+        half = BLOCK // 2
         lanes = [ir.Constant(ir.VectorType(ir.IntType(32), BLOCK), [2 * (k % half) + place for k in range(BLOCK)]) for place in (0, 1)]
-        _store(builder, _call(builder, "smax", *(builder.shuffle_vector(old, nothing, places) for places in lanes)), arguments[0])
+        greatest = _alloca(builder, _splat(builder, least, _BYTES))
+        with cgutils.for_range_slice(builder, none, count, one, intp=_INT64) as (k, _):
+            row = _load(builder, builder.add(rows_at, builder.mul(k, stride)), _BYTES)
+            builder.store(_call(builder, "smax", builder.load(greatest), row), greatest)
+        with cgutils.for_range_slice(builder, none, halvings, one, intp=_INT64):
+            all_lanes = builder.load(greatest)
+            builder.store(_call(builder, "smax", *(builder.shuffle_vector(all_lanes, nothing, places) for places in lanes)), greatest)
+        _store(builder, builder.load(greatest), result_at)
 
-    return types.void(types.int64), generate
+    return types.void(*(types.int64,) * 6), generate
 
 
 def _levels(typing_context: Any, log_odds: Any, levels: Any) -> Any:  # noqa: ANN401
@@ -213,9 +228,9 @@ def _raise_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: A
 
 
 _update: Any = intrinsic(_update_block)
+_fetch_line: Any = intrinsic(_fetch)
 _sum: Any = intrinsic(_sum_blocks)
-_raise_log_odds: Any = intrinsic(_greater_block)
-_halve: Any = intrinsic(_greater_neighbours)
+_greatest: Any = intrinsic(_greatest_of_groups)
 _write_levels: Any = intrinsic(_levels)
 _differs: Any = intrinsic(_positive_differs)
 _count: Any = intrinsic(_count_steps)
@@ -252,21 +267,33 @@ def update_block(address: int, seen: np.uint64, hits: np.uint64, hit: int, miss:
 
 
 @kernel(inline=True)
+def fetch_block(address: int) -> None:
+    """Begin to load a block of bytes that will be written soon; it need not be there."""
+    _fetch_line(address)
+
+
+@kernel(inline=True)
 def sum_blocks(first: int, second: int, result: int) -> None:
     """Write the sum of two blocks of int8, cut to [-127, 127], into a third, which may be one of them."""
     _sum(first, second, result)
 
 
 @kernel(inline=True)
-def raise_log_odds(block: int, other: int) -> None:
-    """Raise the int8 of a block to those of another where these are greater."""
-    _raise_log_odds(block, other)
+def write_greatest(rows: int, stride: int, count: int, least: int, halvings: int, result: int) -> None:
+    """Write the greatest int8 of groups of cells in a word of 64, and of ``least``.
 
-
-@kernel(inline=True)
-def halve_block(block: int) -> None:
-    """Write the greater of every two neighbours of a block of int8 into its first half; the second half repeats them."""
-    _halve(block)
+    Parameters
+    ----------
+    rows, stride, count : int
+        Where the first block lies, how many bytes on the next one, and how many there are.
+    least : int
+        What the result is at least.
+    halvings : int
+        A group has 2 ** halvings columns, and all rows.
+    result : int
+        Where 64 bytes are written, of which the first 64 / 2 ** halvings are the groups'.
+    """
+    _greatest(rows, stride, count, least, halvings, result)
 
 
 @kernel(inline=True)

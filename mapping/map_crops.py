@@ -2,8 +2,8 @@
 
 A crop at scale s shows s x s cells of the map as one, by their greatest log-odds: occupied where any is, else unknown where
 any is, else free. Such pooled maps are kept beside the map and brought up to date where it has changed, so that a crop reads no
-more cells than it shows. The pooled cells that the turned crop can touch are copied into a small patch, and each cell of the crop
-is looked up there.
+more cells than it shows. A turned crop is looked up block by block in registers where the processor can do that; elsewhere the pooled
+cells that it can touch are copied into a small patch, and each cell of the crop is looked up there.
 """
 
 import math
@@ -11,14 +11,19 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.cell_blocks import HALF_BLOCK, halve_block, raise_log_odds, write_levels
-from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel
+from lidarium.mapping.cell_blocks import HALF_BLOCK, write_greatest, write_levels
+from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel, vector_at
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, WORD
+from lidarium.mapping.turned_blocks import SIDE as BLOCK_SIDE
+from lidarium.mapping.turned_blocks import can_look_up_in_registers, turn_blocks
 
 _FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIED)
 
 HALF_STEP = 32768.0
-"""Half a cell in the numbers with 16 binary places by which a crop is looked up."""
+"""Half a cell in the numbers with 16 binary places by which a crop is looked up.
+
+Whole numbers throughout: crops at headings a quarter apart look up the same cells, and no sum of steps drifts.
+"""
 
 
 @kernel(inline=True)
@@ -121,54 +126,63 @@ def _greatest(log_odds: Array, first_row: int, first_column: int, scale: int) ->
 
 @kernel(inline=True)
 def _pool_word(log_odds: Array, first_row: int, last_row: int, word: int, scale: int, greatest: Array, pooled: Array) -> None:
-    """Write the pooled cells of a word of 64 cells; ``scale`` is a power of two below 64, ``greatest`` (64,) is scratch."""
-    columns, block = log_odds.shape[1], greatest.ctypes.data
-    greatest[:] = np.int8(-128) if last_row - first_row == scale else np.int8(0)
-    for row in range(first_row, last_row):
-        raise_log_odds(block, log_odds.ctypes.data + row * columns + word * WORD)
-    width = WORD
-    while scale > 1:
-        halve_block(block)
-        width //= 2
-        scale //= 2
-    target = int8_at(pooled.ctypes.data + word * width, width)
-    for j in range(width):
-        target[j] = greatest[j]
+    """Write the pooled cells of a word of 64 cells; ``scale`` is 2, 4, 8 or 16, ``greatest`` (64,) is scratch."""
+    columns, width, halvings = log_odds.shape[1], WORD // scale, 0
+    while (1 << halvings) < scale:
+        halvings += 1
+    rows = log_odds.ctypes.data + first_row * columns + word * WORD
+    least = -128 if last_row - first_row == scale else 0
+    write_greatest(rows, columns, last_row - first_row, least, halvings, greatest.ctypes.data)
+    source, target = greatest.ctypes.data, pooled.ctypes.data + word * width
+    for place in range(0, width, 4):
+        vector_at(target + place, 1, np.uint32)[0] = vector_at(source + place, 1, np.uint32)[0]
 
 
 @kernel
-def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
-    """Fill crops that are turned with a robot, as levels; unknown outside of the map.
-
-    Rows of a crop go to the robot's left, columns forward; the robot is at the centre. The crop turns about the corner of
-    the pooled cells that is nearest to the robot, so that at headings along the axes a crop is exactly the pooled cells around
-    that corner, turned by quarters. In between, a cell of the crop shows the pooled cell in which its centre lies.
-
-    Parameters
-    ----------
-    pools : (scales, 3) int64
-        Address, rows and columns of the pooled map of each scale; at scale 1 the map itself.
-    x, y : float
-        Where the robot is [cells of the map].
-    heading : float
-        Where it looks in the map [rad].
-    scales : (scales,) int64
-        Side of a crop's cell [cells of the map].
-    crops : (scales, side, side) uint8
-        Written: 0 occupied, 127 unknown, 255 free; side an even number.
-    """
-    cells = crops.shape[1]
-    cosine, sine = math.cos(heading), math.sin(heading)
-    half = int(math.ceil(0.5 * cells * (abs(cosine) + abs(sine))))
+def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
+    """Fill the crops of ``crop_turned`` cell by cell: of any side, on any processor."""
+    cells, cosine, sine = crops.shape[1], math.cos(heading), math.sin(heading)
+    half = _half_patch(cells, cosine, sine)
     width = (2 * half + HALF_BLOCK - 1) // HALF_BLOCK * HALF_BLOCK
     spans = np.empty((2 * half, 2), np.int64)
     _touched_columns(cells, half, cosine, sine, spans)
-    places = _places(half, width, cosine, sine, cells)
+    places = _places(half, width, round(cosine * HALF_STEP), round(sine * HALF_STEP), cells)
     patch = np.empty(2 * half * width, np.uint8)
     for k in range(scales.shape[0]):
-        row, column = int(math.floor(y / scales[k] + 0.5)), int(math.floor(x / scales[k] + 0.5))
+        row, column = _nearest_corner(x, y, scales[k])
         _copy_levels(int8_grid_at(pools[k, 0], pools[k, 1], pools[k, 2]), row - half, column - half, spans, patch)
         _look_up(patch, places, crops[k].reshape(cells * cells).view(np.uint32))
+
+
+@kernel
+def turn_in_registers(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
+    """Fill the crops of ``crop_turned`` by blocks: of a side that is a multiple of ``BLOCK_SIDE``, where ``USES_REGISTERS``."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    half = _half_patch(crops.shape[1], cosine, sine)
+    corners = np.empty((scales.shape[0], 2), np.int64)
+    for k in range(scales.shape[0]):
+        row, column = _nearest_corner(x, y, scales[k])
+        corners[k, 0], corners[k, 1] = row - half, column - half
+    turn_blocks(pools, corners, half, round(cosine * HALF_STEP), round(sine * HALF_STEP), crops)
+
+
+USES_REGISTERS = can_look_up_in_registers()
+"""Whether crops of whole blocks are turned in registers; they are the same, sooner."""
+
+_turn_whole_blocks = turn_in_registers if USES_REGISTERS else turn_by_cells
+"""What a processor cannot run is not compiled for it."""
+
+
+@kernel(inline=True)
+def _half_patch(cells: int, cosine: float, sine: float) -> int:
+    """Return half the rows and columns of the patch that a turned crop touches."""
+    return int(math.ceil(0.5 * cells * (abs(cosine) + abs(sine))))
+
+
+@kernel(inline=True)
+def _nearest_corner(x: float, y: float, scale: int) -> tuple[int, int]:
+    """Return row and column of the corner of pooled cells that is nearest to a place [cells of the map]."""
+    return int(math.floor(y / scale + 0.5)), int(math.floor(x / scale + 0.5))
 
 
 @kernel
@@ -213,10 +227,9 @@ def _copy_levels(pooled: Array, first_row: int, first_column: int, spans: Array,
 
 
 @kernel
-def _places(half: int, width: int, cosine: float, sine: float, cells: int) -> Array:
+def _places(half: int, width: int, step_x: int, step_y: int, cells: int) -> Array:
     """Return where in a patch, row * width + column, the centre of each cell of the crop lies: (cells * cells,) uint32."""
-    # Whole numbers throughout: crops at headings a quarter apart look up the same cells, and no sum of steps drifts.
-    step_x, step_y, stride = round(cosine * HALF_STEP), round(sine * HALF_STEP), np.uint32(width)
+    stride = np.uint32(width)
     forward_x, forward_y = np.empty(cells, np.int32), np.empty(cells, np.int32)
     for j in range(cells):
         forward_x[j] = (half << 16) + (2 * j + 1 - cells) * step_x
@@ -230,3 +243,30 @@ def _places(half: int, width: int, cosine: float, sine: float, cells: int) -> Ar
             x, y = np.uint32(left_x + forward_x[j]) >> np.uint32(16), np.uint32(left_y + forward_y[j]) >> np.uint32(16)
             places_of_row[j] = np.uint32(np.uint32(y) * stride) + np.uint32(x)
     return places.reshape(cells * cells)
+
+
+@kernel
+def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
+    """Fill crops that are turned with a robot, as levels; unknown outside of the map.
+
+    Rows of a crop go to the robot's left, columns forward; the robot is at the centre. The crop turns about the corner of
+    the pooled cells that is nearest to the robot, so that at headings along the axes a crop is exactly the pooled cells around
+    that corner, turned by quarters. In between, a cell of the crop shows the pooled cell in which its centre lies.
+
+    Parameters
+    ----------
+    pools : (scales, 3) int64
+        Address, rows and columns of the pooled map of each scale; at scale 1 the map itself.
+    x, y : float
+        Where the robot is [cells of the map].
+    heading : float
+        Where it looks in the map [rad].
+    scales : (scales,) int64
+        Side of a crop's cell [cells of the map].
+    crops : (scales, side, side) uint8
+        Written: 0 occupied, 127 unknown, 255 free; side an even number.
+    """
+    if USES_REGISTERS and crops.shape[1] % BLOCK_SIDE == 0:
+        _turn_whole_blocks(pools, x, y, heading, scales, crops)
+    else:
+        turn_by_cells(pools, x, y, heading, scales, crops)

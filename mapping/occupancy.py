@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.cell_blocks import update_block
+from lidarium.mapping.cell_blocks import fetch_block, update_block
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.noisy_returns import settle_returns
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
@@ -23,6 +23,9 @@ LOG_ODDS_UNIT = 0.05
 OCCUPIED, UNKNOWN, FREE = 0, 127, 255
 WORD = 64
 MAX_CELLS = 400_000_000
+
+ROWS_AHEAD = 4
+"""So many rows before a row of a map is updated it is fetched from memory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,15 +113,22 @@ def integrate_scan(
     words, word_offset = columns // WORD, column_offset // WORD
     word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
     is_noted = touched.shape[0] > 0
-    for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
+    row_low, row_high = max(box[0], -row_offset), min(box[1], rows - row_offset)
+    for row in range(row_low, row_high):
         address = log_odds.ctypes.data + (row + row_offset) * columns + word_offset * WORD
+        # The rows of a map lie too far apart for the processor to foresee them.
+        ahead = address + min(ROWS_AHEAD, row_high - 1 - row) * columns
+        changes = np.uint64(0)
         for word in range(word_low, word_high):
             seen, hits = bits[row, word], hit_bits[row, word]
+            fetch_block(ahead + word * WORD)
             if seen | hits != np.uint64(0):
                 changed = update_block(address + word * WORD, seen, hits, hit, miss, minimum, maximum)
-                if is_noted:
-                    place = word + word_offset
-                    touched[row + row_offset, place >> 6] |= np.uint64(changed != np.uint64(0)) << np.uint64(place & 63)
+                changes |= np.uint64(changed != np.uint64(0)) << np.uint64((word + word_offset) & 63)
+            is_last_of_group = word + 1 == word_high or (word + 1 + word_offset) & 63 == 0
+            if is_last_of_group and is_noted:
+                touched[row + row_offset, (word + word_offset) >> 6] |= changes
+                changes = np.uint64(0)
 
 
 @kernel

@@ -12,7 +12,7 @@ however many beams crossed it.
 
 import numpy as np
 
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.kernels import Array, kernel, vector_at
 
 GRAZING = 8.0
 """Cotangent of the flattest angle under which two neighbouring end points still belong to one surface."""
@@ -34,15 +34,23 @@ def window_rows(reach: float) -> int:
 
 
 @kernel(inline=True)
-def _toggle_edge(bits: Array, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int) -> None:
-    """Toggle the cell centres right of the edge, in the rows between its ends (half open, so that corners count once)."""
+def _toggle_bit(bits: int, place: int) -> None:
+    """Toggle a bit of the words at an address.
+
+    Words are reached by address throughout: numba counts who holds an array whenever it is handed on or a part of it is taken, which
+    for the few bits of an edge would cost more than the edge.
+    """
+    vector_at(bits + (place >> 6 << 3), 1, np.uint64)[0] ^= np.uint64(1) << np.uint64(place & 63)
+
+
+@kernel(inline=True)
+def _toggle_edge(bits: int, width: int, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int) -> None:
+    """Toggle the cell centres right of the edge, in the rows of ``width`` between its ends (half open, so that corners count once)."""
     slope = (to_x - from_x) / (to_y - from_y)
     first, last = min(from_row, to_row), max(from_row, to_row)
     x = from_x + (first + 0.5 - from_y) * slope + 0.5
-    flat, width = bits.reshape(-1), 64 * bits.shape[1]
     for start in range(first * width, last * width, width):
-        place = start + int(x)
-        flat[np.uintp(place >> 6)] ^= np.uint64(1) << np.uint64(place & 63)
+        _toggle_bit(bits, start + int(x))
         x += slope
 
 
@@ -73,31 +81,25 @@ def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array
         ends[1, beam] = y + lengths[beam] * directions[1, beam]
 
 
-@kernel
-def _toggle_jump(bits: Array, lengths: Array, directions: Array, ends: Array, x: float, y: float, near: int, far: int) -> None:
-    """Toggle the outline between a near and a far end point: along the far beam up to the near range only."""
-    corner_x = x + lengths[near] * directions[0, far]
-    corner_y = y + lengths[near] * directions[1, far]
-    row = _row_of(corner_y)
-    for beam in (near, far):
-        end_row = _row_of(ends[1, beam])
-        if end_row != row:
-            _toggle_edge(bits, ends[0, beam], ends[1, beam], corner_x, corner_y, end_row, row)
-
-
-@kernel
+@kernel(inline=True)
 def _toggle_between(
-    bits: Array, lengths: Array, directions: Array, ends: Array, x: float, y: float, previous: int, beam: int, steepness: float
+    bits: int, width: int, lengths: Array, directions: Array, ends: Array, x: float, y: float, previous: int, beam: int, steepness: float
 ) -> None:
     """Toggle the outline between the end points of two neighbouring beams."""
     step = lengths[beam] - lengths[previous]
-    if abs(step) > 1.0 + steepness * min(lengths[beam], lengths[previous]):
-        near, far = (previous, beam) if step > 0.0 else (beam, previous)
-        _toggle_jump(bits, lengths, directions, ends, x, y, near, far)
+    if abs(step) <= 1.0 + steepness * min(lengths[beam], lengths[previous]):
+        from_row, to_row = _row_of(ends[1, previous]), _row_of(ends[1, beam])
+        if from_row != to_row:
+            _toggle_edge(bits, width, ends[0, previous], ends[1, previous], ends[0, beam], ends[1, beam], from_row, to_row)
         return
-    from_row, to_row = _row_of(ends[1, previous]), _row_of(ends[1, beam])
-    if from_row != to_row:
-        _toggle_edge(bits, ends[0, previous], ends[1, previous], ends[0, beam], ends[1, beam], from_row, to_row)
+    # Between a near and a far end point the outline goes along the far beam, up to the near range only.
+    near, far = (previous, beam) if step > 0.0 else (beam, previous)
+    corner_x, corner_y = x + lengths[near] * directions[0, far], y + lengths[near] * directions[1, far]
+    row = _row_of(corner_y)
+    for end in (near, far):
+        end_row = _row_of(ends[1, end])
+        if end_row != row:
+            _toggle_edge(bits, width, ends[0, end], ends[1, end], corner_x, corner_y, end_row, row)
 
 
 @kernel
@@ -156,12 +158,13 @@ def fill_scan_polygon(
         The box that may hold bits, high ends exclusive.
     """
     beams = lengths.shape[0]
+    flat, width = bits.ctypes.data, 64 * bits.shape[1]
     if not is_full_circle:
         own_row = _row_of(y)
         for beam in (0, beams - 1):
             end_row = _row_of(ends[1, beam])
             if end_row != own_row:
-                _toggle_edge(bits, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
+                _toggle_edge(flat, width, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
     rows, columns = np.empty(beams, np.int32), np.empty(beams, np.int32)
     for beam in range(beams):
         rows[beam], columns[beam] = np.int32(ends[1, beam] + 0.5), np.int32(ends[0, beam])
@@ -171,15 +174,13 @@ def fill_scan_polygon(
         low_column, high_column = min(low_column, columns[beam]), max(high_column, columns[beam])
     steepness = GRAZING * increment
     if is_full_circle:
-        _toggle_between(bits, lengths, directions, ends, x, y, beams - 1, 0, steepness)
-    width = 64 * bits.shape[1]
+        _toggle_between(flat, width, lengths, directions, ends, x, y, beams - 1, 0, steepness)
     crossed, first, second, crossings, slopes = _edges(lengths, ends, rows, steepness, width)
     toggles, listed = np.empty(2 * beams + 2, np.int32), np.uintp(0)
-    flat = bits.reshape(-1)
     for k in range(beams - 1):
         count = crossed[k]
         if count == JUMP:
-            _toggle_between(bits, lengths, directions, ends, x, y, k, k + 1, steepness)
+            _toggle_between(flat, width, lengths, directions, ends, x, y, k, k + 1, steepness)
             continue
         # Most edges cross two rows, one or none. What they toggle is listed without branches, which could not be foreseen.
         toggles[listed] = first[k]
@@ -191,10 +192,9 @@ def fill_scan_polygon(
             for _ in range(2, count):
                 start += width
                 crossing += slopes[k]
-                place = start + int(crossing)
-                flat[np.uintp(place >> 6)] ^= np.uint64(1) << np.uint64(place & 63)
+                _toggle_bit(flat, start + int(crossing))
     for k in range(listed):
-        flat[np.uintp(toggles[k] >> 6)] ^= np.uint64(1) << np.uint64(toggles[k] & 63)
+        _toggle_bit(flat, toggles[k])
     row_low, row_high = max(int(low_row) - 2, 0), min(int(high_row) + 2, bits.shape[0])
     word_low, word_high = max(int(low_column) - 1, 0) >> 6, min((int(high_column) + 2) >> 6, bits.shape[1] - 1) + 1
     for i in range(row_low, row_high):

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarium.envs.simulation.face_casting import cast_by_faces
 from lidarium.envs.simulation.ray_tables import TILE
 from lidarium.mapping.kernels import Array, bytes_at, int32_table_at, kernel
-from lidarium.mapping.scans import ScanGeometry, beam_directions, beams_towards, fast_angle
+from lidarium.mapping.scans import ScanGeometry, beam_directions, beams_towards
 
 FACES, FACES_PER_BEAM = 300, 1.4
 """Most faces in reach for which the face caster runs, alone and for each beam.
@@ -30,9 +31,6 @@ BUNDLE, INNER_BUNDLE = 32, 8
 
 INSIDE = 1e-7
 """Beams that travel together stop this far before the border of a square [cells]."""
-
-CORNER_OVERLAP = 1e-9
-"""Faces reach this far beyond their corners, so that rounding leaves no gap between two of them [cells]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,88 +177,6 @@ def _cast_by_squares(squares: Array, rows: int, columns: int, x: float, y: float
                 ranges[beam] = _travel(squares, quadrant * plane, columns, x, y, row, column, distance, directions, beam, reach)
 
 
-@kernel(inline=True)
-def _draw_face(
-    first: int, last: int, distance: float, run: float, low: float, high: float, inverse: Array, direction: Array, ranges: Array
-) -> None:
-    """Lower the ranges of those beams from ``first`` to ``last`` that meet a face which spans low to high along its run."""
-    if first > last:
-        return
-    inverses, directions, nearest = inverse[first : last + 1], direction[first : last + 1], ranges[first : last + 1]
-    for k in range(nearest.size):
-        candidate = distance * inverses[k]
-        along = run + candidate * directions[k]
-        is_met = (low <= along) & (along <= high) & (candidate > 0.0) & (candidate < nearest[k])
-        nearest[k] = candidate if is_met else nearest[k]
-
-
-@kernel
-def _cast_by_faces(
-    faces: Array,
-    starts: Array,
-    tile_columns: int,
-    window: tuple[int, int, int, int],
-    x: float,
-    y: float,
-    heading: float,
-    angle_first: float,
-    increment: float,
-    directions: Array,
-    reach: float,
-    ranges: Array,
-) -> None:
-    """Fill ``ranges`` [cells] from the faces of the tiles in ``window`` (row_low, row_high, column_low, column_high)."""
-    beams = ranges.shape[0]
-    for beam in range(beams):
-        ranges[beam] = reach
-    beams_per_radian = 1.0 / increment
-    turn = 2.0 * math.pi * beams_per_radian
-    turns_per_beam = 1.0 / turn
-    for tile_row in range(window[0], window[1] + 1):
-        for tile_column in range(window[2], window[3] + 1):
-            group = (tile_row * tile_columns + tile_column) * 4
-            for direction in range(4):
-                along_rows = direction < 2
-                forward = direction & 1 == 0
-                fixed_own, run_own = (x, y) if along_rows else (y, x)
-                # A tile that lies behind shows no face that looks this way.
-                border = (tile_column if along_rows else tile_row) * TILE + (TILE if forward else 0)
-                if forward != (border > fixed_own):
-                    continue
-                for k in range(starts[group + direction], starts[group + direction + 1]):
-                    distance = faces[k, 0] - fixed_own
-                    if forward != (distance > 0.0) or abs(distance) >= reach:
-                        continue
-                    low, high = float(faces[k, 1]), float(faces[k, 2])
-                    sideways = max(0.0, max(low - run_own, run_own - high))
-                    if distance * distance + sideways * sideways >= reach * reach:
-                        continue
-                    if along_rows:
-                        angle_low, angle_high = fast_angle(low - y, distance), fast_angle(high - y, distance)
-                    else:
-                        angle_low, angle_high = fast_angle(distance, low - x), fast_angle(distance, high - x)
-                    # Seen from inside, the low end is the clockwise one on the right and below.
-                    if forward != along_rows:
-                        angle_low, angle_high = angle_high, angle_low
-                    span = angle_high - angle_low
-                    if span < 0.0:
-                        span += 2.0 * math.pi
-                    begin = (angle_low - heading - angle_first) * beams_per_radian
-                    begin -= turn * math.floor(begin * turns_per_beam)
-                    count = span * beams_per_radian
-                    row = 2 if along_rows else 3
-                    other = 1 if along_rows else 0
-                    low -= CORNER_OVERLAP
-                    high += CORNER_OVERLAP
-                    # The fast angle is good to a hundredth of a beam: one more beam on each side holds all that meet the face.
-                    for lap in range(2):
-                        start = begin - lap * turn
-                        first, last = max(int(start) - 1, 0), min(int(start + count) + 2, beams - 1)
-                        _draw_face(first, last, distance, run_own, low, high, directions[row], directions[other], ranges)
-                        if begin + count + 3.0 < turn:
-                            break
-
-
 @kernel
 def cast_scan(
     tables: Array, x: float, y: float, heading: float, angle_first: float, increment: float, directions: Array, reach: float, ranges: Array
@@ -297,7 +213,7 @@ def cast_scan(
         in_reach += starts[last] - starts[first]
     if in_reach <= FACES + FACES_PER_BEAM * ranges.shape[0]:
         faces = int32_table_at(tables[3], tables[4], 3)
-        _cast_by_faces(faces, starts, tile_columns, window, x, y, heading, angle_first, increment, directions, reach, ranges)
+        cast_by_faces(faces, starts, tile_columns, window, x, y, heading + angle_first, increment, directions, reach, ranges)
     else:
         squares = bytes_at(tables[0], 4 * rows * columns)
         _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.envs.simulation.lidar import Lidar, _cast_by_faces, _cast_by_squares, cast_scan, cast_scans, cut_by_disc
+from lidarium.envs.simulation.face_casting import cast_by_faces
+from lidarium.envs.simulation.lidar import Lidar, _cast_by_squares, cast_scan, cast_scans, cut_by_disc
 from lidarium.envs.simulation.ray_tables import RayTables
 from lidarium.mapping.scans import ScanGeometry, beam_directions
 
@@ -120,8 +121,8 @@ def by_faces(tables, x, y, heading, geometry, directions, reach):
     ranges = np.full(directions.shape[1], np.nan)
     tile_rows, tile_columns = -(-tables.rows // 128), tables.tile_columns
     window = (0, tile_rows - 1, 0, tile_columns - 1)
-    _cast_by_faces(
-        tables.faces, tables.face_starts, tile_columns, window, x, y, heading, geometry.angle_first, geometry.angle_increment, directions,
+    cast_by_faces(
+        tables.faces, tables.face_starts, tile_columns, window, x, y, heading + geometry.angle_first, geometry.angle_increment, directions,
         reach, ranges,
     )  # fmt: skip
     return ranges
