@@ -15,7 +15,8 @@ from lidarium.envs.simulation.arrays import world_at
 from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.envs.simulation.stages import RANGE_GAP
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel, use_threads, word_grid_at
-from lidarium.mapping.map_crops import crop_levels, crop_turned, pool_touched, touched_words
+from lidarium.mapping.map_crops import crop_levels, crop_turned
+from lidarium.mapping.pooled_maps import forget_touched, pool_touched, touched_words
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
@@ -103,7 +104,7 @@ def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None
             for k in range(scales.shape[0]):
                 if scales[k] > 1:
                     pool_touched(log_odds, touched, scales[k], int8_grid_at(pools[row, k, 0], pools[row, k, 1], pools[row, k, 2]))
-            touched[:] = np.uint64(0)
+            forget_touched(touched, log_odds.shape[0])
             crop_turned(pools[row], x, y, believed[row, 2], scales, egocentric_maps[row])
 
 

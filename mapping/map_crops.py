@@ -9,13 +9,12 @@ cells that it can touch are copied into a small patch, and each cell of the crop
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lidarium.mapping.cell_blocks import HALF_BLOCK, write_greatest, write_levels
-from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel, vector_at
-from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, WORD
+from lidarium.mapping.cell_blocks import HALF_BLOCK, write_levels
+from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel
+from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.turned_blocks import CAN_LOOK_UP_IN_REGISTERS, turn_blocks
 from lidarium.mapping.turned_blocks import SIDE as BLOCK_SIDE
-from lidarium.mapping.turned_blocks import can_look_up_in_registers, turn_blocks
 
 _FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIED)
 
@@ -63,81 +62,6 @@ def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
         _write_row(log_odds.ctypes.data + map_row * columns + first_column + low, high - low, target + low)
 
 
-@kernel(inline=True)
-def touched_words(columns: int) -> int:
-    """Return how many words hold a bit for each word of 64 cells of a row of a map."""
-    return (columns + WORD * WORD - 1) // (WORD * WORD)
-
-
-def untouched(rows: int, columns: int) -> NDArray[np.uint64]:
-    """Return the bits of the words of 64 cells in which a level of the map has changed, where none has: (rows, ``touched_words``)."""
-    return np.zeros((rows, touched_words(columns)), np.uint64)
-
-
-@kernel
-def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> None:
-    """Bring a pooled map up to date where levels of the map have changed.
-
-    Parameters
-    ----------
-    log_odds : (rows, columns) int8
-        The map; columns a multiple of 64.
-    touched : (rows, touched_words) uint64
-        Bits of the words of 64 cells in which a level has changed, see ``untouched``.
-    scale : int
-        Side of a pooled cell [cells of the map].
-    pooled : (ceil(rows / scale), ceil(columns / scale)) int8
-        Of the sign of the greatest log-odds of the cells of each pooled cell; what a pooled cell has beyond the map counts as
-        unknown.
-    """
-    rows, columns = log_odds.shape
-    # Whole groups of cells in a word are compared many at a time, others one by one.
-    in_groups = scale in (2, 4, 8, 16)
-    greatest = np.empty(WORD, np.int8)
-    for row in range(pooled.shape[0]):
-        first_row, last_row = row * scale, min((row + 1) * scale, rows)
-        for place in range(touched.shape[1]):
-            changed = np.uint64(0)
-            for map_row in range(first_row, last_row):
-                changed |= touched[map_row, place]
-            if changed == np.uint64(0):
-                continue
-            for word in range(place * WORD, min((place + 1) * WORD, columns // WORD)):
-                if (changed >> np.uint64(word & 63)) & np.uint64(1) == np.uint64(0):
-                    continue
-                if in_groups:
-                    _pool_word(log_odds, first_row, last_row, word, scale, greatest, pooled[row])
-                else:
-                    for column in range(word * WORD // scale, min(((word + 1) * WORD - 1) // scale + 1, pooled.shape[1])):
-                        pooled[row, column] = _greatest(log_odds, first_row, column * scale, scale)
-
-
-@kernel(inline=True)
-def _greatest(log_odds: Array, first_row: int, first_column: int, scale: int) -> np.int8:
-    """Return the greatest log-odds of a square of cells; beyond the map they are 0."""
-    last_row, last_column = min(first_row + scale, log_odds.shape[0]), min(first_column + scale, log_odds.shape[1])
-    is_whole = last_row == first_row + scale and last_column == first_column + scale
-    greatest = np.int8(-128) if is_whole else np.int8(0)
-    for row in range(first_row, last_row):
-        for column in range(first_column, last_column):
-            greatest = max(greatest, log_odds[row, column])
-    return greatest
-
-
-@kernel(inline=True)
-def _pool_word(log_odds: Array, first_row: int, last_row: int, word: int, scale: int, greatest: Array, pooled: Array) -> None:
-    """Write the pooled cells of a word of 64 cells; ``scale`` is 2, 4, 8 or 16, ``greatest`` (64,) is scratch."""
-    columns, width, halvings = log_odds.shape[1], WORD // scale, 0
-    while (1 << halvings) < scale:
-        halvings += 1
-    rows = log_odds.ctypes.data + first_row * columns + word * WORD
-    least = -128 if last_row - first_row == scale else 0
-    write_greatest(rows, columns, last_row - first_row, least, halvings, greatest.ctypes.data)
-    source, target = greatest.ctypes.data, pooled.ctypes.data + word * width
-    for place in range(0, width, 4):
-        vector_at(target + place, 1, np.uint32)[0] = vector_at(source + place, 1, np.uint32)[0]
-
-
 @kernel
 def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
     """Fill the crops of ``crop_turned`` cell by cell: of any side, on any processor."""
@@ -156,7 +80,7 @@ def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Arra
 
 @kernel
 def turn_in_registers(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
-    """Fill the crops of ``crop_turned`` by blocks: of a side that is a multiple of ``BLOCK_SIDE``, where ``USES_REGISTERS``."""
+    """Fill the crops of ``crop_turned`` by blocks: of a side that is a multiple of ``BLOCK_SIDE``, where ``CAN_LOOK_UP_IN_REGISTERS``."""
     cosine, sine = math.cos(heading), math.sin(heading)
     half = _half_patch(crops.shape[1], cosine, sine)
     corners = np.empty((scales.shape[0], 2), np.int64)
@@ -166,10 +90,7 @@ def turn_in_registers(pools: Array, x: float, y: float, heading: float, scales: 
     turn_blocks(pools, corners, half, round(cosine * HALF_STEP), round(sine * HALF_STEP), crops)
 
 
-USES_REGISTERS = can_look_up_in_registers()
-"""Whether crops of whole blocks are turned in registers; they are the same, sooner."""
-
-_turn_whole_blocks = turn_in_registers if USES_REGISTERS else turn_by_cells
+_turn_whole_blocks = turn_in_registers if CAN_LOOK_UP_IN_REGISTERS else turn_by_cells
 """What a processor cannot run is not compiled for it."""
 
 
@@ -266,7 +187,7 @@ def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array,
     crops : (scales, side, side) uint8
         Written: 0 occupied, 127 unknown, 255 free; side an even number.
     """
-    if USES_REGISTERS and crops.shape[1] % BLOCK_SIDE == 0:
+    if CAN_LOOK_UP_IN_REGISTERS and crops.shape[1] % BLOCK_SIDE == 0:
         _turn_whole_blocks(pools, x, y, heading, scales, crops)
     else:
         turn_by_cells(pools, x, y, heading, scales, crops)

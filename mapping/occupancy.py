@@ -104,8 +104,9 @@ def integrate_scan(
         Place of the window's first cell in the map; column_offset a multiple of 64.
     increments : (4,) int64
         ``OccupancySettings.increments``.
-    touched : (rows, words) uint64
-        Bits of the words of 64 cells of each row in which a level has changed; added to. None are noted where it has no rows.
+    touched : (rows + rows / 64, words) uint64
+        Bits of the words of 64 cells of each row in which a level has changed, and of these rows (``pooled_maps.untouched``); added to.
+        None are noted where it has no rows.
     """
     _note_hits(ends, is_hit, hit_bits)
     hit, miss, minimum, maximum = increments[0], increments[1], increments[2], increments[3]
@@ -126,8 +127,10 @@ def integrate_scan(
                 changed = update_block(address + word * WORD, seen, hits, hit, miss, minimum, maximum)
                 changes |= np.uint64(changed != np.uint64(0)) << np.uint64((word + word_offset) & 63)
             is_last_of_group = word + 1 == word_high or (word + 1 + word_offset) & 63 == 0
-            if is_last_of_group and is_noted:
-                touched[row + row_offset, (word + word_offset) >> 6] |= changes
+            if is_last_of_group and is_noted and changes != np.uint64(0):
+                of_map = row + row_offset
+                touched[of_map, (word + word_offset) >> 6] |= changes
+                touched[rows + (of_map >> 6), 0] |= np.uint64(1) << np.uint64(of_map & 63)
                 changes = np.uint64(0)
 
 

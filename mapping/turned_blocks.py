@@ -8,16 +8,15 @@ from which AVX-512 VBMI picks 64 bytes by their places in two instructions. Othe
 from typing import Any
 
 import numpy as np
-from llvmlite import binding, ir
+from llvmlite import ir
 from numba import types
-from numba.core import cgutils, config
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from lidarium.mapping.cell_blocks import fetch_block
 from lidarium.mapping.kernels import Array, kernel, vector_at
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
-
-_numba_config: Any = config
+from lidarium.mapping.processor import has_feature
 
 SIDE = 8
 """Side of a block [cells]."""
@@ -139,16 +138,12 @@ def _write_border(typing_context: Any, log_odds: Any, stride: Any, cells: Any, p
     return types.void(*(types.int64,) * 6), generate
 
 
+CAN_LOOK_UP_IN_REGISTERS = has_feature("avx512vbmi")
+"""Whether the processor can do this."""
+
 _places_of_block: Any = intrinsic(_write_places)
 _block: Any = intrinsic(_write_block)
 _border: Any = intrinsic(_write_border)
-
-
-def can_look_up_in_registers() -> bool:
-    """Whether kernels are compiled for a processor that has AVX-512 VBMI."""
-    if _numba_config.CPU_NAME is not None or _numba_config.CPU_FEATURES is not None or not _numba_config.ENABLE_AVX:
-        return "+avx512vbmi" in (_numba_config.CPU_FEATURES or "").split(",")
-    return bool(binding.get_host_cpu_features().get("avx512vbmi", False))
 
 
 @kernel

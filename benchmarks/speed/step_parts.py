@@ -16,8 +16,8 @@ from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE, fill_gaussian
 from lidarium.envs.simulation.stages import _window_corner
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
-from lidarium.mapping.map_crops import touched_words
 from lidarium.mapping.occupancy import integrate_scan
+from lidarium.mapping.pooled_maps import touched_words
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import beam_directions
 

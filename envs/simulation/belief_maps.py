@@ -2,13 +2,13 @@
 
 import math
 import mmap
-from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.mapping.occupancy import WORD
+from lidarium.mapping.pooled_maps import touch
 
 LEAST_MARGIN = 8.0
 """Maps of robots whose poses drift reach at least this far beyond the floor [m]."""
@@ -48,7 +48,8 @@ def wipe(log_odds: NDArray[np.int8], touched: NDArray[np.uint64], window: NDArra
     if not lines.size:
         return
     log_odds[lines[0] : lines[-1] + 1] = 0
-    _note(touched, window, (int(lines[0]), int(lines[-1]) + 1), words.tolist(), (WORD * int(words[0]), WORD * (int(words[-1]) + 1)))
+    first, end = int(words[0]), int(words[-1]) + 1
+    _note(touched, window, (int(lines[0]), int(lines[-1]) + 1), (first, end), (WORD * first, WORD * end))
 
 
 def blank(
@@ -63,15 +64,15 @@ def blank(
     if not rows.size:
         return
     log_odds[corner[0] : corner[0] + where.shape[0], corner[1] : corner[1] + where.shape[1]][where] = 0
-    words = range(int(columns[0]) // WORD, int(columns[-1]) // WORD + 1)
+    words = (int(columns[0]) // WORD, int(columns[-1]) // WORD + 1)
     _note(touched, window, (int(rows[0]), int(rows[-1]) + 1), words, (int(columns[0]), int(columns[-1]) + 1))
 
 
 def _note(
-    touched: NDArray[np.uint64], window: NDArray[np.int64], rows: tuple[int, int], words: Iterable[int], columns: tuple[int, int]
+    touched: NDArray[np.uint64], window: NDArray[np.int64], rows: tuple[int, int], words: tuple[int, int], columns: tuple[int, int]
 ) -> None:
     """Note that a map has changed in rows and columns (low, high), and in which words of 64 cells of these rows."""
-    for word in words if touched.size else ():
-        touched[rows[0] : rows[1], word // WORD] |= np.uint64(1 << word % WORD)
+    if touched.size:
+        touch(touched, rows, words)
     window[0], window[1] = min(window[0], rows[0]), max(window[1], rows[1])
     window[2], window[3] = min(window[2], columns[0]), max(window[3], columns[1])

@@ -26,8 +26,8 @@ from lidarium.envs.simulation.robots import Robot
 from lidarium.envs.simulation.stepping import perceive_parallel, perceive_serial, render_row, step_rows, step_serial
 from lidarium.envs.simulation.world import Sensed
 from lidarium.mapping.kernels import use_threads
-from lidarium.mapping.map_crops import untouched
 from lidarium.mapping.occupancy import WORD, OccupancySettings
+from lidarium.mapping.pooled_maps import untouched
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""
@@ -207,7 +207,7 @@ class KinematicWorld:
         starts = _within_half_turns(starts)
         # What the laser cannot look into does not count, even where a low body could pass below it.
         free = swept_free_space(floor.body, self.smallest_radius, starts) & (floor.laser.solid == 0)
-        counted = pack_bits(counted_cells(free, multiple))
+        counted = self._shared(episode, floor, pack_bits(counted_cells(free, multiple)))
         rows, words = counted.shape
         self.floors[episode] = floor
         self._frames[episode] = floor.frame
@@ -246,6 +246,12 @@ class KinematicWorld:
         self.contact[first:last], self.heard[first:last] = 0, 0.0
         self.flags[first:last] = self._flags | (self._mate_flag if known_starts else OWN_FRAME)
         self.forget_changes(first, last)
+
+    def _shared(self, episode: int, floor: FloorTables, counted: NDArray[np.uint64]) -> NDArray[np.uint64]:
+        """Return F, in the array of an episode on the same floor with the same F if there is one: less memory to go through in a step."""
+        others = (other for other in range(self.episodes) if other != episode and self.floors[other] is floor)
+        same = (self.counted_masks[other] for other in others)
+        return next((mask for mask in same if np.array_equal(mask, counted)), counted)
 
     def _point_at(self, episode: int) -> None:
         """Fill the kernels' tables of addresses with where the episode's arrays lie."""

@@ -16,9 +16,9 @@ from lidarium.envs.simulation.faults import blind_beams
 from lidarium.envs.simulation.lidar import cast_scan, cut_by_disc
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
 from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
-from lidarium.mapping.map_crops import touched_words
 from lidarium.mapping.noisy_returns import settle_returns
 from lidarium.mapping.occupancy import integrate_scan
+from lidarium.mapping.pooled_maps import touched_words
 from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import beam_directions, beams_towards
 

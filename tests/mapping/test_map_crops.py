@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.map_crops import crop_levels, crop_turned, pool_touched, turn_by_cells, untouched
+from lidarium.mapping.map_crops import crop_levels, crop_turned, turn_by_cells
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
+from lidarium.mapping.pooled_maps import forget_touched, pool_touched, touch, untouched
 
 
 def random_map(seed, rows=40, columns=128):
@@ -50,7 +51,7 @@ def turned(log_odds, row, column, heading, scale, cells):
 
 def all_touched(log_odds):
     touched = untouched(*log_odds.shape)
-    touched[:] = 2 ** (log_odds.shape[1] // 64) - 1
+    touch(touched, (0, log_odds.shape[0]), (0, log_odds.shape[1] // 64))
     return touched
 
 
@@ -82,9 +83,10 @@ def test_a_pooled_map_kept_up_to_date_is_the_one_made_anew(seed, scale, changes)
         words = int(generator.integers(1, 4 - word))
         block = log_odds[row : row + height, 64 * word : 64 * (word + words)]
         block[:] = generator.integers(-40, 71, block.shape)
-        touched[row : row + height] |= np.uint64((2**words - 1) << word)
+        touch(touched, (row, min(row + height, 37)), (word, word + words))
         pool_touched(log_odds, touched, scale, pooled)
-        touched[:] = 0
+        forget_touched(touched, 37)
+        assert not touched.any()
     assert np.array_equal(three_levels(pooled), pooled_levels(log_odds, scale))
 
 
@@ -142,10 +144,10 @@ def test_crops_of_whole_blocks_are_those_looked_up_cell_by_cell(row, column, hea
 
 def test_a_processor_that_cannot_look_up_in_registers_turns_the_same_crops(tmp_path):
     code = (
-        "import sys, numpy as np; from lidarium.mapping.map_crops import USES_REGISTERS, crop_turned;"
+        "import sys, numpy as np; from lidarium.mapping.map_crops import CAN_LOOK_UP_IN_REGISTERS, crop_turned;"
         "cells = np.random.default_rng(4).integers(-1, 2, (100, 128)).astype(np.int8);"
         "crops = np.zeros((1, 64, 64), np.uint8); pools = np.array([(cells.ctypes.data, 100, 128)], np.int64);"
-        "crop_turned(pools, 70.0, 30.0, 0.7, np.array([1]), crops); assert not USES_REGISTERS; np.save(sys.argv[1], crops)"
+        "crop_turned(pools, 70.0, 30.0, 0.7, np.array([1]), crops); assert not CAN_LOOK_UP_IN_REGISTERS; np.save(sys.argv[1], crops)"
     )
     without = {"NUMBA_ENABLE_AVX": "0", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "crops.npy")], env={**os.environ, **without}, check=True, timeout=120)
