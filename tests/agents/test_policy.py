@@ -1,6 +1,7 @@
 """The contract of policies: registered by name, one object a team or one a robot, and every robot says why it ended."""
 
 import signal
+from contextlib import contextmanager
 from functools import lru_cache
 
 import numpy as np
@@ -198,26 +199,35 @@ class PressesControlC(Recorder):
         return super().act(observations)
 
 
+@contextmanager
+def interrupts_handled_by(handler):
+    """A process that was begun in the background may ignore SIGINT from its first moment on; these tests do not depend on it."""
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_a_first_interrupt_waits_for_the_end_of_the_step_and_a_second_does_not():
     env = lidarium.parallel_env("scene_room", robots=1, stop_coverage=None, map_cells=32)
     policy = PressesControlC(1)
-    episode = run_episode(policy, env, 1, raise_interrupt=False)
-    assert episode.is_interrupted
-    assert policy.went_on
-    with pytest.raises(KeyboardInterrupt):
-        run_episode(PressesControlC(2), env, 1, raise_interrupt=False)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with interrupts_handled_by(signal.default_int_handler):
+        episode = run_episode(policy, env, 1, raise_interrupt=False)
+        assert episode.is_interrupted
+        assert policy.went_on
+        with pytest.raises(KeyboardInterrupt):
+            run_episode(PressesControlC(2), env, 1, raise_interrupt=False)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_an_application_that_handles_interrupts_keeps_doing_so():
+@pytest.mark.parametrize("is_ignored", [False, True])
+def test_an_application_that_handles_or_ignores_interrupts_keeps_doing_so(is_ignored):
     noted = []
-    before = signal.signal(signal.SIGINT, lambda number, _: noted.append(number))
-    try:
-        env = lidarium.parallel_env("scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env("scene_room", robots=1, horizon_s=10.0, stop_coverage=None, map_cells=32)
+    with interrupts_handled_by(signal.SIG_IGN if is_ignored else lambda number, _: noted.append(number)):
         episode = run_episode(PressesControlC(1), env, 1, raise_interrupt=False)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert noted
+    assert bool(noted) != is_ignored
     assert not episode.is_interrupted
 
 
