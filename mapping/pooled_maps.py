@@ -53,12 +53,16 @@ def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> 
         left = touched[group, 0]
         while left != np.uint64(0):
             row = (group - rows) * WORD + first_bit(left)
-            left &= left - np.uint64(1)
+            # The rows of one row of pooled cells are pooled together, as far as this word of rows goes.
+            end = min((row // scale + 1) * scale, (group - rows + 1) * WORD)
             for place in range(touched.shape[1]):
-                words = touched[row, place]
+                words = np.uint64(0)
+                for other in range(row, min(end, rows)):
+                    words |= touched[other, place]
                 while words != np.uint64(0):
                     _pool_word(log_odds, row // scale, place * WORD + first_bit(words), scale, greatest, pooled)
                     words &= words - np.uint64(1)
+            left = left >> np.uint64(end & 63) << np.uint64(end & 63) if end & 63 else np.uint64(0)
 
 
 @kernel

@@ -1,0 +1,87 @@
+"""The learning preset of this code beside that of another checkout, both driven in turn: what a change of the kernels gained.
+
+    python benchmarks/speed/against.py OTHER_PYTHON [--threads 1] [--rounds 3] [--blocks 40]
+
+OTHER_PYTHON is the interpreter of a virtual environment in which the other checkout is installed. Each runs in a process of its own, and
+they take turns block by block, so that both meet the same noise of the machine.
+"""
+
+import argparse
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from lidarium.benchmarks.speed.batches import OBSERVED, DrivenBatch
+from lidarium.benchmarks.speed.floors import straight_floor
+
+KINDS = ("all observations", "without egocentric maps")
+STEPS = 20
+"""Steps of a block."""
+
+
+def serve(threads: int) -> None:
+    """Drive a block of either kind for each line of standard input that names it, and tell its time an agent step [us]."""
+    preset = {"lidar": "lidar_360_6m", "resolution": 0.05}
+    plain = tuple(name for name in OBSERVED if name != "egocentric_map")
+    floor = straight_floor()
+    batches = {KINDS[0]: DrivenBatch(floor, threads, **preset), KINDS[1]: DrivenBatch(floor, threads, **preset, observe=plain)}
+    for line in sys.stdin:
+        kind, _, place = line.strip().partition(" from ")
+        if place:
+            batches[kind].start(int(place))
+        began = time.perf_counter()
+        for _ in range(STEPS):
+            batches[kind].step()
+        print((time.perf_counter() - began) / STEPS / batches[kind].agents * 1e6, flush=True)
+
+
+def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[str, np.ndarray]:
+    """Return the times an agent step [us] of each kind, shape (pythons, rounds * blocks)."""
+    command = [str(Path(__file__).resolve()), "--serve", "--threads", str(threads)]
+    processes = [subprocess.Popen([python, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for python in pythons]
+    found: dict[str, np.ndarray] = {kind: np.zeros((len(pythons), rounds * blocks)) for kind in KINDS}
+    try:
+        for block in range(rounds * blocks):
+            # Blocks of a round go on where the one before ended; a round begins with blank maps.
+            place = f" from {block // blocks}" if block % blocks == 0 else ""
+            for kind in KINDS:
+                for k, process in enumerate(processes):
+                    assert process.stdin is not None
+                    assert process.stdout is not None
+                    process.stdin.write(f"{kind}{place}\n")
+                    process.stdin.flush()
+                    answer = process.stdout.readline()
+                    if not answer:
+                        raise RuntimeError(f"{pythons[k]} has ended; is lidarium with its benchmarks installed there?")
+                    found[kind][k, block] = float(answer)
+    finally:
+        for process in processes:
+            process.communicate()
+    return found
+
+
+def main() -> None:
+    """Compare two checkouts and print medians with quartiles."""
+    parser = argparse.ArgumentParser(description="The learning preset of this code beside that of another checkout.")
+    parser.add_argument("other", nargs="?", help="interpreter of a virtual environment with the other checkout")
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--rounds", type=int, default=3, help="each begins with blank maps")
+    parser.add_argument("--blocks", type=int, default=40, help=f"blocks of {STEPS} steps in a round")
+    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.serve:
+        serve(options.threads)
+        return
+    if options.other is None or min(options.threads, options.rounds, options.blocks) < 1:
+        parser.error("want the other checkout's interpreter, and threads, rounds and blocks of at least 1")
+    for kind, (ours, other) in times([sys.executable, options.other], options.threads, options.rounds, options.blocks).items():
+        low, middle, high = np.quantile(ours / other, [0.25, 0.5, 0.75])
+        rates = f"{np.median(ours):.2f} us an agent step, the other {np.median(other):.2f}"
+        print(f"{kind}: {rates}; {middle:.3f} of its time (quartiles {low:.3f} to {high:.3f})")
+
+
+if __name__ == "__main__":
+    main()
