@@ -117,7 +117,9 @@ class ClosureFinder:
         best, _ = place(old.coarse, points, around, reach, least, settings.evaluations)
         if best is None:
             return None
-        match, here = self._laid(old, points, best.pose), self._laid(old, points, around)
+        # Where nothing but odometry speaks, along a wall, a scan that is laid where the robot believes to be stays there.
+        weak = np.diag(1.0 / np.array([settings.search_m, settings.search_m, settings.search_angle]) ** 2)
+        match, here = self._laid(old, points, best.pose, np.zeros((3, 3))), self._laid(old, points, around, weak)
         if here.contradiction <= settings.most_contradiction and here.score >= settings.as_good * match.score:
             # What the map knows agrees with where the robot believes to be; what lies beyond it may be the other side of a wall.
             match = here
@@ -131,9 +133,9 @@ class ClosureFinder:
         floor = np.diag([settings.least_deviation_m**2, settings.least_deviation_m**2, settings.least_deviation_angle**2])
         return Closure(old.node, len(poses) - 1, match.pose, match.covariance + floor, match.score)
 
-    def _laid(self, old: _Remembered, points: NDArray[np.float64], start: NDArray[np.float64]) -> Match:
+    def _laid(self, old: _Remembered, points: NDArray[np.float64], start: NDArray[np.float64], information: NDArray[np.float64]) -> Match:
         matching = self._matching
-        return refine(old.coarse.grid, points, start, start, np.zeros((3, 3)), matching.weight(len(points)), matching.unseen)
+        return refine(old.coarse.grid, points, start, start, information, matching.weight(len(points)), matching.unseen)
 
     def _confirmed(self, closure: Closure, poses: NDArray[np.float64]) -> list[Closure]:
         """Return the closure, and those that waited for it; nothing where it has to wait for others itself."""

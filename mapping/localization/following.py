@@ -25,7 +25,7 @@ LOG_SETTINGS = SlamSettings(
     matching=MatchingSettings(
         distance_m=0.02, angle=math.radians(1.0), spacing_m=0.08, points=250, independent_share=1.0, deviation=0.25, unseen=0.5
     ),
-    submaps=SubmapSettings(path_m=8.0),
+    submaps=SubmapSettings(resolution=0.05, path_m=8.0, behind_share=0.0),
     closures=ClosureSettings(least_overlap=0.6),
     graph=GraphSettings(deviation_m=0.01, deviation_per_metre=0.02, deviation_angle=math.radians(0.3)),
     compass=CompassSettings(deviation_angle=math.radians(0.3), drift=0.2),

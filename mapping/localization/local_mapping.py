@@ -216,7 +216,7 @@ class LocalMapper:
 
     def _add(self, node: int, in_older: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
         reach = min(self._matching.range_m, self._geometry.range_max) + 2.0 * self._submaps.path_m
-        active = _Active(Submap(self._submaps.resolution, reach), node, in_older.copy())
+        active = _Active(Submap(self._submaps, reach), node, in_older.copy())
         active.submap.insert(np.zeros(3), ranges, self._geometry, self._matching.range_m)
         self._active.append(active)
 

@@ -60,8 +60,6 @@ class NodeGraph:
         self._edges[0] = (first, second, since, information, is_robust)
         before, begin = self.nodes[1], composed(self.nodes[0], since)
         self.nodes = np.vstack([self.nodes[:1], composed(begin, relative(before, self.nodes[1:]))])
-        if self._compass is not None:
-            self._compass.begin_at(float(begin[2] - before[2]))
 
     def close(self, closures: list[Closure]) -> bool:
         """Take in closures, at least one; return whether poses are to be settled: they contradict some, or enough of them wait."""

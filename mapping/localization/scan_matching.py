@@ -26,6 +26,12 @@ With less, points in the middle of such a wall would agree too well, and scans w
 SURFACE_GAP = 0.3
 """Neighbouring points lie on one surface where they are nearer to each other than this share of their distance, or so many metres."""
 
+SURFACE_REACH_M = 0.25
+"""Points of a surface so near to a point tell which way it runs there [m]."""
+
+MOST_BEND = 0.15
+"""Where the variance of those points across the surface is more than this share of that along it, there is a corner."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
@@ -159,21 +165,59 @@ def _is_unseen(levels: Array, x: float, y: float) -> bool:
     return not (0 <= column < levels.shape[1] and 0 <= row < levels.shape[0]) or levels[row, column] == UNSEEN
 
 
+@kernel(inline=True)
+def _is_one_surface(points: Array, k: int) -> bool:
+    """Whether a point and the next one lie on one surface."""
+    gap = SURFACE_GAP * max(math.hypot(points[k, 0], points[k, 1]), 1.0)
+    return bool(math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]) <= gap)
+
+
 @kernel
 def _find_normals(points: Array, normals: Array) -> None:
-    """Fill ``normals`` (n, 2) with unit vectors across the surface on which each point and its neighbours lie; zero for a point alone."""
+    """Fill ``normals`` (n, 2) with unit vectors across the surface on which each point and its neighbours lie; zero for a point alone.
+
+    Two neighbours tell it where the surface bends; elsewhere more do, since noise turns what lies between two near points.
+    """
     count = points.shape[0]
     for k in range(count):
         before, after = k, k
-        gap = SURFACE_GAP * max(math.hypot(points[k, 0], points[k, 1]), 1.0)
-        if k > 0 and math.hypot(points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]) <= gap:
-            before = k - 1
-        if k + 1 < count and math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]) <= gap:
-            after = k + 1
-        along_x, along_y = points[after, 0] - points[before, 0], points[after, 1] - points[before, 1]
+        while before > 0 and _is_one_surface(points, before - 1) and _is_near(points, before - 1, k):
+            before -= 1
+        while after + 1 < count and _is_one_surface(points, after) and _is_near(points, after + 1, k):
+            after += 1
+        along_x, along_y, is_bent = _axis(points[before : after + 1])
+        if is_bent:
+            before = k - 1 if k > 0 and _is_one_surface(points, k - 1) else k
+            after = k + 1 if k + 1 < count and _is_one_surface(points, k) else k
+            along_x, along_y = points[after, 0] - points[before, 0], points[after, 1] - points[before, 1]
         length = math.hypot(along_x, along_y)
         if length > 0.0:
             normals[k, 0], normals[k, 1] = -along_y / length, along_x / length
+
+
+@kernel(inline=True)
+def _is_near(points: Array, k: int, m: int) -> bool:
+    return bool(math.hypot(points[k, 0] - points[m, 0], points[k, 1] - points[m, 1]) <= SURFACE_REACH_M)
+
+
+@kernel
+def _axis(points: Array) -> tuple[float, float, bool]:
+    """Return the axis along which points vary most, not of unit length, and whether they do not lie along it, or are too few to tell."""
+    count = points.shape[0]
+    if count < 3:
+        return 0.0, 0.0, True
+    x, y = 0.0, 0.0
+    for k in range(count):
+        x += points[k, 0] / count
+        y += points[k, 1] / count
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for k in range(count):
+        xx += (points[k, 0] - x) * (points[k, 0] - x)
+        xy += (points[k, 0] - x) * (points[k, 1] - y)
+        yy += (points[k, 1] - y) * (points[k, 1] - y)
+    half, middle = math.hypot(0.5 * (xx - yy), xy), 0.5 * (xx + yy)
+    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
+    return math.cos(angle), math.sin(angle), middle - half > MOST_BEND * (middle + half)
 
 
 @kernel

@@ -156,18 +156,23 @@ class SubmapSettings:
     ----------
     resolution : float
         Side of a cell [m].
+    behind_m, behind_share : float
+        As far behind the end of a beam, at least and as a share of its range, walls that other scans saw count as seen through [m, 1];
+        twice to three times the standard deviation of a range is right. A share of 0 does without.
     path_m : float
         Way driven, turns counted with a metre a radian, after which a local map is finished [m].
     least_scans : int
         A local map holds at least so many scans.
     """
 
-    resolution: float = 0.05
+    resolution: float = 0.035
+    behind_m: float = 0.025
+    behind_share: float = 0.025
     path_m: float = 16.0
     least_scans: int = 10
 
     def __post_init__(self) -> None:
-        _check_numbers(self)
+        _check_numbers(self, zero=("behind_m", "behind_share"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,7 +255,8 @@ class GraphSettings:
     Attributes
     ----------
     start_path_m : float
-        Way driven, turns counted with a metre a radian, after which the first scan is laid on the map that has grown since [m].
+        Way driven, turns counted with a metre a radian, after which the first scan is laid on the map that has grown since, and where
+        its walls run is surveyed [m].
     distance_m, angle : float
         Way and turn between nodes [m, rad].
     deviation_m, deviation_per_metre : float
@@ -289,25 +295,22 @@ class CompassSettings:
 
     Attributes
     ----------
-    deviation_m : float
-        Standard deviation of a range [m].
+    spacing_m : float
+        Returns that are nearer to each other than this count as one [m].
     deviation_angle : float
         Standard deviation of the direction of a building's walls from place to place [rad].
     drift : float
         How much headings drift from node to node, as a share of the standard deviation of their matches: neighbouring scans are matched
         with one local map, and do not err each on its own.
-    first_drift : float
-        Share of that drift while scans are matched with the first local map, which shows how it was begun.
     deviations : float
         A direction that contradicts the heading by more standard deviations does not count: not all walls run that way.
     most_deviation : float
         Headings that are known less well than this are left alone: they may be off by more than walls can tell [rad].
     """
 
-    deviation_m: float = 0.02
+    spacing_m: float = 0.01
     deviation_angle: float = math.radians(0.1)
     drift: float = 0.4
-    first_drift: float = 0.1
     deviations: float = 3.0
     most_deviation: float = math.radians(3.0)
 

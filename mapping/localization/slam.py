@@ -24,7 +24,7 @@ from lidarium.mapping.localization.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.settings import SlamSettings
 from lidarium.mapping.localization.wall_compass import WallCompass
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
-from lidarium.mapping.rigid import composed, relative
+from lidarium.mapping.rigid import Transform, composed, relative
 from lidarium.mapping.scans import ScanGeometry
 
 
@@ -74,6 +74,8 @@ class Slam:
         self._key_nodes, self._key_poses = GrowingArray((), np.int64), GrowingArray((3,), np.float64)
         self._key_ranges = GrowingArray((self._geometry.beams,), np.float32)
         self._has_begun = False
+        # After so much way it is surveyed where walls run.
+        self._orients_at = settings.graph.start_path_m
         # The first scan's points and pose, until the map tells how well it lies on them.
         self._first: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._last: Sensing | None = None
@@ -108,9 +110,7 @@ class Slam:
         is_far = np.hypot(moved[0], moved[1]) >= matching.distance_m or abs(moved[2]) >= matching.angle
         if is_far or not self._has_begun or not self._settings.uses_odometry:
             ranges = at_last_beam(np.asarray(sensing.ranges, np.float32), self._geometry, motion, matching.beam_interval_s, period)
-            longest = min(matching.range_m, self._geometry.range_max)
-            increment = self._geometry.angle_increment
-            points = scan_points(ranges, self._unit_vectors, increment, longest, matching.spacing_m, matching.points)
+            points = self._points(ranges, matching.spacing_m, matching.points)
             if len(points):
                 self._take(ranges, points, moved, sensing.time_s)
         return self.pose
@@ -177,6 +177,15 @@ class Slam:
         """Let all closures act that were found so far."""
         self._correct(np.inf)
 
+    def _points(self, ranges: NDArray[np.float32], spacing_m: float, limit: int) -> NDArray[np.float64]:
+        """Return points in which beams ended, (n, 2) in the robot's frame [m]: few that stand for all."""
+        longest = min(self._settings.matching.range_m, self._geometry.range_max)
+        return scan_points(ranges, self._unit_vectors, self._geometry.angle_increment, longest, spacing_m, limit)
+
+    def _all_points(self, ranges: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return nearly all points in which beams ended: what is found once for all runs, such as where walls run, gains from each."""
+        return self._points(ranges, self._settings.compass.spacing_m, self._geometry.beams)
+
     def _motion(self, sensing: Sensing) -> NDArray[np.float64]:
         """Return the motion since the last sensing, as odometry or else the last motion says."""
         if self._last is None:
@@ -197,7 +206,7 @@ class Slam:
     def _take(self, ranges: NDArray[np.float32], points: NDArray[np.float64], moved: NDArray[np.float64], time_s: float) -> None:
         """Match a scan and take it into the maps."""
         if not self._has_begun:
-            self._begin(ranges, points)
+            self._begin(ranges)
             return
         match = self._mapper.match(points, self._local, moved, self._growth(), self._failed)
         if match is None:
@@ -217,10 +226,12 @@ class Slam:
         if not self._mapper.insert(match.pose, way(driven), ranges):
             self._begin_anew(ranges, self._motion_covariance(match.covariance, relative(self._at_node, self._local)))
             return
-        self._look_at_walls(points)
+        self._look_at_walls(ranges)
         graph = self._settings.graph
         if self._first is not None and self._path >= graph.start_path_m:
             self._find_start(*self._first)
+        if self._compass is not None and not self._compass.is_surveyed and self._path >= self._orients_at:
+            self._orient(self._compass)
         since = relative(self._at_node, self._local)
         wants_another = self._mapper.wants_another
         if wants_another or np.hypot(since[0], since[1]) >= graph.distance_m or abs(since[2]) >= graph.angle:
@@ -232,18 +243,15 @@ class Slam:
         poses, ended = self._mapper.hand_over(np.stack([self._local, self._matched, self._at_node]))
         self._local, self._matched, self._at_node = poses[0], poses[1], poses[2]
         self._finder_takes(ended)
-        if ended and self._compass is not None:
-            self._compass.leave_first_map()
 
-    def _begin(self, ranges: NDArray[np.float32], points: NDArray[np.float64]) -> None:
+    def _begin(self, ranges: NDArray[np.float32]) -> None:
         """Begin the first map, at a node of its own: where the robot began lies in it as well as one scan could tell."""
         self._has_begun = True
         self._note_key(ranges)
-        self._first = points, self._local.copy()
+        self._first = self._all_points(ranges), self._local.copy()
         growth = turned(self._growth(), float(self._local[2])) if self._told.any() else np.zeros((3, 3))
         self._told[:] = 0.0
         self._begin_maps(ranges, self._motion_covariance(growth, self._local))
-        self._look_at_walls(points)
 
     def _find_start(self, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
         """Lay the first scan on the map: it was begun by few scans, and lies by their errors beside where the robot began."""
@@ -252,6 +260,15 @@ class Slam:
         if match is not None:
             self._graph.begin_at(composed(pose, relative(match.pose, np.zeros(3))))
             self._note_correction()
+
+    def _orient(self, compass: WallCompass) -> None:
+        """Survey where walls run in the local map; where none do, look again after as much way."""
+        self._orients_at = self._path + self._settings.graph.start_path_m
+        node, scans = self._mapper.node, self.key_scans
+        since = np.flatnonzero(self._key_nodes.rows >= node)
+        poses = relative(self._graph.nodes[node], scans.poses[since])
+        points = [Transform(*pose).apply(self._all_points(ranges)) for pose, ranges in zip(poses, scans.ranges[since], strict=True)]
+        compass.survey(np.concatenate(points), node, float(self._graph.nodes[node, 2]))
 
     def _motion_covariance(self, matched: NDArray[np.float64], since: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how well the motion between two nodes is known, both by matches."""
@@ -283,7 +300,7 @@ class Slam:
         self._failed, self._first = 0, None
         if self._compass is not None:
             self._compass.forget()
-            self._compass.leave_first_map()
+            self._orients_at = self._path + self._settings.graph.start_path_m
         self._begin_maps(ranges, covariance)
         self._note_key(ranges)
 
@@ -299,9 +316,9 @@ class Slam:
         self._at_node = self._local.copy()
         self._spread = np.zeros((3, 3))
 
-    def _look_at_walls(self, points: NDArray[np.float64]) -> None:
-        if self._compass is not None:
-            self._compass.look(points, float(self._local[2] - self._at_node[2]))
+    def _look_at_walls(self, ranges: NDArray[np.float32]) -> None:
+        if self._compass is not None and self._compass.is_surveyed:
+            self._compass.look(Transform(*relative(self._at_node, self._local)).apply(self._all_points(ranges)))
 
     def _note_key(self, ranges: NDArray[np.float32]) -> None:
         node, pose = self.place

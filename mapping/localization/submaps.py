@@ -4,6 +4,10 @@ A cell's agreement is the mean, over the scans that observed it, of the weight w
 out among the four cells around it in the way of bilinear interpolation, so that the middle of a wall is kept to a fraction of a cell;
 a scan that saw through counts as nothing. What moved, fades. This is the counting model (Haehnel et al., IROS 2003) with shares in
 place of whole hits.
+
+What scans saw of a cell is whether a beam that came as far ended there. With noise that share grows towards the back of a wall, which
+hardly a beam passes: it is a hazard, and no density. Where a beam ended, known walls a little behind count as seen through, therefore;
+without that, they come to lie behind where they are, and a robot that goes by them runs ahead of itself.
 """
 
 import math
@@ -13,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.localization.settings import SubmapSettings
 from lidarium.mapping.scan_polygon import GRAZING, fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.scans import ScanGeometry, beam_directions
 
@@ -50,8 +55,8 @@ class Submap:
 
     Parameters
     ----------
-    resolution : float
-        Side of a cell [m].
+    settings : SubmapSettings
+        How.
     reach_m : float
         How far from its origin what it holds may lie at most [m].
 
@@ -61,7 +66,8 @@ class Submap:
         How many it holds.
     """
 
-    def __init__(self, resolution: float, reach_m: float) -> None:
+    def __init__(self, settings: SubmapSettings, reach_m: float) -> None:
+        resolution = settings.resolution
         half = math.ceil(reach_m / resolution) + _MARGIN
         # A multiple of 64, so that words of bits begin where cells do; memory is provided where it is touched only.
         self._half = -(-half // 64) * 64
@@ -72,6 +78,7 @@ class Submap:
         self._levels = np.zeros((side, side), np.uint8)
         self._box = np.array([side, 0, side, 0], np.int64)
         self._resolution = resolution
+        self._behind = (settings.behind_m / resolution, settings.behind_share)
         self.scans = 0
 
     @property
@@ -104,7 +111,7 @@ class Submap:
         side = 2 * self._half
         if not (reach + _MARGIN <= min(x, y) and max(x, y) <= side - reach - _MARGIN):
             return False
-        numbers = (geometry.angle_increment, reach, scale, float(geometry.is_full_circle))
+        numbers = (geometry.angle_increment, reach, scale, float(geometry.is_full_circle), *self._behind)
         _insert(
             self._shares,
             self._weights,
@@ -137,11 +144,15 @@ def _insert(
     box: Array,
     place: tuple[float, float, float],
     ranges: Array,
-    geometry: tuple[float, float, float, float],
+    geometry: tuple[float, float, float, float, float, float],
     unit_vectors: Array,
 ) -> None:
-    """Take in a scan from x, y [cells], heading; ``geometry`` is (increment, reach [cells], cells per metre, full circle)."""
-    increment, reach, scale, full_circle = geometry
+    """Take in a scan from x, y [cells], heading.
+
+    ``geometry`` is (increment, reach [cells], cells per metre, full circle, how far walls behind an end count as seen through [cells],
+    the same as a share of the range).
+    """
+    increment, reach, scale, full_circle, behind, behind_share = geometry
     beams = ranges.shape[0]
     directions = np.empty((4, beams))
     beam_directions(place[2], unit_vectors, directions)
@@ -159,6 +170,8 @@ def _insert(
     scan_ends(lengths, directions, local_x, local_y, ends)
     seen = fill_scan_polygon(lengths, directions, ends, local_x, local_y, increment, full_circle != 0.0, bits)
     points = _surface_points(lengths, ends, is_hit, increment, full_circle != 0.0)
+    if behind_share > 0.0:
+        seen = _look_behind(weights, points, (local_x, local_y), (behind, behind_share), bits, seen, row_offset, column_offset)
     _count_ends(shares, weights, counts, levels, points, bits, row_offset, column_offset)
     _count_seen(weights, counts, levels, bits, seen, row_offset, column_offset)
     rows, columns = levels.shape
@@ -197,6 +210,37 @@ def _surface_points(lengths: Array, ends: Array, is_hit: Array, increment: float
             points[count, 0], points[count, 1] = ends[0, beam] + share * gap_x, ends[1, beam] + share * gap_y
             count += 1
     return points[:count]
+
+
+@kernel
+def _look_behind(
+    weights: Array,
+    points: Array,
+    laser: tuple[float, float],
+    depths: tuple[float, float],
+    bits: Array,
+    seen: tuple[int, int, int, int],
+    row_offset: int,
+    column_offset: int,
+) -> tuple[int, int, int, int]:
+    """Set the bits of cells a little behind points of a surface in which beams have ended before; return the rows and words with bits."""
+    first_row, end_row, first_word, end_word = seen
+    for k in range(points.shape[0]):
+        x, y = points[k, 0] - laser[0], points[k, 1] - laser[1]
+        distance = math.sqrt(x * x + y * y)
+        if distance == 0.0:
+            continue
+        steps = 2.0 * max(depths[0], depths[1] * distance)
+        step_x, step_y = 0.5 * x / distance, 0.5 * y / distance
+        for step in range(1, int(steps) + 1):
+            column, row = int(math.floor(points[k, 0] + step * step_x)), int(math.floor(points[k, 1] + step * step_y))
+            if not (0 <= row < bits.shape[0] and 0 <= column < min(64 * bits.shape[1], weights.shape[1] - column_offset)):
+                break
+            if weights[row + row_offset, column + column_offset] > 0.0:
+                bits[row, column >> 6] |= np.uint64(1) << np.uint64(column & 63)
+                first_row, end_row = min(first_row, row), max(end_row, row + 1)
+                first_word, end_word = min(first_word, column >> 6), max(end_word, (column >> 6) + 1)
+    return first_row, end_row, first_word, end_word
 
 
 @kernel

@@ -31,8 +31,8 @@ class Bearing:
 class WallCompass:
     """Collects directions of walls between nodes, and estimates where the walls of the building run and how far headings have drifted.
 
-    Both are estimated together, by a Kalman filter: what the first scans show tells more of the building, what later ones show more of
-    the headings.
+    Where walls run is surveyed once, over the first local map. From then on both are estimated together, by a Kalman filter: what the
+    next nodes show tells more of the building, what later ones show more of the headings.
 
     Parameters
     ----------
@@ -48,29 +48,51 @@ class WallCompass:
     def __init__(self, settings: CompassSettings) -> None:
         self._settings = settings
         self.bearings: list[Bearing] = []
-        # Share of the variances that are told by which headings drift.
-        self._drift = settings.first_drift * settings.drift**2
-        # Of scans since the last node, in its frame.
-        self._seen, self._seen_information = 0.0, 0.0
+        # Points of scans since the last node, in its frame [m].
+        self._points: list[NDArray[np.float64]] = []
         # Where walls run, and the variances of the last node's heading, of that direction, and of both together.
         self._walls: float | None = None
         self._heading_variance, self._walls_variance, self._covariance = 0.0, 0.0, 0.0
 
-    def look(self, points: NDArray[np.float64], heading: float) -> None:
-        """Take in the points (points, 2) [m] of a scan, taken at a heading in the frame of the last node [rad]."""
-        direction, information = wall_direction(points, self._settings.deviation_m)
-        if information > 0.0:
-            self._seen_information += information
-            offset = within_quarter(direction + heading - self._seen)
-            self._seen += offset * information / self._seen_information
+    @property
+    def is_surveyed(self) -> bool:
+        """Whether it is known where walls run."""
+        return self._walls is not None
+
+    def survey(self, points: NDArray[np.float64], node: int, heading: float) -> bool:
+        """Find where walls run.
+
+        Parameters
+        ----------
+        points : (n, 2) float64
+            Points of all scans since a local map was begun at a node, in its frame [m].
+        node : int
+            The node.
+        heading : float
+            What is believed of it [rad].
+
+        Returns
+        -------
+        bool
+            Whether there are such walls.
+        """
+        direction, information = wall_direction(points)
+        if information == 0.0:
+            return False
+        noise = 1.0 / information + self._settings.deviation_angle**2
+        self.bearings.append(Bearing(node, direction, 1.0 / noise))
+        # Headings have drifted since by what is told of each; the local map's own node has not.
+        self._walls, self._walls_variance, self._covariance = heading + direction, noise, 0.0
+        return True
+
+    def look(self, points: NDArray[np.float64]) -> None:
+        """Take in the points (points, 2) of a scan, in the frame of the last node [m]."""
+        if self.is_surveyed:
+            self._points.append(points)
 
     def forget(self) -> None:
         """Forget what was seen since the last node."""
-        self._seen, self._seen_information = 0.0, 0.0
-
-    def leave_first_map(self) -> None:
-        """Take note that scans are matched with another local map from now on, and headings drift more."""
-        self._drift = self._settings.drift**2
+        self._points = []
 
     def turn(self, node: int, since: float, variance: float, heading: float) -> tuple[float, float]:
         """Set a new node; return by how much its heading is to be turned [rad], and its variance then [rad^2].
@@ -94,11 +116,6 @@ class WallCompass:
         turn = self._turn(node, since, variance, heading)
         return turn, self._heading_variance / self._settings.drift**2
 
-    def begin_at(self, turn: float) -> None:
-        """Take note that all headings so far were turned [rad]."""
-        if self._walls is not None:
-            self._walls += turn
-
     def relieve(self, variance: float) -> None:
         """Take note that the last heading is known so well, in the same measure [rad^2]."""
         known = self._settings.drift**2 * variance
@@ -111,24 +128,23 @@ class WallCompass:
     def _turn(self, node: int, since: float, variance: float, heading: float) -> float:
         """Return by how much a new node's heading is to be turned."""
         settings = self._settings
-        seen, information = self._seen - since, self._seen_information
+        points = self._points
         self.forget()
-        self._heading_variance += self._drift * variance
-        if information == 0.0 or self._heading_variance > settings.most_deviation**2:
+        self._heading_variance += settings.drift**2 * variance
+        if not points or self._heading_variance > settings.most_deviation**2:
+            return 0.0
+        seen, information = wall_direction(np.concatenate(points))
+        if information == 0.0:
             return 0.0
         noise = 1.0 / information + settings.deviation_angle**2
-        bearing = Bearing(node, seen, 1.0 / noise)
-        if self._walls is None:
-            self.bearings.append(bearing)
-            self._walls, self._walls_variance, self._covariance = heading + seen, self._heading_variance + noise, self._heading_variance
-            return 0.0
+        bearing = Bearing(node, seen - since, 1.0 / noise)
         rest = self.rest(bearing, heading)
         of_heading, of_walls = self._heading_variance - self._covariance, self._walls_variance - self._covariance
         spread = of_heading + of_walls + noise
         if rest * rest > settings.deviations**2 * spread:
             return 0.0
         self.bearings.append(bearing)
-        self._walls -= of_walls / spread * rest
+        self._walls = (self._walls or 0.0) - of_walls / spread * rest
         self._heading_variance -= of_heading * of_heading / spread
         self._walls_variance -= of_walls * of_walls / spread
         self._covariance += of_heading * of_walls / spread

@@ -10,13 +10,14 @@ from lidarium.mapping.localization.branch_and_bound import place, pyramid
 from lidarium.mapping.localization.scan_matching import refine
 from lidarium.mapping.localization.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.scan_search import search
-from lidarium.mapping.localization.settings import MatchingSettings
+from lidarium.mapping.localization.settings import MatchingSettings, SubmapSettings
 from lidarium.mapping.localization.submaps import FREE_LEVEL, UNSEEN, Submap
 from lidarium.mapping.rigid import composed, relative
 from lidarium.mapping.scans import ScanGeometry
 
 ORIGIN = np.array([2.5, 1.5, 0.3])
 NOTHING_KNOWN = np.zeros((3, 3))
+SUBMAPS = SubmapSettings(resolution=0.05)
 
 
 def points_of(ranges):
@@ -26,7 +27,7 @@ def points_of(ranges):
 @pytest.fixture(scope="module")
 def submap():
     """The odd room as seen from places around its middle."""
-    submap = Submap(0.05, 12.0)
+    submap = Submap(SUBMAPS, 12.0)
     generator = np.random.default_rng(0)
     for offset in generator.uniform(-0.5, 0.5, (8, 3)):
         pose = composed(ORIGIN, offset)
@@ -110,7 +111,7 @@ def test_no_points_match_nowhere(submap):
 
 def test_the_covariance_grows_along_a_bare_corridor():
     walls = np.array([(-30, -1, 30, -1), (-30, 1, 30, 1)], float)
-    submap = Submap(0.05, 12.0)
+    submap = Submap(SUBMAPS, 12.0)
     for x in (0.0, 0.2, 0.4):
         submap.insert(np.array([x, 0.0, 0.0]), cast(walls, np.array([x, 0.0, 0.0])), GEOMETRY, 20.0)
     points = points_of(cast(walls, np.array([0.3, 0.0, 0.0])))
@@ -120,7 +121,7 @@ def test_the_covariance_grows_along_a_bare_corridor():
 
 def test_odometry_holds_the_pose_where_walls_do_not():
     walls = np.array([(-30, -1, 30, -1), (-30, 1, 30, 1)], float)
-    submap = Submap(0.05, 12.0)
+    submap = Submap(SUBMAPS, 12.0)
     submap.insert(np.zeros(3), cast(walls, np.zeros(3)), GEOMETRY, 20.0)
     prior = np.array([0.2, 0.03, 0.0])
     match = refine(submap.grid, points_of(cast(walls, np.array([0.2, 0.0, 0.0]))), prior, prior, np.diag([1e4, 1e2, 1e3]), 500.0, 0.3)
@@ -131,7 +132,7 @@ def test_odometry_holds_the_pose_where_walls_do_not():
 def test_a_wall_that_goes_on_beyond_the_map_holds_no_one_back():
     """The map ends soon ahead of where it was made; a scan farther on sees more of the walls than the map has."""
     walls = np.array([(-30, -1, 30, -1), (-30, 1, 30, 1)], float)
-    submap = Submap(0.05, 14.0)
+    submap = Submap(SUBMAPS, 14.0)
     submap.insert(np.zeros(3), cast(walls, np.zeros(3)), GEOMETRY, 3.0)
     predicted = np.array([2.0, 0.02, 0.01])
     points = points_of(cast(walls, np.array([2.0, 0.0, 0.0])))
@@ -152,7 +153,7 @@ def test_of_poses_that_fit_alike_the_search_takes_the_one_that_odometry_expects(
 
 
 def test_what_moved_fades_and_what_stays_stays():
-    submap = Submap(0.05, 8.0)
+    submap = Submap(SUBMAPS, 8.0)
     far, near = np.full(GEOMETRY.beams, 3.0, np.float32), np.full(GEOMETRY.beams, 1.0, np.float32)
     submap.insert(np.zeros(3), near, GEOMETRY, 20.0)
     for _ in range(9):
@@ -168,7 +169,7 @@ def test_what_moved_fades_and_what_stays_stays():
 
 
 def test_what_a_submap_has_not_seen_is_unseen_and_what_it_saw_through_free():
-    submap = Submap(0.05, 8.0)
+    submap = Submap(SUBMAPS, 8.0)
     submap.insert(np.zeros(3), np.full(GEOMETRY.beams, 2.0, np.float32), GEOMETRY, 20.0)
     grid = submap.grid
     assert grid.levels[-grid.row, -grid.column + 20] == FREE_LEVEL
@@ -176,7 +177,7 @@ def test_what_a_submap_has_not_seen_is_unseen_and_what_it_saw_through_free():
 
 
 def test_a_scan_that_does_not_fit_in_changes_nothing():
-    submap = Submap(0.05, 6.0)
+    submap = Submap(SUBMAPS, 6.0)
     assert not submap.insert(np.array([40.0, 0.0, 0.0]), np.full(GEOMETRY.beams, 2.0, np.float32), GEOMETRY, 20.0)
     assert submap.scans == 0
     assert not submap.grid.levels.any()
@@ -228,13 +229,30 @@ def test_few_returns_count_less_than_many_but_not_more_than_all():
     assert weights[1] < weights[2] < weights[3] == weights[4] == pytest.approx(matching.independent_points / matching.deviation**2)
 
 
+def test_a_wall_that_is_seen_through_noise_lies_where_it_is():
+    walls = np.array([(2.0, -20.0, 2.0, 20.0)], float)
+    places = {}
+    for behind_share in (0.0, 0.025):
+        generator = np.random.default_rng(0)
+        submap = Submap(SubmapSettings(resolution=0.035, behind_share=behind_share, behind_m=0.1), 12.0)
+        for y in np.linspace(-0.5, 0.5, 30):
+            pose = np.array([0.0, y, 0.0])
+            submap.insert(pose, cast(walls, pose) + generator.normal(0.0, 0.04, GEOMETRY.beams).astype(np.float32), GEOMETRY, 20.0)
+        grid = submap.finished()
+        agreement = np.maximum(grid.levels[-grid.row - 20 : -grid.row + 20].astype(float) - FREE_LEVEL, 0.0).sum(axis=0)
+        centres = (np.arange(len(agreement)) + grid.column + 0.5) * grid.resolution
+        places[behind_share] = np.average(centres, weights=agreement)
+    assert places[0.0] > 2.015
+    assert places[0.025] == pytest.approx(2.0, abs=0.005)
+
+
 def test_noise_does_not_turn_scans_against_the_map():
     generator = np.random.default_rng(0)
     turns = []
     for _ in range(80):
         pose = np.array([*generator.uniform(1.5, 3.5, 2), generator.uniform(-3.0, 3.0)])
         scans = [cast(odd_room(), pose) + generator.normal(0.0, 0.03, GEOMETRY.beams).astype(np.float32) for _ in range(2)]
-        submap = Submap(0.05, 12.0)
+        submap = Submap(SUBMAPS, 12.0)
         submap.insert(np.zeros(3), scans[0], GEOMETRY, 20.0)
         turns.append(refine(submap.grid, points_of(scans[1]), np.zeros(3), np.zeros(3), np.zeros((3, 3)), 500.0, 0.3).pose[2])
     assert abs(np.mean(turns)) < 3.0 * np.std(turns) / math.sqrt(len(turns))

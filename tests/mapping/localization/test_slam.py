@@ -135,14 +135,14 @@ def test_the_first_scan_is_laid_on_the_map_that_it_began():
     turned = {}
     for start_path_m in (7.0, 1e6):
         found = []
-        for seed in range(8):
-            run = driven(odd_room(), ROOM_ROUND, seed, noise=0.02)
+        for seed in range(16):
+            run = driven(ring(), [(0.9, 0.9), (5.0, 0.9), (2.0, 0.9), (6.0, 0.9)], seed, noise=0.02)
             slam = Slam(SlamSettings(uses_walls=False, graph=GraphSettings(start_path_m=start_path_m)), GEOMETRY)
             told, _ = follow(slam, run.sensings)
             found.append(np.mean(relative(run.truth, told)[len(told) // 2 :, 2]))
             assert (slam.key_scans.poses[0] == 0.0).all()
         turned[start_path_m] = np.sqrt(np.mean(np.square(found)))
-    assert turned[7.0] < 0.6 * turned[1e6]
+    assert turned[7.0] < 0.75 * turned[1e6]
 
 
 def test_the_frame_is_that_of_the_first_pose():
@@ -161,7 +161,7 @@ def test_the_map_holds_the_walls():
     follow(slam, run.sensings)
     grid = slam.map
     rows, columns = np.nonzero(grid.levels() == 0)
-    places = np.stack([columns + 0.5, rows + 0.5], axis=1) * 0.05 + np.array(grid.origin)
+    places = np.stack([columns + 0.5, rows + 0.5], axis=1) * grid.settings.resolution + np.array(grid.origin)
     places += np.array(ROOM_ROUND[0])
     walls = odd_room()
     along = walls[:, 2:] - walls[:, :2]
