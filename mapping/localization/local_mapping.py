@@ -130,9 +130,10 @@ class LocalMapper:
             # Twice the motion and more: also where a robot is that went back while odometry said forth.
             reach = (min(settings.search_m + 2.2 * distance, reach[0]), min(settings.search_angle + 2.2 * abs(float(moved[2])), reach[1]))
         far = self._match_far(points, predicted, reach)
-        if self._uses_odometry and is_blind and far is not None and far.score < settings.convincing_share * self.usual_score:
-            # So far from odometry something that looks a little alike is soon found.
-            far = None
+        if self._uses_odometry and is_blind and far is not None:
+            # So far from odometry something that looks a little alike, or in part, is soon found.
+            is_alike = far.score >= settings.convincing_share * self.usual_score and far.overlap >= settings.blind_overlap
+            far = far if is_alike else None
         good = [match for match in (near, far) if match is not None and self._is_good(match)]
         if len(good) == 2:
             return self._noted(good[1] if good[1].score > good[0].score + settings.better_by else good[0])
