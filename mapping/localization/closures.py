@@ -135,7 +135,7 @@ class ClosureFinder:
 
     def _laid(self, old: _Remembered, points: NDArray[np.float64], start: NDArray[np.float64], information: NDArray[np.float64]) -> Match:
         matching = self._matching
-        return refine(old.coarse.grid, points, start, start, information, matching.weight(len(points)), matching.unseen)
+        return refine(old.coarse.grid, points, start, start, information, matching.weight(len(points)), matching.unseen, matching.surface_m)
 
     def _confirmed(self, closure: Closure, poses: NDArray[np.float64]) -> list[Closure]:
         """Return the closure, and those that waited for it; nothing where it has to wait for others itself."""

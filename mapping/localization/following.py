@@ -23,7 +23,14 @@ from lidarium.mapping.rigid import composed, relative
 
 LOG_SETTINGS = SlamSettings(
     matching=MatchingSettings(
-        distance_m=0.02, angle=math.radians(1.0), spacing_m=0.08, points=250, independent_share=1.0, deviation=0.25, unseen=0.5
+        distance_m=0.02,
+        angle=math.radians(1.0),
+        spacing_m=0.08,
+        points=250,
+        independent_share=1.0,
+        deviation=0.25,
+        surface_m=0.0,
+        unseen=0.5,
     ),
     submaps=SubmapSettings(resolution=0.05, path_m=8.0, behind_share=0.0),
     closures=ClosureSettings(least_overlap=0.6),
@@ -33,8 +40,8 @@ LOG_SETTINGS = SlamSettings(
 """Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and time is plenty. Lasers of
 logs reach far, so that a local map of a shorter way holds enough, places are recognised by more of them, and few returns tell as
 much as many. Where scans are a metre apart much of each is new, and what is new must not outweigh what agrees; headings between them are
-less sure. Walls that were built deviate more from each other than walls that were drawn, and scans that reach far let headings drift
-less."""
+less sure. Normals are told best by the nearest two returns. Walls that were built deviate more from each other than walls that were drawn,
+and scans that reach far let headings drift less."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -163,7 +163,7 @@ class LocalMapper:
         information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
         weight = settings.weight(len(points))
         start = search(grid, points, predicted, reach_m, reach_angle, information, weight, settings.unseen)
-        return refine(grid, points, start, predicted, information, weight, settings.unseen)
+        return refine(grid, points, start, predicted, information, weight, settings.unseen, settings.surface_m)
 
     def _match_far(self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]) -> Match | None:
         settings, oldest = self._matching, self._active[0].submap
@@ -171,13 +171,15 @@ class LocalMapper:
         found, _ = place(pyramid(oldest.finished()), points, predicted, reach, least, settings.evaluations)
         if found is None:
             return None
-        return refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), settings.weight(len(points)), settings.unseen)
+        weight = settings.weight(len(points))
+        return refine(oldest.grid, points, found.pose, found.pose, np.zeros((3, 3)), weight, settings.unseen, settings.surface_m)
 
     def laid_again(self, points: NDArray[np.float64]) -> Match | None:
         """Return where the points (n, 2) [m] of the older local map's first scan lie on what it has become; None if they do not match."""
         settings, nowhere = self._matching, np.zeros(3)
         grid = self._active[0].submap.grid
-        match = refine(grid, points, nowhere, nowhere, np.zeros((3, 3)), settings.weight(len(points)), settings.unseen)
+        weight = settings.weight(len(points))
+        match = refine(grid, points, nowhere, nowhere, np.zeros((3, 3)), weight, settings.unseen, settings.surface_m)
         return match if self._is_good(match) and not self._is_new_ground(match, len(points)) else None
 
     def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:

@@ -26,9 +26,6 @@ With less, points in the middle of such a wall would agree too well, and scans w
 SURFACE_GAP = 0.3
 """Neighbouring points lie on one surface where they are nearer to each other than this share of their distance, or so many metres."""
 
-SURFACE_REACH_M = 0.25
-"""Points of a surface so near to a point tell which way it runs there [m]."""
-
 MOST_BEND = 0.15
 """Where the variance of those points across the surface is more than this share of that along it, there is a corner."""
 
@@ -72,6 +69,7 @@ def refine(
     information: NDArray[np.float64],
     weight: float,
     unseen: float,
+    surface_m: float = 0.25,
 ) -> Match:
     """Return the pose near a start at which the points agree best with the map.
 
@@ -96,13 +94,15 @@ def refine(
         Square of the disagreement of a point in what the map has not observed. As that of most points, it speaks neither for nor against
         a pose; if it counted in full, a wall that goes on beyond where the map ends would hold the robot back to where the scan covers
         the known part of it, and in a bare corridor nothing else speaks.
+    surface_m : float
+        Points of a surface so near to a point tell which way it runs there; 0 for the nearest two [m].
     """
     pose, hessian, told = np.array(start, np.float64), np.empty((3, 3)), np.zeros(3)
     count = len(points)
     if count == 0:
         return Match(pose, 0.0, 0.0, 0.0, np.zeros((3, 3)), information)
     normals = np.zeros((count, 2))
-    _find_normals(points, normals)
+    _find_normals(points, surface_m, normals)
     _refine(
         grid.levels,
         grid.column,
@@ -173,17 +173,17 @@ def _is_one_surface(points: Array, k: int) -> bool:
 
 
 @kernel
-def _find_normals(points: Array, normals: Array) -> None:
+def _find_normals(points: Array, reach: float, normals: Array) -> None:
     """Fill ``normals`` (n, 2) with unit vectors across the surface on which each point and its neighbours lie; zero for a point alone.
 
-    Two neighbours tell it where the surface bends; elsewhere more do, since noise turns what lies between two near points.
+    Two neighbours tell it where the surface bends; elsewhere all within reach do, since noise turns what lies between two near points.
     """
     count = points.shape[0]
     for k in range(count):
         before, after = k, k
-        while before > 0 and _is_one_surface(points, before - 1) and _is_near(points, before - 1, k):
+        while before > 0 and _is_one_surface(points, before - 1) and _is_near(points, before - 1, k, reach):
             before -= 1
-        while after + 1 < count and _is_one_surface(points, after) and _is_near(points, after + 1, k):
+        while after + 1 < count and _is_one_surface(points, after) and _is_near(points, after + 1, k, reach):
             after += 1
         along_x, along_y, is_bent = _axis(points[before : after + 1])
         if is_bent:
@@ -196,8 +196,8 @@ def _find_normals(points: Array, normals: Array) -> None:
 
 
 @kernel(inline=True)
-def _is_near(points: Array, k: int, m: int) -> bool:
-    return bool(math.hypot(points[k, 0] - points[m, 0], points[k, 1] - points[m, 1]) <= SURFACE_REACH_M)
+def _is_near(points: Array, k: int, m: int, reach: float) -> bool:
+    return bool(math.hypot(points[k, 0] - points[m, 0], points[k, 1] - points[m, 1]) <= reach)
 
 
 @kernel

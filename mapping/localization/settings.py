@@ -94,6 +94,8 @@ class MatchingSettings:
         As how many independent measurements the returns of a scan count, all of them at most and each: neighbouring ones err together.
     deviation : float
         Standard deviation of how far a return is from full agreement with the map, which is 1.
+    surface_m : float
+        Returns of a surface so near to one tell which way it runs there, across which the return is moved; 0 for the nearest two [m].
     unseen : float
         Square of the disagreement with which a return counts that lies in what the local map has not observed.
     least_score, least_overlap : float
@@ -131,6 +133,7 @@ class MatchingSettings:
     independent_points: float = 50.0
     independent_share: float = 0.15
     deviation: float = 0.2
+    surface_m: float = 0.25
     unseen: float = 0.3
     least_score: float = 0.15
     least_share: float = 0.5
@@ -144,7 +147,7 @@ class MatchingSettings:
     lost_angle: float = 0.5
 
     def __post_init__(self) -> None:
-        _check_numbers(self, zero=("beam_interval_s", "distance_m", "angle", "search_m", "search_angle", "unseen"))
+        _check_numbers(self, zero=("beam_interval_s", "distance_m", "angle", "search_m", "search_angle", "surface_m", "unseen"))
 
     def weight(self, points: int) -> float:
         """Return how much full disagreement of all of so many points counts."""
