@@ -100,8 +100,8 @@ class LocalMapper:
         """Return where a scan lies on the older local map; None where it does not match.
 
         Near what odometry says it is searched first, weighing both. Where that does not convince, odometry may be wrong (a wheel slips,
-        the robot was pushed), and the search goes farther, without it; what is found there has to be clearly better. On new ground, and
-        where a scan hardly has a return, nothing but odometry tells where the robot is.
+        the robot was pushed), and the search goes farther, without it, for scans of enough returns; what is found there has to be clearly
+        better. On new ground, and where a scan hardly has a return, nothing but odometry tells where the robot is.
 
         Parameters
         ----------
@@ -129,7 +129,8 @@ class LocalMapper:
         if not is_blind:
             # Twice the motion and more: also where a robot is that went back while odometry said forth.
             reach = (min(settings.search_m + 2.2 * distance, reach[0]), min(settings.search_angle + 2.2 * abs(float(moved[2])), reach[1]))
-        far = self._match_far(points, predicted, reach)
+        is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
+        far = None if is_sparse else self._match_far(points, predicted, reach)
         if self._uses_odometry and is_blind and far is not None:
             # So far from odometry something that looks a little alike, or in part, is soon found.
             is_alike = far.score >= settings.convincing_share * self.usual_score and far.overlap >= settings.blind_overlap

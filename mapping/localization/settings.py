@@ -86,6 +86,8 @@ class MatchingSettings:
         How many standard deviations of odometry the search reaches.
     blind_m, blind_angle : float
         What the search reaches where there is no odometry, or odometry leads nowhere [m, rad].
+    wide_share : float
+        A scan of fewer returns, as a share of the beams, is sought where odometry says it is and not beyond: it fits in many places.
     blind_overlap : float
         Share of the returns near what the local map has observed below which a match does not count where odometry led nowhere.
     evaluations : int
@@ -128,6 +130,7 @@ class MatchingSettings:
     search_deviations: float = 2.0
     blind_m: float = 1.2
     blind_angle: float = math.radians(50.0)
+    wide_share: float = 0.08
     blind_overlap: float = 0.7
     evaluations: int = 100_000
     independent_points: float = 50.0

@@ -148,7 +148,7 @@ class WallCompass:
         self._heading_variance -= of_heading * of_heading / spread
         self._walls_variance -= of_walls * of_walls / spread
         self._covariance += of_heading * of_walls / spread
-        return of_heading / spread * rest
+        return float(of_heading / spread * rest)
 
     def edges(self, nodes: NDArray[np.float64]) -> list[tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]]:
         """Return what the bearings tell of the turns (poses, 3) between the first node and others, as edges that may be wrong."""
