@@ -1,16 +1,17 @@
 """Recognises places: lays a scan on local maps of long ago, and doubts what it finds.
 
 A closure counts where its scan agrees with the local map, does not lie in its free space, has no second place that agrees nearly as
-well, and where it would move the robot far, only together with others that say the same.
+well, and where it would move the robot far, or farther than it can have erred since, only together with others that say the same.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.localization.branch_and_bound import Pyramid, place, pyramid
-from lidarium.mapping.localization.local_mapping import Finished
+from lidarium.mapping.localization.local_mapping import Finished, turned
 from lidarium.mapping.localization.scan_matching import Match, refine
 from lidarium.mapping.localization.settings import ClosureSettings, MatchingSettings
 from lidarium.mapping.rigid import composed, relative, wrapped
@@ -42,8 +43,8 @@ class Closure:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Remembered:
     coarse: Pyramid
-    node: int
-    last_node: int
+    nodes: NDArray[np.int64]
+    places: NDArray[np.float64]
     path: float
 
 
@@ -61,14 +62,21 @@ class ClosureFinder:
     def __init__(self, settings: ClosureSettings, matching: MatchingSettings) -> None:
         self._settings, self._matching = settings, matching
         self._maps: list[_Remembered] = []
-        self._doubtful: list[Closure] = []
+        # Closures that wait for others, each with the first node of its local map.
+        self._doubtful: list[tuple[int, Closure]] = []
 
-    def remember(self, finished: Finished, last_node: int, path: float) -> None:
-        """Take in a finished local map, whose scans end at a node, after so much way of the whole run [m]."""
-        self._maps.append(_Remembered(pyramid(finished.grid), finished.node, last_node, path))
+    def remember(self, finished: Finished, path: float) -> None:
+        """Take in a finished local map, after so much way of the whole run [m]."""
+        self._maps.append(_Remembered(pyramid(finished.grid), finished.nodes, finished.places, path))
 
     def find(
-        self, poses: NDArray[np.float64], points: NDArray[np.float64], covariance: NDArray[np.float64], path: float, usual_score: float
+        self,
+        poses: NDArray[np.float64],
+        points: NDArray[np.float64],
+        covariance: NDArray[np.float64],
+        covariance_since: Callable[[int], NDArray[np.float64]],
+        path: float,
+        usual_score: float,
     ) -> list[Closure]:
         """Return what the last node's scan recognises.
 
@@ -80,6 +88,8 @@ class ClosureFinder:
             The last node's scan in its own frame [m].
         covariance : (3, 3) float64
             How well its pose is known.
+        covariance_since : function of a node
+            How well it is known as seen from that node, in its frame, (3, 3) [m^2, m rad, rad^2].
         path : float
             Way driven so far [m].
         usual_score : float
@@ -91,28 +101,36 @@ class ClosureFinder:
         reach_angle = min(max(settings.deviations * float(np.sqrt(covariance[2, 2])), settings.search_angle), settings.most_angle)
         least_score = max(settings.least_score, settings.least_share * usual_score)
         closures = []
-        for old in self._nearest(poses, path, settings.near_m + reach_m)[: settings.candidates]:
-            closure = self._recognised(old, poses, points, (reach_m, reach_angle), least_score)
+        for old, nearest in self._nearest(poses, path, settings.near_m + reach_m)[: settings.candidates]:
+            closure = self._recognised(old, nearest, poses, points, (reach_m, reach_angle), least_score)
             if closure is not None:
-                closures += self._confirmed(closure, poses)
+                closures += self._confirmed(int(old.nodes[0]), closure, poses, covariance_since(closure.old))
         return closures
 
-    def _nearest(self, poses: NDArray[np.float64], path: float, within: float) -> list[_Remembered]:
-        """Return local maps of long enough ago with a node as near as that, the nearest first."""
+    def _nearest(self, poses: NDArray[np.float64], path: float, within: float) -> list[tuple[_Remembered, int]]:
+        """Return local maps of long enough ago with a node as near as that, the nearest first, and which of their nodes that is."""
         found = []
-        for old in self._maps:
+        for number, old in enumerate(self._maps):
             if path - old.path >= self._settings.path_m:
-                gaps = poses[old.node : old.last_node + 1, :2] - poses[-1, :2]
-                distance = float(np.sqrt((gaps**2).sum(axis=1)).min())
-                if distance <= within:
-                    found.append((distance, old.node, old))
-        return [old for _, _, old in sorted(found, key=lambda entry: entry[:2])]
+                distances = np.hypot(*(poses[old.nodes, :2] - poses[-1, :2]).T)
+                nearest = int(distances.argmin())
+                if distances[nearest] <= within:
+                    found.append((float(distances[nearest]), number, nearest))
+        return [(self._maps[number], nearest) for _, number, nearest in sorted(found)]
 
     def _recognised(
-        self, old: _Remembered, poses: NDArray[np.float64], points: NDArray[np.float64], reach: tuple[float, float], least_score: float
+        self,
+        old: _Remembered,
+        nearest: int,
+        poses: NDArray[np.float64],
+        points: NDArray[np.float64],
+        reach: tuple[float, float],
+        least_score: float,
     ) -> Closure | None:
         settings = self._settings
-        around = relative(poses[old.node], poses[-1])
+        # What a local map holds lies right to the nodes near it: on a long way it may be bent.
+        node, place_of_node = int(old.nodes[nearest]), old.places[nearest]
+        around = composed(place_of_node, relative(poses[node], poses[-1]))
         least = 0.6 * least_score * settings.least_overlap
         best, _ = place(old.coarse, points, around, reach, least, settings.evaluations)
         if best is None:
@@ -131,25 +149,41 @@ class ClosureFinder:
             if second is not None or not is_over:
                 return None
         floor = np.diag([settings.least_deviation_m**2, settings.least_deviation_m**2, settings.least_deviation_angle**2])
-        return Closure(old.node, len(poses) - 1, match.pose, match.covariance + floor, match.score)
+        covariance = turned(match.covariance + floor, -float(place_of_node[2]))
+        return Closure(node, len(poses) - 1, relative(place_of_node, match.pose), covariance, match.score)
 
     def _laid(self, old: _Remembered, points: NDArray[np.float64], start: NDArray[np.float64], information: NDArray[np.float64]) -> Match:
         matching = self._matching
         return refine(old.coarse.grid, points, start, start, information, matching.weight(len(points)), matching.unseen, matching.surface_m)
 
-    def _confirmed(self, closure: Closure, poses: NDArray[np.float64]) -> list[Closure]:
-        """Return the closure, and those that waited for it; nothing where it has to wait for others itself."""
+    def _confirmed(self, first_node: int, closure: Closure, poses: NDArray[np.float64], covariance: NDArray[np.float64]) -> list[Closure]:
+        """Return the closure, and those that waited for it; nothing where it has to wait for others itself.
+
+        Parameters
+        ----------
+        first_node : int
+            The first one of its local map.
+        closure : Closure
+            What was recognised.
+        poses : (nodes, 3) float64
+            The graph's poses [m, rad].
+        covariance : (3, 3) float64
+            How well the new node is known as seen from the old one, without the closure [m^2, m rad, rad^2].
+        """
         settings = self._settings
-        corrected = composed(poses[closure.old], closure.measured)
-        move = corrected - poses[closure.new]
-        if np.hypot(move[0], move[1]) <= settings.confirmed_beyond_m:
+        move = (closure.measured - relative(poses[closure.old], poses[closure.new]))[:2]
+        deviations = float(np.sqrt(move @ np.linalg.solve((covariance + closure.covariance)[:2, :2], move)))
+        is_improbable = deviations > settings.confirmed_beyond_deviations
+        if np.hypot(move[0], move[1]) <= settings.confirmed_beyond_m and not is_improbable:
             return [closure]
-        agreeing = [other for other in self._doubtful if self._agree(other, closure, poses)]
-        if len(agreeing) + 1 < settings.confirmations:
-            self._doubtful = [*self._doubtful[-20:], closure]
+        agreeing = [(first, other) for first, other in self._doubtful if self._agree(other, closure, poses)]
+        # One local map may look like another place, to all scans that are taken there.
+        is_single = is_improbable and all(first == first_node for first, _ in agreeing)
+        if len(agreeing) + 1 < settings.confirmations or is_single:
+            self._doubtful = [*self._doubtful[-20:], (first_node, closure)]
             return []
         self._doubtful = []
-        return [*agreeing, closure]
+        return [*(other for _, other in agreeing), closure]
 
     def _agree(self, first: Closure, second: Closure, poses: NDArray[np.float64]) -> bool:
         """Whether two closures place the way between their new nodes as it was driven."""

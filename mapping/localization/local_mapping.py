@@ -27,6 +27,10 @@ class _Active:
         Node of the graph in whose frame it is.
     in_older : (3,) float64
         That node in the frame of the local map before.
+    nodes : list of int
+        That node, and those that were set since.
+    places : list of (3,) float64
+        Where they lie in the local map's frame.
     path : float
         Way driven since [m].
     """
@@ -34,6 +38,8 @@ class _Active:
     submap: Submap
     node: int
     in_older: NDArray[np.float64]
+    nodes: list[int]
+    places: list[NDArray[np.float64]]
     path: float = 0.0
 
 
@@ -45,12 +51,15 @@ class Finished:
     ----------
     grid : AgreementGrid
         What it holds.
-    node : int
-        Node of the graph in whose frame it is.
+    nodes : (nodes,) int64
+        Nodes of the graph that were set while it grew; in the frame of the first it is.
+    places : (nodes, 3) float64
+        Where they lay in its frame then: what it holds near them lies right to them, whatever is believed of the way between them later.
     """
 
     grid: AgreementGrid
-    node: int
+    nodes: NDArray[np.int64]
+    places: NDArray[np.float64]
 
 
 class LocalMapper:
@@ -198,6 +207,13 @@ class LocalMapper:
                 return False
         return True
 
+    def note_node(self, node: int, pose: NDArray[np.float64]) -> None:
+        """Take in that a node was set at x, y, theta (3,) in the older local map's frame."""
+        for active in self._active:
+            pose = pose if active is self._active[0] else relative(active.in_older, pose)
+            active.nodes.append(node)
+            active.places.append(pose.copy())
+
     @property
     def wants_another(self) -> bool:
         """Whether it is time to begin another local map, at a new node."""
@@ -220,12 +236,13 @@ class LocalMapper:
 
     def _add(self, node: int, in_older: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
         reach = min(self._matching.range_m, self._geometry.range_max) + 2.0 * self._submaps.path_m
-        active = _Active(Submap(self._submaps, reach), node, in_older.copy())
+        active = _Active(Submap(self._submaps, reach), node, in_older.copy(), [node], [np.zeros(3)])
         active.submap.insert(np.zeros(3), ranges, self._geometry, self._matching.range_m)
         self._active.append(active)
 
     def _ended(self, active: list[_Active]) -> list[Finished]:
-        return [Finished(one.submap.finished(), one.node) for one in active if one.submap.scans >= self._submaps.least_scans // 2]
+        ended = [one for one in active if one.submap.scans >= self._submaps.least_scans // 2]
+        return [Finished(one.submap.finished(), np.array(one.nodes), np.stack(one.places)) for one in ended]
 
 
 def turned(matrix: NDArray[np.float64], angle: float) -> NDArray[np.float64]:

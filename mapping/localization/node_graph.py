@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.growing import GrowingArray
 from lidarium.mapping.localization.closures import Closure
 from lidarium.mapping.localization.odometry import compounded
 from lidarium.mapping.localization.pose_graph import Edges, optimised, residuals
@@ -38,13 +39,16 @@ class NodeGraph:
         self._settings, self._compass = settings, compass
         self.nodes = np.array(pose, np.float64)[None]
         self.covariance = np.zeros((3, 3))
-        self._edges: list[Edge] = []
+        # The motion from each node to the next: what was measured, and how well.
+        self._motions, self._covariances = GrowingArray((3,), np.float64), GrowingArray((3, 3), np.float64)
+        self._closures: list[Edge] = []
         self._waiting = 0
 
     def add(self, since: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
         """Set a node so far (3,) from the last one [m, rad], in its frame, and so well known (3, 3)."""
         last, number = self.nodes[-1], len(self.nodes)
-        self._edges.append((number - 1, number, since, _inverse(covariance), False))
+        self._motions.append(since)
+        self._covariances.append(covariance)
         self.covariance = compounded(last, self.covariance, since, covariance)
         pose = composed(last, since)
         if self._compass is not None:
@@ -56,16 +60,26 @@ class NodeGraph:
 
     def begin_at(self, since: NDArray[np.float64]) -> None:
         """Move all nodes after the first, so that the second lies at x, y, theta (3,) in its frame [m, rad]."""
-        first, second, _, information, is_robust = self._edges[0]
-        self._edges[0] = (first, second, since, information, is_robust)
+        self._motions.rows[0] = since
         before, begin = self.nodes[1], composed(self.nodes[0], since)
         self.nodes = np.vstack([self.nodes[:1], composed(begin, relative(before, self.nodes[1:]))])
 
+    def covariance_since(self, node: int) -> NDArray[np.float64]:
+        """Return how well the last node is known as seen from another, in its frame, by the motions between, (3, 3) [m^2, m rad, rad^2]."""
+        poses = relative(self.nodes[node], self.nodes[node:])
+        cosine, sine = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
+        rest = poses[-1, :2] - poses[1:, :2]
+        levers = np.zeros((len(rest), 3, 3))
+        levers[:, 0, 0], levers[:, 0, 1], levers[:, 0, 2] = cosine, -sine, -rest[:, 1]
+        levers[:, 1, 0], levers[:, 1, 1], levers[:, 1, 2] = sine, cosine, rest[:, 0]
+        levers[:, 2, 2] = 1.0
+        return np.asarray((levers @ self._covariances.rows[node:] @ levers.transpose(0, 2, 1)).sum(axis=0))
+
     def close(self, closures: list[Closure]) -> bool:
         """Take in closures, at least one; return whether poses are to be settled: they contradict some, or enough of them wait."""
-        self._edges += [(closure.old, closure.new, closure.measured, _inverse(closure.covariance), True) for closure in closures]
+        self._closures += [(closure.old, closure.new, closure.measured, _inverse(closure.covariance), True) for closure in closures]
         self._waiting += len(closures)
-        rest = np.abs(residuals(self.nodes, _arrays(self._edges[-len(closures) :])))
+        rest = np.abs(residuals(self.nodes, _arrays(self._closures[-len(closures) :])))
         settings = self._settings
         is_far = np.hypot(rest[:, 0], rest[:, 1]) > settings.correct_beyond_m
         return bool(is_far.any() or (rest[:, 2] > settings.correct_beyond_angle).any()) or self._waiting >= settings.waiting
@@ -78,7 +92,10 @@ class NodeGraph:
     def settle(self, newest: int) -> None:
         """Bring all poses to agree; the last so many closures have not had their say yet."""
         walls = self._compass.edges(self.nodes) if self._compass is not None else []
-        edges = _arrays([*walls, *self._edges])
+        numbers = np.arange(len(self._motions))
+        motions = Edges(numbers, numbers + 1, self._motions.rows, _inverse(self._covariances.rows), np.zeros(len(numbers), np.bool_))
+        parts = [_arrays(walls), motions, _arrays(self._closures)]
+        edges = Edges(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
         self.nodes, self.covariance = optimised(self.nodes, edges, self._settings.robust_scale, self._settings.iterations, newest)
         if self._compass is not None:
             self._compass.relieve(float(self.covariance[2, 2]))
@@ -86,8 +103,9 @@ class NodeGraph:
 
 
 def _arrays(edges: list[Edge]) -> Edges:
-    a, b, measured, information, is_robust = zip(*edges, strict=True)
-    return Edges(np.array(a), np.array(b), np.stack(measured), np.stack(information), np.array(is_robust))
+    a, b, measured, information, is_robust = zip(*edges, strict=True) if edges else ((),) * 5
+    ends, number = (np.array(nodes, np.int64) for nodes in (a, b)), len(edges)
+    return Edges(*ends, np.reshape(measured, (number, 3)), np.reshape(information, (number, 3, 3)), np.array(is_robust, np.bool_))
 
 
 def _inverse(covariance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -222,6 +222,8 @@ class ClosureSettings:
         No closure is better than this [m, rad].
     confirmed_beyond_m : float
         A closure that would move the robot by more is taken only together with others that say the same [m].
+    confirmed_beyond_deviations : float
+        So is one that would move it by more standard deviations of the way since; those have to be of at least two local maps.
     confirmations : int
         How many have to agree.
     agree_m, agree_angle : float
@@ -249,6 +251,7 @@ class ClosureSettings:
     least_deviation_m: float = 0.03
     least_deviation_angle: float = math.radians(0.4)
     confirmed_beyond_m: float = 0.4
+    confirmed_beyond_deviations: float = 2.5
     confirmations: int = 3
     agree_m: float = 0.3
     agree_angle: float = math.radians(3.0)

@@ -236,6 +236,7 @@ class Slam:
         wants_another = self._mapper.wants_another
         if wants_another or np.hypot(since[0], since[1]) >= graph.distance_m or abs(since[2]) >= graph.angle:
             self._add_node(since, self._motion_covariance(match.covariance, since))
+            self._mapper.note_node(self._last_node, self._local)
             if wants_another:
                 self._mapper.add(self._last_node, self._local, ranges)
             self._look_for_closures(points, time_s)
@@ -328,10 +329,11 @@ class Slam:
 
     def _finder_takes(self, ended: list[Finished]) -> None:
         for finished in ended:
-            self._finder.remember(finished, self._last_node, self._path)
+            self._finder.remember(finished, self._path)
 
     def _look_for_closures(self, points: NDArray[np.float64], time_s: float) -> None:
-        for closure in self._finder.find(self._graph.nodes, points, self._graph.covariance, self._path, self._mapper.usual_score):
+        graph, usual_score = self._graph, self._mapper.usual_score
+        for closure in self._finder.find(graph.nodes, points, graph.covariance, graph.covariance_since, self._path, usual_score):
             self._due.append((time_s + self._settings.closures.delay_s, closure))
 
     def _correct(self, time_s: float) -> None:

@@ -9,33 +9,49 @@ from lidarium.mapping.localization.local_mapping import Finished
 from lidarium.mapping.localization.scan_points import scan_points
 from lidarium.mapping.localization.settings import ClosureSettings, MatchingSettings, SubmapSettings
 from lidarium.mapping.localization.submaps import Submap
-from lidarium.mapping.rigid import composed
+from lidarium.mapping.rigid import composed, relative
 
 KNOWN = np.diag([0.05**2, 0.05**2, math.radians(1.0) ** 2])
 """How well the pose is known when the robot comes back."""
 
+SINCE = np.diag([0.3**2, 0.3**2, math.radians(5.0) ** 2])
+"""How well it is known as seen from where the local map was made."""
 
-def finder_of(walls, poses):
-    """Return a finder that knows one local map, seen from poses in its frame; it ended long ago."""
+
+def map_of(walls, poses, nodes=(0,), places=((0.0, 0.0, 0.0),)):
+    """Return a finished local map, seen from poses in its frame, with nodes at places in it."""
     submap = Submap(SubmapSettings(), 12.0)
     for pose in poses:
         assert submap.insert(pose, cast(walls, pose), GEOMETRY, 20.0)
+    return Finished(submap.finished(), np.array(nodes), np.array(places))
+
+
+def finder_of(walls, poses):
+    """Return a finder that knows one local map, seen from poses in its frame; it ended long ago."""
     finder = ClosureFinder(ClosureSettings(), MatchingSettings())
-    finder.remember(Finished(submap.finished(), 0), 0, 0.0)
+    finder.remember(map_of(walls, poses), 0.0)
     return finder
 
 
-def closures_of(finder, walls, true, believed):
+def closures_of(finder, walls, true, believed, nodes=((0.0, 0.0, 0.0),), since=SINCE):
     """Return what a scan taken at a true pose finds where the robot believes to be at another."""
     points = scan_points(cast(walls, true), GEOMETRY.unit_vectors, GEOMETRY.angle_increment, 5.6, 0.05, 350)
-    return finder.find(np.stack([np.zeros(3), believed]), points, KNOWN, 50.0, 0.6)
+    return finder.find(np.array([*nodes, believed]), points, KNOWN, lambda _node: since, 50.0, 0.6)
 
 
 @pytest.fixture(scope="module")
-def room_finder():
-    middle = np.array([3.0, 2.2, 0.3])
-    offsets = np.random.default_rng(0).uniform(-0.4, 0.4, (10, 3)) * [1.0, 1.0, 4.0]
-    return finder_of(odd_room(), middle + offsets)
+def middle():
+    return np.array([3.0, 2.2, 0.3])
+
+
+@pytest.fixture(scope="module")
+def around_middle(middle):
+    return middle + np.random.default_rng(0).uniform(-0.4, 0.4, (10, 3)) * [1.0, 1.0, 4.0]
+
+
+@pytest.fixture(scope="module")
+def room_finder(around_middle):
+    return finder_of(odd_room(), around_middle)
 
 
 def test_a_room_is_recognised_from_where_the_robot_believes_to_be(room_finder):
@@ -74,3 +90,29 @@ def test_what_was_moved_in_a_corridor_does_not_move_the_robot():
     (closure,) = closures_of(finder, corridor(5.2), places[4], places[4])
     # The box, moved by 0.2 m, is all that tells where along the corridor the robot is.
     assert np.hypot(*(closure.measured - places[4])[:2]) < 0.1
+
+
+def test_a_move_that_the_way_since_makes_improbable_waits_for_another_local_map(middle, around_middle):
+    aside, surely = np.array([0.15, 0.1, 0.0]), np.diag([0.02**2, 0.02**2, math.radians(0.5) ** 2])
+    finder, nodes = finder_of(odd_room(), around_middle), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    assert closures_of(finder, odd_room(), middle, middle + aside, nodes, surely) == []
+    # However many scans say so: all of them see one local map, which may be of another place.
+    for x in (0.05, -0.05, 0.1):
+        true = middle + np.array([x, 0.0, 0.0])
+        assert closures_of(finder, odd_room(), true, true + aside, nodes, surely) == []
+    # A second local map, whose node is nearer now, is another witness.
+    finder.remember(map_of(odd_room(), around_middle, nodes=(1,), places=nodes[1:]), 0.0)
+    closures = closures_of(finder, odd_room(), middle, middle + aside, nodes, surely)
+    assert {closure.old for closure in closures} == {0, 1}
+    assert len(closures) >= ClosureSettings().confirmations
+
+
+def test_a_closure_is_seen_from_the_nearest_node_of_a_local_map_that_is_bent(middle, around_middle):
+    # On the way from the first node to the third the local map has become too long by 0.2 m; what is near the third lies right to it.
+    places = np.array([(-4.0, 2.0, 0.0), (0.0, 2.0, 0.1), middle - [0.5, 0.0, 0.0]])
+    finder = ClosureFinder(ClosureSettings(), MatchingSettings())
+    finder.remember(map_of(odd_room(), around_middle, nodes=(0, 1, 2), places=places), 0.0)
+    nodes = places + np.array([0.2, 0.1, 0.0])[:, None] * [1.0, 0.0, 0.0]
+    (closure,) = closures_of(finder, odd_room(), middle, middle + np.array([0.03, -0.02, 0.01]), nodes)
+    assert (closure.old, closure.new) == (2, 3)
+    assert closure.measured == pytest.approx(relative(places[2], middle), abs=0.02)

@@ -117,3 +117,16 @@ def test_all_but_the_first_node_move_together_to_where_the_first_map_begins():
     moved = graph.nodes.copy()
     graph.settle(0)
     assert graph.nodes == pytest.approx(moved, abs=1e-9)
+
+
+def test_how_well_a_node_is_known_from_another_is_what_the_motions_between_leave_open():
+    generator = np.random.default_rng(1)
+    motions, deviations = generator.normal(0.0, 0.5, (8, 3)), np.array([0.02, 0.01, 0.02])
+    graph = NodeGraph(GraphSettings(), None, np.array([1.0, 2.0, 0.5]))
+    for motion in motions:
+        graph.add(motion, np.diag(deviations**2))
+    ends = np.zeros((20000, 3))
+    for motion in motions[3:]:
+        ends = composed(ends, motion + generator.normal(0.0, 1.0, ends.shape) * deviations)
+    assert graph.covariance_since(3) == pytest.approx(np.cov(ends.T), abs=0.03 * np.cov(ends.T).max())
+    assert (graph.covariance_since(8) == 0.0).all()
