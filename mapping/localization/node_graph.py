@@ -94,8 +94,7 @@ class NodeGraph:
         walls = self._compass.edges(self.nodes) if self._compass is not None else []
         numbers = np.arange(len(self._motions))
         motions = Edges(numbers, numbers + 1, self._motions.rows, _inverse(self._covariances.rows), np.zeros(len(numbers), np.bool_))
-        parts = [_arrays(walls), motions, _arrays(self._closures)]
-        edges = Edges(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        edges = _joined([_arrays(walls), motions, _arrays(self._closures)])
         self.nodes, self.covariance = optimised(self.nodes, edges, self._settings.robust_scale, self._settings.iterations, newest)
         if self._compass is not None:
             self._compass.relieve(float(self.covariance[2, 2]))
@@ -104,8 +103,14 @@ class NodeGraph:
 
 def _arrays(edges: list[Edge]) -> Edges:
     a, b, measured, information, is_robust = zip(*edges, strict=True) if edges else ((),) * 5
-    ends, number = (np.array(nodes, np.int64) for nodes in (a, b)), len(edges)
+    number = len(edges)
+    ends = np.array(a, np.int64), np.array(b, np.int64)
     return Edges(*ends, np.reshape(measured, (number, 3)), np.reshape(information, (number, 3, 3)), np.array(is_robust, np.bool_))
+
+
+def _joined(parts: list[Edges]) -> Edges:
+    a, b, measured, information, is_robust = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return Edges(a, b, measured, information, is_robust)
 
 
 def _inverse(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
