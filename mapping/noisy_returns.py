@@ -9,7 +9,9 @@ A cell beside a free one may be the surface of something, such as the next piece
 
 import math
 
-from lidarium.mapping.kernels import Array, kernel
+import numpy as np
+
+from lidarium.mapping.kernels import Array, int8_at, kernel
 
 DEVIATIONS = 3.0
 """Noise explains so many of its standard deviations, and one cell."""
@@ -29,6 +31,36 @@ def _is_beside_free(log_odds: Array, row: int, column: int) -> bool:
         or (is_row and 0 < column <= columns and log_odds[row, column - 1] < 0)
         or (is_row and -1 <= column < columns - 1 and log_odds[row, column + 1] < 0)
     )
+
+
+@kernel
+def _unsettled(log_odds: Array, x: float, y: float, lengths: Array, directions: Array, is_hit: Array, occupied: int) -> Array:
+    """Which returns have to be looked at: neither in an occupied cell nor beside a free one, as most are, or at the map's border.
+
+    They are listed without branches, which could not be foreseen.
+    """
+    rows, columns = log_odds.shape
+    beams = lengths.shape[0]
+    cells, is_inner = np.empty(beams, np.int32), np.empty(beams, np.bool_)
+    for beam in range(beams):
+        row = np.int32(math.floor(y + lengths[beam] * directions[1, beam]))
+        column = np.int32(math.floor(x + lengths[beam] * directions[0, beam]))
+        is_inner[beam] = (row > 0) & (row < rows - 1) & (column > 0) & (column < columns - 1)
+        cells[beam] = row * np.int32(columns) + column
+    listed, count = np.empty(beams, np.int32), np.uintp(0)
+    flat, above, beside = int8_at(log_odds.ctypes.data, rows * columns), np.uintp(columns), np.uintp(1)
+    for beam in range(beams):
+        if not is_hit[beam]:
+            continue
+        listed[count] = beam
+        if is_inner[beam]:
+            cell = np.uintp(cells[beam])
+            # The sign of the four together is that of the lowest.
+            around = flat[cell - beside] | flat[cell + beside] | flat[cell - above] | flat[cell + above]
+            count += np.uintp((around >= 0) & (flat[cell] < occupied))
+        else:
+            count += np.uintp(1)
+    return listed[:count]
 
 
 @kernel
@@ -55,9 +87,7 @@ def settle_returns(
         Log-odds from which on a cell counts as occupied.
     """
     rows, columns = log_odds.shape
-    for beam in range(lengths.shape[0]):
-        if not is_hit[beam]:
-            continue
+    for beam in _unsettled(log_odds, x, y, lengths, directions, is_hit, occupied):
         end = lengths[beam]
         row, column = int(math.floor(y + end * directions[1, beam])), int(math.floor(x + end * directions[0, beam]))
         if _is_beside_free(log_odds, row, column):

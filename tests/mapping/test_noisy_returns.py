@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import lidarium
 from lidarium.envs.settings import make_settings
@@ -11,6 +13,7 @@ from lidarium.evaluation.history import History
 from lidarium.evaluation.result import result_of
 from lidarium.evaluation.runner import run_episode
 from lidarium.evaluation.watching import WatchedExploration
+from lidarium.mapping.noisy_returns import DEVIATIONS, STEP, settle_returns
 from lidarium.mapping.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.scans import ScanGeometry
 
@@ -37,6 +40,48 @@ def column_of(grid, x):
     column = math.floor((x - x_low) / first)
     rows = [math.floor((y - y_low) / first) for y in np.arange(-0.475, 0.5, 0.05)]
     return grid.log_odds[rows, column]
+
+
+def settled_one_by_one(log_odds, x, y, lengths, directions, is_hit, deviation, share, occupied):
+    """Return the lengths of the beams as the module tells it, beam by beam."""
+    around = np.pad(log_odds, 2)
+
+    def level(row, column):
+        inside = -2 <= row < len(log_odds) + 2 and -2 <= column < log_odds.shape[1] + 2
+        return around[row + 2, column + 2] if inside else 0
+
+    result = lengths.copy()
+    for beam in np.flatnonzero(is_hit):
+        end = lengths[beam]
+        row, column = math.floor(y + end * directions[1, beam]), math.floor(x + end * directions[0, beam])
+        if any(level(row + up, column + right) < 0 for up, right in ((1, 0), (-1, 0), (0, 1), (0, -1))):
+            continue
+        at = end
+        while at >= max(end - DEVIATIONS * max(deviation, share * end) - 1.0, 0.0):
+            if level(math.floor(y + at * directions[1, beam]), math.floor(x + at * directions[0, beam])) >= occupied:
+                result[beam] = at
+                break
+            at -= STEP
+    return result
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    rows=st.integers(1, 20),
+    columns=st.sampled_from([64, 128]),
+    shares=st.sampled_from([(0.0, 0.1), (0.02, 0.1), (0.3, 0.3), (0.9, 0.05)]),
+    noise=st.sampled_from([(0.5, 0.0), (2.0, 0.0), (0.2, 0.05)]),
+)
+def test_returns_settle_as_told_beam_by_beam_at_the_border_and_beyond_it_too(seed, rows, columns, shares, noise):
+    generator = np.random.default_rng(seed)
+    log_odds = generator.choice(np.array([-20, 0, 20], np.int8), (rows, columns), p=[shares[0], 1.0 - sum(shares), shares[1]])
+    x, y = generator.uniform((0.0, 0.0), (columns, rows))
+    angles, is_hit = generator.uniform(-math.pi, math.pi, 200), generator.random(200) < 0.8
+    lengths, directions = generator.uniform(0.0, 1.5 * rows + 5.0, 200), np.array([np.cos(angles), np.sin(angles)])
+    expected = settled_one_by_one(log_odds, x, y, lengths, directions, is_hit, *noise, 15)
+    settle_returns(log_odds, x, y, lengths, directions, is_hit, *noise, 15)
+    np.testing.assert_array_equal(lengths, expected)
 
 
 def test_a_return_just_behind_a_wall_counts_as_one_of_the_wall():
