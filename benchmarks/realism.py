@@ -39,6 +39,9 @@ FLOORS = ("apartment", "clinic", "building:17", "building:23", "office:15")
 TEAM = 5
 """Robots of the team whose speed is told."""
 
+REPEATED, REPEATS = 3, 5
+"""So many episodes with the longest corrections of the past run so many times, since a machine's other work falls on some moments."""
+
 
 class TimedLocalizer:
     """A localizer that notes how long each scan takes it."""
@@ -125,7 +128,8 @@ def episode(floor: str, robots: int, seed: int, horizon_s: float) -> dict[str, A
     aligned = [absolute_error(believed[:, robot], true[:, robot]) for robot in range(robots)]
     last = np.hypot(*(env.world.believed - env.world.poses)[:, :2].T)
     return {
-        "floor": result["floor"], "robots": robots, "seed": seed, "time_s": result["time_s"], "coverage": result["coverage_final"],
+        "floor": result["floor"], "spec": floor, "robots": robots, "seed": seed, "time_s": result["time_s"],
+        "coverage": result["coverage_final"],
         "way_m": result["path_m"], "ate_m": result["ate_m"], "aligned_m": aligned, "last_m": last.tolist(),
         "wheels_m": np.sqrt(np.mean(np.square(watch.wheels), axis=0)).tolist(), "seconds": watch.seconds,
         "iou": result["iou_occupied"], "aligned_iou": aligned_iou(env, believed.reshape(-1, 3), true.reshape(-1, 3)),
@@ -168,15 +172,32 @@ def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
         )
 
 
-def times_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
-    """Return lines that tell how long scans take."""
+def corrections_of(told: dict[str, Any]) -> NDArray[np.float64]:
+    """Return how long the corrections of an episode's past took [s]."""
+    return np.array([seconds for seconds, is_corrected in told["seconds"] if is_corrected] or [np.nan])
+
+
+def longest_correction(episodes: list[dict[str, Any]], horizon_s: float) -> float:
+    """Return how long the longest correction takes [s]: each one's median over the repeats of its episode, which are equal to the bit."""
+    longest = []
+    for told in sorted(episodes, key=lambda told: -float(np.nan_to_num(corrections_of(told)).max()))[:REPEATED]:
+        again = [episode(told["spec"], told["robots"], told["seed"], horizon_s) for _ in range(REPEATS)]
+        longest.append(np.median([corrections_of(repeat) for repeat in again], axis=0).max())
+    return float(np.nanmax(longest))
+
+
+def times_of(episodes: list[dict[str, Any]], longest: float) -> Iterator[str]:
+    """Return lines that tell how long scans take, of which the longest correction was measured by itself [s]."""
     seconds = [entry for told in episodes for entry in told["seconds"]]
     plain = 1e3 * np.array([time for time, is_corrected in seconds if not is_corrected])
-    corrected = 1e3 * np.array([time for time, is_corrected in seconds if is_corrected] or [np.nan])
+    corrected = 1e3 * np.concatenate([corrections_of(told) for told in episodes])
     # A scan that is not matched takes microseconds.
     matched = plain[plain > 0.2]
     yield f"A scan that is matched takes {np.median(matched):.2f} ms (95 % within {np.quantile(matched, 0.95):.2f} ms)."
-    yield f"One at which the past is corrected takes {np.nanmedian(corrected):.1f} ms ({np.nanmax(corrected):.1f} ms at most)."
+    yield (
+        f"One at which the past is corrected takes {np.nanmedian(corrected):.1f} ms, and the longest {1e3 * longest:.1f} ms (median of "
+        f"{REPEATS} runs of its episode; {np.nanmax(corrected):.1f} ms is the most that was seen once)."
+    )
 
 
 def team_rates(seeds: int) -> list[float]:
@@ -218,14 +239,24 @@ HEADER = (
 )
 
 
-def page(episodes: list[dict[str, Any]], rates: list[float], command: str) -> str:
+def page(episodes: list[dict[str, Any]], longest: float, rates: list[float], command: str) -> str:
     """Return the whole page."""
     speed = (
         f"Five robots on building:17 make {np.median(rates):.0f} agent steps a second on one core ({min(rates):.0f} to {max(rates):.0f}), "
         "policy, maps and localizers included."
     )
     table = [f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER), *rows_of(episodes)]
-    lines = [*heading("Robots in worlds that are not ideal", about(command)), "", ABOUT, "", *table, "", *times_of(episodes), speed, ""]
+    lines = [
+        *heading("Robots in worlds that are not ideal", about(command)),
+        "",
+        ABOUT,
+        "",
+        *table,
+        "",
+        *times_of(episodes, longest),
+        speed,
+        "",
+    ]
     return "\n".join(lines)
 
 
@@ -254,7 +285,9 @@ def main() -> None:
                     flush=True,
                 )
                 episodes.append(told)
-    write_text(options.out, page(episodes, rates, "python benchmarks/realism.py"))
+    longest = longest_correction(episodes, options.horizon)
+    floors = " ".join(Path(floor).name.partition(".")[0] for floor in options.floors)
+    write_text(options.out, page(episodes, longest, rates, f"python benchmarks/realism.py --seeds {options.seeds} --floors {floors}"))
 
 
 if __name__ == "__main__":
