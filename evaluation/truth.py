@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lidarium.envs.coverage import unpack_bits
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Raster
-from lidarium.envs.floors.starts import swept_free_space
+from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.simulation.kinematic import counted_cells
 from lidarium.evaluation.metrics import surface
 from lidarium.evaluation.metrics.shares import Mask
@@ -63,8 +63,8 @@ def left_by_failed(env: ExplorationEnv) -> Mask | None:
         # A cell less than the body: a robot that touches it still fits beside it.
         near = np.hypot(body.origin[0] + (columns + 0.5) * resolution - x, body.origin[1] + (rows + 0.5) * resolution - y)
         solid[near < env.settings.robot.radius - resolution] = 1
-    free = swept_free_space(Raster(solid, body.origin, resolution), world.smallest_radius, world.poses[~failed])
-    free &= tables.laser.solid == 0
+    swept = swept_free_space(Raster(solid, body.origin, resolution), world.smallest_radius, world.poses[~failed])
+    free = swept & (tables.laser.solid == 0)
     left = counted_cells(free, round(env.settings.occupancy.resolution / resolution))
     counted = unpack_bits(world.counted_masks[0], left.shape[1])
     return np.asarray(left & counted)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor, Raster, Solid
+from lidarium.envs.floors.free_space import configuration_space
 from lidarium.envs.floors.furnishing import Furnished, furnish
 from lidarium.envs.floors.layouts import Proportions, apartment_layout, corridor_layout, office_layout
 from lidarium.envs.floors.plans import (
@@ -27,7 +28,6 @@ from lidarium.envs.floors.plans import (
     room_areas,
     wall_rectangles,
 )
-from lidarium.envs.floors.starts import configuration_space
 
 KINDS = ("apartment", "office", "corridors")
 

@@ -8,6 +8,7 @@ import hashlib
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -71,11 +72,20 @@ class Raster:
         Lower left corner of cell (0, 0) [m].
     resolution : float
         Side of a cell [m].
+    kept : dict
+        What was made of the cells, where they are read-only, see ``free_space``.
     """
 
     solid: NDArray[np.uint8]
     origin: tuple[float, float]
     resolution: float
+    kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the cells take, and what is kept of them."""
+        sizes: list[int] = [value.nbytes for value in list(self.kept.values()) if value is not None]
+        return self.solid.nbytes + sum(sizes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.starts import configuration_space
+from lidarium.envs.floors.free_space import configuration_space
 
 MEASURED_RADIUS = 0.30
 """Radius of the robot whose loops are counted [m]."""

@@ -34,6 +34,8 @@ MADE_BY = (
 class TablesCache:
     """Tables used last, bounded in bytes; tables in use elsewhere are found, too, and never made twice.
 
+    Tables grow by what episodes make their rasters keep: how large they are is asked whenever they are used.
+
     Parameters
     ----------
     max_bytes : int
@@ -47,7 +49,7 @@ class TablesCache:
 
     def __init__(self, max_bytes: int) -> None:
         self.max_bytes, self.nbytes = max_bytes, 0
-        self._kept: OrderedDict[str, FloorTables] = OrderedDict()
+        self._kept: OrderedDict[str, tuple[FloorTables, int]] = OrderedDict()
         self._alive: WeakValueDictionary[str, FloorTables] = WeakValueDictionary()
         self._lock = Lock()
 
@@ -59,13 +61,13 @@ class TablesCache:
         with self._lock:
             # Of two threads that made the same, one wins.
             tables = self._alive.setdefault(key, tables)
-            if key not in self._kept:
-                self.nbytes += tables.nbytes
-            self._kept[key] = tables
+            size = tables.nbytes
+            self.nbytes += size - self._kept.get(key, (tables, 0))[1]
+            self._kept[key] = tables, size
             self._kept.move_to_end(key)
             while self.nbytes > self.max_bytes:
-                _, oldest = self._kept.popitem(last=False)
-                self.nbytes -= oldest.nbytes
+                _, (_, size) = self._kept.popitem(last=False)
+                self.nbytes -= size
         return tables
 
 

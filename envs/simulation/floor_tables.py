@@ -70,17 +70,14 @@ class FloorTables:
 
     @property
     def nbytes(self) -> int:
-        """How much memory the arrays take."""
-        return sum(array.nbytes for array in self._arrays)
-
-    @property
-    def _arrays(self) -> list[NDArray[Any]]:
-        rasters = [self.body.solid] if self.laser is self.body else [self.body.solid, self.laser.solid]
-        return [*rasters, self.rays.squares, self.rays.faces, self.rays.face_starts, self.bound]
+        """How much memory the arrays take, and what episodes have made the rasters keep."""
+        rasters = [self.body] if self.laser is self.body else [self.body, self.laser]
+        tables = [self.rays.squares, self.rays.faces, self.rays.face_starts, self.bound]
+        return sum(raster.nbytes for raster in rasters) + sum(array.nbytes for array in tables)
 
     def _frozen(self) -> "FloorTables":
         """Make the arrays read-only: all episodes on the floor share them."""
-        for array in self._arrays:
+        for array in (self.body.solid, self.laser.solid, self.rays.squares, self.rays.faces, self.rays.face_starts, self.bound):
             array.flags.writeable = False
         return self
 

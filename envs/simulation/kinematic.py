@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from lidarium.envs.coverage import pack_bits
-from lidarium.envs.floors.starts import swept_free_space
+from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.simulation.arrays import DEAD_RECKONING, KNOWN_MATES, OWN_FRAME, SOME_MATES, TRUE_POSE, WorldArrays, table_of
 from lidarium.envs.simulation.belief_maps import blank, blank_map, map_around_start, map_with_margin, wipe
 from lidarium.envs.simulation.faults import FAULT_NUMBERS, NO_FAULTS, FaultSettings, plan_faults

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lidarium.envs.coverage import count_bits, mark_seen, pack_bits, share_news, unpack_bits
 from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Floor, Raster, Solid
-from lidarium.envs.floors.starts import swept_free_space
+from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.scorer import THRESHOLDS, Scorer, reward_weights
 from lidarium.envs.settings import ExplorationSettings, RewardSettings
 from lidarium.envs.simulation.floor_cache import floor_tables

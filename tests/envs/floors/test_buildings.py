@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from lidarium.envs.floors.buildings import KINDS, START_CLEARANCE, BuildingSettings, generate_building
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.free_space import configuration_space
 from lidarium.envs.floors.furniture import PIECES, place
 from lidarium.envs.floors.measures import measure_building
-from lidarium.envs.floors.starts import configuration_space
 
 ROBOT_RADIUS = 0.30
 

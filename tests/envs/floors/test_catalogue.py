@@ -17,8 +17,9 @@ from lidarium.envs.floors.catalogue import (
     set_floors,
     set_sha256,
 )
+from lidarium.envs.floors.free_space import configuration_space
 from lidarium.envs.floors.measures import measure_building
-from lidarium.envs.floors.starts import check_starts, configuration_space
+from lidarium.envs.floors.starts import check_starts
 from lidarium.envs.simulation.robots import ROBOTS
 
 SCENES = ("scene_loop", "scene_corridor", "scene_corner", "scene_room", "scene_loop_corridor", "scene_room_corner")

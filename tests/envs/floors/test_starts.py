@@ -4,70 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import ndimage
 
-from lidarium.envs.floors.floor import Floor, Raster, Solid
-from lidarium.envs.floors.starts import check_starts, configuration_space, draw_starts, swept_free_space
-
-
-def wall(x, y, width, height):
-    return Solid(np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]]))
-
-
-def two_rooms(door=0.0):
-    """A room of 4 m x 4 m and one of 2 m x 4 m behind a wall, with a door in it."""
-    parts = (wall(4.0, 0.0, 0.1, 2.0 - door / 2.0), wall(4.0, 2.0 + door / 2.0, 0.1, 2.0 - door / 2.0))
-    return Floor("rooms", (0.0, 0.0, 6.1, 4.0), parts).raster(0.025, 0.0, 1.0)
-
-
-def random_raster(seed, share):
-    solid = np.ones((24, 32), np.uint8)
-    solid[1:-1, 1:-1] = np.random.default_rng(seed).random((22, 30)) < share
-    return Raster(solid, (0.0, 0.0), 0.05)
-
-
-@settings(max_examples=40)
-@given(st.integers(0, 1000), st.floats(0.0, 0.2), st.sampled_from([0.0, 0.01, 0.05, 0.1, 0.12, 0.18, 0.2]))
-def test_the_configuration_space_keeps_the_radius_from_every_solid_square(seed, share, radius):
-    raster = random_raster(seed, share)
-    i, j = np.indices(raster.solid.shape)
-    rows, columns = raster.solid.nonzero()
-    across = np.maximum(np.abs(i[..., None] - rows) - 0.5, 0.0)
-    along = np.maximum(np.abs(j[..., None] - columns) - 0.5, 0.0)
-    distance = np.hypot(across, along).min(axis=-1) * raster.resolution
-    np.testing.assert_array_equal(configuration_space(raster, radius), (distance >= radius - 1e-9) & (raster.solid == 0))
-
-
-@settings(max_examples=40)
-@given(st.integers(0, 1000), st.sampled_from([0.0, 0.05, 0.1, 0.12]))
-def test_the_swept_space_is_what_discs_cover_from_the_start(seed, radius):
-    raster = random_raster(seed, 0.05)
-    space = configuration_space(raster, radius)
-    labels, count = ndimage.label(space)
-    if count == 0:
-        return
-    row, column = (indices[0] for indices in space.nonzero())
-    kept = np.argwhere(labels == labels[row, column])
-    i, j = np.indices(space.shape)
-    near = np.hypot(i[..., None] - kept[:, 0], j[..., None] - kept[:, 1]).min(axis=-1) * raster.resolution <= radius + 1e-9
-    start = np.array([[(column + 0.5) * 0.05, (row + 0.5) * 0.05, 0.0]])
-    np.testing.assert_array_equal(swept_free_space(raster, radius, start), near & (raster.solid == 0))
-
-
-def test_a_sealed_room_is_never_swept():
-    swept = swept_free_space(two_rooms(), 0.18, np.array([[1.0, 1.0, 0.0]]))
-    assert 0.97 < swept.sum() * 0.025**2 / 16.0 <= 1.0
-
-
-def test_a_door_is_passed_by_a_robot_that_fits_and_by_no_other():
-    start = np.array([[1.0, 1.0, 0.0]])
-    assert swept_free_space(two_rooms(0.8), 0.18, start).sum() * 0.025**2 > 23.0
-    assert swept_free_space(two_rooms(0.8), 0.45, start).sum() * 0.025**2 < 17.0
-
-
-def test_both_rooms_are_swept_if_robots_start_in_both():
-    swept = swept_free_space(two_rooms(), 0.18, np.array([[1.0, 1.0], [5.0, 2.0]]))
-    assert swept.sum() * 0.025**2 > 23.0
+from lidarium.envs.floors.floor import Floor, Raster
+from lidarium.envs.floors.starts import check_starts, draw_starts
+from tests.envs.floors.rooms import two_rooms
 
 
 @settings(max_examples=30)
@@ -152,9 +92,3 @@ def test_starts_that_a_user_insists_on_must_fit_and_not_overlap():
 def test_a_team_without_robots_is_refused(count):
     with pytest.raises(ValueError, match="at least 1"):
         draw_starts(two_rooms(), 0.18, count, np.random.default_rng(0))
-
-
-@pytest.mark.parametrize("radius", [-0.1, math.nan])
-def test_a_bad_radius_is_refused(radius):
-    with pytest.raises(ValueError, match="radius is"):
-        configuration_space(two_rooms(), radius)

@@ -14,6 +14,7 @@ from lidarium.envs.floors import catalogue
 from lidarium.envs.floors.buildings import generate_building
 from lidarium.envs.floors.catalogue import load_floor
 from lidarium.envs.floors.floor import Floor, Solid
+from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.floors.store import FOLDER_VARIABLE, floor_store
 from lidarium.envs.simulation import floor_cache
 from lidarium.envs.simulation.floor_cache import SIZE_VARIABLE, TablesCache, floor_tables, prepare_tables
@@ -135,6 +136,20 @@ def test_the_tables_used_last_stay_and_those_in_use_are_never_made_twice():
     assert tiny.get("first", lambda: first) is first
     assert tiny.nbytes == 0
     assert tiny.get("first", refuse) is first
+
+
+def test_what_episodes_add_to_tables_counts():
+    tables = FloorTables.of_floor(box(3.0), *HEIGHTS)
+    cache = TablesCache(3 * tables.nbytes)
+    cache.get("first", lambda: tables)
+    bare = cache.nbytes
+    for _ in range(2):
+        swept_free_space(tables.body, 0.1, np.array([[2.5, 2.5]]))
+    assert cache.get("first", refuse) is tables
+    assert cache.nbytes == tables.nbytes > bare
+    cache.get("large", lambda: FloorTables.of_floor(box(6.0), *HEIGHTS))
+    gc.collect()
+    assert cache.nbytes == 0
 
 
 def test_the_environment_bounds_the_cache(monkeypatch):

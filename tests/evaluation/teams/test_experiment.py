@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from lidarium.envs.floors.catalogue import load_floor
-from lidarium.envs.floors.starts import draw_starts, swept_free_space
+from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.floors.starts import draw_starts
 from lidarium.evaluation.campaign import Campaign
 from lidarium.evaluation.experiments import EXPERIMENTS, supervisor
 from lidarium.evaluation.experiments.supervisor import failing_suite, typical_runs

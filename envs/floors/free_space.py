@@ -1,0 +1,224 @@
+"""Where a disc fits on a raster, and the free space that it sweeps from its starts.
+
+What follows from the raster and the disc alone is kept with rasters that are read-only, for all episodes that share one.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import Raster
+from lidarium.mapping.kernels import kernel
+
+Made = TypeVar("Made")
+
+KEPT = 8
+"""The most that a raster keeps: components for radii, and what is swept from some of them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Components:
+    """The 4-connected components of the configuration space of a disc.
+
+    Attributes
+    ----------
+    labels : (rows, columns) uint8, uint16 or uint32
+        Number of the component of each cell, from 1; 0 where the disc does not fit.
+    areas : (components + 1,) int64
+        Cells of each component, and in front those of none.
+    """
+
+    labels: NDArray[np.unsignedinteger[Any]]
+    areas: NDArray[np.int64]
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the arrays take."""
+        return self.labels.nbytes + self.areas.nbytes
+
+
+def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
+    """Return where the centre of a disc may be: cells whose centre is no nearer than the radius to any solid cell's square.
+
+    Parameters
+    ----------
+    raster : Raster
+        Solid cells at the body's height.
+    radius : float
+        Radius of the robot [m].
+
+    Returns
+    -------
+    (rows, columns) bool
+        True where the disc fits. Exact, not an approximation by distances between centres.
+
+    Raises
+    ------
+    ValueError
+        If the radius is negative or not finite.
+    """
+    reach = _cells_of(raster, radius)
+    space = np.zeros(raster.solid.shape, dtype=np.bool_)
+    box = _box_of_free_cells(raster)
+    if box is None:
+        return space
+    # The square's nearest point is half a cell nearer than its centre along each axis, except in the same row or column.
+    gaps = np.maximum(np.arange(math.ceil(reach) + 2) - 0.5, 0.0)
+    near = gaps[:, None] ** 2 + gaps[None, :] ** 2 < reach**2 - 1e-9
+    space[box] = ~_dilated(raster.solid[box] != 0, near) & (raster.solid[box] == 0)
+    return space
+
+
+def components(raster: Raster, radius: float) -> Components:
+    """Return the components of the configuration space of a disc of a radius [m], read-only; raises ``ValueError`` as that does."""
+
+    def make() -> Components:
+        space = configuration_space(raster, radius)
+        count, labels = cv2.connectedComponents(space.view(np.uint8), connectivity=4, ltype=cv2.CV_32S)
+        smallest = np.asarray(labels, np.min_scalar_type(count - 1))
+        return Components(_frozen(smallest), _frozen(np.bincount(labels.ravel(), minlength=count)))
+
+    return _kept(raster, ("components", radius), make)
+
+
+def swept_free_space(raster: Raster, radius: float, starts: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return the free cells that discs can sweep from the starts.
+
+    Parameters
+    ----------
+    raster : Raster
+        Solid cells at the body's height.
+    radius : float
+        Radius of the robot [m].
+    starts : (N, 2 or 3) float64
+        Starts x, y (theta is not used) [m].
+
+    Returns
+    -------
+    (rows, columns) bool
+        Free cells whose centre is within the radius of a cell centre of the configuration space, in its 4-connected
+        components that hold a start. Read-only.
+
+    Raises
+    ------
+    ValueError
+        If the robot does not fit at a start (nor at a cell beside it).
+    """
+    found = components(raster, radius)
+    kept = sorted({component_near(raster, found.labels, start, radius) for start in np.asarray(starts, dtype=np.float64)})
+
+    def make() -> NDArray[np.bool_]:
+        box = _box_of_free_cells(raster)
+        swept = np.zeros(found.labels.shape, dtype=np.bool_)
+        if box is not None and kept:
+            chosen = np.zeros(found.areas.size, dtype=np.bool_)
+            chosen[kept] = True
+            reach = _cells_of(raster, radius)
+            steps = np.arange(math.floor(reach + 1e-9) + 2)
+            disc = steps[:, None] ** 2 + steps[None, :] ** 2 <= reach**2 + 1e-9
+            swept[box] = _dilated(chosen[found.labels[box]], disc) & (raster.solid[box] == 0)
+        return _frozen(swept)
+
+    return _kept(raster, ("swept", radius, *kept), make)
+
+
+def cell_of(raster: Raster, point: NDArray[np.float64]) -> tuple[int, int]:
+    """Return the cell (row, column) of a point, or the nearest one of the raster, which is solid."""
+    column, row = ((point[axis] - raster.origin[axis]) / raster.resolution for axis in (0, 1))
+    rows, columns = raster.solid.shape
+    return min(max(math.floor(row + 1e-9), 0), rows - 1), min(max(math.floor(column + 1e-9), 0), columns - 1)
+
+
+def component_near(raster: Raster, labels: NDArray[np.unsignedinteger[Any]], start: NDArray[np.float64], radius: float) -> int:
+    """Return the component at a start, or at the nearest cell beside it where rounding to cells puts the start outside."""
+    i, j = cell_of(raster, start)
+    if raster.solid[i, j]:
+        raise ValueError(f"start ({start[0]:.3f}, {start[1]:.3f}) m is inside a wall; want one in free space")
+    for near in sorted(((i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)), key=lambda cell: abs(cell[0] - i) + abs(cell[1] - j)):
+        if labels[near]:
+            return int(labels[near])
+    raise ValueError(f"a robot of radius {radius} m does not fit at start ({start[0]:.3f}, {start[1]:.3f}) m; want more room")
+
+
+def _cells_of(raster: Raster, radius: float) -> float:
+    if not (math.isfinite(radius) and radius >= 0.0):
+        raise ValueError(f"radius is {radius} m; want zero or more")
+    return radius / raster.resolution
+
+
+def _frozen(array: NDArray[Any]) -> NDArray[Any]:
+    array.flags.writeable = False
+    return array
+
+
+def _kept(raster: Raster, key: tuple[Any, ...], make: Callable[[], Made]) -> Made:
+    """Return what a raster keeps, or make it; a raster that can be written to keeps nothing.
+
+    It is kept from the second time on: many floors of large sets are drawn once, and would only fill the memory.
+    """
+    if raster.solid.flags.writeable:
+        return make()
+    value: Made | None = raster.kept.get(key)
+    if value is None:
+        value = make()
+        raster.kept[key] = value if key in raster.kept else None
+        while len(raster.kept) > KEPT:
+            raster.kept.pop(next(iter(raster.kept)))
+    return value
+
+
+def _box_of_free_cells(raster: Raster) -> tuple[slice, slice] | None:
+    """Return the rows and columns with free cells and one solid ring around them."""
+    free = raster.solid == 0
+    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
+    if rows.size == 0:
+        return None
+    return slice(max(rows[0] - 1, 0), rows[-1] + 2), slice(max(columns[0] - 1, 0), columns[-1] + 2)
+
+
+def _dilated(mask: NDArray[np.bool_], shape: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Dilate by a shape that is symmetric about both axes, given as its quadrant ``shape[|di|, |dj|]``."""
+    widths = shape.sum(axis=1).astype(np.int64) - 1
+    widths = widths[widths >= 0]
+    if widths.size == 0:
+        return np.zeros_like(mask)
+    result = np.empty_like(mask)
+    _dilate_rows(mask, widths, result)
+    return result
+
+
+@kernel
+def _dilate_rows(mask: NDArray[np.bool_], widths: NDArray[np.int64], result: NDArray[np.bool_]) -> None:
+    rows, columns = mask.shape
+    reach = len(widths) - 1
+    far = np.uint16(widths.max() + 1)
+    # Distance along the row to the nearest set cell, for the rows that the shape reaches at once: memory stays in the cache.
+    distances = np.full((2 * reach + 1, columns), far, np.uint16)
+    for i in range(-reach, rows):
+        ahead = i + reach
+        slot = ahead % (2 * reach + 1)
+        if ahead < rows:
+            distance = far
+            for j in range(columns):
+                distance = np.uint16(0) if mask[ahead, j] else min(np.uint16(distance + 1), far)
+                distances[slot, j] = distance
+            distance = far
+            for j in range(columns - 1, -1, -1):
+                distance = np.uint16(0) if mask[ahead, j] else min(np.uint16(distance + 1), far)
+                distances[slot, j] = min(distances[slot, j], distance)
+        else:
+            distances[slot, :] = far
+        if i < 0:
+            continue
+        result[i, :] = False
+        for di in range(-reach, reach + 1):
+            row = distances[(i + di) % (2 * reach + 1)]
+            width = np.uint16(widths[abs(di)])
+            if i + di >= 0:
+                for j in range(columns):
+                    result[i, j] |= row[j] <= width
