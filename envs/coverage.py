@@ -8,7 +8,11 @@ configuration space, connected to the starts.
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.cell_blocks import fetch_block
 from lidarium.mapping.kernels import Array, kernel, word_grid_at
+
+ROWS_AHEAD = 24
+"""So many rows before a row of a mask is looked at it is fetched from memory."""
 
 
 def pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
@@ -64,6 +68,7 @@ def mark_seen(
     row_low, row_high = rows, 0
     for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
         i = row + row_offset
+        fetch_block(own.ctypes.data + (i + ROWS_AHEAD) * words * 8)
         found = np.uint64(0)
         for word in range(word_low, word_high):
             j = word + word_offset

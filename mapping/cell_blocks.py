@@ -102,15 +102,6 @@ def _sum_blocks(typing_context: Any, first: Any, second: Any, result: Any) -> An
     return types.void(*(types.int64,) * 3), generate
 
 
-def _first_bit(typing_context: Any, word: Any) -> Any:  # noqa: ANN401
-    """Tell which is the first bit that is set."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
-
-    return types.int64(types.uint64), generate
-
-
 def _greatest_of_groups(typing_context: Any, rows: Any, stride: Any, count: Any, least: Any, halvings: Any, result: Any) -> Any:  # noqa: ANN401
     """Write the greatest of the blocks of some rows, and of neighbours in it, halved and halved again."""
 
@@ -239,7 +230,6 @@ def _raise_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: A
 _update: Any = intrinsic(_update_block)
 _fetch_line: Any = intrinsic(_fetch)
 _sum: Any = intrinsic(_sum_blocks)
-_first: Any = intrinsic(_first_bit)
 _greatest: Any = intrinsic(_greatest_of_groups)
 _write_levels: Any = intrinsic(_levels)
 _differs: Any = intrinsic(_positive_differs)
@@ -286,13 +276,6 @@ def fetch_block(address: int) -> None:
 def sum_blocks(first: int, second: int, result: int) -> None:
     """Write the sum of two blocks of int8, cut to [-127, 127], into a third, which may be one of them."""
     _sum(first, second, result)
-
-
-@kernel(inline=True)
-def first_bit(word: np.uint64) -> int:
-    """Return which bit of a word is the first that is set; one must be."""
-    place: int = _first(word)
-    return place
 
 
 @kernel(inline=True)

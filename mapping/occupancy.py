@@ -24,7 +24,7 @@ OCCUPIED, UNKNOWN, FREE = 0, 127, 255
 WORD = 64
 MAX_CELLS = 400_000_000
 
-ROWS_AHEAD = 4
+ROWS_AHEAD = 12
 """So many rows before a row of a map is updated it is fetched from memory."""
 
 

@@ -7,7 +7,8 @@ behind the last row, so that rows in which nothing has changed are not even look
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.cell_blocks import first_bit, write_greatest
+from lidarium.mapping.bit_words import first_bit
+from lidarium.mapping.cell_blocks import write_greatest
 from lidarium.mapping.kernels import Array, kernel, vector_at
 from lidarium.mapping.occupancy import WORD
 

@@ -12,6 +12,7 @@ however many beams crossed it.
 
 import numpy as np
 
+from lidarium.mapping.bit_words import running_xor
 from lidarium.mapping.kernels import Array, kernel, vector_at
 
 GRAZING = 8.0
@@ -200,14 +201,7 @@ def fill_scan_polygon(
     for i in range(row_low, row_high):
         carry = np.uint64(0)
         for word in range(word_low, word_high):
-            value = bits[i, word]
-            value ^= value << np.uint64(1)
-            value ^= value << np.uint64(2)
-            value ^= value << np.uint64(4)
-            value ^= value << np.uint64(8)
-            value ^= value << np.uint64(16)
-            value ^= value << np.uint64(32)
-            value ^= carry
+            value = running_xor(bits[i, word]) ^ carry
             bits[i, word] = value
             carry = np.uint64(0) - (value >> np.uint64(63))
     return row_low, row_high, word_low, word_high

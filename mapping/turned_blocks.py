@@ -29,6 +29,9 @@ _BYTE, _INT, _LONG = ir.IntType(8), ir.IntType(32), ir.IntType(64)
 _PIECE, _REGISTER, _INTS = ir.VectorType(_BYTE, COLUMNS), ir.VectorType(_BYTE, _CELLS), ir.VectorType(_INT, _CELLS)
 _ROWS_OF_BLOCK = ir.VectorType(_LONG, SIDE)
 _ALL_UNKNOWN = np.uint64(UNKNOWN * 0x0101010101010101)
+LINE = 64
+"""Cells in a line of the caches."""
+
 PLACES = 16
 """Binary places of the numbers by which cells are looked up."""
 
@@ -190,6 +193,16 @@ def _bits_within(first: int, count: int, size: int) -> np.uint16:
     return np.uint16((1 << high) - (1 << low))
 
 
+@kernel(inline=True)
+def _fetch_patch(pool: Array, corner: Array, half: int) -> None:
+    """Begin to load the part of a pooled map that a crop touches."""
+    rows, columns = pool[1], pool[2]
+    first, last = max(corner[1], 0), min(corner[1] + 2 * half, columns)
+    for row in range(max(corner[0], 0), min(corner[0] + 2 * half, rows)):
+        for column in range(first, last, LINE):
+            fetch_block(pool[0] + row * columns + column)
+
+
 @kernel
 def turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: int, crops: Array) -> None:
     """Fill crops that are turned, block by block.
@@ -209,6 +222,8 @@ def turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: in
     """
     side = crops.shape[1]
     blocks = side // SIDE
+    for k in range(pools.shape[0]):
+        _fetch_patch(pools[k], corners[k], half)
     loads, places = np.empty((blocks * blocks, 2), np.int64), np.empty((blocks * blocks, _CELLS), np.uint8)
     _write_all_places(half, side, step_x, step_y, loads, places)
     inside = np.empty(ROWS, np.uint16)

@@ -35,6 +35,7 @@ from lidarium.envs.onboard.state import OperatingState
 from lidarium.envs.options import FloorChoice, ResetOptions
 from lidarium.envs.settings import ExplorationSettings
 from lidarium.envs.simulation.arrays import ENDED
+from lidarium.mapping.turns import new_turns
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -130,6 +131,7 @@ class EpisodeBatch:
         )  # fmt: skip
         self._commands = np.zeros((self.rows, 2))
         self._states = np.full(self.rows, OperatingState.OPERATING.value, object)
+        self._orders = [np.arange(self.episodes), np.arange(self.episodes)[::-1].copy()]
 
     @property
     def rewards(self) -> NDArray[np.float64]:
@@ -225,10 +227,13 @@ class EpisodeBatch:
             return
         threads = self.world.threads
         self.world.use_threads()
+        # To and fro: the maps of the episodes that ran last are in the caches yet.
+        self._orders.reverse()
         run = run_parallel if threads > 1 else run_serial
         run(
             self.world.table, self.robots, modes, commands, self.level.drives, self.level.following, self._tally,
-            self.settings.decision_steps, seen, *self._writer.arguments(self.world, self._offsets, self.observations, self._goals), threads,
+            self.settings.decision_steps, seen, *self._writer.arguments(self.world, self._offsets, self.observations, self._goals),
+            self._orders[0], new_turns(), threads,
         )  # fmt: skip
 
     def _run_staged(self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]) -> None:

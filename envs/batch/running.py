@@ -12,6 +12,7 @@ from lidarium.envs.scorer import is_near
 from lidarium.envs.simulation.arrays import WorldArrays, world_at
 from lidarium.envs.simulation.stepping import step_episode
 from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.turns import take_turn
 
 WAITS, LOOKS, STEPS, DECIDES = range(4)
 """What an episode does in a call: nothing; it takes the scan at the start; one step by the commands given; or up to the longest
@@ -131,14 +132,20 @@ def _run_episodes(
     known: Arrays,
     limits: Arrays,
     observed: Arrays,
-    pieces: int,
+    order: Array,
+    turns: Array,
+    threads: int,
 ) -> None:
     """Run the episodes by their ``modes`` (episodes,), on so many threads, and write the observations of ``seen`` rows.
 
-    An episode's observations are written right after its run, while its maps are in the thread's cache.
+    An episode's observations are written right after its run, while its maps are in the thread's cache. Threads take the episodes by
+    ``new_turns`` in the ``order`` (episodes,) int64.
     """
-    for piece in numba.prange(pieces):
-        for episode in range(piece, modes.shape[0], pieces):
+    for _ in numba.prange(threads):
+        turn = take_turn(turns)
+        while turn < order.shape[0]:
+            episode = order[turn]
+            turn = take_turn(turns)
             if modes[episode] != WAITS:
                 _run_episode(table, robots, episode, modes[episode], commands, drives, following, tally, longest)
                 for row in range(episode * robots, (episode + 1) * robots):

@@ -24,6 +24,7 @@ from lidarium.mapping.grid_search import LARGEST_BUDGET, STRAIGHT
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.path_search import clear_memory, search_all
 from lidarium.mapping.search_targets import disc_spans
+from lidarium.mapping.turns import new_turns, take_turn
 
 CANDIDATES = 16
 """Most frontiers that a robot chooses among."""
@@ -217,11 +218,13 @@ def _renew_teams(
     is_live: Array,
     is_offered: Array,
     reasons: Array,
+    turns: Array,
     pieces: int,
 ) -> None:
     """Give up what robots chose in vain, then offer anew, in so many pieces."""
     for piece in numba.prange(pieces):
-        for k in range(piece, len(episodes), pieces):
+        k = take_turn(turns)
+        while k < len(episodes):
             _give_up(planning, maps, drives, looking, choices, episodes[k], is_live, reasons)
             cells, starts = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
             listed = -1
@@ -233,6 +236,7 @@ def _renew_teams(
                     record = planning.records[listed]
                     cells, starts = frontier_clusters(flags_of(record), tiles_of(record), 1)
                 _offer(planning, looking, offers, row, cells, starts, piece)
+            k = take_turn(turns)
 
 
 _renew_teams_serial = kernel(_renew_teams)
@@ -325,7 +329,7 @@ class FrontierOffers:
             renew = _renew_teams_parallel if threads > 1 else _renew_teams_serial
             renew(
                 self._driver.planning(rows, with_frontiers=True), self._perception.maps, self._driver.drives, looking, self.offers,
-                self.choices, episodes, is_live, is_offered, reasons, threads,
+                self.choices, episodes, is_live, is_offered, reasons, new_turns(), threads,
             )  # fmt: skip
         return reasons
 

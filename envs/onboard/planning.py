@@ -13,6 +13,7 @@ from lidarium.envs.onboard.navigation import COLUMNS, ROWS, TeamMaps, closeness_
 from lidarium.mapping.kernels import Array, kernel
 from lidarium.mapping.path_search import Passage, budget_of, find_path
 from lidarium.mapping.path_smoothing import kept_places, line_is_clear
+from lidarium.mapping.turns import take_turn
 
 MATE_DISTANCE = 0.06
 """Paths round teammates keep this gap to them [m]."""
@@ -241,10 +242,13 @@ def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> N
         avoided = ended
 
 
-def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, episodes: Array, is_blocked: Array, pieces: int) -> None:
+def _prepare_teams(
+    planning: Planning, drives: Drives, maps: TeamMaps, episodes: Array, is_blocked: Array, turns: Array, pieces: int
+) -> None:
     """Prepare the live robots of some teams, in their order, on fresh maps, in so many pieces; note where a robot is blocked."""
     for piece in numba.prange(pieces):
-        for k in range(piece, len(episodes), pieces):
+        k = take_turn(turns)
+        while k < len(episodes):
             first = episodes[k] * planning.robots
             is_fresh = False
             for row in range(first, first + planning.robots):
@@ -257,6 +261,7 @@ def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, episodes:
                     prepare_robot(planning, drives, row, piece)
                 if drives.states[row] == BLOCKED:
                     is_blocked[k] = True
+            k = take_turn(turns)
 
 
 prepare_teams_serial = kernel(_prepare_teams)

@@ -34,6 +34,7 @@ from lidarium.envs.simulation.arrays import ENDED
 from lidarium.mapping.clearance import limit_of
 from lidarium.mapping.grid_planning import Cell, Disc, Footprint, cells_of, discs_of, passage_of
 from lidarium.mapping.path_search import Passage
+from lidarium.mapping.turns import new_turns
 
 BODY_MARGIN = 0.002
 """Paths keep the body this far from occupied cells [m]."""
@@ -152,7 +153,7 @@ class TeamDriver:
             planning = self.planning(rows[drives.is_ordered[rows] & (self._perception.world.flags[rows] & ENDED == 0)])
             threads = self._perception.threads_for(len(simple))
             prepare = prepare_teams_parallel if threads > 1 else prepare_teams_serial
-            prepare(planning, drives, self._perception.maps, simple, is_blocked, threads)
+            prepare(planning, drives, self._perception.maps, simple, is_blocked, new_turns(), threads)
         for episode in simple[is_blocked]:
             self._settle_team(int(episode))
         for episode in episodes[has_refuge]:

@@ -2,6 +2,7 @@
 
 import math
 import mmap
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,32 +14,57 @@ from lidarium.mapping.pooled_maps import touch
 LEAST_MARGIN = 8.0
 """Maps of robots whose poses drift reach at least this far beyond the floor [m]."""
 
+PIECE = 2**20
+"""Memory is asked for in pieces of at least this size [bytes]; what is not touched of a piece takes no room."""
+
+LINE = 64
+"""A line of the caches [bytes]."""
+
+Number = TypeVar("Number", bound=np.generic)
+
 Map = tuple[NDArray[np.int8], tuple[float, float]]
 """Log-odds (rows, columns), and where cell (0, 0) begins [m]."""
 
 
-def blank_map(rows: int, columns: int) -> NDArray[np.int8]:
-    """Return a map of zeros of its own pages, which the system provides where they are touched.
+class Pages:
+    """Blank memory for the arrays of an episode, one beside the other, which the system provides where it is touched.
 
-    What numpy allocates may come from memory that was used before, which has to be written over as a whole.
+    What numpy allocates may come from memory that was used before, which has to be written over as a whole. An array keeps the memory of
+    all alive that came from one piece.
     """
-    return np.frombuffer(mmap.mmap(-1, max(rows * columns, 1)), np.int8, rows * columns).reshape(rows, columns)
+
+    def __init__(self) -> None:
+        self._left = np.zeros(0, np.uint8)
+
+    def blank(self, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
+        """Return an array of zeros that begins on a line of the caches."""
+        size = math.prod(shape) * np.dtype(kind).itemsize
+        if size > self._left.size:
+            self._left = np.frombuffer(_private_memory(max(size, PIECE)), np.uint8)
+        array = self._left[:size].view(kind).reshape(shape)
+        self._left = self._left[-(-size // LINE) * LINE :]
+        return array
 
 
-def map_around_start(floor: FloorTables, resolution: float) -> Map:
+def _private_memory(size: int) -> mmap.mmap:
+    """Return blank memory that a fork of this process does not share."""
+    return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS) if hasattr(mmap, "MAP_PRIVATE") else mmap.mmap(-1, size)
+
+
+def map_around_start(pages: Pages, floor: FloorTables, resolution: float) -> Map:
     """Return a map in the start's own frame that holds the whole floor, however it is turned."""
     rows, columns = floor.laser.solid.shape
     # A square around the start, in steps of 32 m: its size and place tell nothing of the floor's shape.
     diagonal = math.hypot(rows, columns) * floor.laser.resolution
     half = math.ceil(math.ceil(diagonal / 32.0) * 32.0 / resolution / WORD) * WORD
-    return blank_map(2 * half, 2 * half), (-half * resolution, -half * resolution)
+    return pages.blank((2 * half, 2 * half), np.int8), (-half * resolution, -half * resolution)
 
 
-def map_with_margin(floor: FloorTables, rows: int, columns: int, resolution: float) -> Map:
+def map_with_margin(pages: Pages, floor: FloorTables, rows: int, columns: int, resolution: float) -> Map:
     """Return a map on the floor's lattice of ``rows`` x ``columns`` cells that reaches beyond it, for poses that drift."""
     margin = math.ceil(max(LEAST_MARGIN, 0.5 * math.hypot(rows, columns) * resolution) / resolution / WORD) * WORD
     x, y = floor.laser.origin
-    return blank_map(rows + 2 * margin, columns + 2 * margin), (x - margin * resolution, y - margin * resolution)
+    return pages.blank((rows + 2 * margin, columns + 2 * margin), np.int8), (x - margin * resolution, y - margin * resolution)
 
 
 def wipe(log_odds: NDArray[np.int8], touched: NDArray[np.uint64], window: NDArray[np.int64]) -> None:

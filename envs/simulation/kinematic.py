@@ -16,7 +16,7 @@ from scipy import ndimage
 from lidarium.envs.coverage import pack_bits
 from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.simulation.arrays import DEAD_RECKONING, KNOWN_MATES, OWN_FRAME, SOME_MATES, TRUE_POSE, WorldArrays, table_of
-from lidarium.envs.simulation.belief_maps import blank, blank_map, map_around_start, map_with_margin, wipe
+from lidarium.envs.simulation.belief_maps import Pages, blank, map_around_start, map_with_margin, wipe
 from lidarium.envs.simulation.faults import FAULT_NUMBERS, NO_FAULTS, FaultSettings, plan_faults
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.lidar import Lidar
@@ -209,9 +209,11 @@ class KinematicWorld:
         free = swept_free_space(floor.body, self.smallest_radius, starts) & (floor.laser.solid == 0)
         counted = self._shared(episode, floor, pack_bits(counted_cells(free, multiple)))
         rows, words = counted.shape
+        # What an episode's step goes through lies together.
+        pages = Pages()
         self.floors[episode] = floor
         self._frames[episode] = floor.frame
-        self.counted_masks[episode], self.team_masks[episode] = counted, np.zeros_like(counted)
+        self.counted_masks[episode], self.team_masks[episode] = counted, pages.blank(counted.shape, np.uint64)
         self.counted[episode] = int(np.bitwise_count(counted).sum())
         self.team_seen[episode], self.seeds[episode] = 0, seed
         # The scan at the start is taken before step 0.
@@ -225,22 +227,23 @@ class KinematicWorld:
         self.odometry[first:last], self.measured[first:last], self.failed[first:last] = 0.0, 0.0, 0
         self.faults[first:last] = self._plan_faults(floor, free, starts, seed)
         for row in range(first, last):
-            self.masks[row] = np.zeros_like(counted)
+            self.masks[row] = pages.blank(counted.shape, np.uint64)
             if known_starts and self._is_true:
                 self.believed[row], self.origins[row] = starts[row - first], floor.laser.origin
-                self.log_odds[row] = blank_map(rows, words * WORD)
+                self.log_odds[row] = pages.blank((rows, words * WORD), np.int8)
             elif known_starts:
                 self.believed[row] = starts[row - first]
-                self.log_odds[row], self.origins[row] = map_with_margin(floor, rows, words * WORD, self.occupancy.resolution)
+                self.log_odds[row], self.origins[row] = map_with_margin(pages, floor, rows, words * WORD, self.occupancy.resolution)
             else:
                 self.believed[row] = 0.0
-                self.log_odds[row], self.origins[row] = map_around_start(floor, self.occupancy.resolution)
+                self.log_odds[row], self.origins[row] = map_around_start(pages, floor, self.occupancy.resolution)
             height, width = self.log_odds[row].shape
             # At scale 1 a map is its own pooled map.
             self._pools[row] = [
-                np.zeros((-(-height // scale), -(-width // scale)), np.int8) if scale > 1 else self.log_odds[row] for scale in self.scales
+                pages.blank((-(-height // scale), -(-width // scale)), np.int8) if scale > 1 else self.log_odds[row]
+                for scale in self.scales
             ]
-            self._touched[row] = untouched(height if self.scales else 0, width)
+            self._touched[row] = pages.blank(untouched(height if self.scales else 0, width).shape, np.uint64)
         self._point_at(episode)
         self.starts[first:last] = starts
         self.contact[first:last], self.heard[first:last] = 0, 0.0
