@@ -38,7 +38,7 @@ def count_bits(value: np.uint64) -> int:
     return int((value * np.uint64(0x0101010101010101)) >> np.uint64(56))
 
 
-@kernel
+@kernel(borrowing=True)
 def mark_seen(
     own: Array, counted: Array, bits: Array, box: tuple[int, int, int, int], row_offset: int, word_offset: int, news: Array
 ) -> int:
@@ -83,7 +83,7 @@ def mark_seen(
     return new
 
 
-@kernel
+@kernel(borrowing=True)
 def share_news(owns: Array, team: Array, news: Array, first: int, robots: int, gains: Array) -> int:
     """Credit each cell that is new to the team in equal parts to the robots that saw it in this step, in robot order.
 
@@ -142,7 +142,7 @@ def share_news(owns: Array, team: Array, news: Array, first: int, robots: int, g
     return total
 
 
-@kernel
+@kernel(borrowing=True)
 def add_rewards(gains: Array, contacts: Array, travelled: Array, weights: Array, travelled_before: Array, rewards: Array) -> None:
     """Add each robot's reward of a step: its share of the new cells less the prices of time, contact and energy.
 

@@ -62,7 +62,7 @@ def action_space() -> spaces.Box:
     return spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 
-@kernel
+@kernel(borrowing=True)
 def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None:
     """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``."""
     table, offsets, goals, pools = known

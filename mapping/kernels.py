@@ -21,7 +21,7 @@ import numpy as np
 from numba import types
 from numba.core import config
 from numba.extending import intrinsic
-from numba.np.numpy_support import carray
+from numba.np import arrayobj
 from numpy.typing import NDArray
 
 from lidarium.mapping.files import first_writable, user_cache_folder
@@ -30,6 +30,10 @@ Array = NDArray[Any]
 """An array in the signature of a kernel; its docstring gives shape and type."""
 
 _numba_config: Any = config
+_numba_arrays: Any = arrayobj
+
+_LINE = 64
+"""A line of the caches [bytes]."""
 
 PACKAGE_FOLDERS = ("mapping", "envs", "evaluation")
 
@@ -72,7 +76,14 @@ def is_cache_empty() -> bool:
     return folder is not None and next(Path(folder).rglob("*.nbi"), None) is None
 
 
-def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False, inline: bool = False, spliced: bool = False) -> Any:  # noqa: ANN401
+def kernel(
+    function: Callable[..., Any] | None = None,
+    *,
+    parallel: bool = False,
+    inline: bool = False,
+    spliced: bool = False,
+    borrowing: bool = False,
+) -> Any:  # noqa: ANN401
     """Compile a function of arrays with numba: nopython, exact floating point, no GIL, cached.
 
     Parameters
@@ -88,6 +99,10 @@ def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False
     spliced : bool
         Whether numba puts the function's body into its callers before it compiles them. For thin functions around heavy ones: what
         lies below a compiled function is compiled again with every caller.
+    borrowing : bool
+        Whether the function only works on arrays that others hold: it makes none but by ``scratch_vector`` and ``scratch_grid``, and
+        returns none but views at addresses. Nothing is counted then, where each array that is handed on is counted twice otherwise, and
+        the forty of a world as well.
 
     Returns
     -------
@@ -98,6 +113,8 @@ def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False
     def decorate(target: Callable[..., Any]) -> Any:  # noqa: ANN401
         # Division by zero gives inf or nan, as in numpy: a check before each division would keep loops off vector registers.
         options: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "parallel": parallel, "cache": _CAN_CACHE}
+        # Told to every kernel: one that says nothing would take over what the first of its callers says.
+        options["_nrt"] = not borrowing
         if inline:
             options["forceinline"] = True
         if spliced:
@@ -114,70 +131,123 @@ def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False
     return decorate if function is None else decorate(function)
 
 
-def _pointer_at(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
-    """Turn an integer into a pointer inside a kernel."""
+def _fill_view(context: Any, builder: Any, kind: Any, address: Any, shape: list[Any]) -> Any:  # noqa: ANN401
+    """Return an array of a kind at an address that nobody counts."""
+    view = context.make_array(kind)(context, builder)
+    size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    strides = [context.get_constant(types.intp, size)]
+    for length in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], length))
+    pointer = builder.inttoptr(address, view.data.type)
+    _numba_arrays.populate_array(
+        view, data=pointer, shape=shape, strides=strides, itemsize=context.get_constant(types.intp, size), meminfo=None
+    )
+    return view._getvalue()
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
-    return types.voidptr(address), generate
+def _vector_of(typing_context: Any, address: Any, count: Any, kind: Any) -> Any:  # noqa: ANN401
+    """View a vector of a kind at an address inside a kernel."""
+    array = types.Array(kind.dtype, 1, "C")
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        return _fill_view(context, builder, array, arguments[0], [arguments[1]])
+
+    return array(types.intp, types.intp, kind), generate
 
 
-_pointer: Any = intrinsic(_pointer_at)
+def _grid_of(typing_context: Any, address: Any, rows: Any, columns: Any, kind: Any) -> Any:  # noqa: ANN401
+    """View a grid of a kind at an address inside a kernel."""
+    array = types.Array(kind.dtype, 2, "C")
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        return _fill_view(context, builder, array, arguments[0], list(arguments[1:3]))
+
+    return array(types.intp, types.intp, types.intp, kind), generate
 
 
-@kernel(inline=True)
+def _room_for(typing_context: Any, count: Any, kind: Any) -> Any:  # noqa: ANN401
+    """Set aside room for so many numbers of a kind on the stack of the kernel that asks, until it returns; tell its address."""
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        room = builder.alloca(context.get_data_type(kind.dtype), arguments[0])
+        room.align = _LINE
+        return builder.ptrtoint(room, context.get_value_type(types.intp))
+
+    return types.intp(types.intp, kind), generate
+
+
+_vector_view: Any = intrinsic(_vector_of)
+_grid_view: Any = intrinsic(_grid_of)
+_room: Any = intrinsic(_room_for)
+
+
+@kernel(spliced=True)
+def scratch_vector(count: int, kind: Any) -> Any:  # noqa: ANN401
+    """Return ``count`` numbers of a kind, undefined at first, that are gone when the kernel that asks for them returns.
+
+    For some numbers a beam, not for grids: a stack holds a few megabytes. Not within a loop, which would set aside room each time.
+    """
+    return _vector_view(_room(count, kind), count, kind)
+
+
+@kernel(spliced=True)
+def scratch_grid(rows: int, columns: int, kind: Any) -> Any:  # noqa: ANN401
+    """Return a (rows, columns) grid in the way of ``scratch_vector``."""
+    return _grid_view(_room(rows * columns, kind), rows, columns, kind)
+
+
+@kernel(spliced=True)
 def vector_at(address: int, count: int, kind: Any) -> Any:  # noqa: ANN401
-    """View ``count`` numbers of a kind (such as np.float64) at an address inside a kernel."""
-    return carray(_pointer(address), (count,), kind)
+    """View ``count`` numbers of a kind (such as np.float64) at an address inside a kernel; the caller keeps the array alive."""
+    return _vector_view(address, count, kind)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def grid_at(address: int, rows: int, columns: int, kind: Any) -> Any:  # noqa: ANN401
     """View a (rows, columns) grid of a kind (such as np.float64) at an address inside a kernel."""
-    return carray(_pointer(address), (rows, columns), kind)
+    return _grid_view(address, rows, columns, kind)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def bytes_at(address: int, count: int) -> Any:  # noqa: ANN401
-    """View ``count`` uint8 at an address inside a kernel; the caller keeps the array alive."""
-    return carray(_pointer(address), (count,), np.uint8)
+    """View ``count`` uint8 at an address inside a kernel."""
+    return _vector_view(address, count, np.uint8)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def int8_at(address: int, count: int) -> Any:  # noqa: ANN401
     """View ``count`` int8 at an address inside a kernel: a part of a row at less cost than a slice."""
-    return carray(_pointer(address), (count,), np.int8)
+    return _vector_view(address, count, np.int8)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def int8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) int8 grid at an address inside a kernel."""
-    return carray(_pointer(address), (rows, columns), np.int8)
+    return _grid_view(address, rows, columns, np.int8)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def uint8_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) uint8 grid at an address inside a kernel."""
-    return carray(_pointer(address), (rows, columns), np.uint8)
+    return _grid_view(address, rows, columns, np.uint8)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def uint16_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) uint16 grid at an address inside a kernel."""
-    return carray(_pointer(address), (rows, columns), np.uint16)
+    return _grid_view(address, rows, columns, np.uint16)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def word_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) uint64 grid at an address inside a kernel."""
-    return carray(_pointer(address), (rows, columns), np.uint64)
+    return _grid_view(address, rows, columns, np.uint64)
 
 
-@kernel(inline=True)
+@kernel(spliced=True)
 def int32_table_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) int32 table at an address inside a kernel."""
-    return carray(_pointer(address), (rows, columns), np.int32)
+    return _grid_view(address, rows, columns, np.int32)
 
 
 def available_threads() -> int:

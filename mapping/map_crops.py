@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from lidarium.mapping.cell_blocks import HALF_BLOCK, write_levels
-from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel
+from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel, scratch_grid
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.turned_blocks import CAN_LOOK_UP_IN_REGISTERS, turn_blocks
 from lidarium.mapping.turned_blocks import SIDE as BLOCK_SIDE
@@ -30,7 +30,7 @@ def _level(log_odds: int) -> np.uint8:
     return _FREE if log_odds < 0 else (_OCCUPIED if log_odds > 0 else _UNKNOWN)
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _write_row(log_odds: int, count: int, levels: int) -> None:
     """Write ``count`` cells from one address on as levels from another on."""
     if count < HALF_BLOCK:
@@ -44,7 +44,7 @@ def _write_row(log_odds: int, count: int, levels: int) -> None:
     write_levels(log_odds + count - HALF_BLOCK, levels + count - HALF_BLOCK)
 
 
-@kernel
+@kernel(borrowing=True)
 def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
     """Copy the cells around (row, column) into ``crop`` (side, side), contiguous, as levels; unknown outside of the map."""
     side = crop.shape[0]
@@ -78,12 +78,12 @@ def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Arra
         _look_up(patch, places, crops[k].reshape(cells * cells).view(np.uint32))
 
 
-@kernel
+@kernel(borrowing=True)
 def turn_in_registers(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
     """Fill the crops of ``crop_turned`` by blocks: of a side that is a multiple of ``BLOCK_SIDE``, where ``CAN_LOOK_UP_IN_REGISTERS``."""
     cosine, sine = math.cos(heading), math.sin(heading)
     half = _half_patch(crops.shape[1], cosine, sine)
-    corners = np.empty((scales.shape[0], 2), np.int64)
+    corners = scratch_grid(scales.shape[0], 2, np.int64)
     for k in range(scales.shape[0]):
         row, column = _nearest_corner(x, y, scales[k])
         corners[k, 0], corners[k, 1] = row - half, column - half
@@ -166,7 +166,7 @@ def _places(half: int, width: int, step_x: int, step_y: int, cells: int) -> Arra
     return places.reshape(cells * cells)
 
 
-@kernel
+@kernel(borrowing=True)
 def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
     """Fill crops that are turned with a robot, as levels; unknown outside of the map.
 

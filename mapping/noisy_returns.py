@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from lidarium.mapping.kernels import Array, int8_at, kernel
+from lidarium.mapping.kernels import Array, int8_at, kernel, scratch_vector
 
 DEVIATIONS = 3.0
 """Noise explains so many of its standard deviations, and one cell."""
@@ -20,7 +20,7 @@ STEP = 0.5
 """Beams are walked back from their ends in steps of this [cells]."""
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _is_beside_free(log_odds: Array, row: int, column: int) -> bool:
     """Whether one of the four cells beside a cell is free, so that the cell may be a wall's surface."""
     rows, columns = log_odds.shape
@@ -33,21 +33,21 @@ def _is_beside_free(log_odds: Array, row: int, column: int) -> bool:
     )
 
 
-@kernel
-def _unsettled(log_odds: Array, x: float, y: float, lengths: Array, directions: Array, is_hit: Array, occupied: int) -> Array:
-    """Which returns have to be looked at: neither in an occupied cell nor beside a free one, as most are, or at the map's border.
+@kernel(borrowing=True)
+def _unsettled(log_odds: Array, x: float, y: float, lengths: Array, directions: Array, is_hit: Array, occupied: int, listed: Array) -> int:
+    """List the returns that have to be looked at: neither in an occupied cell nor beside a free one, as most are, or at the map's border.
 
-    They are listed without branches, which could not be foreseen.
+    They are listed without branches, which could not be foreseen; tells how many there are.
     """
     rows, columns = log_odds.shape
     beams = lengths.shape[0]
-    cells, is_inner = np.empty(beams, np.int32), np.empty(beams, np.bool_)
+    cells, is_inner = scratch_vector(beams, np.int32), scratch_vector(beams, np.bool_)
     for beam in range(beams):
         row = np.int32(math.floor(y + lengths[beam] * directions[1, beam]))
         column = np.int32(math.floor(x + lengths[beam] * directions[0, beam]))
         is_inner[beam] = (row > 0) & (row < rows - 1) & (column > 0) & (column < columns - 1)
         cells[beam] = row * np.int32(columns) + column
-    listed, count = np.empty(beams, np.int32), np.uintp(0)
+    count = np.uintp(0)
     flat, above, beside = int8_at(log_odds.ctypes.data, rows * columns), np.uintp(columns), np.uintp(1)
     for beam in range(beams):
         if not is_hit[beam]:
@@ -60,10 +60,10 @@ def _unsettled(log_odds: Array, x: float, y: float, lengths: Array, directions: 
             count += np.uintp((around >= 0) & (flat[cell] < occupied))
         else:
             count += np.uintp(1)
-    return listed[:count]
+    return int(count)
 
 
-@kernel
+@kernel(borrowing=True)
 def settle_returns(
     log_odds: Array, x: float, y: float, lengths: Array, directions: Array, is_hit: Array, deviation: float, share: float, occupied: int
 ) -> None:
@@ -87,7 +87,9 @@ def settle_returns(
         Log-odds from which on a cell counts as occupied.
     """
     rows, columns = log_odds.shape
-    for beam in _unsettled(log_odds, x, y, lengths, directions, is_hit, occupied):
+    listed = scratch_vector(lengths.shape[0], np.int32)
+    for k in range(_unsettled(log_odds, x, y, lengths, directions, is_hit, occupied, listed)):
+        beam = listed[k]
         end = lengths[beam]
         row, column = int(math.floor(y + end * directions[1, beam])), int(math.floor(x + end * directions[0, beam]))
         if _is_beside_free(log_odds, row, column):

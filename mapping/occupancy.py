@@ -66,7 +66,7 @@ class OccupancySettings:
         return np.array([round(value / LOG_ODDS_UNIT) for value in (self.hit, self.miss, self.minimum, self.maximum)], np.int64)
 
 
-@kernel
+@kernel(borrowing=True)
 def _note_hits(ends: Array, is_hit: Array, hit_bits: Array) -> None:
     """Set the bits of the cells in which beams ended."""
     flat, words = hit_bits.reshape(-1), hit_bits.shape[1]
@@ -75,7 +75,7 @@ def _note_hits(ends: Array, is_hit: Array, hit_bits: Array) -> None:
         flat[np.uintp(row * words + (column >> 6))] |= np.uint64(is_hit[beam]) << np.uint64(column & 63)
 
 
-@kernel
+@kernel(borrowing=True)
 def integrate_scan(
     log_odds: Array,
     bits: Array,

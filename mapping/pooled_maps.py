@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.bit_words import first_bit
 from lidarium.mapping.cell_blocks import write_greatest
-from lidarium.mapping.kernels import Array, kernel, vector_at
+from lidarium.mapping.kernels import Array, kernel, scratch_vector, vector_at
 from lidarium.mapping.occupancy import WORD
 
 
@@ -33,7 +33,7 @@ def touch(touched: NDArray[np.uint64], rows: tuple[int, int], words: tuple[int, 
         touched[of_rows + row // WORD, 0] |= np.uint64(1 << row % WORD)
 
 
-@kernel
+@kernel(borrowing=True)
 def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> None:
     """Bring a pooled map up to date where levels of the map have changed.
 
@@ -49,7 +49,7 @@ def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> 
         Of the sign of the greatest log-odds of the cells of each pooled cell; what a pooled cell has beyond the map counts as
         unknown.
     """
-    rows, greatest = log_odds.shape[0], np.empty(WORD, np.int8)
+    rows, greatest = log_odds.shape[0], scratch_vector(WORD, np.int8)
     for group in range(rows, touched.shape[0]):
         left = touched[group, 0]
         while left != np.uint64(0):
@@ -66,7 +66,7 @@ def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> 
             left = left >> np.uint64(end & 63) << np.uint64(end & 63) if end & 63 else np.uint64(0)
 
 
-@kernel
+@kernel(borrowing=True)
 def forget_touched(touched: Array, rows: int) -> None:
     """Forget where a map of so many rows has changed."""
     for group in range(rows, touched.shape[0]):
@@ -77,7 +77,7 @@ def forget_touched(touched: Array, rows: int) -> None:
             left &= left - np.uint64(1)
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _pool_word(log_odds: Array, row: int, word: int, scale: int, greatest: Array, pooled: Array) -> None:
     """Write the pooled cells of a word of 64 cells in a row of pooled cells; ``greatest`` (64,) int8 is scratch."""
     rows, columns = log_odds.shape
@@ -95,7 +95,7 @@ def _pool_word(log_odds: Array, row: int, word: int, scale: int, greatest: Array
         pooled[row, column] = _greatest(log_odds, row * scale, column * scale, scale)
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _greatest(log_odds: Array, first_row: int, first_column: int, scale: int) -> np.int8:
     """Return the greatest log-odds of a square of cells; beyond the map they are 0."""
     last_row, last_column = min(first_row + scale, log_odds.shape[0]), min(first_column + scale, log_odds.shape[1])

@@ -13,7 +13,7 @@ however many beams crossed it.
 import numpy as np
 
 from lidarium.mapping.bit_words import running_xor
-from lidarium.mapping.kernels import Array, kernel, vector_at
+from lidarium.mapping.kernels import Array, kernel, scratch_vector, vector_at
 
 GRAZING = 8.0
 """Cotangent of the flattest angle under which two neighbouring end points still belong to one surface."""
@@ -34,7 +34,7 @@ def window_rows(reach: float) -> int:
     return 2 * (int(reach) + 3) + 1
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _toggle_bit(bits: int, place: int) -> None:
     """Toggle a bit of the words at an address.
 
@@ -44,7 +44,7 @@ def _toggle_bit(bits: int, place: int) -> None:
     vector_at(bits + (place >> 6 << 3), 1, np.uint64)[0] ^= np.uint64(1) << np.uint64(place & 63)
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _toggle_edge(bits: int, width: int, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int) -> None:
     """Toggle the cell centres right of the edge, in the rows of ``width`` between its ends (half open, so that corners count once)."""
     slope = (to_x - from_x) / (to_y - from_y)
@@ -61,7 +61,7 @@ def _row_of(y: float) -> int:
     return int(y + 0.5)
 
 
-@kernel
+@kernel(borrowing=True)
 def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array) -> None:
     """Fill ``ends`` (2, beams) with the end points of the beams in the window [cells].
 
@@ -82,7 +82,7 @@ def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array
         ends[1, beam] = y + lengths[beam] * directions[1, beam]
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _toggle_between(
     bits: int, width: int, lengths: Array, directions: Array, ends: Array, x: float, y: float, previous: int, beam: int, steepness: float
 ) -> None:
@@ -103,9 +103,12 @@ def _toggle_between(
             _toggle_edge(bits, width, ends[0, end], ends[1, end], corner_x, corner_y, end_row, row)
 
 
-@kernel
-def _edges(lengths: Array, ends: Array, rows: Array, steepness: float, width: int) -> tuple[Array, Array, Array, Array, Array]:
-    """How many rows the edge from each beam to the next crosses (or ``JUMP``), which bits it toggles in the first two, and its line.
+@kernel(borrowing=True)
+def _find_edges(
+    lengths: Array, ends: Array, rows: Array, steepness: float, width: int,
+    crossed: Array, first: Array, second: Array, crossings: Array, slopes: Array,
+) -> None:  # fmt: skip
+    """Tell how many rows the edge from each beam to the next crosses (or ``JUMP``), which bits it toggles in the first two, its line.
 
     The line is where it crosses the first row, and by how much farther each one after it. Loops without branches over few arrays,
     which LLVM runs on vectors.
@@ -113,28 +116,23 @@ def _edges(lengths: Array, ends: Array, rows: Array, steepness: float, width: in
     edges = lengths.shape[0] - 1
     from_x, to_x, from_y, to_y = ends[0, :-1], ends[0, 1:], ends[1, :-1], ends[1, 1:]
     from_row, to_row, from_length, to_length = rows[:-1], rows[1:], lengths[:-1], lengths[1:]
-    crossed = np.empty(edges, np.uint8)
     for k in range(edges):
         step = abs(to_length[k] - from_length[k])
         climb = abs(to_row[k] - from_row[k])
         is_surface = (step <= 1.0 + steepness * min(from_length[k], to_length[k])) & (climb < JUMP)
         crossed[k] = np.uint8(climb) if is_surface else JUMP
-    slopes, crossings = np.empty(edges), np.empty(edges)
     for k in range(edges):
         slopes[k] = (to_x[k] - from_x[k]) / (to_y[k] - from_y[k])
     for k in range(edges):
         crossings[k] = from_x[k] + (min(from_row[k], to_row[k]) + 0.5 - from_y[k]) * slopes[k] + 0.5
-    places = np.empty((2, edges), np.int32)
-    first, second = places[0], places[1]
     stride = np.int32(width)
     for k in range(edges):
         first[k] = min(from_row[k], to_row[k]) * stride + np.int32(crossings[k])
     for k in range(edges):
         second[k] = (min(from_row[k], to_row[k]) + np.int32(1)) * stride + np.int32(crossings[k] + slopes[k])
-    return crossed, first, second, crossings, slopes
 
 
-@kernel
+@kernel(borrowing=True)
 def fill_scan_polygon(
     lengths: Array, directions: Array, ends: Array, x: float, y: float, increment: float, is_full_circle: bool, bits: Array
 ) -> tuple[int, int, int, int]:
@@ -166,7 +164,7 @@ def fill_scan_polygon(
             end_row = _row_of(ends[1, beam])
             if end_row != own_row:
                 _toggle_edge(flat, width, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
-    rows, columns = np.empty(beams, np.int32), np.empty(beams, np.int32)
+    rows, columns = scratch_vector(beams, np.int32), scratch_vector(beams, np.int32)
     for beam in range(beams):
         rows[beam], columns[beam] = np.int32(ends[1, beam] + 0.5), np.int32(ends[0, beam])
     low_row, high_row, low_column, high_column = np.int32(y), np.int32(y), np.int32(x), np.int32(x)
@@ -176,8 +174,10 @@ def fill_scan_polygon(
     steepness = GRAZING * increment
     if is_full_circle:
         _toggle_between(flat, width, lengths, directions, ends, x, y, beams - 1, 0, steepness)
-    crossed, first, second, crossings, slopes = _edges(lengths, ends, rows, steepness, width)
-    toggles, listed = np.empty(2 * beams + 2, np.int32), np.uintp(0)
+    crossed, first, second = scratch_vector(beams, np.uint8), scratch_vector(beams, np.int32), scratch_vector(beams, np.int32)
+    crossings, slopes = scratch_vector(beams, np.float64), scratch_vector(beams, np.float64)
+    _find_edges(lengths, ends, rows, steepness, width, crossed, first, second, crossings, slopes)
+    toggles, listed = scratch_vector(2 * beams + 2, np.int32), np.uintp(0)
     for k in range(beams - 1):
         count = crossed[k]
         if count == JUMP:

@@ -63,7 +63,7 @@ class ScanGeometry:
         return np.stack([np.cos(self.angles), np.sin(self.angles)])
 
 
-@kernel
+@kernel(borrowing=True)
 def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> None:
     """Turn the beams' unit vectors (2, beams) by the heading, into ``directions`` (4, beams): x, y and their inverses."""
     cosine, sine = math.cos(heading), math.sin(heading)
@@ -81,9 +81,8 @@ def fast_angle(y: float, x: float) -> float:
     """Angle of (x, y) to within 2e-5 rad [rad], after Abramowitz and Stegun 4.4.49."""
     absolute_x, absolute_y = abs(x), abs(y)
     larger, smaller = max(absolute_x, absolute_y), min(absolute_x, absolute_y)
-    if larger == 0.0:
-        return 0.0
-    z = smaller / larger
+    # Without a branch, so that loops over many angles run on vectors.
+    z = smaller / max(larger, 5e-324)
     square = z * z
     angle = z * (0.9998660 + square * (-0.3302995 + square * (0.1801410 + square * (-0.0851330 + square * 0.0208351))))
     if absolute_y > absolute_x:

@@ -14,7 +14,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from lidarium.mapping.cell_blocks import fetch_block
-from lidarium.mapping.kernels import Array, kernel, vector_at
+from lidarium.mapping.kernels import Array, kernel, scratch_grid, scratch_vector, vector_at
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.processor import has_feature
 
@@ -149,7 +149,7 @@ _block: Any = intrinsic(_write_block)
 _border: Any = intrinsic(_write_border)
 
 
-@kernel
+@kernel(borrowing=True)
 def _write_all_places(half: int, cells: int, step_x: int, step_y: int, corners: Array, places: Array) -> None:
     """Tell which part of a patch of 2 * ``half`` rows each block of a crop loads, and where its cells lie in it.
 
@@ -162,7 +162,7 @@ def _write_all_places(half: int, cells: int, step_x: int, step_y: int, corners: 
     places : (blocks, 64) uint8
         Result: 16 * row + column of each cell in what its block loads.
     """
-    offsets = np.empty((2, _CELLS), np.int32)
+    offsets = scratch_grid(2, _CELLS, np.int32)
     for i in range(SIDE):
         for j in range(SIDE):
             offsets[0, i * SIDE + j], offsets[1, i * SIDE + j] = 2 * (j * step_x - i * step_y), 2 * (j * step_y + i * step_x)
@@ -179,7 +179,7 @@ def _write_all_places(half: int, cells: int, step_x: int, step_y: int, corners: 
             _places_of_block(x, y, row * COLUMNS + column, offsets.ctypes.data, places.ctypes.data + block * _CELLS)
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _fill(crop: int, side: int) -> None:
     """Write a block at an address that lies beyond the map."""
     for row in range(SIDE):
@@ -193,7 +193,7 @@ def _bits_within(first: int, count: int, size: int) -> np.uint16:
     return np.uint16((1 << high) - (1 << low))
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _fetch_patch(pool: Array, corner: Array, half: int) -> None:
     """Begin to load the part of a pooled map that a crop touches."""
     rows, columns = pool[1], pool[2]
@@ -203,7 +203,7 @@ def _fetch_patch(pool: Array, corner: Array, half: int) -> None:
             fetch_block(pool[0] + row * columns + column)
 
 
-@kernel
+@kernel(borrowing=True)
 def turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: int, crops: Array) -> None:
     """Fill crops that are turned, block by block.
 
@@ -224,9 +224,9 @@ def turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: in
     blocks = side // SIDE
     for k in range(pools.shape[0]):
         _fetch_patch(pools[k], corners[k], half)
-    loads, places = np.empty((blocks * blocks, 2), np.int64), np.empty((blocks * blocks, _CELLS), np.uint8)
+    loads, places = scratch_grid(blocks * blocks, 2, np.int64), scratch_grid(blocks * blocks, _CELLS, np.uint8)
     _write_all_places(half, side, step_x, step_y, loads, places)
-    inside = np.empty(ROWS, np.uint16)
+    inside = scratch_vector(ROWS, np.uint16)
     for k in range(pools.shape[0]):
         rows, columns = pools[k, 1], pools[k, 2]
         for block in range(blocks * blocks):

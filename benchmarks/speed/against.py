@@ -10,6 +10,7 @@ import argparse
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -49,18 +50,25 @@ def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[st
             place = f" from {block // blocks}" if block % blocks == 0 else ""
             for kind in KINDS:
                 for k, process in enumerate(processes):
-                    assert process.stdin is not None
-                    assert process.stdout is not None
-                    process.stdin.write(f"{kind}{place}\n")
-                    process.stdin.flush()
-                    answer = process.stdout.readline()
+                    answer = _answer(process, f"{kind}{place}\n")
                     if not answer:
                         raise RuntimeError(f"{pythons[k]} has ended; is lidarium with its benchmarks installed there?")
                     found[kind][k, block] = float(answer)
     finally:
         for process in processes:
-            process.communicate()
+            with suppress(BrokenPipeError):
+                process.communicate()
     return found
+
+
+def _answer(process: "subprocess.Popen[str]", question: str) -> str:
+    """Return the line with which a process answers; nothing where it has ended."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    with suppress(BrokenPipeError):
+        process.stdin.write(question)
+        process.stdin.flush()
+    return process.stdout.readline()
 
 
 def main() -> None:

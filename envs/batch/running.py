@@ -43,7 +43,7 @@ class Tally(NamedTuple):
     waiting: NDArray[np.bool_]
 
 
-@kernel
+@kernel(borrowing=True)
 def _is_interrupted(poses: Array, contacts: Array, failed: Array, live: Array, goal: Array, radius: float, stops_on_contact: bool) -> bool:
     """Whether something happened to a robot of the episode that ends it: the goal reached, a collision, a failure."""
     for robot in range(live.shape[0]):
@@ -56,7 +56,7 @@ def _is_interrupted(poses: Array, contacts: Array, failed: Array, live: Array, g
     return False
 
 
-@kernel
+@kernel(borrowing=True)
 def _ends(world: WorldArrays, episode: int, robots: int, drives: Drives, tally: Tally, decides: bool) -> bool:
     """Whether an episode's run ends with the step that was just taken."""
     first, last = episode * robots, (episode + 1) * robots
@@ -98,7 +98,7 @@ def note_ends(modes: Array, robots: int, table: Array, drives: Drives, tally: Ta
             modes[episode] = WAITS
 
 
-@kernel
+@kernel(borrowing=True)
 def _run_episode(
     table: Array, robots: int, episode: int, mode: int, commands: Array, drives: Drives, following: Following, tally: Tally, longest: int
 ) -> None:

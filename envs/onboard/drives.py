@@ -116,13 +116,13 @@ def no_drives(rows: int) -> Drives:
     )
 
 
-@kernel
+@kernel(borrowing=True)
 def drop_path(drives: Drives, row: int) -> None:
     """Forget a robot's path: it stands (kernel)."""
     drives.has_path[row], drives.states[row], drives.stood[row], drives.counts[row] = False, IDLE, 0, 0
 
 
-@kernel
+@kernel(borrowing=True)
 def drive_state(drives: Drives, row: int) -> int:
     """Return the number of what a robot's driving is about (kernel)."""
     if drives.passing[row] >= 0:
@@ -146,21 +146,21 @@ def drive_states(drives: Drives) -> NDArray[np.int8]:
     return numbers
 
 
-@kernel
+@kernel(borrowing=True)
 def is_done(drives: Drives, row: int) -> bool:
     """Whether a robot with a target waits for its next order (kernel)."""
     is_at_rest = drives.states[row] != DRIVING and drives.states[row] != BLOCKED
     return bool(drives.is_ordered[row] and drives.passing[row] < 0 and is_at_rest)
 
 
-@kernel
+@kernel(borrowing=True)
 def mark_waiting(drives: Drives, first: int, last: int, waiting: Array) -> None:
     """Note in ``waiting`` (rows,) bool which of the rows ``first`` to ``last`` wait for their next order (kernel)."""
     for row in range(first, last):
         waiting[row] = is_done(drives, row)
 
 
-@kernel
+@kernel(borrowing=True)
 def any_newly_done(drives: Drives, first: int, last: int, live: Array, waiting: Array) -> bool:
     """Whether a live robot of the rows ``first`` to ``last`` waits for its next order that did not at ``mark_waiting`` (kernel)."""
     newly_done = 0

@@ -1,54 +1,20 @@
-"""The maps that robots begin with: blank, large enough for the floor, of memory that the system provides where it is touched."""
+"""The maps that robots begin with: blank, and large enough for the floor."""
 
 import math
-import mmap
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.mapping.occupancy import WORD
+from lidarium.mapping.pages import Pages
 from lidarium.mapping.pooled_maps import touch
 
 LEAST_MARGIN = 8.0
 """Maps of robots whose poses drift reach at least this far beyond the floor [m]."""
 
-PIECE = 2**20
-"""Memory is asked for in pieces of at least this size [bytes]; what is not touched of a piece takes no room."""
-
-LINE = 64
-"""A line of the caches [bytes]."""
-
-Number = TypeVar("Number", bound=np.generic)
-
 Map = tuple[NDArray[np.int8], tuple[float, float]]
 """Log-odds (rows, columns), and where cell (0, 0) begins [m]."""
-
-
-class Pages:
-    """Blank memory for the arrays of an episode, one beside the other, which the system provides where it is touched.
-
-    What numpy allocates may come from memory that was used before, which has to be written over as a whole. An array keeps the memory of
-    all alive that came from one piece.
-    """
-
-    def __init__(self) -> None:
-        self._left = np.zeros(0, np.uint8)
-
-    def blank(self, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
-        """Return an array of zeros that begins on a line of the caches."""
-        size = math.prod(shape) * np.dtype(kind).itemsize
-        if size > self._left.size:
-            self._left = np.frombuffer(_private_memory(max(size, PIECE)), np.uint8)
-        array = self._left[:size].view(kind).reshape(shape)
-        self._left = self._left[-(-size // LINE) * LINE :]
-        return array
-
-
-def _private_memory(size: int) -> mmap.mmap:
-    """Return blank memory that a fork of this process does not share."""
-    return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS) if hasattr(mmap, "MAP_PRIVATE") else mmap.mmap(-1, size)
 
 
 def map_around_start(pages: Pages, floor: FloorTables, resolution: float) -> Map:

@@ -13,7 +13,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from lidarium.envs.simulation.ray_tables import TILE
-from lidarium.mapping.kernels import Array, kernel, vector_at
+from lidarium.mapping.kernels import Array, kernel, scratch_grid, vector_at
 from lidarium.mapping.scans import fast_angle
 
 CORNER_OVERLAP = 1e-9
@@ -58,7 +58,7 @@ def _lower_lanes(
 _lower: Any = intrinsic(_lower_lanes)
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _draw_face(
     first: int, last: int, beams: int, distance: float, run: float, low: float, high: float, inverse: int, direction: int, ranges: int
 ) -> None:
@@ -82,7 +82,66 @@ def _draw_face(
         _lower(inverse + offset, direction + offset, ranges + offset, distance, run, low, high)
 
 
-@kernel
+@kernel(inline=True, borrowing=True)
+def _list_faces(
+    faces: Array, starts: Array, tile_columns: int, window: tuple[int, int, int, int], direction: int, fixed_own: float, run_own: float,
+    reach: float, listed: Array,
+) -> int:  # fmt: skip
+    """List the faces of a direction that look at the laser and are in reach: distance, low and high end of each; tells how many.
+
+    Most branches on a single face could not be foreseen, so each is written down and counted if it is one.
+    """
+    forward = direction & 1 == 0
+    sign = 1.0 if forward else -1.0
+    count = np.uintp(0)
+    for tile_row in range(window[0], window[1] + 1):
+        for tile_column in range(window[2], window[3] + 1):
+            # A tile that lies behind shows no face that looks this way.
+            border = (tile_column if direction < 2 else tile_row) * TILE + (TILE if forward else 0)
+            if forward != (border > fixed_own):
+                continue
+            group = (tile_row * tile_columns + tile_column) * 4 + direction
+            for k in range(starts[group], starts[group + 1]):
+                distance, low, high = faces[k, 0] - fixed_own, float(faces[k, 1]), float(faces[k, 2])
+                sideways = max(0.0, max(low - run_own, run_own - high))
+                listed[0, count], listed[1, count], listed[2, count] = distance, low, high
+                is_near = distance * distance + sideways * sideways < reach * reach
+                count += np.uintp((sign * distance > 0.0) & is_near)
+    return int(count)
+
+
+@kernel(inline=True, borrowing=True)
+def _find_spans(
+    listed: Array, count: int, run_own: float, along_rows: bool, forward: bool, first_angle: float, increment: float, beams: int,
+    spans: Array,
+) -> None:  # fmt: skip
+    """Tell which beams may meet each of the listed faces: the first, the last, and the last from 0 on where they go on there (or -1).
+
+    The fast angle is good to a hundredth of a beam: one more beam on each side holds all that meet the face.
+    """
+    beams_per_radian = 1.0 / increment
+    turn = 2.0 * math.pi * beams_per_radian
+    turns_per_beam = 1.0 / turn
+    # Seen from inside, the low end is the clockwise one on the right and below.
+    begins, ends = (1, 2) if forward == along_rows else (2, 1)
+    distances, begin_at, end_at = listed[0], listed[begins], listed[ends]
+    firsts, lasts, goes_on = spans[0], spans[1], spans[2]
+    for k in range(count):
+        begin_run, end_run, distance = begin_at[k] - run_own, end_at[k] - run_own, distances[k]
+        if along_rows:
+            angle, angle_end = fast_angle(begin_run, distance), fast_angle(end_run, distance)
+        else:
+            angle, angle_end = fast_angle(distance, begin_run), fast_angle(distance, end_run)
+        span = angle_end - angle
+        span += 2.0 * math.pi if span < 0.0 else 0.0
+        begin = (angle - first_angle) * beams_per_radian
+        begin -= turn * math.floor(begin * turns_per_beam)
+        end = begin + span * beams_per_radian
+        firsts[k], lasts[k] = max(int(begin) - 1, 0), min(int(end) + 2, beams - 1)
+        goes_on[k] = min(int(end - turn) + 2, beams - 1) if end + 3.0 >= turn else -1
+
+
+@kernel(borrowing=True)
 def cast_by_faces(
     faces: Array, starts: Array, tile_columns: int, window: tuple[int, int, int, int], x: float, y: float, first_angle: float,
     increment: float, directions: Array, reach: float, ranges: Array,
@@ -110,49 +169,21 @@ def cast_by_faces(
     for beam in range(beams):
         ranges[beam] = reach
     ranges_at, directions_at, row_size = ranges.ctypes.data, directions.ctypes.data, _FLOAT * beams
-    beams_per_radian = 1.0 / increment
-    turn = 2.0 * math.pi * beams_per_radian
-    turns_per_beam = 1.0 / turn
+    most = 0
     for tile_row in range(window[0], window[1] + 1):
-        for tile_column in range(window[2], window[3] + 1):
-            group = (tile_row * tile_columns + tile_column) * 4
-            for direction in range(4):
-                along_rows = direction < 2
-                forward = direction & 1 == 0
-                fixed_own, run_own = (x, y) if along_rows else (y, x)
-                # A tile that lies behind shows no face that looks this way.
-                border = (tile_column if along_rows else tile_row) * TILE + (TILE if forward else 0)
-                if forward != (border > fixed_own):
-                    continue
-                inverse = directions_at + (2 if along_rows else 3) * row_size
-                other = directions_at + (1 if along_rows else 0) * row_size
-                for k in range(starts[group + direction], starts[group + direction + 1]):
-                    distance = faces[k, 0] - fixed_own
-                    if forward != (distance > 0.0) or abs(distance) >= reach:
-                        continue
-                    low, high = float(faces[k, 1]), float(faces[k, 2])
-                    sideways = max(0.0, max(low - run_own, run_own - high))
-                    if distance * distance + sideways * sideways >= reach * reach:
-                        continue
-                    if along_rows:
-                        angle_low, angle_high = fast_angle(low - y, distance), fast_angle(high - y, distance)
-                    else:
-                        angle_low, angle_high = fast_angle(distance, low - x), fast_angle(distance, high - x)
-                    # Seen from inside, the low end is the clockwise one on the right and below.
-                    if forward != along_rows:
-                        angle_low, angle_high = angle_high, angle_low
-                    span = angle_high - angle_low
-                    if span < 0.0:
-                        span += 2.0 * math.pi
-                    begin = (angle_low - first_angle) * beams_per_radian
-                    begin -= turn * math.floor(begin * turns_per_beam)
-                    count = span * beams_per_radian
-                    low -= CORNER_OVERLAP
-                    high += CORNER_OVERLAP
-                    # The fast angle is good to a hundredth of a beam: one more beam on each side holds all that meet the face.
-                    for lap in range(2):
-                        start = begin - lap * turn
-                        first, last = max(int(start) - 1, 0), min(int(start + count) + 2, beams - 1)
-                        _draw_face(first, last, beams, distance, run_own, low, high, inverse, other, ranges_at)
-                        if begin + count + 3.0 < turn:
-                            break
+        first_group = (tile_row * tile_columns + window[2]) * 4
+        most += starts[first_group + 4 * (window[3] - window[2] + 1)] - starts[first_group]
+    # One more than there can be: each candidate is written down before it is known whether it counts.
+    listed, spans = scratch_grid(3, most + 1, np.float64), scratch_grid(3, most + 1, np.int64)
+    for direction in range(4):
+        along_rows, forward = direction < 2, direction & 1 == 0
+        fixed_own, run_own = (x, y) if along_rows else (y, x)
+        count = _list_faces(faces, starts, tile_columns, window, direction, fixed_own, run_own, reach, listed)
+        _find_spans(listed, count, run_own, along_rows, forward, first_angle, increment, beams, spans)
+        inverse = directions_at + (2 if along_rows else 3) * row_size
+        other = directions_at + (1 if along_rows else 0) * row_size
+        for k in range(count):
+            distance, low, high = listed[0, k], listed[1, k] - CORNER_OVERLAP, listed[2, k] + CORNER_OVERLAP
+            _draw_face(spans[0, k], spans[1, k], beams, distance, run_own, low, high, inverse, other, ranges_at)
+            if spans[2, k] >= 0:
+                _draw_face(0, spans[2, k], beams, distance, run_own, low, high, inverse, other, ranges_at)

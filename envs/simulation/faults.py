@@ -205,12 +205,12 @@ NO_FAULTS = FaultSettings()
 """Nothing goes wrong."""
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _is_active(faults: Array, k: int, kind: int, step: int) -> bool:
     return bool(faults[k] == kind and faults[k + 1] <= step < faults[k + 2])
 
 
-@kernel
+@kernel(borrowing=True)
 def has_fault(faults: Array, kind: int, step: int) -> bool:
     """Whether a robot with ``faults`` (capacity * 6,) has one of a kind in a step."""
     for k in range(0, faults.shape[0], FAULT_NUMBERS):  # noqa: SIM110 (kernels know no any())
@@ -219,7 +219,7 @@ def has_fault(faults: Array, kind: int, step: int) -> bool:
     return False
 
 
-@kernel
+@kernel(borrowing=True)
 def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) -> None:
     """Change a robot's speed and turn rate (2,) to what is left of them where a wheel does not turn."""
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
@@ -230,7 +230,7 @@ def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) ->
             command[1] = (-turning if faults[k + 3] != 0.0 else turning) / wheel_base
 
 
-@kernel
+@kernel(borrowing=True)
 def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) -> bool:
     """Put a robot elsewhere if it is time to and the place is free; where a teammate stands there it is put as soon as that has left."""
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
@@ -248,7 +248,7 @@ def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) ->
     return False
 
 
-@kernel
+@kernel(borrowing=True)
 def blind_beams(faults: Array, step: int, angle_first: float, increment: float, ranges: Array, lengths: Array) -> None:
     """Make beams invalid that a dropout, a blind sector or death takes away: ``ranges`` nan, ``lengths`` 0."""
     for k in range(0, faults.shape[0], FAULT_NUMBERS):

@@ -16,7 +16,7 @@ from scipy import ndimage
 from lidarium.envs.coverage import pack_bits
 from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.simulation.arrays import DEAD_RECKONING, KNOWN_MATES, OWN_FRAME, SOME_MATES, TRUE_POSE, WorldArrays, table_of
-from lidarium.envs.simulation.belief_maps import Pages, blank, map_around_start, map_with_margin, wipe
+from lidarium.envs.simulation.belief_maps import blank, map_around_start, map_with_margin, wipe
 from lidarium.envs.simulation.faults import FAULT_NUMBERS, NO_FAULTS, FaultSettings, plan_faults
 from lidarium.envs.simulation.floor_tables import FloorTables
 from lidarium.envs.simulation.lidar import Lidar
@@ -27,6 +27,7 @@ from lidarium.envs.simulation.stepping import perceive_parallel, perceive_serial
 from lidarium.envs.simulation.world import Sensed
 from lidarium.mapping.kernels import use_threads
 from lidarium.mapping.occupancy import WORD, OccupancySettings
+from lidarium.mapping.pages import Pages
 from lidarium.mapping.pooled_maps import untouched
 
 ROWS_FOR_THREADS = 8
@@ -188,6 +189,7 @@ class KinematicWorld:
             ]
         )
         self._everywhere = np.ones(episodes, np.bool_)
+        self._pages: Pages | None = None
         self._threads = min(threads, int(os.cpu_count() or 1))
         self._choose_kernels()
 
@@ -210,7 +212,10 @@ class KinematicWorld:
         counted = self._shared(episode, floor, pack_bits(counted_cells(free, multiple)))
         rows, words = counted.shape
         # What an episode's step goes through lies together.
-        pages = Pages()
+        if self._pages is None:
+            # Log-odds take a byte a cell; masks and pooled maps hardly half of that.
+            self._pages = Pages(3 * counted.size * WORD * self.robots * self.episodes // 2)
+        pages = self._pages
         self.floors[episode] = floor
         self._frames[episode] = floor.frame
         self.counted_masks[episode], self.team_masks[episode] = counted, pages.blank(counted.shape, np.uint64)
@@ -286,10 +291,11 @@ class KinematicWorld:
             use_threads(self.threads)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_perceive", "_table")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_perceive", "_table", "_pages")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        self._pages = None
         self._choose_kernels()
         for episode in range(self.episodes):
             self._point_at(episode)

@@ -62,13 +62,13 @@ class Lidar(ScanGeometry):
         return self.noise_floor > 0.0 or self.noise_share > 0.0
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _quadrant(directions: Array, beam: int) -> int:
     """Quadrant that a beam looks into: 1 for leftwards plus 2 for downwards."""
     return (1 if directions[0, beam] < 0.0 else 0) + (2 if directions[1, beam] < 0.0 else 0)
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _travel(
     squares: Array,
     offset: int,
@@ -115,7 +115,7 @@ def _travel(
             row += step_y * side
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _travel_together(
     squares: Array, offset: int, columns: int, x: float, y: float, directions: Array, first: int, last: int, distance: float, reach: float
 ) -> float:
@@ -150,7 +150,7 @@ def _travel_together(
             return distance
 
 
-@kernel
+@kernel(borrowing=True)
 def _cast_by_squares(squares: Array, rows: int, columns: int, x: float, y: float, directions: Array, reach: float, ranges: Array) -> None:
     """Fill ``ranges`` [cells] with the distance to the first solid cell, or ``reach``."""
     plane = rows * columns
@@ -177,7 +177,7 @@ def _cast_by_squares(squares: Array, rows: int, columns: int, x: float, y: float
                 ranges[beam] = _travel(squares, quadrant * plane, columns, x, y, row, column, distance, directions, beam, reach)
 
 
-@kernel
+@kernel(borrowing=True)
 def cast_scan(
     tables: Array, x: float, y: float, heading: float, angle_first: float, increment: float, directions: Array, reach: float, ranges: Array
 ) -> None:
@@ -219,7 +219,7 @@ def cast_scan(
         _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges)
 
 
-@kernel
+@kernel(borrowing=True)
 def cut_by_disc(
     x: float,
     y: float,

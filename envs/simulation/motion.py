@@ -53,7 +53,7 @@ def _wrapped(angle: float) -> float:
     return math.pi if wrapped <= -math.pi else wrapped
 
 
-@kernel
+@kernel(borrowing=True)
 def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float, float, float]:
     """Find the solid cell that a disc enters deepest; positions and radius in cells.
 
@@ -93,7 +93,7 @@ def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float
     return depth, normal_x, normal_y
 
 
-@kernel
+@kernel(borrowing=True)
 def _deepest_robot(poses: Array, bodies: Array, robot: int, x: float, y: float) -> tuple[float, float, float]:
     """Find the robot that the disc of ``robot`` at x, y [m] enters deepest."""
     depth, normal_x, normal_y = 0.0, 0.0, 0.0
@@ -112,7 +112,7 @@ def _deepest_robot(poses: Array, bodies: Array, robot: int, x: float, y: float) 
     return depth, normal_x, normal_y
 
 
-@kernel
+@kernel(borrowing=True)
 def _free_of_contact(bound: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, margin: float) -> bool:
     """Whether nothing is within ``margin`` [m] of the disc at x, y, by bounds alone."""
     resolution = frame[2]
@@ -129,7 +129,7 @@ def _free_of_contact(bound: Array, frame: Array, poses: Array, bodies: Array, ro
     return True
 
 
-@kernel
+@kernel(borrowing=True)
 def _push_out(
     solid: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, heading: float, bumpers: Array
 ) -> tuple[float, float, bool, bool]:
@@ -175,7 +175,7 @@ def _along_arc(x: float, y: float, heading: float, speed: float, turn_rate: floa
     return x + arc * (math.sin(after) - math.sin(heading)), y + arc * (math.cos(heading) - math.cos(after)), after
 
 
-@kernel
+@kernel(borrowing=True)
 def move_robots(
     bound_address: int,
     solid_address: int,

@@ -44,14 +44,14 @@ def stream_key(seed: int, robot: int, step: int) -> np.uint32:
     return np.uint32(mix(key ^ np.uint32(step)))
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def gaussian_at(key: np.uint32, table: Array, k: int) -> np.float32:
     """Draw number ``k`` of the stream ``key``, a standard Gaussian."""
     bits = mix(np.uint32(key + np.uint32(np.uint32(k) * np.uint32(0x9E3779B9))))
     return np.float32(table[bits & np.uint32(4095)] + table[(bits >> np.uint32(12)) & np.uint32(4095)])
 
 
-@kernel
+@kernel(borrowing=True)
 def fill_gaussian(key: np.uint32, table: Array, values: Array) -> None:
     """Fill ``values`` (count,) float32 with standard Gaussian draws of the stream ``key``."""
     for k in range(values.shape[0]):

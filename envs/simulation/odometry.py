@@ -120,7 +120,7 @@ def begin_wheels(settings: OdometrySettings, robots: int, seed: int) -> NDArray[
     return wheels
 
 
-@kernel
+@kernel(borrowing=True)
 def disturb_commands(numbers: Array, noise_table: Array, seed: np.uint64, step: int, commands: Array) -> None:
     """Change the speeds and turn rates (robots, 2) of a team to what its drives make of them."""
     for robot in range(commands.shape[0]):
@@ -129,7 +129,7 @@ def disturb_commands(numbers: Array, noise_table: Array, seed: np.uint64, step: 
         commands[robot, 1] *= 1.0 + numbers[6] * gaussian_at(key, noise_table, 1)
 
 
-@kernel
+@kernel(borrowing=True)
 def read_encoders(
     numbers: Array,
     noise_table: Array,

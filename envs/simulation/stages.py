@@ -7,6 +7,7 @@ computed once for the scorer and the map.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from lidarium.envs.simulation.arrays import KNOWN_MATES, OWN_FRAME, SOME_MATES, 
 from lidarium.envs.simulation.faults import blind_beams
 from lidarium.envs.simulation.lidar import cast_scan, cut_by_disc
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
-from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
+from lidarium.mapping.kernels import Array, int8_grid_at, kernel, scratch_grid, scratch_vector, word_grid_at
 from lidarium.mapping.noisy_returns import settle_returns
 from lidarium.mapping.occupancy import integrate_scan
 from lidarium.mapping.pooled_maps import touched_words
@@ -37,7 +38,24 @@ ROUND_UP = 1.0 + 1.2e-7
 """Ranges are rounded up to float32, so that the end of a beam lies in the cell that it met."""
 
 
-@kernel
+class ScanScratch(NamedTuple):
+    """What a scan is worked out in; one serves robot after robot.
+
+    Attributes
+    ----------
+    directions, lengths, ends : (4, beams), (beams,), (2, beams) float64
+        Of the beams, see ``beam_directions`` and ``scan_ends``.
+    windows : (2, window rows, words) uint64
+        Bits of the cells around the robot: those seen, and those in which beams ended.
+    """
+
+    directions: Array
+    lengths: Array
+    ends: Array
+    windows: Array
+
+
+@kernel(borrowing=True)
 def _measure(world: WorldArrays, row: int, first: int, robots: int, directions: Array, ranges: Array, lengths: Array) -> None:
     """Take the scan of one robot without noise: ``ranges`` [m], inf for no return, and ``lengths`` of the beams [map cells]."""
     robot, episode = row - first, first // robots
@@ -63,7 +81,7 @@ def _measure(world: WorldArrays, row: int, first: int, robots: int, directions: 
     blind_beams(world.faults[row], world.steps[episode], angle_first, increment, ranges, lengths)
 
 
-@kernel
+@kernel(borrowing=True)
 def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
     """Take the scan of one robot: the world's ranges as the sensor tells, and ``lengths`` of the true beams [map cells]."""
     sensor, ranges = world.sensor, world.ranges[row]
@@ -71,7 +89,7 @@ def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Ar
     if _is_noisy(sensor):
         beams = lengths.shape[0]
         episode = first // robots
-        noise = np.empty(beams, np.float32)
+        noise = scratch_vector(beams, np.float32)
         fill_gaussian(stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise)
         floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
         low, high = np.float32(sensor[RANGE_MIN]), np.float32(sensor[RANGE_MAX] - RANGE_GAP)
@@ -93,7 +111,7 @@ def _window_corner(x: float, y: float, reach: float) -> tuple[int, int]:
     return int(math.floor(y)) - margin, ((int(math.floor(x)) - margin) >> 6) << 6
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _seen_area(
     world: WorldArrays, row: int, first: int, robots: int, lengths: Array, directions: Array, ends: Array, bits: Array
 ) -> tuple[tuple[int, int, int, int], int, int]:
@@ -110,13 +128,12 @@ def _seen_area(
     return box, row_offset, column_offset >> 6
 
 
-@kernel
-def _score(
-    world: WorldArrays, row: int, first: int, robots: int, lengths: Array, directions: Array, ends: Array, bits: Array
-) -> tuple[int, int, int, int]:
+@kernel(borrowing=True)
+def _score(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> tuple[int, int, int, int]:
     """Fill the area that the true beams have seen and add it to the robot's mask; returns the box that holds bits."""
     box: tuple[int, int, int, int]
-    box, row_offset, word_offset = _seen_area(world, row, first, robots, lengths, directions, ends, bits)
+    bits = scratch.windows[0]
+    box, row_offset, word_offset = _seen_area(world, row, first, robots, scratch.lengths, scratch.directions, scratch.ends, bits)
     masks = world.masks[row]
     own, counted = word_grid_at(masks[0], masks[3], masks[4]), word_grid_at(masks[2], masks[3], masks[4])
     world.seen[row] += mark_seen(own, counted, bits, box, row_offset, word_offset, world.boxes[row])
@@ -157,7 +174,7 @@ def footprint(world: WorldArrays, row: int, first: int, robots: int, bits: Array
     return _seen_area(world, row, first, robots, lengths, directions, ends, bits)  # type: ignore[no-any-return]
 
 
-@kernel
+@kernel(borrowing=True)
 def _filter_mates(world: WorldArrays, row: int, first: int, robots: int, x: float, y: float, ends: Array, is_hit: Array) -> None:
     """Take out the hits on teammates, whose believed poses are known: they are no part of the floor."""
     sensor, believed = world.sensor, world.believed
@@ -203,20 +220,15 @@ def invalidate_mates(world: WorldArrays, row: int, first: int, robots: int, rang
             ranges[beam] = np.float32(np.nan)
 
 
-@kernel
+@kernel(borrowing=True)
 def _update_map(
-    world: WorldArrays,
-    row: int,
-    first: int,
-    robots: int,
-    directions: Array,
-    lengths: Array,
-    ends: Array,
-    bits: Array,
-    box: tuple[int, int, int, int],
-    is_filled: bool,
+    world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch, box: tuple[int, int, int, int], is_filled: bool
 ) -> None:
-    """Update one robot's map from its scan; ``bits``, ``ends`` and ``box`` hold the seen area already where ``is_filled``."""
+    """Update one robot's map from its scan, whose beams' directions ``scratch`` holds.
+
+    Where ``is_filled``, its ends and first window hold the seen area, of this ``box``, already; whatever window is not filled is zero.
+    """
+    directions, lengths, ends, bits = scratch.directions, scratch.lengths, scratch.ends, scratch.windows[0]
     sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]
     ranges, belief = world.ranges[row], world.maps[row]
     beams = ranges.shape[0]
@@ -227,7 +239,7 @@ def _update_map(
         # Whoever takes himself to be beyond his map is lost.
         world.failed[row] = 1
         return
-    is_hit = np.empty(beams, np.bool_)
+    is_hit = scratch_vector(beams, np.bool_)
     for beam in range(beams):
         is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
     log_odds = int8_grid_at(belief[0], belief[1], belief[2])
@@ -245,7 +257,7 @@ def _update_map(
     if world.flags[row] & (KNOWN_MATES | SOME_MATES):
         _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
     touched = word_grid_at(belief[3], belief[4], touched_words(belief[2]))
-    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, world.increments, np.zeros_like(bits), touched)
+    integrate_scan(log_odds, bits, box, ends, is_hit, row_offset, column_offset, world.increments, scratch.windows[1], touched)
     # A hit may lie one cell beyond the seen area.
     window = world.windows[row]
     window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
@@ -255,34 +267,35 @@ def _update_map(
 
 
 @kernel(spliced=True)
-def _blank_window(sensor: Array) -> Array:
-    """Return the bits of a scan's window, all zero."""
-    reach = sensor[RANGE_MAX] / sensor[MAP_RESOLUTION]
-    return np.zeros((window_rows(reach), window_words(reach)), np.uint64)
+def scan_scratch(world: WorldArrays) -> ScanScratch:
+    """Return scratch for the scans of a world, that is gone when the kernel that asks for it returns; not within a loop."""
+    beams, reach = world.ranges.shape[1], world.sensor[RANGE_MAX] / world.sensor[MAP_RESOLUTION]
+    # The windows of a laser that reaches far on a fine map are too large for the stack.
+    windows = np.empty((2, window_rows(reach), window_words(reach)), np.uint64)
+    return ScanScratch(
+        scratch_grid(4, beams, np.float64), scratch_vector(beams, np.float64), scratch_grid(2, beams, np.float64), windows
+    )  # fmt: skip
 
 
 @kernel(spliced=True)
-def perceive_robot(world: WorldArrays, row: int, first: int, robots: int) -> None:
+def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
     """Run stage two alone: update one robot's map from its ranges at its believed pose."""
-    beams = world.ranges.shape[1]
-    directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
-    beam_directions(world.believed[row, 2], world.unit_vectors, directions)
-    _update_map(world, row, first, robots, directions, lengths, ends, _blank_window(world.sensor), (0, 0, 0, 0), False)
+    scratch.windows[:] = np.uint64(0)
+    beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
+    _update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)
 
 
 @kernel(spliced=True)
-def sense_and_perceive(world: WorldArrays, row: int, first: int, robots: int, perceives: bool) -> None:
+def sense_and_perceive(world: WorldArrays, row: int, first: int, robots: int, perceives: bool, scratch: ScanScratch) -> None:
     """Run both stages for one robot (or the first alone, where not ``perceives``); ``first`` is the first row of its episode."""
-    beams = world.ranges.shape[1]
-    directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
-    _sense(world, row, first, robots, directions, lengths)
-    bits = _blank_window(world.sensor)
-    box = _score(world, row, first, robots, lengths, directions, ends, bits)
+    scratch.windows[:] = np.uint64(0)
+    _sense(world, row, first, robots, scratch.directions, scratch.lengths)
+    box = _score(world, row, first, robots, scratch)
     if not perceives:
         return
     is_same = world.flags[row] & (TRUE_POSE | OWN_FRAME) == TRUE_POSE and not _is_noisy(world.sensor)
     if not is_same:
-        bits = _blank_window(world.sensor)
+        scratch.windows[0] = np.uint64(0)
         if world.believed[row, 2] != world.poses[row, 2]:
-            beam_directions(world.believed[row, 2], world.unit_vectors, directions)
-    _update_map(world, row, first, robots, directions, lengths, ends, bits, box, is_same)
+            beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
+    _update_map(world, row, first, robots, scratch, box, is_same)

@@ -15,7 +15,7 @@ from lidarium.envs.simulation.faults import DEAD_ROBOT, has_fault, kidnap, stick
 from lidarium.envs.simulation.motion import move_robots
 from lidarium.envs.simulation.noise import stream_key
 from lidarium.envs.simulation.odometry import TICKS_PER_METRE, WHEEL_BASE, disturb_commands, read_encoders, within_half_turns
-from lidarium.envs.simulation.stages import TIME_STEP, invalidate_mates, perceive_robot, sense_and_perceive
+from lidarium.envs.simulation.stages import TIME_STEP, invalidate_mates, perceive_robot, scan_scratch, sense_and_perceive
 from lidarium.mapping.kernels import Array, kernel, word_grid_at
 
 
@@ -43,7 +43,7 @@ def _believe_odometry(odometry: Array, start: Array, is_relative: bool, believed
     believed[2] = within_half_turns(odometry[2] + start[2])
 
 
-@kernel
+@kernel(borrowing=True)
 def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> None:
     """Let the faults of the episode's robots happen, and write into ``world.driven`` what drives make of ``commands`` (rows, 2)."""
     first, step = episode * robots, world.steps[episode]
@@ -108,9 +108,10 @@ def step_episode(table: Array, episode: int, robots: int, commands: Array, moves
     """Run a step of one episode: move, sense, score and (where ``perceives``) map."""
     world = world_at(table)
     _move(world, episode, robots, commands, moves_bodies)
+    scratch = scan_scratch(world)
     for row in range(episode * robots, (episode + 1) * robots):
         if not world.flags[row] & ENDED:
-            sense_and_perceive(world, row, episode * robots, robots, perceives)
+            sense_and_perceive(world, row, episode * robots, robots, perceives, scratch)
     _share(world, episode, robots)
 
 
@@ -129,14 +130,14 @@ def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
     """Run both stages for the robot of a row, if it has not ended."""
     world = world_at(table)
     if not world.flags[row] & ENDED:
-        sense_and_perceive(world, row, row // robots * robots, robots, perceives)
+        sense_and_perceive(world, row, row // robots * robots, robots, perceives, scan_scratch(world))
 
 
 @kernel
 def _perceive_row(table: Array, row: int, robots: int, runs: Array) -> None:
     world = world_at(table)
     if runs[row // robots] and not world.flags[row] & ENDED:
-        perceive_robot(world, row, row // robots * robots, robots)
+        perceive_robot(world, row, row // robots * robots, robots, scan_scratch(world))
 
 
 @kernel
@@ -146,10 +147,11 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
     flags, pose, scan = world.flags[row], world.believed[row].copy(), world.ranges[row].copy()
     # Where teammates were at the time is not known any more.
     world.flags[row] = flags & ~(KNOWN_MATES | SOME_MATES)
+    scratch = scan_scratch(world)
     for k in range(poses.shape[0]):
         world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = poses[k, 0], poses[k, 1], poses[k, 2]
         world.ranges[row, :] = ranges[k]
-        perceive_robot(world, row, row // robots * robots, robots)
+        perceive_robot(world, row, row // robots * robots, robots, scratch)
     world.flags[row] = flags
     world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = pose[0], pose[1], pose[2]
     world.ranges[row, :] = scan

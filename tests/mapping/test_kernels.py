@@ -16,6 +16,8 @@ from lidarium.mapping.kernels import (
     int8_grid_at,
     int32_table_at,
     kernel,
+    scratch_grid,
+    scratch_vector,
     uint8_grid_at,
     uint16_grid_at,
     use_threads,
@@ -55,6 +57,25 @@ def odd_sums(values):
     for value in values:
         total += value
     return total, math.isnan(values[0] / values[0])
+
+
+@kernel(borrowing=True)
+def sum_by_scratch(values):
+    twice, rows = scratch_vector(values.shape[0], np.float64), scratch_grid(3, values.shape[0], np.int32)
+    for k in range(values.shape[0]):
+        twice[k], rows[1, k], rows[2, k] = 2.0 * values[k], 3, k
+    total = 0.0
+    for k in range(values.shape[0]):
+        total += twice[k] * rows[1, k] + rows[2, k]
+    return total
+
+
+@kernel
+def sum_often(values, times):
+    total = 0.0
+    for k in range(times):
+        total += sum_by_scratch(values[k % 2 :])
+    return total
 
 
 @kernel(parallel=True)
@@ -217,3 +238,19 @@ def test_kernels_are_compiled_anew_where_nothing_can_be_written(tmp_path):
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True)
     assert result.stdout.split() == ["2", "False"]
+
+
+def test_scratch_is_there_while_a_kernel_runs_and_gone_when_it_returns():
+    values = np.arange(1000.0)
+    whole, rest = 6.0 * values.sum() + 499500.0, 6.0 * values.sum() + 498501.0
+    assert sum_by_scratch(values) == whole
+    # All together are larger than any stack.
+    assert sum_often(values, 10_000) == 5_000 * (whole + rest)
+
+
+def test_kernels_that_borrow_arrays_leave_their_count_as_it_was():
+    values = np.arange(100.0)
+    before = sys.getrefcount(values)
+    sum_often(values, 100)
+    sum_by_scratch(values)
+    assert sys.getrefcount(values) == before

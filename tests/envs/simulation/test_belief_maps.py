@@ -1,15 +1,11 @@
 """What is taken out of a map is noted where pooled maps and planning look for changes."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lidarium.envs.simulation.belief_maps import LINE, PIECE, Pages, blank, wipe
+from lidarium.envs.simulation.belief_maps import blank, wipe
 from lidarium.mapping.pooled_maps import pool_touched, touch, untouched
 
 SHAPE = (96, 128)
@@ -71,38 +67,3 @@ def test_nothing_is_noted_where_nothing_changes():
     blank(drawn(1), np.zeros((4, 4), bool), (0, 0), touched, window)
     assert not touched.any()
     assert window.tolist() == empty_window().tolist()
-
-
-def test_arrays_of_pages_are_blank_apart_and_begin_on_lines():
-    pages = Pages()
-    kinds = [((3, 64), np.int8), ((0, 2), np.uint64), ((7, 5), np.uint64), ((PIECE + 1,), np.uint8), ((2, 2), np.int8)]
-    arrays = [pages.blank(shape, kind) for shape, kind in kinds]
-    for k, (array, (shape, kind)) in enumerate(zip(arrays, kinds, strict=True)):
-        assert array.shape == shape
-        assert array.dtype == kind
-        assert array.flags.carray
-        assert array.ctypes.data % LINE == 0 or not array.size
-        assert not array.any()
-        array[...] = k + 1
-    assert [set(array.ravel().tolist()) for array in arrays] == [{1}, set(), {3}, {4}, {5}]
-
-
-FORKS = """
-import os
-import numpy as np
-from lidarium.envs.simulation.belief_maps import Pages
-array = Pages().blank((4, 64), np.int8)
-array[0] = 5
-if os.fork() == 0:
-    array[...] = 7
-    os._exit(0)
-os.wait()
-print(array.sum())
-"""
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes do not fork here")
-def test_a_fork_has_maps_of_its_own():
-    # In a process of its own: this one may have threads.
-    told = subprocess.run([sys.executable, "-c", FORKS], capture_output=True, text=True, check=True)
-    assert told.stdout.strip() == str(5 * 64)
