@@ -344,8 +344,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             order = orders[row]
             infos[agent] = {
                 "truth": {"pose": poses[row], "coverage": coverage, "seen_cells": seen[row]},
-                "state": states[row].value,
-                "order": "" if order is None else order.kind.value,
+                "state": states[row]._value_,
+                "order": "" if order is None else order.kind._value_,
             }
         if self.settings.battery.is_limited:
             for agent in agents:

@@ -20,7 +20,7 @@ BLOCK = 64
 """Cells of a block."""
 
 HALF_BLOCK = 32
-"""Cells of which levels are told at a time."""
+"""Cells of which levels are told at a time where there are fewer than a block."""
 
 _INT16, _INT64 = ir.IntType(16), ir.IntType(64)
 _BYTES, _SHORTS = ir.VectorType(ir.IntType(8), BLOCK), ir.VectorType(_INT16, BLOCK)
@@ -122,17 +122,20 @@ def _greatest_of_groups(typing_context: Any, rows: Any, stride: Any, count: Any,
     return types.void(*(types.int64,) * 6), generate
 
 
-def _levels(typing_context: Any, log_odds: Any, levels: Any) -> Any:  # noqa: ANN401
-    """Write a half block of log-odds as levels: 0 where positive, 127 at zero, 255 where negative."""
+def _levels_of(cells: int) -> Any:  # noqa: ANN401
+    """Return what writes so many log-odds as levels: 0 where positive, 127 at zero, 255 where negative."""
 
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        kind = ir.VectorType(ir.IntType(8), HALF_BLOCK)
-        zero, unknown, free = (ir.Constant(kind, [level] * HALF_BLOCK) for level in (0, 127, 255))
-        old = _load(builder, arguments[0], kind)
-        known = builder.select(builder.icmp_signed(">", old, zero), zero, unknown)
-        _store(builder, builder.select(builder.icmp_signed("<", old, zero), free, known), arguments[1])
+    def levels_of(typing_context: Any, log_odds: Any, levels: Any) -> Any:  # noqa: ANN401
+        def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+            kind = ir.VectorType(ir.IntType(8), cells)
+            zero, unknown, free = (ir.Constant(kind, [level] * cells) for level in (0, 127, 255))
+            old = _load(builder, arguments[0], kind)
+            known = builder.select(builder.icmp_signed(">", old, zero), zero, unknown)
+            _store(builder, builder.select(builder.icmp_signed("<", old, zero), free, known), arguments[1])
 
-    return types.void(types.int64, types.int64), generate
+        return types.void(types.int64, types.int64), generate
+
+    return intrinsic(levels_of)
 
 
 def _positive_differs(typing_context: Any, log_odds: Any, numbers: Any, number: Any) -> Any:  # noqa: ANN401
@@ -231,7 +234,7 @@ _update: Any = intrinsic(_update_block)
 _fetch_line: Any = intrinsic(_fetch)
 _sum: Any = intrinsic(_sum_blocks)
 _greatest: Any = intrinsic(_greatest_of_groups)
-_write_levels: Any = intrinsic(_levels)
+_block_of_levels, _half_block_of_levels = _levels_of(BLOCK), _levels_of(HALF_BLOCK)
 _differs: Any = intrinsic(_positive_differs)
 _count: Any = intrinsic(_count_steps)
 _least: Any = intrinsic(_least_sums)
@@ -299,7 +302,13 @@ def write_greatest(rows: int, stride: int, count: int, least: int, halvings: int
 @kernel(inline=True)
 def write_levels(log_odds: int, levels: int) -> None:
     """Write 32 cells of int8 as levels of uint8: 0 occupied where positive, 127 unknown at zero, 255 free where negative."""
-    _write_levels(log_odds, levels)
+    _half_block_of_levels(log_odds, levels)
+
+
+@kernel(inline=True)
+def write_block_of_levels(log_odds: int, levels: int) -> None:
+    """Write 64 cells as ``write_levels`` does."""
+    _block_of_levels(log_odds, levels)
 
 
 @kernel(inline=True)

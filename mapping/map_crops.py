@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from lidarium.mapping.cell_blocks import HALF_BLOCK, write_levels
+from lidarium.mapping.cell_blocks import BLOCK, HALF_BLOCK, write_block_of_levels, write_levels
 from lidarium.mapping.kernels import Array, bytes_at, int8_at, int8_grid_at, kernel, scratch_grid
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.turned_blocks import CAN_LOOK_UP_IN_REGISTERS, turn_blocks
@@ -38,10 +38,14 @@ def _write_row(log_odds: int, count: int, levels: int) -> None:
         for j in range(count):
             target[j] = _level(source[j])
         return
-    for place in range(0, count - HALF_BLOCK, HALF_BLOCK):
-        write_levels(log_odds + place, levels + place)
     # The last ones may overlap those before: nothing remains to go through one by one.
-    write_levels(log_odds + count - HALF_BLOCK, levels + count - HALF_BLOCK)
+    if count < BLOCK:
+        write_levels(log_odds, levels)
+        write_levels(log_odds + count - HALF_BLOCK, levels + count - HALF_BLOCK)
+        return
+    for place in range(0, count - BLOCK, BLOCK):
+        write_block_of_levels(log_odds + place, levels + place)
+    write_block_of_levels(log_odds + count - BLOCK, levels + count - BLOCK)
 
 
 @kernel(borrowing=True)
