@@ -21,6 +21,9 @@ LARGEST_PIECE = 2**24
 LARGE_PAGE = 2**21
 """A large page [bytes]."""
 
+MOST_IN_LARGE_PAGES = 2**27
+"""Who expects more than this does without large pages [bytes]: all of such a page takes room as soon as a part of it is touched."""
+
 LINE = 64
 """A line of the caches [bytes]."""
 
@@ -41,6 +44,7 @@ class Pages:
 
     def __init__(self, expected: int = PIECE) -> None:
         self._piece = min(max(expected, PIECE), LARGEST_PIECE)
+        self._is_large = expected <= MOST_IN_LARGE_PAGES
         self._left = np.zeros(0, np.uint8)
 
     def blank(self, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
@@ -48,19 +52,19 @@ class Pages:
         size = math.prod(shape) * np.dtype(kind).itemsize
         if size > self._piece // 2:
             # Large ones have a piece of their own, so that none is left over by half.
-            return _private_memory(size)[:size].view(kind).reshape(shape)
+            return _private_memory(size, self._is_large)[:size].view(kind).reshape(shape)
         if size > self._left.size:
-            self._left = _private_memory(self._piece)
+            self._left = _private_memory(self._piece, self._is_large)
         array = self._left[:size].view(kind).reshape(shape)
         self._left = self._left[-(-size // LINE) * LINE :]
         return array
 
 
-def _private_memory(size: int) -> NDArray[np.uint8]:
-    """Return blank memory that a fork of this process does not share, in large pages if there is room for some."""
+def _private_memory(size: int, is_large: bool) -> NDArray[np.uint8]:
+    """Return blank memory that a fork of this process does not share; if asked for, in large pages where there is room for some."""
     is_private = hasattr(mmap, "MAP_PRIVATE")
     memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS) if is_private else mmap.mmap(-1, size)
-    if size >= 2 * LARGE_PAGE and hasattr(mmap, "MADV_HUGEPAGE"):
+    if is_large and size >= 2 * LARGE_PAGE and hasattr(mmap, "MADV_HUGEPAGE"):
         # Systems may be built without.
         with suppress(OSError):
             memory.madvise(mmap.MADV_HUGEPAGE)
