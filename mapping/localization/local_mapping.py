@@ -146,7 +146,7 @@ class LocalMapper:
             far = far if is_alike else None
         good = [match for match in (near, far) if match is not None and self._is_good(match)]
         if len(good) == 2:
-            return self._noted(good[1] if good[1].score > good[0].score + settings.better_by else good[0])
+            return self._noted(good[1] if outweighs(good[1], good[0], settings.better_by) else good[0])
         return self._noted(good[0]) if good else None
 
     def _noted(self, match: Match) -> Match:
@@ -243,6 +243,22 @@ class LocalMapper:
     def _ended(self, active: list[_Active]) -> list[Finished]:
         ended = [one for one in active if one.submap.scans >= self._submaps.least_scans // 2]
         return [Finished(one.submap.finished(), np.array(one.nodes), np.stack(one.places)) for one in ended]
+
+
+def outweighs(far: Match, near: Match, better_by: float) -> bool:
+    """Return whether a match against odometry is so much better than one with it that odometry has to be wrong.
+
+    Where nearly all of a scan lies near known walls, and elsewhere only a part of it, that part may agree better by chance, as on the
+    other side of a wall: all points together must not agree less.
+
+    Parameters
+    ----------
+    far, near : Match
+        The match against odometry, and that with it.
+    better_by : float
+        By how much more the points near what the map has observed have to agree.
+    """
+    return far.score > near.score + better_by and far.score * far.overlap >= near.score * near.overlap
 
 
 def turned(matrix: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
