@@ -178,7 +178,7 @@ class ClosureFinder:
             return [closure]
         agreeing = [(first, other) for first, other in self._doubtful if self._agree(other, closure, poses)]
         # One local map may look like another place, to all scans that are taken there.
-        is_single = is_improbable and all(first == first_node for first, _ in agreeing)
+        is_single = (is_improbable or settings.doubts_one_map) and all(first == first_node for first, _ in agreeing)
         if len(agreeing) + 1 < settings.confirmations or is_single:
             self._doubtful = [*self._doubtful[-20:], (first_node, closure)]
             return []

@@ -33,7 +33,7 @@ LOG_SETTINGS = SlamSettings(
         unseen=0.5,
     ),
     submaps=SubmapSettings(resolution=0.05, path_m=8.0, behind_share=0.0),
-    closures=ClosureSettings(least_overlap=0.6),
+    closures=ClosureSettings(least_overlap=0.6, confirmed_beyond_m=0.4, doubts_one_map=False, agree_m=0.3),
     graph=GraphSettings(deviation_m=0.01, deviation_per_metre=0.02, deviation_angle=math.radians(0.3)),
     compass=CompassSettings(deviation_angle=math.radians(0.3), drift=0.2),
 )
@@ -41,7 +41,7 @@ LOG_SETTINGS = SlamSettings(
 logs reach far, so that a local map of a shorter way holds enough, places are recognised by more of them, and few returns tell as
 much as many. Where scans are a metre apart much of each is new, and what is new must not outweigh what agrees; headings between them are
 less sure. Normals are told best by the nearest two returns. Walls that were built deviate more from each other than walls that were drawn,
-and scans that reach far let headings drift less."""
+and scans that reach far let headings drift less; over the ways of logs robots err by more than walls are thick."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

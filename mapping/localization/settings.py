@@ -221,13 +221,16 @@ class ClosureSettings:
     least_deviation_m, least_deviation_angle : float
         No closure is better than this [m, rad].
     confirmed_beyond_m : float
-        A closure that would move the robot by more is taken only together with others that say the same [m].
+        A closure that would move the robot by more is taken only together with others that say the same: less than the thickness of
+        walls, since the other side of one looks like this side [m].
     confirmed_beyond_deviations : float
         So is one that would move it by more standard deviations of the way since; those have to be of at least two local maps.
+    doubts_one_map : bool
+        Whether those have to be of at least two local maps also where the way since allows the move.
     confirmations : int
         How many have to agree.
     agree_m, agree_angle : float
-        By how much they may differ [m, rad].
+        By how much they may differ [m, rad]; less than the thickness of walls, lest both sides of one agree.
     """
 
     delay_s: float = 1.0
@@ -250,14 +253,15 @@ class ClosureSettings:
     apart_angle: float = math.radians(15.0)
     least_deviation_m: float = 0.03
     least_deviation_angle: float = math.radians(0.4)
-    confirmed_beyond_m: float = 0.4
+    confirmed_beyond_m: float = 0.15
     confirmed_beyond_deviations: float = 2.5
+    doubts_one_map: bool = True
     confirmations: int = 3
-    agree_m: float = 0.3
+    agree_m: float = 0.1
     agree_angle: float = math.radians(3.0)
 
     def __post_init__(self) -> None:
-        _check_numbers(self, zero=("delay_s", "path_m", "candidates"))
+        _check_numbers(self, zero=("delay_s", "path_m", "candidates", "doubts_one_map"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -59,7 +59,7 @@ def test_a_room_is_recognised_from_where_the_robot_believes_to_be(room_finder):
     errors = []
     for _ in range(1000):
         true = np.array([3.0, 2.2, 0.3]) + generator.uniform(-1.0, 1.0, 3) * [0.2, 0.2, 0.3]
-        believed = true + generator.uniform(-1.0, 1.0, 3) * [0.2, 0.2, 0.05]
+        believed = true + generator.uniform(-1.0, 1.0, 3) * [0.1, 0.1, 0.05]
         errors += [closure.measured - true for closure in closures_of(room_finder, odd_room(), true, believed)]
     # Now and then a scan slides into a place that agrees a little less well, or finds none that is sure.
     distances, turns = np.hypot(*np.array(errors)[:, :2].T), np.abs(np.array(errors)[:, 2])
@@ -105,6 +105,32 @@ def test_a_move_that_the_way_since_makes_improbable_waits_for_another_local_map(
     closures = closures_of(finder, odd_room(), middle, middle + aside, nodes, surely)
     assert {closure.old for closure in closures} == {0, 1}
     assert len(closures) >= ClosureSettings().confirmations
+
+
+@pytest.mark.parametrize(("distance", "waits"), [(0.1, False), (0.16, True), (0.2, True)])
+def test_a_move_as_long_as_walls_are_thick_waits_for_another_local_map_however_far_the_robot_may_have_erred(
+    middle, around_middle, distance, waits
+):
+    finder, nodes, aside = finder_of(odd_room(), around_middle), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), np.array([distance, 0.0, 0.0])
+    anywhere = np.diag([2.0**2, 2.0**2, math.radians(5.0) ** 2])
+    for x in (0.0, 0.05, -0.05):
+        true = middle + np.array([x, 0.0, 0.0])
+        assert (closures_of(finder, odd_room(), true, true + aside, nodes, anywhere) == []) == waits
+    finder.remember(map_of(odd_room(), around_middle, nodes=(1,), places=nodes[1:]), 0.0)
+    found = closures_of(finder, odd_room(), middle, middle + aside, nodes, anywhere)
+    assert len(found) == (4 if waits else 1)
+
+
+@pytest.mark.parametrize(("apart", "confirms"), [(0.05, True), (0.16, False)])
+def test_closures_that_lie_apart_by_the_thickness_of_a_wall_do_not_confirm_each_other(middle, around_middle, apart, confirms):
+    finder, nodes, aside = finder_of(odd_room(), around_middle), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), np.array([0.16, 0.0, 0.0])
+    anywhere = np.diag([2.0**2, 2.0**2, math.radians(5.0) ** 2])
+    for x in (0.0, 0.05, -0.05):
+        true = middle + np.array([x, 0.0, 0.0])
+        assert closures_of(finder, odd_room(), true, true + aside, nodes, anywhere) == []
+    # The second local map lies aside of where its node is believed to be.
+    finder.remember(map_of(odd_room(), around_middle, nodes=(1,), places=((1.0, apart, 0.0),)), 0.0)
+    assert bool(closures_of(finder, odd_room(), middle, middle + aside, nodes, anywhere)) == confirms
 
 
 def test_a_closure_is_seen_from_the_nearest_node_of_a_local_map_that_is_bent(middle, around_middle):
