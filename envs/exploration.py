@@ -184,20 +184,21 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def drive(self, actions: dict[str, Any]) -> None:
         """Run one time step of the world without building observations; ``outcome`` tells what came of it."""
+        commands, rows = self._commands, self._rows
         for agent in self.agents:
             action = actions.get(agent)
             if action is None:
-                if agent in self._stopping or self.operating.is_addressed(self._rows[agent]):
-                    self._commands[self._rows[agent]] = 0.0
+                if agent in self._stopping or self.operating.is_addressed(rows[agent]):
+                    commands[rows[agent]] = 0.0
                     continue
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
             shares = action if isinstance(action, np.ndarray) else np.asarray(action, np.float64)
             if shares.shape != (2,):
                 raise ValueError(f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and turn rate")
-            self._commands[self._rows[agent]] = shares
-        if not scale_shares(self._commands, self._limits):
+            commands[rows[agent]] = shares
+        if not scale_shares(commands, self._limits):
             raise ValueError(f"an action is nan or infinite ({actions}); want two finite numbers within [-1, 1] for each agent")
-        self.drive_at(self._commands)
+        self.drive_at(commands)
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
         """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s], without building observations.
@@ -330,9 +331,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
 
     def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:
-        arrays = self._writer.write(self.world, self._offsets, goals=self._goals)
-        rows = self._rows
-        return {agent: {name: array[rows[agent]] for name, array in arrays.items()} for agent in agents}
+        arrays = list(self._writer.write(self.world, self._offsets, goals=self._goals).items())
+        rows = [(agent, self._rows[agent]) for agent in agents]
+        return {agent: {name: array[row] for name, array in arrays} for agent, row in rows}
 
     def _infos(self, agents: Sequence[str]) -> dict[str, dict[str, Any]]:
         """Return what a learner may not see, and the operating states, by agent."""

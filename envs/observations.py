@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Mapping
+from operator import itemgetter
 from typing import Any
 
 import numba
@@ -23,6 +24,8 @@ FARTHEST = 1000.0
 
 KEYS = (*OBSERVABLES, "goal")
 """All that is ever observed, in the order in which the kernel takes the arrays."""
+
+_IN_ORDER = itemgetter(*KEYS)
 
 Arrays = tuple[Array, ...]
 """Arrays that go to the kernel together; a tuple costs no more than its arrays alone, where a named one costs twice as much."""
@@ -226,7 +229,7 @@ class ObservationWriter:
         if self._scales is not None and world.scales != self._scales:
             raise ValueError(f"the world pools its maps at scales {world.scales}; want those of the settings, {self._scales}")
         known = (world.table, offsets, goals, world.pool_rows)
-        return known, self._limits, tuple([out[name] if name in out else self._absent[name] for name in KEYS])
+        return known, self._limits, _IN_ORDER({**self._absent, **out})
 
     def check(self, out: Mapping[str, NDArray[Any]], rows: int) -> None:
         """Check arrays that a caller gives.
