@@ -15,9 +15,9 @@ COVERED, REACHED, COLLISION, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE, FAILED 
 def endings(
     world: KinematicWorld,
     settings: ExplorationSettings,
-    goals: NDArray[np.float64],
+    goals: NDArray[np.float64] | None,
     live: NDArray[np.bool_],
-    stopping: NDArray[np.int8],
+    stopping: NDArray[np.int8] | None,
 ) -> NDArray[np.int8]:
     """Return why live robots end now, by number in ``REASONS``, shape (rows,).
 
@@ -27,17 +27,16 @@ def endings(
         What has happened.
     settings : ExplorationSettings
         What ends an episode.
-    goals : (episodes, 2) float64
-        Goals in the floor's frame [m], nan for none.
+    goals : (episodes, 2) float64 or None
+        Goals in the floor's frame [m], nan for none; None where no episode has one.
     live : (rows,) bool
         Who has not ended and took part in the step.
-    stopping : (rows,) int8
-        Why robots end of themselves, 0 where they do not.
+    stopping : (rows,) int8 or None
+        Why robots end of themselves, 0 where they do not; None where nobody does.
     """
     robots = settings.robots
-    reasons = np.where(live, stopping, np.int8(0))
-    has_goal = goals[:, 0] == goals[:, 0]
-    if has_goal.any():
+    reasons = np.zeros(len(live), np.int8) if stopping is None else np.where(live, stopping, np.int8(0))
+    if goals is not None:
         away = world.poses[:, :2] - np.repeat(goals, robots, axis=0)
         with np.errstate(invalid="ignore"):
             is_there = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] <= settings.goal_radius * settings.goal_radius

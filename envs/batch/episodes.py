@@ -40,6 +40,12 @@ from lidarium.mapping.turns import new_turns
 Arrays = dict[str, NDArray[Any]]
 
 
+def _frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """Return an array that cannot be written to any more."""
+    array.flags.writeable = False
+    return array
+
+
 class EpisodeBatch:
     """Many episodes of one team size and one choice of settings; floors may differ.
 
@@ -74,8 +80,14 @@ class EpisodeBatch:
         Which robots took part in the last step.
     reasons : (rows,) int8
         Why robots ended in the last step, by number in ``endings.REASONS``; 0 where they did not.
+    is_whole : bool
+        Whether all robots of all episodes are live.
+    has_endings : bool
+        Whether a robot ended in the last step.
     infos : dict
         What the last step tells beside, in arrays over rows.
+    everyone : (rows,) bool
+        All true; cannot be written to.
     floors : list of Floor
         The floor of each episode.
 
@@ -119,6 +131,7 @@ class EpisodeBatch:
         self.live, self.acted = np.zeros(self.rows, np.bool_), np.zeros(self.rows, np.bool_)
         self.reasons = np.zeros(self.rows, np.int8)
         self.infos: dict[str, Any] = {}
+        self.is_whole, self.has_endings, self._has_goals = False, False, False
         self.floors: list[Floor | None] = [None] * self.episodes
         self._generators: list[np.random.Generator | None] = [None] * self.episodes
         horizon, cover = settings.horizon_steps, settings.stop_coverage
@@ -130,7 +143,9 @@ class EpisodeBatch:
             np.array(bounds, np.float64), self.live, np.zeros(self.rows, np.bool_),
         )  # fmt: skip
         self._commands = np.zeros((self.rows, 2))
-        self._states = np.full(self.rows, OperatingState.OPERATING.value, object)
+        # What is told of all rows alike at most steps is one array that cannot be written to, not a new one each time.
+        self.everyone, self._no_orders = _frozen(np.ones(self.rows, np.bool_)), _frozen(np.full(self.rows, "", object))
+        self._states = _frozen(np.full(self.rows, OperatingState.OPERATING.value, object))
         self._orders = [np.arange(self.episodes), np.arange(self.episodes)[::-1].copy()]
 
     @property
@@ -177,34 +192,34 @@ class EpisodeBatch:
             Where an action or an option cannot be used; nothing has run then.
         """
         robots = self.robots
-        modes = np.full(self.episodes, WAITS, np.int8)
         # Most steps are of episodes of which none begins or has lost a robot: what concerns others costs nothing then.
         begins = len(beginning) > 0
-        is_plain = actions is not None and not begins and bool(self.live.all())
-        if is_plain:
-            modes[:] = STEPS
-        elif actions is not None:
+        is_plain = actions is not None and not begins and self.is_whole
+        modes = np.full(self.episodes, STEPS if is_plain else WAITS, np.int8)
+        if actions is not None and not is_plain:
             modes[~self.is_over] = STEPS
             modes[beginning] = WAITS
         acted = self.live.copy() if is_plain else self.live & np.repeat(modes == STEPS, robots)
-        stopping = np.zeros(self.rows, np.int8)
-        if actions is not None:
-            stopping = self.level.take(actions, acted, self._commands, modes)
+        stopping = None if actions is None else self.level.take(actions, acted, self._commands, modes)
         if begins:
             for episode, start in self._draw(beginning, seeds, options or {}).items():
                 self._place(episode, start)
             modes[beginning] = LOOKS
-        seen = acted.copy()
-        seen.reshape(self.episodes, robots)[beginning] = True
+        seen = acted
+        if begins:
+            seen = acted.copy()
+            seen.reshape(self.episodes, robots)[beginning] = True
         self._turn_buffers(seen, is_same_step)
         self.world.rewards[:] = 0.0
         self.run_kernel(modes, self._commands, seen)
         if not is_plain:
             self.world.rewards[~acted] = 0.0
         self.acted = acted
-        self.reasons = endings(self.world, self.settings, self._tally.goals, acted, stopping)
-        if self.reasons.any():
+        self.reasons = endings(self.world, self.settings, self._tally.goals if self._has_goals else None, acted, stopping)
+        self.has_endings = bool(self.reasons.any())
+        if self.has_endings:
             ended = self.reasons != 0
+            self.is_whole = False
             self.live[ended] = False
             self.world.moves[ended] = 0
             self.world.flags[ended] |= ENDED
@@ -277,8 +292,10 @@ class EpisodeBatch:
         self._offsets[rows] = map_frames(start, self.settings)
         self._goals[rows] = goal_of_robots(start, self.settings)
         self._tally.goals[episode] = np.nan if start.goal is None else start.goal
+        self._has_goals = not bool(np.isnan(self._tally.goals[:, 0]).all())
         self._commands[rows], self.live[rows] = 0.0, True
-        self._states[rows] = OperatingState.OPERATING.value
+        self.is_whole = bool(self.live.all())
+        self._note_states(rows, OperatingState.OPERATING.value)
         self.perception.start(start.goal, episode)
         self._software.start(episode, start.seed)
         self.level.start(episode)
@@ -301,24 +318,29 @@ class EpisodeBatch:
 
     def _tell(self, seen: NDArray[np.bool_]) -> None:
         """Put together what the step tells beside the observations."""
-        everyone = np.ones(self.rows, np.bool_)
+        everyone = self.everyone
         truth = {
             "pose": self.world.poses.copy(),
             "coverage": np.repeat(self.world.coverages(), self.robots),
             "seen_cells": self.world.seen.copy(),
         }
         # Nobody gives orders here: states follow from the endings alone.
-        orders = np.full(self.rows, "", object)
-        self.infos = {"truth": truth, "_truth": everyone, "order": orders, "_order": everyone}
-        if self.reasons.any():
+        self.infos = {"truth": truth, "_truth": everyone, "order": self._no_orders, "_order": everyone}
+        if self.has_endings:
             ended = self.reasons != 0
             names = np.full(self.rows, None, object)
             names[ended] = [REASONS[number] for number in self.reasons[ended]]
             self.infos["ended_because"], self.infos["_ended_because"] = names, ended
-            self._states[ended] = [state_after(name).value for name in names[ended]]
-        self.infos["state"], self.infos["_state"] = self._states.copy(), everyone
+            self._note_states(ended, [state_after(name).value for name in names[ended]])
+        self.infos["state"], self.infos["_state"] = self._states, everyone
         # Episodes that have not run in this call have nothing to be looked at again.
         self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
+
+    def _note_states(self, rows: slice | NDArray[np.bool_], states: str | list[str]) -> None:
+        """Note the operating states of some rows; those that were told of before stay as they are."""
+        changed = self._states.copy()
+        changed[rows] = states
+        self._states = _frozen(changed)
 
     @property
     def terminated(self) -> NDArray[np.bool_]:

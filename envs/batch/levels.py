@@ -46,13 +46,13 @@ class Level(Protocol):
         """Begin an episode."""
         ...
 
-    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
+    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8] | None:
         """Take the actions of live rows: write ``commands`` or orders, and in ``modes`` how the episodes run.
 
         Returns
         -------
-        (rows,) int8
-            Why robots end of themselves, by number in ``endings.REASONS``.
+        (rows,) int8 or None
+            Why robots end of themselves, by number in ``endings.REASONS``; None where nobody does.
         """
         ...
 
@@ -114,13 +114,13 @@ class VelocityLevel:
     def start(self, episode: int) -> None:
         """Begin an episode."""
 
-    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
+    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> None:
         """Scale the shares; no robot ends of itself."""
         shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]")
         np.copyto(commands, shares)
-        commands[~live] = 0.0
+        if not live.all():
+            commands[~live] = 0.0
         scale_shares(commands, self._limits)
-        return np.zeros(len(live), np.int8)
 
     def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
         """Add nothing."""
@@ -142,13 +142,12 @@ class WaypointLevel:
         """Begin an episode: no robot has a target."""
         self.driver.start(episode)
 
-    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
+    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> None:
         """Give the robots their targets and plan."""
         shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]").astype(np.float64)
         places = self._perception.world.believed[:, :2] - self._perception.offsets
         targets = places + np.clip(shares, -1.0, 1.0) * self._half_side
         self.carry_out(Orders(live, targets, np.full(len(live), np.nan)), live, modes)
-        return np.zeros(len(live), np.int8)
 
     def carry_out(self, orders: Orders, live: Rows, modes: NDArray[np.int8]) -> None:
         """Let the episodes that step drive by orders for a decision."""

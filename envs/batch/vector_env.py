@@ -13,6 +13,8 @@ from lidarium.envs.batch.episodes import Arrays, EpisodeBatch
 from lidarium.envs.batch.requests import episodes_of, options_of, seeds_of, settings_of
 from lidarium.envs.floors.floor import Floor
 
+_NO_EPISODES = np.zeros(0, np.int64)
+
 Step = tuple[Arrays, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
@@ -89,7 +91,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
         chosen = episodes_of(options, batch.episodes)
         seeds = seeds_of(seed, batch.episodes)
         batch.run(None, chosen, [seeds[episode] for episode in chosen], options_of(options, chosen, batch.episodes, batch.robots))
-        return batch.observations, self._infos(batch.live)
+        return batch.observations, self._infos(batch.live.copy())
 
     def step(self, actions: NDArray[Any]) -> Step:
         """Run all episodes for one step (velocity) or decision; those that are over begin anew.
@@ -105,6 +107,9 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
             raise RuntimeError("the environment was not reset; call reset() before step()")
         if actions is None:
             raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
+        if batch.is_whole:
+            batch.run(actions, _NO_EPISODES)
+            return batch.observations, batch.rewards.copy(), batch.terminated, batch.truncated, self._infos(batch.everyone)
         over = batch.is_over
         masked = ~batch.live & ~np.repeat(over, batch.robots)
         batch.run(actions, np.flatnonzero(over))
@@ -114,7 +119,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
         return batch.observations, batch.rewards.copy(), batch.terminated, truncated, self._infos(~masked)
 
     def _infos(self, active: NDArray[np.bool_]) -> dict[str, Any]:
-        return {**self.batch.infos, "active": active.copy(), "_active": np.ones(self.num_envs, np.bool_)}
+        return {**self.batch.infos, "active": active, "_active": self.batch.everyone}
 
     def _check_open(self) -> None:
         if self.closed:
