@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.kernels import Array, kernel
 
+MOST_BEAMS = 16_384
+"""Kernels keep some 200 bytes a beam on the stack."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScanGeometry:
@@ -16,7 +19,7 @@ class ScanGeometry:
     Attributes
     ----------
     beams : int
-        Number of beams, at least 1.
+        Number of beams, 1 to 16,384.
     field_of_view : float
         Angle between the first and the last beam, or the full circle 2 pi, whose last beam does not repeat the first [rad].
     range_min, range_max : float
@@ -29,8 +32,8 @@ class ScanGeometry:
     range_max: float = 5.6
 
     def __post_init__(self) -> None:
-        if self.beams < 1:
-            raise ValueError(f"beams is {self.beams}; a lidar has at least 1")
+        if not 1 <= self.beams <= MOST_BEAMS:
+            raise ValueError(f"beams is {self.beams}; want 1 to {MOST_BEAMS}")
         if not 0.0 < self.field_of_view <= 2.0 * math.pi + 1e-9:
             raise ValueError(f"field_of_view is {self.field_of_view} rad; want more than 0 and at most 2 pi")
         if not 0.0 <= self.range_min < self.range_max or not math.isfinite(self.range_max):

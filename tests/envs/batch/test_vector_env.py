@@ -19,6 +19,7 @@ from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings import make_settings
 from lidarium.envs.simulation.lidar import Lidar
 from lidarium.mapping.kernels import available_threads
+from lidarium.mapping.scans import MOST_BEAMS
 
 ROOM = Floor("room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),))
 COARSE = Lidar(beams=36, field_of_view=2.0 * math.pi, range_max=6.0)
@@ -414,3 +415,14 @@ def test_actions_of_rows_that_do_not_act_are_ignored():
     assert batch.step(np.zeros((2, 2)))[3].all()
     observations, *_ = batch.step(np.full((2, 2), np.nan))
     assert batch.observation_space.contains(observations)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_scans_of_as_many_beams_as_there_may_be_find_room_on_the_stacks_of_all_threads(threads):
+    lidar = Lidar(beams=MOST_BEAMS, field_of_view=2.0 * math.pi, range_max=12.0, noise_floor=0.01)
+    batch = lidarium.vector_env(8, "apartment", lidar=lidar, observe=["scan", "egocentric_map"], egocentric_cells=1024, threads=threads)
+    batch.reset(seed=0)
+    for _ in range(2):
+        observations, _, _, _, infos = batch.step(batch.action_space.sample())
+    assert np.all(infos["truth"]["coverage"] > 0.0)
+    assert np.all(observations["scan"].min(axis=1) > 0.0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lidarium.envs.simulation.face_casting import cast_by_faces
 from lidarium.envs.simulation.lidar import Lidar, _cast_by_squares, cast_scan, cast_scans, cut_by_disc
 from lidarium.envs.simulation.ray_tables import RayTables
-from lidarium.mapping.scans import ScanGeometry, beam_directions
+from lidarium.mapping.scans import MOST_BEAMS, ScanGeometry, beam_directions
 
 TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025
 """In cells of a raster of 2.5 cm."""
@@ -356,8 +356,8 @@ def test_a_raster_that_rays_could_leave_is_refused(solid, words):
 @pytest.mark.parametrize(
     "options",
     [
-        {"beams": 0}, {"field_of_view": 0.0}, {"field_of_view": 7.0}, {"range_min": 6.0}, {"range_min": -1.0}, {"range_max": math.inf},
-        {"range_max": math.nan}, {"noise_floor": -0.1}, {"noise_share": math.nan}, {"height": 0.0},
+        {"beams": 0}, {"beams": MOST_BEAMS + 1}, {"field_of_view": 0.0}, {"field_of_view": 7.0}, {"range_min": 6.0}, {"range_min": -1.0},
+        {"range_max": math.inf}, {"range_max": math.nan}, {"noise_floor": -0.1}, {"noise_share": math.nan}, {"height": 0.0},
     ],
 )  # fmt: skip
 def test_a_lidar_that_cannot_be_is_refused(options):
