@@ -32,7 +32,7 @@ Array = NDArray[Any]
 _numba_config: Any = config
 _numba_arrays: Any = arrayobj
 
-_LINE = 64
+LINE = 64
 """A line of the caches [bytes]."""
 
 PACKAGE_FOLDERS = ("mapping", "envs", "evaluation")
@@ -170,7 +170,7 @@ def _room_for(typing_context: Any, count: Any, kind: Any) -> Any:  # noqa: ANN40
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         room = builder.alloca(context.get_data_type(kind.dtype), arguments[0])
-        room.align = _LINE
+        room.align = LINE
         return builder.ptrtoint(room, context.get_value_type(types.intp))
 
     return types.intp(types.intp, kind), generate

@@ -12,6 +12,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.kernels import LINE
+
 PIECE = 2**20
 """Memory is asked for in pieces of at least this size [bytes]; what is not touched of a piece takes no room."""
 
@@ -23,9 +25,6 @@ LARGE_PAGE = 2**21
 
 MOST_IN_LARGE_PAGES = 2**27
 """Who expects more than this does without large pages [bytes]: all of such a page takes room as soon as a part of it is touched."""
-
-LINE = 64
-"""A line of the caches [bytes]."""
 
 Number = TypeVar("Number", bound=np.generic)
 

@@ -14,7 +14,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from lidarium.mapping.cell_blocks import fetch_block
-from lidarium.mapping.kernels import Array, kernel, scratch_grid, scratch_vector, vector_at
+from lidarium.mapping.kernels import LINE, Array, kernel, scratch_grid, scratch_vector, vector_at
 from lidarium.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.processor import has_feature
 
@@ -29,9 +29,6 @@ _BYTE, _INT, _LONG = ir.IntType(8), ir.IntType(32), ir.IntType(64)
 _PIECE, _REGISTER, _INTS = ir.VectorType(_BYTE, COLUMNS), ir.VectorType(_BYTE, _CELLS), ir.VectorType(_INT, _CELLS)
 _ROWS_OF_BLOCK = ir.VectorType(_LONG, SIDE)
 _ALL_UNKNOWN = np.uint64(UNKNOWN * 0x0101010101010101)
-LINE = 64
-"""Cells in a line of the caches."""
-
 PLACES = 16
 """Binary places of the numbers by which cells are looked up."""
 

@@ -204,6 +204,8 @@ class EpisodeBatch:
         if begins:
             for episode, start in self._draw(beginning, seeds, options or {}).items():
                 self._place(episode, start)
+            self.is_whole, self._has_goals = bool(self.live.all()), not bool(np.isnan(self._tally.goals[:, 0]).all())
+            self._note_states(np.repeat(np.isin(np.arange(self.episodes), beginning), robots), OperatingState.OPERATING.value)
             modes[beginning] = LOOKS
         seen = acted
         if begins:
@@ -292,10 +294,7 @@ class EpisodeBatch:
         self._offsets[rows] = map_frames(start, self.settings)
         self._goals[rows] = goal_of_robots(start, self.settings)
         self._tally.goals[episode] = np.nan if start.goal is None else start.goal
-        self._has_goals = not bool(np.isnan(self._tally.goals[:, 0]).all())
         self._commands[rows], self.live[rows] = 0.0, True
-        self.is_whole = bool(self.live.all())
-        self._note_states(rows, OperatingState.OPERATING.value)
         self.perception.start(start.goal, episode)
         self._software.start(episode, start.seed)
         self.level.start(episode)
@@ -336,7 +335,7 @@ class EpisodeBatch:
         # Episodes that have not run in this call have nothing to be looked at again.
         self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
 
-    def _note_states(self, rows: slice | NDArray[np.bool_], states: str | list[str]) -> None:
+    def _note_states(self, rows: NDArray[np.bool_], states: str | list[str]) -> None:
         """Note the operating states of some rows; those that were told of before stay as they are."""
         changed = self._states.copy()
         changed[rows] = states

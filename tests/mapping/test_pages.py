@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lidarium.mapping.pages import LARGE_PAGE, LARGEST_PIECE, LINE, PIECE, Pages
+from lidarium.mapping.kernels import LINE
+from lidarium.mapping.pages import LARGE_PAGE, LARGEST_PIECE, PIECE, Pages
 
 
 def test_arrays_of_pages_are_blank_apart_and_begin_on_lines():
