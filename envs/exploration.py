@@ -15,7 +15,6 @@ from lidarium.envs.episodes import Beginning, begin, goal_of_robots, make_world,
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
 from lidarium.envs.onboard.meters import Meters
-from lidarium.envs.onboard.operating import Operating
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.reports import Station
 from lidarium.envs.onboard.software import Software
@@ -55,6 +54,11 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         ``human`` (a window), ``rgb_array`` or None.
     image_resolution : float or None
         Side of a pixel [m] where the floor is a plain image.
+
+    Attributes
+    ----------
+    operating : Operating
+        The robots' operating states and orders.
 
     Notes
     -----
@@ -111,9 +115,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._software = Software(self.perception, self.settings)
         # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a tenth of a step.
         self._step = self._software.step if self._software.is_staged else self.world.step
-        self._may_fail = self.settings.may_fail
+        self._may_fail, self._is_battery_limited = self.settings.may_fail, self.settings.battery.is_limited
         self._meters = self.perception.meters = Meters(self.world, self.settings)
         self.station = Station(self.perception, self._meters)
+        self.operating = self.station.operating
         self._stopping = self.operating.stopping
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -186,16 +191,16 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Run one time step of the world without building observations; ``outcome`` tells what came of it."""
         commands, rows = self._commands, self._rows
         for agent in self.agents:
-            action = actions.get(agent)
+            row, action = rows[agent], actions.get(agent)
             if action is None:
-                if agent in self._stopping or self.operating.is_addressed(rows[agent]):
-                    commands[rows[agent]] = 0.0
+                if agent in self._stopping or self.operating.is_addressed(row):
+                    commands[row] = 0.0
                     continue
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
             shares = action if isinstance(action, np.ndarray) else np.asarray(action, np.float64)
             if shares.shape != (2,):
                 raise ValueError(f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and turn rate")
-            commands[rows[agent]] = shares
+            commands[row] = shares
         if not scale_shares(commands, self._limits):
             raise ValueError(f"an action is nan or infinite ({actions}); want two finite numbers within [-1, 1] for each agent")
         self.drive_at(commands)
@@ -205,13 +210,12 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
         Those of robots that are paused, or back out after a pause, are overwritten.
         """
-        operating = self.operating
-        is_active = operating.is_active
+        is_active = self.operating.is_active
         if is_active:
-            operating.before_step(commands)
+            self.operating.before_step(commands)
         self._step(commands)
         if is_active:
-            operating.after_step()
+            self.operating.after_step()
         if self._meters.is_active:
             self._meters.advance()
         self.scorer.advance()
@@ -220,11 +224,6 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     def energy_j(self) -> NDArray[np.float64]:
         """What the robots have used of their batteries, (robots,) [J]; 0 where these have no limit."""
         return self._meters.used_j.copy()
-
-    @property
-    def operating(self) -> Operating:
-        """The robots' operating states and orders."""
-        return self.station.operating
 
     @property
     def stopping(self) -> dict[str, str]:
@@ -238,10 +237,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         live = self.agents
         self.operating.is_interrupting = False
         observations = self._observations(live)
-        rewards_of_rows = self.scorer.take_rewards()
-        endings, is_truncated = self._endings(live)
-        rows = self._rows
+        rows, rewards_of_rows = self._rows, self.scorer.take_rewards()
         rewards = {agent: rewards_of_rows[rows[agent]] for agent in live}
+        endings, is_truncated = self._endings(live)
         infos = self._infos(live)
         terminations, truncations = dict.fromkeys(live, False), dict.fromkeys(live, is_truncated)
         if endings or is_truncated:
@@ -331,9 +329,13 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
 
     def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:
-        arrays = list(self._writer.write(self.world, self._offsets, goals=self._goals).items())
-        rows = [(agent, self._rows[agent]) for agent in agents]
-        return {agent: {name: array[row] for name, array in arrays} for agent, row in rows}
+        arrays = self._writer.write(self.world, self._offsets, goals=self._goals)
+        observations: dict[str, Observation] = {}
+        for agent in agents:
+            row, observation = self._rows[agent], observations.setdefault(agent, {})
+            for name, array in arrays.items():
+                observation[name] = array[row]
+        return observations
 
     def _infos(self, agents: Sequence[str]) -> dict[str, dict[str, Any]]:
         """Return what a learner may not see, and the operating states, by agent."""
@@ -348,7 +350,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                 "state": states[row]._value_,
                 "order": "" if order is None else order.kind._value_,
             }
-        if self.settings.battery.is_limited:
+        if self._is_battery_limited:
             for agent in agents:
                 infos[agent]["energy_j"] = float(self._meters.used_j[rows[agent]])
         return infos

@@ -12,10 +12,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.settings import OBSERVABLES, ExplorationSettings
-from lidarium.envs.simulation.arrays import world_at
+from lidarium.envs.simulation.arrays import grid_of, table_of, vector_of, world_at
 from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.envs.simulation.stages import RANGE_GAP
-from lidarium.mapping.kernels import Array, int8_grid_at, kernel, use_threads, word_grid_at
+from lidarium.mapping.kernels import Array, grid_at, int8_grid_at, kernel, use_threads, word_grid_at
 from lidarium.mapping.map_crops import crop_levels, crop_turned
 from lidarium.mapping.pooled_maps import forget_touched, pool_touched, touched_words
 
@@ -66,13 +66,12 @@ def action_space() -> spaces.Box:
 
 
 @kernel(borrowing=True)
-def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None:
+def write_row(row: int, sources: Array, observed: Arrays) -> None:
     """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``."""
-    table, offsets, goals, pools = known
-    world = world_at(table)
+    world, offsets, goals = world_at(grid_of(sources, 0, np.int64)), grid_of(sources, 1, np.float64), grid_of(sources, 2, np.float64)
+    numbers, scales = vector_of(sources, 4, np.float64), vector_of(sources, 5, np.int64)
     ranges, believed, velocities, bumpers = world.ranges, world.believed, world.measured, world.bumpers
     beliefs, origins = world.maps, world.origins
-    numbers, scales = limits
     scans, poses, motions, presses, maps, egocentric_maps, observed_goals = observed
     resolution, range_max, max_speed, max_turn_rate = numbers[0], numbers[1], numbers[2], numbers[3]
     farthest = np.float32(FARTHEST)
@@ -104,25 +103,26 @@ def write_row(row: int, known: Arrays, limits: Arrays, observed: Arrays) -> None
             crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
         if egocentric_maps.size > 0:
             touched = word_grid_at(beliefs[row, 3], beliefs[row, 4], touched_words(beliefs[row, 2]))
+            pools = grid_at(sources[3, 0] + row * sources[3, 2] * 8, scales.shape[0], 3, np.int64)
             for k in range(scales.shape[0]):
                 if scales[k] > 1:
-                    pool_touched(log_odds, touched, scales[k], int8_grid_at(pools[row, k, 0], pools[row, k, 1], pools[row, k, 2]))
+                    pool_touched(log_odds, touched, scales[k], int8_grid_at(pools[k, 0], pools[k, 1], pools[k, 2]))
             forget_touched(touched, log_odds.shape[0])
-            crop_turned(pools[row], x, y, believed[row, 2], scales, egocentric_maps[row])
+            crop_turned(pools, x, y, believed[row, 2], scales, egocentric_maps[row])
 
 
 @kernel
-def _write_serial(active: Array, known: Arrays, limits: Arrays, observed: Arrays) -> None:
+def _write_serial(active: Array, sources: Array, observed: Arrays) -> None:
     for row in range(active.shape[0]):
         if active[row]:
-            write_row(row, known, limits, observed)
+            write_row(row, sources, observed)
 
 
 @kernel(parallel=True)
-def _write_parallel(active: Array, known: Arrays, limits: Arrays, observed: Arrays) -> None:
+def _write_parallel(active: Array, sources: Array, observed: Arrays) -> None:
     for row in numba.prange(active.shape[0]):
         if active[row]:
-            write_row(row, known, limits, observed)
+            write_row(row, sources, observed)
 
 
 class ObservationWriter:
@@ -154,6 +154,7 @@ class ObservationWriter:
         )
         self._scales = settings.egocentric_scales if "egocentric_map" in self.keys else None
         self._everyone = np.ones(0, np.bool_)
+        self._told: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[np.int64]] | None = None
         self._shapes: dict[int, list[tuple[str, tuple[int, ...], np.dtype[Any]]]] = {}
         self._threads = min(settings.threads, int(os.cpu_count() or 1))
 
@@ -194,7 +195,7 @@ class ObservationWriter:
         Raises
         ------
         ValueError
-            Where an array is missing or is not of the shape, type and order that is written, or the goals are missing.
+            Where an array is missing or is not of the shape, type and order that is written or read, or the goals are missing.
         """
         rows = len(world.believed)
         if out is None:
@@ -203,12 +204,12 @@ class ObservationWriter:
             self.check(out, rows)
         if active is None:
             active = self._everyone = self._everyone if len(self._everyone) == rows else np.ones(rows, np.bool_)
-        known, limits, observed = self.arguments(world, offsets, out, goals)
+        sources, observed = self.arguments(world, offsets, out, goals)
         if self._threads > 1 and rows >= ROWS_FOR_THREADS:
             use_threads(self._threads)
-            _write_parallel(active, known, limits, observed)
+            _write_parallel(active, sources, observed)
         else:
-            _write_serial(active, known, limits, observed)
+            _write_serial(active, sources, observed)
         return out
 
     def arguments(
@@ -217,8 +218,8 @@ class ObservationWriter:
         offsets: NDArray[np.float64],
         out: Mapping[str, NDArray[Any]],
         goals: NDArray[np.float64] | None = None,
-    ) -> tuple[Arrays, Arrays, Arrays]:
-        """Return what ``write_row`` takes beside the row: what is known, the limits, and the arrays to write; as for ``write``.
+    ) -> tuple[Array, Arrays]:
+        """Return what ``write_row`` takes beside the row: where that lies which is told, and the arrays to write; as for ``write``.
 
         ``out`` must hold what ``buffers`` gives.
         """
@@ -228,8 +229,22 @@ class ObservationWriter:
             goals = offsets
         if self._scales is not None and world.scales != self._scales:
             raise ValueError(f"the world pools its maps at scales {world.scales}; want those of the settings, {self._scales}")
-        known = (world.table, offsets, goals, world.pool_rows)
-        return known, self._limits, _IN_ORDER({**self._absent, **out})
+        return self._table_of(world, offsets, goals), _IN_ORDER({**self._absent, **out})
+
+    def _table_of(self, world: KinematicWorld, offsets: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return where the world's table, offsets, goals, pooled maps, limits and scales lie; it is made anew for other arrays."""
+        told = self._told
+        if told is None or told[0] is not world.table or told[1] is not offsets or told[2] is not goals:
+            for name, array in (("offsets", offsets), ("goals", goals)):
+                if array.shape != (len(world.believed), 2) or array.dtype != np.float64 or not array.flags.c_contiguous:
+                    raise ValueError(f"{name} are {array.dtype} {array.shape}; want float64 {(len(world.believed), 2)}, contiguous")
+            arrays = (world.table, offsets, goals, world.pool_rows, *self._limits)
+            self._told = told = (*arrays[:3], table_of(arrays))
+        return told[3]
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Arrays lie elsewhere in another process.
+        return {**self.__dict__, "_told": None}
 
     def check(self, out: Mapping[str, NDArray[Any]], rows: int) -> None:
         """Check arrays that a caller gives.

@@ -74,14 +74,15 @@ class Scorer:
         self._note()
 
     def _note(self) -> None:
-        if int(self._world.steps[0]) % self._track_steps == 0:
-            self.track.append((self.time, self._world.poses.copy()))
-        seen = int(self._world.team_seen[0])
+        world = self._world
+        step, seen = world.steps.item(0), world.team_seen.item(0)
+        time = step * self._settings.time_step
+        if step % self._track_steps == 0:
+            self.track.append((time, world.poses.copy()))
         if seen == self._last_seen:
             return
         self._last_seen = seen
-        time = self.time
-        self.coverage = seen / max(int(self._world.counted[0]), 1)
+        self.coverage = seen / max(world.counted.item(0), 1)
         self.curve.append((time, self.coverage))
         for threshold in THRESHOLDS[len(self.times) :]:
             if self.coverage < threshold:
@@ -101,5 +102,5 @@ class Scorer:
     def take_rewards(self) -> list[float]:
         """Return each robot's reward since the last call, and begin anew."""
         rewards: list[float] = self._world.rewards.tolist()
-        self._world.rewards[:] = 0.0
+        self._world.rewards.fill(0.0)
         return rewards

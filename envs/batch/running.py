@@ -129,8 +129,7 @@ def _run_episodes(
     tally: Tally,
     longest: int,
     seen: Array,
-    known: Arrays,
-    limits: Arrays,
+    sources: Array,
     observed: Arrays,
     order: Array,
     turns: Array,
@@ -150,7 +149,7 @@ def _run_episodes(
                 _run_episode(table, robots, episode, modes[episode], commands, drives, following, tally, longest)
                 for row in range(episode * robots, (episode + 1) * robots):
                     if seen[row]:
-                        write_row(row, known, limits, observed)
+                        write_row(row, sources, observed)
 
 
 run_serial = kernel(_run_episodes)

@@ -4,7 +4,8 @@ A kernel views the arrays where they lie. Arrays handed over as arguments would 
 threads in the same places of memory; views are not.
 """
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,18 +119,20 @@ class WorldArrays(NamedTuple):
     heard: Array
 
 
-def table_of(arrays: WorldArrays) -> NDArray[np.int64]:
-    """Return where the arrays lie: address, rows and columns (1 for a vector) of each, shape (40, 3). The caller keeps them alive."""
+def table_of(arrays: Iterable[NDArray[Any]]) -> NDArray[np.int64]:
+    """Return where arrays lie: address, rows and columns (1 for a vector) of each, shape (arrays, 3). The caller keeps them alive."""
     return np.array([(array.ctypes.data, array.shape[0], array.size // max(array.shape[0], 1)) for array in arrays], np.int64)
 
 
 @kernel(spliced=True)
-def _vector(table: Array, place: int, kind: type[np.generic]) -> Array:
+def vector_of(table: Array, place: int, kind: type[np.generic]) -> Array:
+    """View the vector that has a place in a table, inside a kernel."""
     return vector_at(table[place, 0], table[place, 1], kind)  # type: ignore[no-any-return]
 
 
 @kernel(spliced=True)
-def _grid(table: Array, place: int, kind: type[np.generic]) -> Array:
+def grid_of(table: Array, place: int, kind: type[np.generic]) -> Array:
+    """View the grid that has a place in a table, inside a kernel."""
     return grid_at(table[place, 0], table[place, 1], table[place, 2], kind)  # type: ignore[no-any-return]
 
 
@@ -137,44 +140,44 @@ def _grid(table: Array, place: int, kind: type[np.generic]) -> Array:
 def world_at(table: Array) -> WorldArrays:
     """View the arrays of a table inside a kernel."""
     return WorldArrays(
-        _grid(table, 0, np.float64),
-        _vector(table, 1, np.float64),
-        _grid(table, 2, np.float64),
-        _vector(table, 3, np.float32),
-        _vector(table, 4, np.int64),
-        _grid(table, 5, np.int64),
-        _grid(table, 6, np.float64),
-        _vector(table, 7, np.uint64),
-        _vector(table, 8, np.int64),
-        _vector(table, 9, np.int64),
-        _vector(table, 10, np.uint8),
-        _vector(table, 11, np.int64),
-        _grid(table, 12, np.float64),
-        _grid(table, 13, np.float64),
-        _grid(table, 14, np.float64),
-        _grid(table, 15, np.float64),
-        _grid(table, 16, np.float32),
-        _grid(table, 17, np.int64),
-        _grid(table, 18, np.float64),
-        _grid(table, 19, np.int64),
-        _grid(table, 20, np.int64),
-        _grid(table, 21, np.int64),
-        _vector(table, 22, np.int64),
-        _vector(table, 23, np.float64),
-        _grid(table, 24, np.int8),
-        _vector(table, 25, np.uint8),
-        _vector(table, 26, np.float64),
-        _vector(table, 27, np.int64),
-        _vector(table, 28, np.float64),
-        _vector(table, 29, np.float64),
-        _vector(table, 30, np.float64),
-        _vector(table, 31, np.float64),
-        _grid(table, 32, np.float64),
-        _grid(table, 33, np.float64),
-        _grid(table, 34, np.float64),
-        _grid(table, 35, np.float64),
-        _vector(table, 36, np.uint8),
-        _grid(table, 37, np.float64),
-        _grid(table, 38, np.uint8),
-        _grid(table, 39, np.float64),
+        grid_of(table, 0, np.float64),
+        vector_of(table, 1, np.float64),
+        grid_of(table, 2, np.float64),
+        vector_of(table, 3, np.float32),
+        vector_of(table, 4, np.int64),
+        grid_of(table, 5, np.int64),
+        grid_of(table, 6, np.float64),
+        vector_of(table, 7, np.uint64),
+        vector_of(table, 8, np.int64),
+        vector_of(table, 9, np.int64),
+        vector_of(table, 10, np.uint8),
+        vector_of(table, 11, np.int64),
+        grid_of(table, 12, np.float64),
+        grid_of(table, 13, np.float64),
+        grid_of(table, 14, np.float64),
+        grid_of(table, 15, np.float64),
+        grid_of(table, 16, np.float32),
+        grid_of(table, 17, np.int64),
+        grid_of(table, 18, np.float64),
+        grid_of(table, 19, np.int64),
+        grid_of(table, 20, np.int64),
+        grid_of(table, 21, np.int64),
+        vector_of(table, 22, np.int64),
+        vector_of(table, 23, np.float64),
+        grid_of(table, 24, np.int8),
+        vector_of(table, 25, np.uint8),
+        vector_of(table, 26, np.float64),
+        vector_of(table, 27, np.int64),
+        vector_of(table, 28, np.float64),
+        vector_of(table, 29, np.float64),
+        vector_of(table, 30, np.float64),
+        vector_of(table, 31, np.float64),
+        grid_of(table, 32, np.float64),
+        grid_of(table, 33, np.float64),
+        grid_of(table, 34, np.float64),
+        grid_of(table, 35, np.float64),
+        vector_of(table, 36, np.uint8),
+        grid_of(table, 37, np.float64),
+        grid_of(table, 38, np.uint8),
+        grid_of(table, 39, np.float64),
     )

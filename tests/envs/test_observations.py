@@ -177,6 +177,28 @@ def test_a_goal_is_in_the_frame_of_the_pose_and_zero_where_it_is_not_known():
         ObservationWriter(env.settings, has_goal=True).write(env.world, env._offsets)
 
 
+def test_one_writer_tells_of_several_worlds_and_frames():
+    worlds = [driven(steps)[0] for steps in (2, 6)]
+    writer = writer_of(worlds[0])
+    for offsets in (worlds[0]._offsets, worlds[0]._offsets + 1.0):
+        for env in worlds:
+            told, alone = writer.write(env.world, offsets), writer_of(env).write(env.world, offsets.copy())
+            assert all(np.array_equal(array, alone[name]) for name, array in told.items())
+
+
+@pytest.mark.parametrize(
+    ("offsets", "words"),
+    [
+        (np.zeros((3, 3))[:, :2], r"offsets are float64 \(3, 2\); want float64 \(3, 2\), contiguous"),
+        (np.zeros((3, 2), np.float32), "offsets are float32"), (np.zeros((2, 2)), r"offsets are float64 \(2, 2\)"),
+    ],
+)  # fmt: skip
+def test_frames_that_cannot_be_read_are_refused(offsets, words):
+    env, _ = driven(1)
+    with pytest.raises(ValueError, match=words):
+        writer_of(env).write(env.world, offsets)
+
+
 def test_the_gymnasium_form_takes_the_choice():
     env = gymnasium.make("lidarium/Exploration-v0", observe=["egocentric_map"], egocentric_cells=32, egocentric_scales=[2])
     observation, _ = env.reset(seed=0)
