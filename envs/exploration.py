@@ -332,9 +332,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         arrays = self._writer.write(self.world, self._offsets, goals=self._goals)
         observations: dict[str, Observation] = {}
         for agent in agents:
-            row, observation = self._rows[agent], observations.setdefault(agent, {})
+            row, observation = self._rows[agent], {}
             for name, array in arrays.items():
                 observation[name] = array[row]
+            observations[agent] = observation
         return observations
 
     def _infos(self, agents: Sequence[str]) -> dict[str, dict[str, Any]]:

@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Mapping
+from itertools import starmap
 from operator import itemgetter
 from typing import Any
 
@@ -24,8 +25,6 @@ FARTHEST = 1000.0
 
 KEYS = (*OBSERVABLES, "goal")
 """All that is ever observed, in the order in which the kernel takes the arrays."""
-
-_IN_ORDER = itemgetter(*KEYS)
 
 Arrays = tuple[Array, ...]
 """Arrays that go to the kernel together; a tuple costs no more than its arrays alone, where a named one costs twice as much."""
@@ -143,8 +142,12 @@ class ObservationWriter:
 
     def __init__(self, settings: ExplorationSettings, has_goal: bool = False) -> None:
         self.keys = observed_keys(settings, has_goal)
-        self._kinds = {name: (box.shape, box.dtype) for name, box in _boxes(settings).items()}
-        self._absent = {name: np.empty((0,) * (1 + len(shape)), dtype) for name, (shape, dtype) in self._kinds.items()}
+        kinds = {name: (box.shape, box.dtype) for name, box in _boxes(settings).items()}
+        self._kinds = [kinds[name] for name in self.keys]
+        # The kernel takes the arrays of all keys, in their order; what is not observed stands behind what is.
+        self._absent = [np.empty((0,) * (1 + len(kinds[name][0])), kinds[name][1]) for name in KEYS if name not in self.keys]
+        placed = (*self.keys, *(name for name in KEYS if name not in self.keys))
+        self._in_order = itemgetter(*(placed.index(name) for name in KEYS))
         robot = settings.robot
         numbers = (settings.occupancy.resolution, settings.lidar.range_max, robot.max_speed, robot.max_turn_rate)
         # The space's bounds are float32, and so are those to which values are clipped.
@@ -155,14 +158,18 @@ class ObservationWriter:
         self._scales = settings.egocentric_scales if "egocentric_map" in self.keys else None
         self._everyone = np.ones(0, np.bool_)
         self._told: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[np.int64]] | None = None
-        self._shapes: dict[int, list[tuple[str, tuple[int, ...], np.dtype[Any]]]] = {}
+        self._shapes: dict[int, list[tuple[tuple[int, ...], np.dtype[Any]]]] = {}
         self._threads = min(settings.threads, int(os.cpu_count() or 1))
 
     def buffers(self, rows: int) -> dict[str, NDArray[Any]]:
         """Return new arrays for the observations of ``rows`` rows, by key; what they hold is undefined until it is written."""
+        return dict(zip(self.keys, self._new(rows), strict=True))
+
+    def _new(self, rows: int) -> list[NDArray[Any]]:
+        """Return what ``buffers`` does, in the order of the keys."""
         if rows not in self._shapes:
-            self._shapes[rows] = [(name, (rows, *self._kinds[name][0]), self._kinds[name][1]) for name in self.keys]
-        return {name: np.empty(shape, dtype) for name, shape, dtype in self._shapes[rows]}
+            self._shapes[rows] = [((rows, *shape), dtype) for shape, dtype in self._kinds]
+        return list(starmap(np.empty, self._shapes[rows]))
 
     def write(
         self,
@@ -198,19 +205,16 @@ class ObservationWriter:
             Where an array is missing or is not of the shape, type and order that is written or read, or the goals are missing.
         """
         rows = len(world.believed)
-        if out is None:
-            out = self.buffers(rows)
-        else:
-            self.check(out, rows)
+        arrays = self._new(rows) if out is None else self.check(out, rows)
         if active is None:
             active = self._everyone = self._everyone if len(self._everyone) == rows else np.ones(rows, np.bool_)
-        sources, observed = self.arguments(world, offsets, out, goals)
+        sources, observed = self._sources(world, offsets, goals), self._in_order(arrays + self._absent)
         if self._threads > 1 and rows >= ROWS_FOR_THREADS:
             use_threads(self._threads)
             _write_parallel(active, sources, observed)
         else:
             _write_serial(active, sources, observed)
-        return out
+        return dict(zip(self.keys, arrays, strict=True)) if out is None else out
 
     def arguments(
         self,
@@ -223,18 +227,18 @@ class ObservationWriter:
 
         ``out`` must hold what ``buffers`` gives.
         """
+        return self._sources(world, offsets, goals), self._in_order([out[name] for name in self.keys] + self._absent)
+
+    def _sources(self, world: KinematicWorld, offsets: NDArray[np.float64], goals: NDArray[np.float64] | None) -> NDArray[np.int64]:
+        """Return where the world's table, offsets, goals, pooled maps, limits and scales lie; it is made anew for other arrays."""
         if goals is None:
             if "goal" in self.keys:
                 raise ValueError("goals is None; want each robot's goal (rows, 2), nan where it does not know one")
             goals = offsets
-        if self._scales is not None and world.scales != self._scales:
-            raise ValueError(f"the world pools its maps at scales {world.scales}; want those of the settings, {self._scales}")
-        return self._table_of(world, offsets, goals), _IN_ORDER({**self._absent, **out})
-
-    def _table_of(self, world: KinematicWorld, offsets: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return where the world's table, offsets, goals, pooled maps, limits and scales lie; it is made anew for other arrays."""
         told = self._told
         if told is None or told[0] is not world.table or told[1] is not offsets or told[2] is not goals:
+            if self._scales is not None and world.scales != self._scales:
+                raise ValueError(f"the world pools its maps at scales {world.scales}; want those of the settings, {self._scales}")
             for name, array in (("offsets", offsets), ("goals", goals)):
                 if array.shape != (len(world.believed), 2) or array.dtype != np.float64 or not array.flags.c_contiguous:
                     raise ValueError(f"{name} are {array.dtype} {array.shape}; want float64 {(len(world.believed), 2)}, contiguous")
@@ -246,18 +250,20 @@ class ObservationWriter:
         # Arrays lie elsewhere in another process.
         return {**self.__dict__, "_told": None}
 
-    def check(self, out: Mapping[str, NDArray[Any]], rows: int) -> None:
-        """Check arrays that a caller gives.
+    def check(self, out: Mapping[str, NDArray[Any]], rows: int) -> list[NDArray[Any]]:
+        """Check arrays that a caller gives, and return them in the order of the keys.
 
         Raises
         ------
         ValueError
             Where an array is missing or is not of the shape, type and order that is written.
         """
-        for name in self.keys:
-            shape, dtype = (rows, *self._kinds[name][0]), self._kinds[name][1]
-            array = out.get(name)
+        arrays = []
+        for name, (kind, dtype) in zip(self.keys, self._kinds, strict=True):
+            shape, array = (rows, *kind), out.get(name)
             if array is None:
                 raise ValueError(f"out has no array for {name}; want {', '.join(self.keys)}")
             if array.shape != shape or array.dtype != dtype or not array.flags.carray:
                 raise ValueError(f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous and writeable")
+            arrays.append(array)
+        return arrays

@@ -67,13 +67,10 @@ class Scorer:
         self._world.rewards[:] = 0.0
         self.times, self.curve, self.track, self.ended_because = {}, [], [], {}
         self._last_seen = -1
-        self._note()
+        self.advance()
 
     def advance(self) -> None:
-        """Take in one step of the world."""
-        self._note()
-
-    def _note(self) -> None:
+        """Take in one step of the world, or the scan taken at the start."""
         world = self._world
         step, seen = world.steps.item(0), world.team_seen.item(0)
         time = step * self._settings.time_step
