@@ -100,11 +100,11 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._rows = {agent: row for row, agent in enumerate(self.possible_agents)}
         self.world = make_world(self.settings)
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
-        self._writer = ObservationWriter(self.settings, self.has_goal)
         self._horizon = self.settings.horizon_steps
         self._generator: np.random.Generator | None = None
         self._offsets = np.zeros((self.settings.robots, 2))
         self._goals = np.full((self.settings.robots, 2), np.nan)
+        self._writer = ObservationWriter(self.world, self.settings, self._offsets, self._goals if self.has_goal else None)
         self._commands = np.zeros((self.settings.robots, 2))
         self._window: Any = None
         self.floor: Floor | None = None
@@ -329,7 +329,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
 
     def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:
-        arrays = self._writer.write(self.world, self._offsets, goals=self._goals)
+        arrays = self._writer.write()
         observations: dict[str, Observation] = {}
         for agent in agents:
             row, observation = self._rows[agent], {}

@@ -129,70 +129,72 @@ class ObservationWriter:
 
     Parameters
     ----------
+    world : KinematicWorld
+        Where the robots are.
     settings : ExplorationSettings
         What is observed; sizes, limits and threads.
-    has_goal : bool
-        Whether the goal is observed.
+    offsets : (rows, 2) float64
+        Origin of each robot's map frame in the frame of its believed pose [m]; read at each call.
+    goals : (rows, 2) float64 or None
+        Each robot's goal in the frame of its believed pose [m], nan where it does not know one; read at each call. None where there are
+        no goals, which are not observed then.
 
     Attributes
     ----------
     keys : tuple of str
         What is observed.
+
+    Raises
+    ------
+    ValueError
+        Where the offsets or goals are of another type, or the world does not pool its maps at the scales that are observed.
     """
 
-    def __init__(self, settings: ExplorationSettings, has_goal: bool = False) -> None:
-        self.keys = observed_keys(settings, has_goal)
-        kinds = {name: (box.shape, box.dtype) for name, box in _boxes(settings).items()}
-        self._kinds = [kinds[name] for name in self.keys]
-        # The kernel takes the arrays of all keys, in their order; what is not observed stands behind what is.
-        self._absent = [np.empty((0,) * (1 + len(kinds[name][0])), kinds[name][1]) for name in KEYS if name not in self.keys]
-        placed = (*self.keys, *(name for name in KEYS if name not in self.keys))
-        self._in_order = itemgetter(*(placed.index(name) for name in KEYS))
-        robot = settings.robot
-        numbers = (settings.occupancy.resolution, settings.lidar.range_max, robot.max_speed, robot.max_turn_rate)
-        # The space's bounds are float32, and so are those to which values are clipped.
-        self._limits = (
-            np.array([numbers[0], *(float(np.float32(number)) for number in numbers[1:])]),
-            np.array(settings.egocentric_scales, np.int64),
-        )
-        self._scales = settings.egocentric_scales if "egocentric_map" in self.keys else None
-        self._everyone = np.ones(0, np.bool_)
-        self._told: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[np.int64]] | None = None
-        self._shapes: dict[int, list[tuple[tuple[int, ...], np.dtype[Any]]]] = {}
-        self._threads = min(settings.threads, int(os.cpu_count() or 1))
-
-    def buffers(self, rows: int) -> dict[str, NDArray[Any]]:
-        """Return new arrays for the observations of ``rows`` rows, by key; what they hold is undefined until it is written."""
-        return dict(zip(self.keys, self._new(rows), strict=True))
-
-    def _new(self, rows: int) -> list[NDArray[Any]]:
-        """Return what ``buffers`` does, in the order of the keys."""
-        if rows not in self._shapes:
-            self._shapes[rows] = [((rows, *shape), dtype) for shape, dtype in self._kinds]
-        return list(starmap(np.empty, self._shapes[rows]))
-
-    def write(
+    def __init__(
         self,
         world: KinematicWorld,
+        settings: ExplorationSettings,
         offsets: NDArray[np.float64],
-        out: Mapping[str, NDArray[Any]] | None = None,
-        active: NDArray[np.bool_] | None = None,
         goals: NDArray[np.float64] | None = None,
-    ) -> Mapping[str, NDArray[Any]]:
+    ) -> None:
+        self.keys = observed_keys(settings, goals is not None)
+        self.rows = len(world.believed)
+        for name, array in (("offsets", offsets), ("goals", offsets if goals is None else goals)):
+            if array.shape != (self.rows, 2) or array.dtype != np.float64 or not array.flags.c_contiguous:
+                raise ValueError(f"{name} are {array.dtype} {array.shape}; want float64 {(self.rows, 2)}, contiguous")
+        if "egocentric_map" in self.keys and world.scales != settings.egocentric_scales:
+            raise ValueError(f"the world pools its maps at scales {world.scales}; want those of the settings, {settings.egocentric_scales}")
+        kinds = {name: ((self.rows, *box.shape), box.dtype) for name, box in _boxes(settings).items()}
+        self._kinds = [kinds[name] for name in self.keys]
+        # The kernel takes the arrays of all keys, in their order; what is not observed stands behind what is.
+        absent = [name for name in KEYS if name not in self.keys]
+        self._absent = [np.empty((0,) * len(kinds[name][0]), kinds[name][1]) for name in absent]
+        self._in_order = itemgetter(*((*self.keys, *absent).index(name) for name in KEYS))
+        robot = settings.robot
+        # The space's bounds are float32, and so are those to which values are clipped.
+        limits = [float(np.float32(limit)) for limit in (settings.lidar.range_max, robot.max_speed, robot.max_turn_rate)]
+        self._world = world
+        self._told = (
+            offsets, offsets if goals is None else goals, world.pool_rows,
+            np.array([settings.occupancy.resolution, *limits]), np.array(settings.egocentric_scales, np.int64),
+        )  # fmt: skip
+        self._sources: NDArray[np.int64] | None = None
+        self._everyone = np.ones(self.rows, np.bool_)
+        self._threads = min(settings.threads, int(os.cpu_count() or 1)) if self.rows >= ROWS_FOR_THREADS else 1
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        """Return new arrays for the observations, by key; what they hold is undefined until it is written."""
+        return {name: np.empty(*kind) for name, kind in zip(self.keys, self._kinds, strict=True)}
+
+    def write(self, out: Mapping[str, NDArray[Any]] | None = None, active: NDArray[np.bool_] | None = None) -> Mapping[str, NDArray[Any]]:
         """Write one observation a row.
 
         Parameters
         ----------
-        world : KinematicWorld
-            Where the robots are.
-        offsets : (rows, 2) float64
-            Origin of each robot's map frame in the frame of its believed pose [m].
         out : dict of arrays or None
             Where to write, as ``buffers`` makes it; new arrays where None.
         active : (rows,) bool or None
             Which rows to write, the others keep what they hold; all where None.
-        goals : (rows, 2) float64 or None
-            Each robot's goal in the frame of its believed pose [m], nan where it does not know one; needed where goals are observed.
 
         Returns
         -------
@@ -202,55 +204,33 @@ class ObservationWriter:
         Raises
         ------
         ValueError
-            Where an array is missing or is not of the shape, type and order that is written or read, or the goals are missing.
+            Where an array is missing or is not of the shape, type and order that is written.
         """
-        rows = len(world.believed)
-        arrays = self._new(rows) if out is None else self.check(out, rows)
-        if active is None:
-            active = self._everyone = self._everyone if len(self._everyone) == rows else np.ones(rows, np.bool_)
-        sources, observed = self._sources(world, offsets, goals), self._in_order(arrays + self._absent)
-        if self._threads > 1 and rows >= ROWS_FOR_THREADS:
+        arrays = list(starmap(np.empty, self._kinds)) if out is None else self.check(out)
+        sources = self._table() if self._sources is None else self._sources
+        chosen, observed = self._everyone if active is None else active, self._in_order(arrays + self._absent)
+        if self._threads > 1:
             use_threads(self._threads)
-            _write_parallel(active, sources, observed)
+            _write_parallel(chosen, sources, observed)
         else:
-            _write_serial(active, sources, observed)
+            _write_serial(chosen, sources, observed)
         return dict(zip(self.keys, arrays, strict=True)) if out is None else out
 
-    def arguments(
-        self,
-        world: KinematicWorld,
-        offsets: NDArray[np.float64],
-        out: Mapping[str, NDArray[Any]],
-        goals: NDArray[np.float64] | None = None,
-    ) -> tuple[Array, Arrays]:
-        """Return what ``write_row`` takes beside the row: where that lies which is told, and the arrays to write; as for ``write``.
+    def arguments(self, out: Mapping[str, NDArray[Any]]) -> tuple[Array, Arrays]:
+        """Return what ``write_row`` takes beside the row: where that lies which is told, and where to write, as ``buffers`` makes it."""
+        sources = self._table() if self._sources is None else self._sources
+        return sources, self._in_order([out[name] for name in self.keys] + self._absent)
 
-        ``out`` must hold what ``buffers`` gives.
-        """
-        return self._sources(world, offsets, goals), self._in_order([out[name] for name in self.keys] + self._absent)
-
-    def _sources(self, world: KinematicWorld, offsets: NDArray[np.float64], goals: NDArray[np.float64] | None) -> NDArray[np.int64]:
-        """Return where the world's table, offsets, goals, pooled maps, limits and scales lie; it is made anew for other arrays."""
-        if goals is None:
-            if "goal" in self.keys:
-                raise ValueError("goals is None; want each robot's goal (rows, 2), nan where it does not know one")
-            goals = offsets
-        told = self._told
-        if told is None or told[0] is not world.table or told[1] is not offsets or told[2] is not goals:
-            if self._scales is not None and world.scales != self._scales:
-                raise ValueError(f"the world pools its maps at scales {world.scales}; want those of the settings, {self._scales}")
-            for name, array in (("offsets", offsets), ("goals", goals)):
-                if array.shape != (len(world.believed), 2) or array.dtype != np.float64 or not array.flags.c_contiguous:
-                    raise ValueError(f"{name} are {array.dtype} {array.shape}; want float64 {(len(world.believed), 2)}, contiguous")
-            arrays = (world.table, offsets, goals, world.pool_rows, *self._limits)
-            self._told = told = (*arrays[:3], table_of(arrays))
-        return told[3]
+    def _table(self) -> NDArray[np.int64]:
+        """Return where the world's table, offsets, goals, pooled maps, limits and scales lie."""
+        self._sources = table_of((self._world.table, *self._told))
+        return self._sources
 
     def __getstate__(self) -> dict[str, Any]:
-        # Arrays lie elsewhere in another process.
-        return {**self.__dict__, "_told": None}
+        # A copy's arrays lie elsewhere; where, is known when all of it has been made.
+        return {**self.__dict__, "_sources": None}
 
-    def check(self, out: Mapping[str, NDArray[Any]], rows: int) -> list[NDArray[Any]]:
+    def check(self, out: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
         """Check arrays that a caller gives, and return them in the order of the keys.
 
         Raises
@@ -259,8 +239,8 @@ class ObservationWriter:
             Where an array is missing or is not of the shape, type and order that is written.
         """
         arrays = []
-        for name, (kind, dtype) in zip(self.keys, self._kinds, strict=True):
-            shape, array = (rows, *kind), out.get(name)
+        for name, (shape, dtype) in zip(self.keys, self._kinds, strict=True):
+            array = out.get(name)
             if array is None:
                 raise ValueError(f"out has no array for {name}; want {', '.join(self.keys)}")
             if array.shape != shape or array.dtype != dtype or not array.flags.carray:

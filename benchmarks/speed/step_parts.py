@@ -140,8 +140,8 @@ class StepParts:
         }
         self.whole: Callable[[], object] = step
         settings = make_settings(robots=ROBOTS, lidar=lidar, resolution=floor.resolution, observe=OBSERVED)
-        writer, offsets = ObservationWriter(settings), np.zeros((ROBOTS, 2))
-        self.observation: Callable[[], object] = partial(writer.write, world, offsets, writer.buffers(ROBOTS))
+        writer = ObservationWriter(world, settings, np.zeros((ROBOTS, 2)))
+        self.observation: Callable[[], object] = partial(writer.write, writer.buffers())
         for part in self.parts.values():
             part()
         self.rays, self.cells = float(beams), float(np.bitwise_count(noisy_bits).sum()) / ROBOTS

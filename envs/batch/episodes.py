@@ -121,7 +121,7 @@ class EpisodeBatch:
         self.perception = Perception(self.world, settings, self._offsets)
         self._software = Software(self.perception, settings)
         self.level = make_level(level, self.perception, settings)
-        self._writer = ObservationWriter(settings, self._choice.has_goal)
+        self._writer = ObservationWriter(self.world, settings, self._offsets, self._goals if self._choice.has_goal else None)
         known = observation_space(settings, self._choice.has_goal).spaces
         self.observation_space = spaces.Dict({**known, **self.level.boxes})
         self.action_space = self.level.action_space
@@ -249,7 +249,7 @@ class EpisodeBatch:
         run = run_parallel if threads > 1 else run_serial
         run(
             self.world.table, self.robots, modes, commands, self.level.drives, self.level.following, self._tally,
-            self.settings.decision_steps, seen, *self._writer.arguments(self.world, self._offsets, self.observations, self._goals),
+            self.settings.decision_steps, seen, *self._writer.arguments(self.observations),
             self._orders[0], new_turns(), threads,
         )  # fmt: skip
 
@@ -268,7 +268,7 @@ class EpisodeBatch:
             note_ends(modes, self.robots, self.world.table, self.level.drives, self._tally)
             left[runs] -= 1
             modes[left == 0] = WAITS
-        self._writer.write(self.world, self._offsets, self.observations, seen, self._goals)
+        self._writer.write(self.observations, seen)
 
     def _draw(
         self, beginning: NDArray[np.int64], seeds: Sequence[int | None] | None, options: Mapping[int, ResetOptions]
@@ -300,7 +300,7 @@ class EpisodeBatch:
         self.level.start(episode)
 
     def _new_buffers(self) -> Arrays:
-        arrays = self._writer.buffers(self.rows)
+        arrays = self._writer.buffers()
         return {**arrays, **{name: np.zeros((self.rows, *(box.shape or ())), box.dtype) for name, box in self.level.boxes.items()}}
 
     def _turn_buffers(self, seen: NDArray[np.bool_], is_same_step: bool) -> None:

@@ -1,6 +1,8 @@
 """Observations: what is chosen and nothing else, written where the caller wants it, the same however it is asked for."""
 
+import copy
 import math
+import pickle
 from itertools import combinations
 
 import gymnasium
@@ -30,8 +32,8 @@ def driven(steps=15, floor="building:5", **options):
     return env, observations
 
 
-def writer_of(env, **options):
-    return ObservationWriter(make_settings(env.settings, **options), env.has_goal)
+def writer_of(env, offsets=None, goals=None, **options):
+    return ObservationWriter(env.world, make_settings(env.settings, **options), env._offsets if offsets is None else offsets, goals)
 
 
 OFFSETS = np.zeros((9, 2))
@@ -46,8 +48,8 @@ def test_the_default_is_all_but_the_egocentric_map():
 @pytest.mark.parametrize("names", [*combinations(OBSERVABLES, 1), *combinations(OBSERVABLES, 2), OBSERVABLES])
 def test_what_is_observed_does_not_depend_on_what_else_is(names):
     env, _ = driven(8)
-    everything = writer_of(env, observe=OBSERVABLES).write(env.world, OFFSETS[:3])
-    chosen = writer_of(env, observe=names).write(env.world, OFFSETS[:3])
+    everything = writer_of(env, OFFSETS[:3], observe=OBSERVABLES).write()
+    chosen = writer_of(env, OFFSETS[:3], observe=names).write()
     assert tuple(chosen) == names
     for name, array in chosen.items():
         assert np.array_equal(array, everything[name])
@@ -110,9 +112,9 @@ def test_the_egocentric_map_does_not_tell_the_heading_on_the_floor():
 def test_given_arrays_are_filled_and_returned():
     env, observations = driven(observe=OBSERVABLES)
     writer = writer_of(env)
-    buffers = writer.buffers(3)
+    buffers = writer.buffers()
     arrays = list(buffers.values())
-    out = writer.write(env.world, env._offsets, buffers)
+    out = writer.write(buffers)
     assert out is buffers
     assert all(array is kept for array, kept in zip(out.values(), arrays, strict=True))
     for row, agent in enumerate(env.agents):
@@ -123,12 +125,11 @@ def test_given_arrays_are_filled_and_returned():
 @pytest.mark.parametrize("observe", [OBSERVABLES, ("scan", "egocentric_map")])
 def test_rows_that_are_not_active_keep_what_they_hold(observe):
     env, _ = driven(floor=GOAL_FLOOR, robots=2)
-    writer = ObservationWriter(make_settings(env.settings, observe=observe), has_goal=True)
-    goals, whole = np.array([[4.0, 3.0]] * 2), writer.buffers(2)
-    writer.write(env.world, env._offsets, whole, goals=goals)
+    writer = writer_of(env, goals=np.array([[4.0, 3.0]] * 2), observe=observe)
+    whole = writer.write()
     for active in ([False, False], [True, False], [False, True]):
         out = {name: np.full_like(array, 77) for name, array in whole.items()}
-        writer.write(env.world, env._offsets, out, np.array(active), goals)
+        writer.write(out, np.array(active))
         for name, array in out.items():
             for row, is_active in enumerate(active):
                 assert np.array_equal(array[row], whole[name][row] if is_active else np.full_like(array[row], 77))
@@ -139,8 +140,8 @@ def test_threads_do_not_change_an_observation():
     for threads in (1, 2):
         env, _ = driven(5, robots=9, threads=threads, observe=OBSERVABLES)
         active = np.arange(9) % 4 != 1
-        out = {name: np.zeros_like(array) for name, array in writer_of(env).buffers(9).items()}
-        written.append((writer_of(env).write(env.world, OFFSETS), writer_of(env).write(env.world, OFFSETS, out, active)))
+        out = {name: np.zeros_like(array) for name, array in writer_of(env).buffers().items()}
+        written.append((writer_of(env, OFFSETS).write(), writer_of(env, OFFSETS).write(out, active)))
     for one, other in zip(*written, strict=True):
         for name, array in one.items():
             assert np.array_equal(array, other[name])
@@ -157,10 +158,10 @@ def test_threads_do_not_change_an_observation():
 )  # fmt: skip
 def test_arrays_that_do_not_fit_are_refused(change, words):
     env, _ = driven(1)
-    out = writer_of(env).buffers(3)
+    out = writer_of(env).buffers()
     change(out)
     with pytest.raises(ValueError, match=words):
-        writer_of(env).write(env.world, env._offsets, out)
+        writer_of(env).write(out)
 
 
 def test_a_goal_is_in_the_frame_of_the_pose_and_zero_where_it_is_not_known():
@@ -170,20 +171,35 @@ def test_a_goal_is_in_the_frame_of_the_pose_and_zero_where_it_is_not_known():
     _, observations = driven(floor=GOAL_FLOOR, robots=2, observe=["pose"], known_starts=False)
     assert all(not observation["goal"].any() for observation in observations.values())
     goals = np.array([[np.nan, np.nan], [4.0, 3.0]])
-    written = ObservationWriter(env.settings, has_goal=True).write(env.world, env._offsets, goals=goals)["goal"]
+    written = writer_of(env, goals=goals).write()["goal"]
     assert written[0].tolist() == [0.0, 0.0]
     assert written[1].any()
-    with pytest.raises(ValueError, match="goals is None"):
-        ObservationWriter(env.settings, has_goal=True).write(env.world, env._offsets)
+    assert "goal" not in writer_of(env).write()
 
 
-def test_one_writer_tells_of_several_worlds_and_frames():
-    worlds = [driven(steps)[0] for steps in (2, 6)]
-    writer = writer_of(worlds[0])
-    for offsets in (worlds[0]._offsets, worlds[0]._offsets + 1.0):
-        for env in worlds:
-            told, alone = writer.write(env.world, offsets), writer_of(env).write(env.world, offsets.copy())
-            assert all(np.array_equal(array, alone[name]) for name, array in told.items())
+def test_a_writer_reads_frames_and_goals_as_they_are_at_each_call():
+    env, _ = driven(3, observe=["pose"])
+    offsets, goals = np.zeros((3, 2)), np.full((3, 2), 2.0)
+    writer = writer_of(env, offsets, goals)
+    before = writer.write()
+    offsets += 1.0
+    goals += 2.0
+    after = writer.write()
+    assert np.allclose(before["pose"][:, :2] - after["pose"][:, :2], 1.0, atol=1e-6)
+    assert np.allclose(after["goal"] - before["goal"], 1.0)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda pair: pickle.loads(pickle.dumps(pair))], ids=["deepcopy", "pickle"])
+def test_a_copied_writer_tells_of_the_copied_world(copied):
+    env, _ = driven(3)
+    writer = writer_of(env)
+    before = writer.write()
+    other, twin = copied((env, writer))
+    other.step({agent: np.ones(2, np.float32) for agent in other.agents})
+    told, expected = twin.write(), writer_of(other).write()
+    assert all(np.array_equal(array, expected[name]) for name, array in told.items())
+    assert not np.array_equal(told["pose"], before["pose"])
+    assert np.array_equal(writer.write()["pose"], before["pose"])
 
 
 @pytest.mark.parametrize(
@@ -196,7 +212,7 @@ def test_one_writer_tells_of_several_worlds_and_frames():
 def test_frames_that_cannot_be_read_are_refused(offsets, words):
     env, _ = driven(1)
     with pytest.raises(ValueError, match=words):
-        writer_of(env).write(env.world, offsets)
+        writer_of(env, offsets)
 
 
 def test_the_gymnasium_form_takes_the_choice():
