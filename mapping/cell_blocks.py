@@ -92,12 +92,14 @@ def _fetch(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
 
 
 def _sum_blocks(typing_context: Any, first: Any, second: Any, result: Any) -> Any:  # noqa: ANN401
-    """Write the sum of two blocks, cut to [-127, 127]."""
+    """Write the sum of two blocks, cut to [-127, 127], where it is another than what is there."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        one, other = (_load(builder, address, _BYTES) for address in arguments[:2])
-        total = _call(builder, "sadd.sat", one, other)
-        _store(builder, _call(builder, "smax", total, ir.Constant(_BYTES, [-127] * BLOCK)), arguments[2])
+        one, other, old = (_load(builder, address, _BYTES) for address in arguments)
+        total = _call(builder, "smax", _call(builder, "sadd.sat", one, other), ir.Constant(_BYTES, [-127] * BLOCK))
+        is_new = builder.bitcast(builder.icmp_signed("!=", total, old), _INT64)
+        with builder.if_then(builder.icmp_unsigned("!=", is_new, ir.Constant(_INT64, 0))):
+            _store(builder, total, arguments[2])
 
     return types.void(*(types.int64,) * 3), generate
 
@@ -161,6 +163,23 @@ def _count_steps(typing_context: Any, log_odds: Any, steps: Any, largest: Any) -
         _store(builder, builder.select(is_positive, _NO_SHORTS, more), steps_at)
 
     return types.void(*(types.int64,) * 3), generate
+
+
+def _squares(typing_context: Any, steps: Any, others: Any, far: Any, cap: Any, result: Any) -> Any:  # noqa: ANN401
+    """Write the squared distances in half cells after the fewer of two numbers of steps; tell the fewest."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        steps_at, others_at, far, cap, result_at = arguments
+        steps = _call(builder, "umin", *(_load(builder, address, _SHORTS) for address in (steps_at, others_at)))
+        half_cells = _call(builder, "usub.sat", builder.add(steps, steps), ir.Constant(_SHORTS, [1] * BLOCK))
+        caps, is_near = _splat(builder, cap, _SHORTS), builder.icmp_unsigned("<", steps, _splat(builder, far, _SHORTS))
+        squares = _call(builder, "umin", builder.mul(half_cells, half_cells), caps)
+        _store(builder, builder.select(is_near, squares, caps), result_at)
+        insert: Any = cgutils.get_or_insert_function
+        function = insert(builder.module, ir.FunctionType(_INT16, [_SHORTS]), f"llvm.vector.reduce.umin.v{BLOCK}i16")
+        return builder.zext(builder.call(function, [steps]), _INT64)
+
+    return types.int64(*(types.int64,) * 5), generate
 
 
 def _least_sums(typing_context: Any, numbers: Any, costs: Any, low: Any, high: Any, cap: Any, result: Any) -> Any:  # noqa: ANN401
@@ -237,6 +256,7 @@ _greatest: Any = intrinsic(_greatest_of_groups)
 _block_of_levels, _half_block_of_levels = _levels_of(BLOCK), _levels_of(HALF_BLOCK)
 _differs: Any = intrinsic(_positive_differs)
 _count: Any = intrinsic(_count_steps)
+_square: Any = intrinsic(_squares)
 _least: Any = intrinsic(_least_sums)
 _raise: Any = intrinsic(_raise_block)
 _signs: Any = intrinsic(_sign_bits)
@@ -277,7 +297,7 @@ def fetch_block(address: int) -> None:
 
 @kernel(inline=True)
 def sum_blocks(first: int, second: int, result: int) -> None:
-    """Write the sum of two blocks of int8, cut to [-127, 127], into a third, which may be one of them."""
+    """Write the sum of two blocks of int8, cut to [-127, 127], into a third, which may be one of them; not where it is there already."""
     _sum(first, second, result)
 
 
@@ -322,6 +342,16 @@ def cells_that_differ(log_odds: int, numbers: int, number: int) -> np.uint64:
 def count_steps(log_odds: int, steps: int, largest: int) -> None:
     """Count one more step in each cell of a block of uint16, up to ``largest``, or begin anew at 0 where log-odds (int8) are positive."""
     _count(log_odds, steps, largest)
+
+
+@kernel(inline=True)
+def write_squares(steps: int, others: int, far: int, cap: int, result: int) -> int:
+    """Write how far it is, squared and in half cells, after the fewer of two numbers of steps of cells, each in a block of uint16.
+
+    From ``far`` steps on it is ``cap``, which it never exceeds; (2 ``far`` - 1) ^ 2 must fit into 16 bits. Returns the fewest steps.
+    """
+    fewest: int = _square(steps, others, far, cap, result)
+    return fewest
 
 
 @kernel(inline=True)

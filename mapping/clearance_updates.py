@@ -6,7 +6,7 @@ Computing 8, 2012); with a small largest distance the plain minimum along rows, 
 
 import numpy as np
 
-from lidarium.mapping.cell_blocks import BLOCK, cells_that_differ, count_steps, raise_block, same_cells, write_least_sums
+from lidarium.mapping.cell_blocks import BLOCK, cells_that_differ, count_steps, raise_block, same_cells, write_least_sums, write_squares
 from lidarium.mapping.kernels import Array, kernel
 
 Window = tuple[int, int, int, int]
@@ -28,10 +28,17 @@ def update_closeness(log_odds: Array, closeness: Array, limit: int, stamp: Array
 
     Parameters are those of :class:`ClearanceField` and its ``update``.
     """
-    reach = stamp.shape[0] // 2
-    changed, added = _changed_cells(log_odds, closeness, limit, grown_window(window, 0, log_odds.shape))
+    return update_around(log_odds, closeness, limit, stamp, _changed_cells(log_odds, closeness, limit, window))  # type: ignore[no-any-return]
+
+
+@kernel
+def update_around(log_odds: Array, closeness: Array, limit: int, stamp: Array, changed: Array) -> bool:
+    """Bring closeness up to date around the cells (N, 2) that became occupied or ceased to be, all of them; whether any did (kernel)."""
     if len(changed) == 0:
         return False
+    reach, added = stamp.shape[0] // 2, 0
+    for k in range(len(changed)):
+        added += log_odds[changed[k, 0], changed[k, 1]] > 0
     target = grown_window(_box_of(log_odds, changed), reach, log_odds.shape)
     first_block, last_block = target[2] // BLOCK, (target[3] - 1) // BLOCK + 1
     is_stale = np.zeros((last_block - first_block, target[1] - target[0]), np.bool_)
@@ -95,31 +102,50 @@ def _mark_stale(closeness: Array, stamp: Array, row: int, column: int, first_row
 
 
 @kernel
-def _changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window) -> tuple[Array, int]:
-    """List the cells (row, column) that became occupied or free, and count those that became occupied."""
-    row_low, row_high, column_low, column_high = window
+def _changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window) -> Array:
+    """List the cells (row, column) of a window that became occupied or free."""
+    row_low, row_high, column_low, column_high = grown_window(window, 0, log_odds.shape)
     columns = log_odds.shape[1]
-    changed = np.empty((256, 2), np.int64)
-    count, added = 0, 0
+    changed, count = room_for_cells(), 0
     for row in range(row_low, row_high):
         place = row * columns + column_low
         for column in range(column_low, column_high, BLOCK):
             differing = _that_differ(log_odds, closeness, limit, place, min(BLOCK, column_high - column))
             place += BLOCK
-            if differing == np.uint64(0):
-                continue
-            if count + BLOCK > len(changed):
-                longer = np.empty((2 * len(changed), 2), np.int64)
-                longer[:count] = changed[:count]
-                changed = longer
-            while differing != np.uint64(0):
-                if differing & np.uint64(1):
-                    changed[count, 0], changed[count, 1] = row, column
-                    added += log_odds[row, column] > 0
-                    count += 1
-                differing >>= np.uint64(1)
-                column += 1
-    return changed[:count], added
+            if differing != np.uint64(0):
+                changed, count = list_cells(changed, count, differing, row, column)
+    cells: Array = changed[:count]
+    return cells
+
+
+@kernel(inline=True)
+def room_for_cells() -> Array:
+    """Return what ``list_cells`` can list cells in (kernel)."""
+    return np.empty((256, 2), np.int64)
+
+
+@kernel
+def list_cells(listed: Array, count: int, word: np.uint64, row: int, column: int) -> tuple[Array, int]:
+    """Add the cells (row, column) of a block of a row, from ``column`` on, whose bits are set, to a list of so many (kernel).
+
+    Returns
+    -------
+    listed : (N, 2) int64
+        The list, another one where there was no room left.
+    count : int
+        How many there are now.
+    """
+    if count + BLOCK > len(listed):
+        longer = np.empty((2 * len(listed), 2), np.int64)
+        longer[:count] = listed[:count]
+        listed = longer
+    while word != np.uint64(0):
+        if word & np.uint64(1):
+            listed[count, 0], listed[count, 1] = row, column
+            count += 1
+        word >>= np.uint64(1)
+        column += 1
+    return listed, count
 
 
 @kernel
@@ -181,9 +207,9 @@ def _recompute(log_odds: Array, closeness: Array, limit: int, reach: int, row_lo
     """Compute the closeness of a block of columns, from ``column`` on, in the stale rows from ``row_low`` on from all occupied cells."""
     rows, columns = log_odds.shape
     row_high = row_low + stale.size
-    first, far, cap = column - reach, reach + 1, np.uint16(limit)
+    first, far = column - reach, reach + 1
     width = (BLOCK + 2 * reach + BLOCK - 1) // BLOCK * BLOCK
-    costs, squared = np.empty(2 * reach + 1, np.uint16), np.full(far + 1, cap, np.uint16)
+    costs, squared = np.empty(2 * reach + 1, np.uint16), np.full(far + 1, np.uint16(limit), np.uint16)
     for k in range(2 * reach + 1):
         costs[k] = max(2 * abs(k - reach) - 1, 0) ** 2
     for k in range(far):
@@ -202,17 +228,13 @@ def _recompute(log_odds: Array, closeness: Array, limit: int, reach: int, row_lo
         _count_row(log_odds, row, first, steps, far)
         if row >= row_high or not stale[row - row_low]:
             continue
-        squares = below[row - row_low]
-        nearest = np.uint16(far)
-        for i in range(width):
-            squares[i] = min(squares[i], steps[i])
-            nearest = min(nearest, squares[i])
+        squares, nearest = below[row - row_low], far
+        for chunk in range(0, width, BLOCK):
+            place = squares.ctypes.data + 2 * chunk
+            nearest = min(nearest, write_squares(place, steps.ctypes.data + 2 * chunk, far, limit, place))
         if nearest == far:
             closeness[row, column : column + used] = 0
             continue
-        for i in range(width):
-            half_cells = np.uint16(max(np.int16(2 * squares[i] - 1), np.int16(0)))
-            squares[i] = min(np.uint16(half_cells * half_cells), cap) if squares[i] < far else cap
         # Steps to the side that cost more than what is left cannot bring anything.
         side = 0
         while side < reach and np.int64(costs[reach + side + 1]) + np.int64(squared[nearest]) < limit:

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.cell_blocks import BLOCK, sum_blocks
+from lidarium.mapping.cell_blocks import BLOCK, positive_cells, sum_blocks
 from lidarium.mapping.clearance import ClearanceField
-from lidarium.mapping.clearance_updates import Window, update_closeness
+from lidarium.mapping.clearance_updates import Window, list_cells, room_for_cells, update_around, update_closeness
 from lidarium.mapping.frontiers import FrontierMap, update_frontiers
 from lidarium.mapping.grid_planning import SearchSpace
 from lidarium.mapping.kernels import Array, int8_at, int8_grid_at, int32_table_at, kernel, uint8_grid_at, uint16_grid_at
@@ -139,15 +139,19 @@ def tiles_of(record: Array) -> Any:  # noqa: ANN401
 @kernel
 def refresh_map(record: Array, limit: int, stamp: Array, window: Array) -> None:
     """Bring clearance, and frontiers where they are kept, up to date in a window (4,) of a map that changed (kernel)."""
-    inside = (
-        max(window[0], 0), min(window[1], record[ROWS]), max(window[2], 0), min(window[3], record[COLUMNS])
-    )  # fmt: skip
+    inside = _inside(record, window)
     if inside[0] >= inside[1] or inside[2] >= inside[3]:
         return
     extend_window(record[ROW_LOW:], window)
     update_closeness(log_odds_of(record), closeness_of(record), limit, stamp, inside)
     if record[FLAGS] != 0:
         update_frontiers(log_odds_of(record), flags_of(record), tiles_of(record), inside)
+
+
+@kernel
+def _inside(record: Array, window: Array) -> Window:
+    """Return the part of a window (4,) that lies within a map."""
+    return max(window[0], 0), min(window[1], record[ROWS]), max(window[2], 0), min(window[3], record[COLUMNS])
 
 
 @kernel
@@ -159,40 +163,55 @@ def extend_window(known: Array, window: Array) -> None:
 
 
 @kernel
-def _sum_maps(beliefs: Array, window: Array, total: Array) -> None:
-    """Write the sum of maps of one shape into ``total`` within a window and nowhere else, cut to [-127, 127]."""
-    if beliefs.shape[0] == 1:
-        alone = int8_grid_at(beliefs[0, 0], beliefs[0, 1], beliefs[0, 2])
-        total[window[0] : window[1], window[2] : window[3]] = alone[window[0] : window[1], window[2] : window[3]]
-        return
-    columns = total.shape[1]
-    width = window[3] - window[2]
+def _sum_maps(beliefs: Array, window: Window, total: Array) -> Array:
+    """Write the sum of maps of one shape into ``total`` within a window and nowhere else, cut to [-127, 127].
+
+    Returns
+    -------
+    (N, 2) int64
+        The cells (row, column) of the sum that became occupied or ceased to be.
+    """
+    columns, width = total.shape[1], window[3] - window[2]
+    changed, count = room_for_cells(), 0
+    nothing = np.zeros(BLOCK, np.int8)
     for row in range(window[0], window[1]):
-        first = row * columns + window[2]
         if width < BLOCK:
-            for place in range(first, first + width):
-                _sum_cell(beliefs, place, total)
+            word = np.uint64(0)
+            for k in range(width):
+                word |= np.uint64(_sum_cell(beliefs, row * columns + window[2] + k, total)) << np.uint64(k)
+            changed, count = list_cells(changed, count, word, row, window[2])
             continue
-        for place in range(first, first + width - BLOCK, BLOCK):
-            _sum_block(beliefs, place, total)
-        # The last block may overlap the one before, whose cells it sums anew.
-        _sum_block(beliefs, first + width - BLOCK, total)
+        for block in range(window[2], window[3], BLOCK):
+            # The last block may overlap the one before, whose cells it sums anew.
+            column = min(block, window[3] - BLOCK)
+            word = _sum_block(beliefs, row * columns + column, total, nothing)
+            if word != np.uint64(0):
+                changed, count = list_cells(changed, count, word, row, column)
+    cells: Array = changed[:count]
+    return cells
 
 
 @kernel(inline=True)
-def _sum_block(beliefs: Array, place: int, total: Array) -> None:
+def _sum_block(beliefs: Array, place: int, total: Array, nothing: Array) -> np.uint64:
+    """Sum a block of the maps; tell which of its cells became occupied or ceased to be."""
     target = total.ctypes.data + place
-    sum_blocks(beliefs[0, 0] + place, beliefs[1, 0] + place, target)
+    before = positive_cells(target)
+    sum_blocks(beliefs[0, 0] + place, beliefs[1, 0] + place if beliefs.shape[0] > 1 else nothing.ctypes.data, target)
     for k in range(2, beliefs.shape[0]):
         sum_blocks(target, beliefs[k, 0] + place, target)
+    changed: np.uint64 = before ^ positive_cells(target)
+    return changed
 
 
 @kernel(inline=True)
-def _sum_cell(beliefs: Array, place: int, total: Array) -> None:
+def _sum_cell(beliefs: Array, place: int, total: Array) -> bool:
+    """Sum a cell of the maps; tell whether it became occupied or ceased to be."""
     value = int(int8_at(beliefs[0, 0] + place, 1)[0])
     for k in range(1, beliefs.shape[0]):
         value = min(max(value + int(int8_at(beliefs[k, 0] + place, 1)[0]), -127), 127)
-    total.reshape(-1)[place] = np.int8(value)
+    cell = total.reshape(-1)
+    was_occupied, cell[place] = cell[place] > 0, np.int8(value)
+    return bool(was_occupied != (value > 0))
 
 
 class TeamMaps(NamedTuple):
@@ -229,8 +248,14 @@ class TeamMaps(NamedTuple):
 @kernel
 def sum_maps(record: Array, beliefs: Array, limit: int, stamp: Array, window: Array) -> None:
     """Make the map of a record the sum of maps (maps, 3 or more) of its shape in a window (4,) in which these changed (kernel)."""
-    _sum_maps(beliefs, window, log_odds_of(record))
-    refresh_map(record, limit, stamp, window)
+    inside = _inside(record, window)
+    if inside[0] >= inside[1] or inside[2] >= inside[3]:
+        return
+    extend_window(record[ROW_LOW:], window)
+    # Nobody else writes a sum: where it changed is known without a look at its clearance, which takes more memory than all the maps.
+    update_around(log_odds_of(record), closeness_of(record), limit, stamp, _sum_maps(beliefs, inside, log_odds_of(record)))
+    if record[FLAGS] != 0:
+        update_frontiers(log_odds_of(record), flags_of(record), tiles_of(record), inside)
 
 
 @kernel

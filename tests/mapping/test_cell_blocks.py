@@ -5,13 +5,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.cell_blocks import negative_cells, positive_cells
+from lidarium.mapping.cell_blocks import negative_cells, positive_cells, sum_blocks, write_squares
 from lidarium.mapping.kernels import kernel
 
 
 @kernel
 def signs_at(address):
     return negative_cells(address), positive_cells(address)
+
+
+@kernel
+def sum_at(first, second, result):
+    sum_blocks(first, second, result)
+
+
+@kernel
+def squares_at(steps, others, far, cap, result):
+    return write_squares(steps, others, far, cap, result)
 
 
 def bits_of(cells):
@@ -24,3 +34,20 @@ def test_the_signs_of_a_block_are_told_wherever_it_lies(cells, offset):
     negative, positive = signs_at(block.ctypes.data)
     assert int(negative) == bits_of(block < 0)
     assert int(positive) == bits_of(block > 0)
+
+
+@given(arrays(np.int8, 64), arrays(np.int8, 64), arrays(np.int8, 64), st.booleans())
+def test_blocks_are_summed_without_running_over_also_into_one_of_them(first, second, result, is_same):
+    expected = np.clip(first.astype(int) + second, -127, 127)
+    target = first if is_same else result
+    sum_at(first.ctypes.data, second.ctypes.data, target.ctypes.data)
+    assert np.array_equal(target, expected)
+
+
+@given(arrays(np.uint16, 64, elements=st.integers(0, 91)), arrays(np.uint16, 64, elements=st.integers(0, 91)), st.integers(1, 91))
+def test_steps_become_squared_half_cells_up_to_a_cap(steps, others, far):
+    fewer, cap = np.minimum(steps, others).astype(int), max((2 * far - 1) ** 2 - 3, 1)
+    result = np.zeros(64, np.uint16)
+    assert squares_at(steps.ctypes.data, others.ctypes.data, far, cap, result.ctypes.data) == fewer.min()
+    squares = np.minimum(np.maximum(2 * fewer - 1, 0) ** 2, cap)
+    assert np.array_equal(result, np.where(fewer < far, squares, cap))
