@@ -152,25 +152,31 @@ def _positive_differs(typing_context: Any, log_odds: Any, numbers: Any, number: 
     return types.uint64(*(types.int64,) * 3), generate
 
 
-def _count_steps(typing_context: Any, log_odds: Any, steps: Any, largest: Any) -> Any:  # noqa: ANN401
-    """Count one more step in each lane, up to the largest number, or begin anew at 0 where the log-odds are positive."""
+def _count_rows(typing_context: Any, log_odds: Any, stride: Any, rows: Any, steps: Any, largest: Any, fewest: Any, width: Any) -> Any:  # noqa: ANN401
+    """Count the steps in each lane, row by row, up to the largest number, or begin anew at 0 where the log-odds are positive."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        beliefs_at, steps_at, most = arguments
-        is_positive = builder.icmp_signed(">", _load(builder, beliefs_at, _BYTES), _NO_BYTES)
-        more = builder.add(_load(builder, steps_at, _SHORTS), ir.Constant(_SHORTS, [1] * BLOCK))
-        more = _call(builder, "umin", more, _splat(builder, most, _SHORTS))
-        _store(builder, builder.select(is_positive, _NO_SHORTS, more), steps_at)
+        beliefs_at, stride, rows, steps_at, most, fewest_at, width = arguments
+        none, one = ir.Constant(_INT64, 0), ir.Constant(_INT64, 1)
+        largest, counted = _splat(builder, most, _SHORTS), _alloca(builder, _load(builder, steps_at, _SHORTS))
+        with cgutils.for_range_slice(builder, none, rows, one, intp=_INT64) as (k, _):
+            beliefs = _load(builder, builder.add(beliefs_at, builder.mul(k, stride)), _BYTES)
+            more = _call(builder, "umin", builder.add(builder.load(counted), ir.Constant(_SHORTS, [1] * BLOCK)), largest)
+            now = builder.select(builder.icmp_signed(">", beliefs, _NO_BYTES), _NO_SHORTS, more)
+            builder.store(now, counted)
+            target = builder.add(fewest_at, builder.mul(k, width))
+            _store(builder, _call(builder, "umin", now, _load(builder, target, _SHORTS)), target)
+        _store(builder, builder.load(counted), steps_at)
 
-    return types.void(*(types.int64,) * 3), generate
+    return types.void(*(types.int64,) * 7), generate
 
 
-def _squares(typing_context: Any, steps: Any, others: Any, far: Any, cap: Any, result: Any) -> Any:  # noqa: ANN401
-    """Write the squared distances in half cells after the fewer of two numbers of steps; tell the fewest."""
+def _squares(typing_context: Any, steps: Any, far: Any, cap: Any, result: Any) -> Any:  # noqa: ANN401
+    """Write the squared distances in half cells after some steps; tell the fewest."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        steps_at, others_at, far, cap, result_at = arguments
-        steps = _call(builder, "umin", *(_load(builder, address, _SHORTS) for address in (steps_at, others_at)))
+        steps_at, far, cap, result_at = arguments
+        steps = _load(builder, steps_at, _SHORTS)
         half_cells = _call(builder, "usub.sat", builder.add(steps, steps), ir.Constant(_SHORTS, [1] * BLOCK))
         caps, is_near = _splat(builder, cap, _SHORTS), builder.icmp_unsigned("<", steps, _splat(builder, far, _SHORTS))
         squares = _call(builder, "umin", builder.mul(half_cells, half_cells), caps)
@@ -179,7 +185,7 @@ def _squares(typing_context: Any, steps: Any, others: Any, far: Any, cap: Any, r
         function = insert(builder.module, ir.FunctionType(_INT16, [_SHORTS]), f"llvm.vector.reduce.umin.v{BLOCK}i16")
         return builder.zext(builder.call(function, [steps]), _INT64)
 
-    return types.int64(*(types.int64,) * 5), generate
+    return types.int64(*(types.int64,) * 4), generate
 
 
 def _least_sums(typing_context: Any, numbers: Any, costs: Any, low: Any, high: Any, cap: Any, result: Any) -> Any:  # noqa: ANN401
@@ -255,7 +261,7 @@ _sum: Any = intrinsic(_sum_blocks)
 _greatest: Any = intrinsic(_greatest_of_groups)
 _block_of_levels, _half_block_of_levels = _levels_of(BLOCK), _levels_of(HALF_BLOCK)
 _differs: Any = intrinsic(_positive_differs)
-_count: Any = intrinsic(_count_steps)
+_count: Any = intrinsic(_count_rows)
 _square: Any = intrinsic(_squares)
 _least: Any = intrinsic(_least_sums)
 _raise: Any = intrinsic(_raise_block)
@@ -339,18 +345,29 @@ def cells_that_differ(log_odds: int, numbers: int, number: int) -> np.uint64:
 
 
 @kernel(inline=True)
-def count_steps(log_odds: int, steps: int, largest: int) -> None:
-    """Count one more step in each cell of a block of uint16, up to ``largest``, or begin anew at 0 where log-odds (int8) are positive."""
-    _count(log_odds, steps, largest)
+def count_rows(log_odds: int, stride: int, rows: int, steps: int, largest: int, fewest: int, width: int) -> None:
+    """Count, row by row, the rows since the last occupied cell of each of 64 columns, and keep the fewest that each place has had.
+
+    Parameters
+    ----------
+    log_odds, stride, rows : int
+        Where the first row's block of int8 lies, how many bytes on the next one, less than 0 for the way back, and how many there are.
+    steps : int
+        A block of uint16 with the steps before the first row, and after the last one in the end: one more in each row up to
+        ``largest``, 0 where log-odds are positive.
+    fewest, width : int
+        Where the block of uint16 of the first row lies that is lowered to the steps, and how many bytes on the next one.
+    """
+    _count(log_odds, stride, rows, steps, largest, fewest, width)
 
 
 @kernel(inline=True)
-def write_squares(steps: int, others: int, far: int, cap: int, result: int) -> int:
-    """Write how far it is, squared and in half cells, after the fewer of two numbers of steps of cells, each in a block of uint16.
+def write_squares(steps: int, far: int, cap: int, result: int) -> int:
+    """Write how far it is, squared and in half cells, after the steps of cells in a block of uint16, and return the fewest steps.
 
-    From ``far`` steps on it is ``cap``, which it never exceeds; (2 ``far`` - 1) ^ 2 must fit into 16 bits. Returns the fewest steps.
+    From ``far`` steps on it is ``cap``, which it never exceeds; (2 ``far`` - 1) ^ 2 must fit into 16 bits.
     """
-    fewest: int = _square(steps, others, far, cap, result)
+    fewest: int = _square(steps, far, cap, result)
     return fewest
 
 

@@ -138,12 +138,16 @@ class ClearanceField:
 
 @lru_cache(maxsize=16)
 def stamp_of(limit: int) -> NDArray[np.uint16]:
-    """Return the closeness around one occupied cell, (2 k + 1, 2 k + 1 and more) uint16: rows end in zeros, to whole blocks."""
+    """Return the closeness around one occupied cell, k cells either way: (2 k + 1, 2 k + 1 and more) uint16.
+
+    Rows begin with a block of zeros, and end with zeros to whole blocks and one more: 64 lanes from any place on are there, and raise
+    nothing beyond the stamp.
+    """
     reach = 0
     while (2 * reach + 1) ** 2 < limit:
         reach += 1
     steps = np.maximum(2 * np.abs(np.arange(-reach, reach + 1)) - 1, 0) ** 2
-    stamp: NDArray[np.uint16] = np.zeros((len(steps), -(-len(steps) // BLOCK) * BLOCK), np.uint16)
-    stamp[:, : len(steps)] = np.maximum(limit - (steps[:, None] + steps[None, :]), 0)
+    stamp: NDArray[np.uint16] = np.zeros((len(steps), (-(-len(steps) // BLOCK) + 2) * BLOCK), np.uint16)
+    stamp[:, BLOCK : BLOCK + len(steps)] = np.maximum(limit - (steps[:, None] + steps[None, :]), 0)
     stamp.flags.writeable = False
     return stamp

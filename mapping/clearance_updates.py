@@ -6,7 +6,7 @@ Computing 8, 2012); with a small largest distance the plain minimum along rows, 
 
 import numpy as np
 
-from lidarium.mapping.cell_blocks import BLOCK, cells_that_differ, count_steps, raise_block, same_cells, write_least_sums, write_squares
+from lidarium.mapping.cell_blocks import BLOCK, cells_that_differ, count_rows, raise_block, same_cells, write_least_sums, write_squares
 from lidarium.mapping.kernels import Array, kernel
 
 Window = tuple[int, int, int, int]
@@ -72,28 +72,35 @@ def _next_stale(stale: Array, row: int) -> int:
     return row
 
 
+@kernel(inline=True)
+def _within(column: int, columns: int) -> int:
+    """Return from which column on 64 columns lie within the grid that hold all of those from ``column`` on that do; -1 for none."""
+    return min(max(column, 0), columns - BLOCK) if columns >= BLOCK and -BLOCK < column < columns else -1
+
+
 @kernel
 def _mark_stale(closeness: Array, stamp: Array, row: int, column: int, first_row: int, first_block: int, is_stale: Array) -> None:
     """Mark the rows of blocks in which the closeness of a cell may have come from one that ceased to be occupied.
 
     Where it did not come from there it was greater, and the occupied cell from which it came is still there, or marks it itself.
     """
-    rows, columns = closeness.shape
-    reach, first = stamp.shape[0] // 2, column - stamp.shape[0] // 2
-    is_inside = first >= 0 and first + stamp.shape[1] <= columns
-    low_block, high_block = max(first, 0) // BLOCK, min(column + reach, columns - 1) // BLOCK + 1
-    for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
-        if not is_inside:
-            is_stale[low_block - first_block : high_block - first_block, other - first_row] = True
+    (rows, columns), reach = closeness.shape, stamp.shape[0] // 2
+    low, high = max(row - reach, 0), min(row + reach + 1, rows)
+    if columns < BLOCK:
+        is_stale[:, low - first_row : high - first_row] = True
+        return
+    for lane in range(BLOCK, stamp.shape[1] - BLOCK, BLOCK):
+        first = column - reach + lane - BLOCK
+        within = _within(first, columns)
+        if within < 0:
             continue
-        target = closeness.ctypes.data + 2 * (other * columns + first)
-        source = stamp.ctypes.data + 2 * (other - row + reach) * stamp.shape[1]
-        for chunk in range(0, stamp.shape[1], BLOCK):
-            same = same_cells(target + 2 * chunk, source + 2 * chunk)
+        # The lanes lie in one block of columns, or in two.
+        place, border = within // BLOCK - first_block, BLOCK - within % BLOCK
+        for other in range(low, high):
+            source = stamp.ctypes.data + 2 * ((other - row + reach) * stamp.shape[1] + lane + within - first)
+            same = same_cells(closeness.ctypes.data + 2 * (other * columns + within), source)
             if same == np.uint64(0):
                 continue
-            # The lanes lie in one block of columns, or in two.
-            place, border = (first + chunk) // BLOCK - first_block, BLOCK - (first + chunk) % BLOCK
             near = same if border == BLOCK else same & ((np.uint64(1) << np.uint64(border)) - np.uint64(1))
             if near != np.uint64(0):
                 is_stale[place, other - first_row] = True
@@ -173,72 +180,89 @@ def _box_of(log_odds: Array, cells: Array) -> Window:
 @kernel
 def _stamp_at(closeness: Array, stamp: Array, row: int, column: int) -> None:
     """Raise the closeness around an occupied cell."""
-    rows, columns = closeness.shape
-    reach = stamp.shape[0] // 2
-    first = column - reach
-    if first >= 0 and first + stamp.shape[1] <= columns:
-        for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
-            target = closeness.ctypes.data + 2 * (other * columns + first)
-            source = stamp.ctypes.data + 2 * (other - row + reach) * stamp.shape[1]
-            for block in range(0, stamp.shape[1], BLOCK):
-                raise_block(target + 2 * block, source + 2 * block)
+    (rows, columns), reach = closeness.shape, stamp.shape[0] // 2
+    low, high = max(row - reach, 0), min(row + reach + 1, rows)
+    if columns < BLOCK:
+        for other in range(low, high):
+            for place in range(max(column - reach, 0), min(column + reach + 1, columns)):
+                closeness[other, place] = max(closeness[other, place], stamp[other - row + reach, BLOCK + place - column + reach])
         return
-    left, right = max(first, 0), min(column + reach + 1, columns)
-    for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
-        for place in range(left, right):
-            closeness[other, place] = max(closeness[other, place], stamp[other - row + reach, place - first])
+    for lane in range(BLOCK, stamp.shape[1] - BLOCK, BLOCK):
+        first = column - reach + lane - BLOCK
+        within = _within(first, columns)
+        if within < 0:
+            continue
+        for other in range(low, high):
+            source = stamp.ctypes.data + 2 * ((other - row + reach) * stamp.shape[1] + lane + within - first)
+            raise_block(closeness.ctypes.data + 2 * (other * columns + within), source)
 
 
 @kernel
-def _count_row(log_odds: Array, row: int, first: int, steps: Array, largest: int) -> None:
-    """Count the rows up to the last occupied cell of each column from ``first`` on; beyond the grid there are none."""
-    columns = log_odds.shape[1]
-    for chunk in range(0, steps.size, BLOCK):
-        column = first + chunk
-        if column >= 0 and column + BLOCK <= columns:
-            count_steps(log_odds.ctypes.data + row * columns + column, steps.ctypes.data + 2 * chunk, largest)
-            continue
-        for k in range(max(-column, 0), min(BLOCK, columns - column)):
-            steps[chunk + k] = 0 if log_odds[row, column + k] > 0 else min(steps[chunk + k] + 1, largest)
+def _count_rows(log_odds: Array, row: int, step: int, rows: int, column: int, steps: Array, fewest: Array, lane: int, largest: int) -> None:
+    """Do what ``count_rows`` does for the columns from ``column`` on, from a row on in steps of 1 or -1.
+
+    ``steps`` is (64,); ``fewest`` (rows, width), in which the columns begin at ``lane``, may have one row for all. Beyond the grid
+    nothing is occupied.
+    """
+    columns, width = log_odds.shape[1], fewest.shape[1]
+    place = lane if step > 0 else (fewest.shape[0] - 1) * width + lane
+    stride = step * width if fewest.shape[0] > 1 else 0
+    if column >= 0 and column + BLOCK <= columns:
+        beliefs, target = log_odds.ctypes.data + row * columns + column, fewest.ctypes.data + 2 * place
+        count_rows(beliefs, step * columns, rows, steps.ctypes.data, largest, target, 2 * stride)
+        return
+    lanes = fewest.reshape(-1)
+    for k in range(max(-column, 0), min(BLOCK, columns - column)):
+        for i in range(rows):
+            steps[k] = 0 if log_odds[row + i * step, column + k] > 0 else min(steps[k] + 1, largest)
+            lanes[place + i * stride + k] = min(lanes[place + i * stride + k], steps[k])
+
+
+@kernel
+def _nearest_rows(log_odds: Array, reach: int, row_low: int, row_high: int, column: int, width: int) -> Array:
+    """Return how many rows off the nearest occupied cell of the same column is, ``reach`` + 1 for farther: (rows, width) uint16."""
+    far, low, high = reach + 1, max(row_low - reach, 0), min(row_high + reach, log_odds.shape[0])
+    steps, beyond = np.empty(BLOCK, np.uint16), np.empty((1, width), np.uint16)
+    fewest = np.full((row_high - row_low, width), far, np.uint16)
+    for chunk in range(0, width, BLOCK):
+        # At the border 64 columns within the grid, of which some are counted twice, serve as well.
+        within = _within(column + chunk, log_odds.shape[1])
+        first = within if within >= 0 and 0 <= within - column <= width - BLOCK else column + chunk
+        for step, outside, inside in ((1, low, row_low), (-1, high - 1, row_high - 1)):
+            steps[:] = far
+            _count_rows(log_odds, outside, step, abs(inside - outside), first, steps, beyond, first - column, far)
+            _count_rows(log_odds, inside, step, row_high - row_low, first, steps, fewest, first - column, far)
+    return fewest
 
 
 @kernel
 def _recompute(log_odds: Array, closeness: Array, limit: int, reach: int, row_low: int, stale: Array, column: int) -> None:
     """Compute the closeness of a block of columns, from ``column`` on, in the stale rows from ``row_low`` on from all occupied cells."""
-    rows, columns = log_odds.shape
-    row_high = row_low + stale.size
-    first, far = column - reach, reach + 1
+    columns, far = log_odds.shape[1], reach + 1
     width = (BLOCK + 2 * reach + BLOCK - 1) // BLOCK * BLOCK
-    costs, squared = np.empty(2 * reach + 1, np.uint16), np.full(far + 1, np.uint16(limit), np.uint16)
+    costs, sides = np.empty(2 * reach + 1, np.uint16), np.empty(far, np.int64)
     for k in range(2 * reach + 1):
         costs[k] = max(2 * abs(k - reach) - 1, 0) ** 2
-    for k in range(far):
-        squared[k] = min(max(2 * k - 1, 0) ** 2, limit)
-    # Rows up to the last occupied cell of each column, first from below, then from above.
-    steps = np.full(width, far, np.uint16)
-    below = np.empty((row_high - row_low, width), np.uint16)
-    for row in range(max(row_low - reach, 0), row_high):
-        _count_row(log_odds, row, first, steps, far)
-        if row >= row_low and stale[row - row_low]:
-            below[row - row_low, :] = steps
-    steps[:] = far
+    side = reach
+    for nearest in range(far):
+        # Steps to the side that cost more than what is left cannot bring anything.
+        while side > 0 and np.int64(costs[reach + side]) + max(2 * nearest - 1, 0) ** 2 >= limit:
+            side -= 1
+        sides[nearest] = side
+    distances = _nearest_rows(log_odds, reach, row_low, row_low + stale.size, column - reach, width)
     result = np.empty(BLOCK, np.uint16)
     used = min(BLOCK, columns - column)
-    for row in range(min(row_high + reach, rows) - 1, row_low - 1, -1):
-        _count_row(log_odds, row, first, steps, far)
-        if row >= row_high or not stale[row - row_low]:
+    for k in range(stale.size):
+        if not stale[k]:
             continue
-        squares, nearest = below[row - row_low], far
+        row, squares, nearest = row_low + k, distances[k], far
         for chunk in range(0, width, BLOCK):
             place = squares.ctypes.data + 2 * chunk
-            nearest = min(nearest, write_squares(place, steps.ctypes.data + 2 * chunk, far, limit, place))
+            nearest = min(nearest, write_squares(place, far, limit, place))
         if nearest == far:
             closeness[row, column : column + used] = 0
             continue
-        # Steps to the side that cost more than what is left cannot bring anything.
-        side = 0
-        while side < reach and np.int64(costs[reach + side + 1]) + np.int64(squared[nearest]) < limit:
-            side += 1
+        side = sides[nearest]
         target = closeness.ctypes.data + 2 * (row * columns + column) if used == BLOCK else result.ctypes.data
         write_least_sums(squares.ctypes.data, costs.ctypes.data, reach - side, reach + side + 1, limit, target)
         if used < BLOCK:

@@ -229,7 +229,7 @@ class TeamMaps(NamedTuple):
         What part of each robot's log-odds has changed since it was last taken in, and the part that ever had until then.
     steps, fresh_at : (episodes,) int64
         The step of each episode, and the one at which its maps were last brought up to date.
-    limit, stamp : int, (2 k + 1, 2 k + 1) uint16
+    limit, stamp : int, (2 k + 1, 2 k + 1 and more) uint16
         Of the clearance, see ``ClearanceField``.
     """
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.cell_blocks import negative_cells, positive_cells, sum_blocks, write_squares
+from lidarium.mapping.cell_blocks import count_rows, negative_cells, positive_cells, sum_blocks, write_squares
 from lidarium.mapping.kernels import kernel
 
 
@@ -20,8 +20,13 @@ def sum_at(first, second, result):
 
 
 @kernel
-def squares_at(steps, others, far, cap, result):
-    return write_squares(steps, others, far, cap, result)
+def squares_at(steps, far, cap, result):
+    return write_squares(steps, far, cap, result)
+
+
+@kernel
+def count_at(log_odds, stride, rows, steps, largest, fewest, width):
+    count_rows(log_odds, stride, rows, steps, largest, fewest, width)
 
 
 def bits_of(cells):
@@ -44,10 +49,24 @@ def test_blocks_are_summed_without_running_over_also_into_one_of_them(first, sec
     assert np.array_equal(target, expected)
 
 
-@given(arrays(np.uint16, 64, elements=st.integers(0, 91)), arrays(np.uint16, 64, elements=st.integers(0, 91)), st.integers(1, 91))
-def test_steps_become_squared_half_cells_up_to_a_cap(steps, others, far):
-    fewer, cap = np.minimum(steps, others).astype(int), max((2 * far - 1) ** 2 - 3, 1)
-    result = np.zeros(64, np.uint16)
-    assert squares_at(steps.ctypes.data, others.ctypes.data, far, cap, result.ctypes.data) == fewer.min()
-    squares = np.minimum(np.maximum(2 * fewer - 1, 0) ** 2, cap)
-    assert np.array_equal(result, np.where(fewer < far, squares, cap))
+@given(arrays(np.uint16, 64, elements=st.integers(0, 91)), st.integers(1, 91))
+def test_steps_become_squared_half_cells_up_to_a_cap(steps, far):
+    cap, result = max((2 * far - 1) ** 2 - 3, 1), np.zeros(64, np.uint16)
+    assert squares_at(steps.ctypes.data, far, cap, result.ctypes.data) == steps.min()
+    squares = np.minimum(np.maximum(2 * steps.astype(int) - 1, 0) ** 2, cap)
+    assert np.array_equal(result, np.where(steps < far, squares, cap))
+
+
+@given(arrays(np.int8, (7, 70), elements=st.integers(-1, 1)), st.booleans(), st.integers(1, 9))
+def test_rows_since_the_last_occupied_cell_are_counted_either_way(log_odds, is_back, largest):
+    steps, fewest = np.full(64, largest, np.uint16), np.full((7, 64), 3, np.uint16)
+    rows = range(6, -1, -1) if is_back else range(7)
+    begin = log_odds[rows[0], 2:].ctypes.data
+    sign = -1 if is_back else 1
+    count_at(begin, sign * 70, 7, steps.ctypes.data, largest, fewest[rows[0]].ctypes.data, sign * 128)
+    counted, expected = np.full(64, largest), np.full((7, 64), 3)
+    for row in rows:
+        counted = np.where(log_odds[row, 2:66] > 0, 0, np.minimum(counted + 1, largest))
+        expected[row] = np.minimum(expected[row], counted)
+    assert np.array_equal(fewest, expected)
+    assert np.array_equal(steps, counted)

@@ -57,6 +57,28 @@ def test_updates_of_windows_agree_with_a_field_made_anew(seed, edits):
     np.testing.assert_array_equal(field.metres(), clearance(belief > 0, RESOLUTION, 0.3))
 
 
+@settings(max_examples=40)
+@given(
+    seed=st.integers(0, 10**6),
+    shape=st.sampled_from([(30, 40), (70, 64), (50, 97), (20, 200), (45, 256)]),
+    maximum=st.sampled_from([0.1, 0.6, 1.7, 2.2]),
+)
+def test_cells_that_come_and_go_at_the_border_and_within_leave_the_distance_to_those_that_are_there(seed, shape, maximum):
+    random = np.random.default_rng(seed)
+    belief = np.full(shape, -1, np.int8)
+    field = ClearanceField(shape, RESOLUTION, maximum)
+    for _ in range(4):
+        places = random.integers(0, shape, (12, 2))
+        places[:4] *= random.integers(0, 2, (4, 2))
+        places[4:8] = np.where(random.random((4, 2)) < 0.5, np.array(shape) - 1, places[4:8])
+        belief[places[:, 0], places[:, 1]] = random.choice([-1, 1], 12)
+        occupied = np.argwhere(belief > 0)
+        gone = occupied[random.random(len(occupied)) < 0.3]
+        belief[gone[:, 0], gone[:, 1]] = -1
+        field.update(belief)
+        np.testing.assert_allclose(field.metres(), by_brute_force(belief > 0, RESOLUTION, maximum), atol=1e-6)
+
+
 def test_update_reports_whether_anything_became_occupied_or_free():
     belief = np.full((50, 50), -3, np.int8)
     field = ClearanceField(belief.shape, RESOLUTION)
