@@ -6,7 +6,8 @@ Computing 8, 2012); with a small largest distance the plain minimum along rows, 
 
 import numpy as np
 
-from lidarium.mapping.cell_blocks import BLOCK, cells_that_differ, count_rows, raise_block, same_cells, write_least_sums, write_squares
+from lidarium.mapping.cell_blocks import BLOCK
+from lidarium.mapping.clearance_blocks import cells_that_differ, count_rows, raise_block, same_cells, write_least_sums, write_squares
 from lidarium.mapping.kernels import Array, kernel
 
 Window = tuple[int, int, int, int]

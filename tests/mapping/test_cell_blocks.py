@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.cell_blocks import count_rows, negative_cells, positive_cells, sum_blocks, write_squares
+from lidarium.mapping.cell_blocks import negative_cells, positive_cells, sum_blocks
+from lidarium.mapping.clearance_blocks import count_rows, write_squares
 from lidarium.mapping.kernels import kernel
 
 
