@@ -251,12 +251,6 @@ def write_block_of_levels(log_odds: int, levels: int) -> None:
 
 
 @kernel(inline=True)
-@kernel(inline=True)
-@kernel(inline=True)
-@kernel(inline=True)
-@kernel(inline=True)
-@kernel(inline=True)
-@kernel(inline=True)
 def sign_bits(address: int) -> tuple[np.uint64, np.uint64]:
     """Return which of the 64 int16 at an address are below 0, and which are above, bit 0 the first one."""
     return _signs(address)  # type: ignore[no-any-return]

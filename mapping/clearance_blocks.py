@@ -22,6 +22,7 @@ from lidarium.mapping.cell_blocks import (
     splat,
     store_at,
 )
+from lidarium.mapping.kernels import kernel
 
 
 def _positive_differs(typing_context: Any, log_odds: Any, numbers: Any, number: Any) -> Any:  # noqa: ANN401
@@ -109,12 +110,22 @@ def _raise_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: A
     return types.void(types.int64, types.int64), generate
 
 
+_differs: Any = intrinsic(_positive_differs)
+_count: Any = intrinsic(_count_rows)
+_square: Any = intrinsic(_squares)
+_least: Any = intrinsic(_least_sums)
+_raise: Any = intrinsic(_raise_block)
+_same: Any = intrinsic(_same_block)
+
+
+@kernel(inline=True)
 def cells_that_differ(log_odds: int, numbers: int, number: int) -> np.uint64:
     """Tell in which cells of two blocks, int8 and uint16, only one is true: the log-odds are positive, the other is ``number``."""
     cells: np.uint64 = _differs(log_odds, numbers, number)
     return cells
 
 
+@kernel(inline=True)
 def count_rows(log_odds: int, stride: int, rows: int, steps: int, largest: int, fewest: int, width: int) -> None:
     """Count, row by row, the rows since the last occupied cell of each of 64 columns, and keep the fewest that each place has had.
 
@@ -131,6 +142,7 @@ def count_rows(log_odds: int, stride: int, rows: int, steps: int, largest: int, 
     _count(log_odds, stride, rows, steps, largest, fewest, width)
 
 
+@kernel(inline=True)
 def write_squares(steps: int, far: int, cap: int, result: int) -> int:
     """Write how far it is, squared and in half cells, after the steps of cells in a block of uint16, and return the fewest steps.
 
@@ -140,6 +152,7 @@ def write_squares(steps: int, far: int, cap: int, result: int) -> int:
     return fewest
 
 
+@kernel(inline=True)
 def write_least_sums(numbers: int, costs: int, low: int, high: int, cap: int, result: int) -> None:
     """Write what is left of ``cap`` after the least of ``numbers[j + k] + costs[k]`` over k from ``low`` to ``high``, for 64 cells j.
 
@@ -148,20 +161,14 @@ def write_least_sums(numbers: int, costs: int, low: int, high: int, cap: int, re
     _least(numbers, costs, low, high, cap, result)
 
 
+@kernel(inline=True)
 def raise_block(block: int, other: int) -> None:
     """Raise the uint16 of a block to those of another where these are greater."""
     _raise(block, other)
 
 
+@kernel(inline=True)
 def same_cells(block: int, other: int) -> np.uint64:
     """Tell which uint16 of two blocks are the same, and not 0."""
     cells: np.uint64 = _same(block, other)
     return cells
-
-
-_differs: Any = intrinsic(_positive_differs)
-_count: Any = intrinsic(_count_rows)
-_square: Any = intrinsic(_squares)
-_least: Any = intrinsic(_least_sums)
-_raise: Any = intrinsic(_raise_block)
-_same: Any = intrinsic(_same_block)
