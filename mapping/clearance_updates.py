@@ -29,7 +29,7 @@ def update_closeness(log_odds: Array, closeness: Array, limit: int, stamp: Array
 
     Parameters are those of :class:`ClearanceField` and its ``update``.
     """
-    return update_around(log_odds, closeness, limit, stamp, _changed_cells(log_odds, closeness, limit, window))  # type: ignore[no-any-return]
+    return update_around(log_odds, closeness, limit, stamp, changed_cells(log_odds, closeness, limit, window))  # type: ignore[no-any-return]
 
 
 @kernel
@@ -110,8 +110,8 @@ def _mark_stale(closeness: Array, stamp: Array, row: int, column: int, first_row
 
 
 @kernel
-def _changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window) -> Array:
-    """List the cells (row, column) of a window that became occupied or free."""
+def changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window) -> Array:
+    """List the cells (row, column) of a window that became occupied or ceased to be since closeness was brought up to date (kernel)."""
     row_low, row_high, column_low, column_high = grown_window(window, 0, log_odds.shape)
     columns = log_odds.shape[1]
     changed, count = room_for_cells(), 0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.cell_blocks import BLOCK, positive_cells, sum_blocks
 from lidarium.mapping.clearance import ClearanceField
-from lidarium.mapping.clearance_updates import Window, list_cells, room_for_cells, update_around, update_closeness
+from lidarium.mapping.clearance_updates import Window, changed_cells, list_cells, room_for_cells, update_around
 from lidarium.mapping.frontiers import FrontierMap, update_frontiers
 from lidarium.mapping.grid_planning import SearchSpace
 from lidarium.mapping.kernels import Array, int8_at, int8_grid_at, int32_table_at, kernel, uint8_grid_at, uint16_grid_at
@@ -140,18 +140,24 @@ def tiles_of(record: Array) -> Any:  # noqa: ANN401
 def refresh_map(record: Array, limit: int, stamp: Array, window: Array) -> None:
     """Bring clearance, and frontiers where they are kept, up to date in a window (4,) of a map that changed (kernel)."""
     inside = _inside(record, window)
-    if inside[0] >= inside[1] or inside[2] >= inside[3]:
-        return
-    extend_window(record[ROW_LOW:], window)
-    update_closeness(log_odds_of(record), closeness_of(record), limit, stamp, inside)
-    if record[FLAGS] != 0:
-        update_frontiers(log_odds_of(record), flags_of(record), tiles_of(record), inside)
+    _take_in(record, limit, stamp, inside, changed_cells(log_odds_of(record), closeness_of(record), limit, inside))
 
 
 @kernel
 def _inside(record: Array, window: Array) -> Window:
     """Return the part of a window (4,) that lies within a map."""
     return max(window[0], 0), min(window[1], record[ROWS]), max(window[2], 0), min(window[3], record[COLUMNS])
+
+
+@kernel
+def _take_in(record: Array, limit: int, stamp: Array, inside: Window, changed: Array) -> None:
+    """Bring up to date what is kept beside a map that changed in a window, where the cells (N, 2) became occupied or ceased to be."""
+    if inside[0] >= inside[1] or inside[2] >= inside[3]:
+        return
+    extend_window(record[ROW_LOW:], np.array(inside))
+    update_around(log_odds_of(record), closeness_of(record), limit, stamp, changed)
+    if record[FLAGS] != 0:
+        update_frontiers(log_odds_of(record), flags_of(record), tiles_of(record), inside)
 
 
 @kernel
@@ -249,13 +255,8 @@ class TeamMaps(NamedTuple):
 def sum_maps(record: Array, beliefs: Array, limit: int, stamp: Array, window: Array) -> None:
     """Make the map of a record the sum of maps (maps, 3 or more) of its shape in a window (4,) in which these changed (kernel)."""
     inside = _inside(record, window)
-    if inside[0] >= inside[1] or inside[2] >= inside[3]:
-        return
-    extend_window(record[ROW_LOW:], window)
-    # Nobody else writes a sum: where it changed is known without a look at its clearance, which takes more memory than all the maps.
-    update_around(log_odds_of(record), closeness_of(record), limit, stamp, _sum_maps(beliefs, inside, log_odds_of(record)))
-    if record[FLAGS] != 0:
-        update_frontiers(log_odds_of(record), flags_of(record), tiles_of(record), inside)
+    # Nobody else writes a sum: where it changed is known without a look at its clearance, which takes twice the memory of a map.
+    _take_in(record, limit, stamp, inside, _sum_maps(beliefs, inside, log_odds_of(record)))
 
 
 @kernel
