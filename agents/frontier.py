@@ -1,8 +1,8 @@
 """Explorers that drive to frontiers: the nearest one, the one of greatest utility for the team, the one of least cost.
 
-They share everything but the choice. A robot keeps its target while the frontier there stands; having come near and turned
-to it, what still is frontier there cannot be seen and is given up by name. A robot without a frontier in reach stays idle
-and gives way; all stop together when none has work, each with its reason.
+They share everything but the choice. A robot keeps its target while the frontier there stands; having come
+near and turned to it, what still is frontier there cannot be seen and is given up by name. A robot without a
+frontier in reach stays idle and gives way; all stop together when none has work, each with its reason.
 """
 
 import math
@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from lidarium.agents.frontier_reach import Choice, Reach, reach_of
 from lidarium.agents.policy import Action, GivenUp, Stop, Team
+from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.envs.onboard.state import DriveState, Target
-from lidarium.envs.onboard.team_driver import footprint_of
-from lidarium.mapping.frontier_approach import approach, default_reach, nearest_frontier
-from lidarium.mapping.frontiers import FRONTIER, IGNORED, Clusters
-from lidarium.mapping.grid_lines import visible
-from lidarium.mapping.grid_planning import Cell, Footprint, cells_of, centres_of, search
+from lidarium.envs.radio.messages import DriveState, Target
+from lidarium.mapping.grids.grid_lines import visible
+from lidarium.mapping.planning.frontier_approach import approach, default_reach, nearest_frontier
+from lidarium.mapping.planning.frontiers import FRONTIER, IGNORED, Clusters
+from lidarium.mapping.planning.grid_planning import Cell, Footprint, cells_of, centres_of, search
 
 PATIENCE_S = 20.0
 """A robot that has not moved for this long while its target stands gives the frontier there up [s]."""
@@ -31,7 +31,10 @@ MOST_UTILITY_LOST = 2.0
 """A frontier whose way costs more utility than this above the cheapest one's is not considered."""
 
 FIRST_SLACK = 4.0
-"""How far beyond the cheapest frontier others are looked for at first [m]; further where that does not settle the choice."""
+"""How far beyond the cheapest frontier others are looked for at first [m].
+
+Further where that does not settle the choice.
+"""
 
 MOVED = 0.15
 """What counts as having moved [m]."""
@@ -88,8 +91,13 @@ class FrontierExplorer(ABC):
 
     @property
     def given_up(self) -> list[GivenUp]:
-        """What is left unexplored by now, and why; what was given up and seen later from elsewhere is not."""
-        still = [entry for entry, navigation, cell in self._given_up if navigation.frontiers.flags[cell] == IGNORED]
+        """What is left unexplored by now, and why.
+
+        What was given up and seen later from elsewhere is not.
+        """
+        still = [
+            entry for entry, navigation, cell in self._given_up if navigation.frontiers.flags[cell] == IGNORED
+        ]
         return still + self._unreached
 
     @abstractmethod
@@ -136,7 +144,8 @@ class FrontierExplorer(ABC):
             work.choice = None
             return
         if state is DriveState.NO_PATH:
-            # The map may have changed since the choice: choose anew, and give up what is chosen again without a way.
+            # The map may have changed since the choice: choose anew, and give up what is chosen again without
+            # a way.
             if work.failed_at == work.choice.frontier_cell:
                 self._give_up_around(agent, work.choice, "blocked")
             self._work[agent] = _Work(failed_at=work.choice.frontier_cell)
@@ -155,7 +164,9 @@ class FrontierExplorer(ABC):
     def _give_up_around(self, agent: str, choice: Choice, reason: str) -> None:
         """Ignore the frontier cells near the one looked at, and say so."""
         navigation, belief = self.navigation(agent), self.team.belief(agent)
-        count = navigation.frontiers.ignore_near(choice.frontier_cell, default_reach(self.footprint, navigation.resolution))
+        count = navigation.frontiers.ignore_near(
+            choice.frontier_cell, default_reach(self.footprint, navigation.resolution)
+        )
         x, y = centres_of(np.asarray(choice.frontier_cell), belief.map_origin, navigation.resolution)
         entry = GivenUp(agent, float(x), float(y), count * navigation.resolution, reason)
         self._given_up.append((entry, navigation, choice.frontier_cell))
@@ -175,7 +186,9 @@ class FrontierExplorer(ABC):
         beside = [
             (row + i, column + j)
             for i, j in ((0, 1), (1, 0), (0, -1), (-1, 0))
-            if 0 <= row + i < log_odds.shape[0] and 0 <= column + j < log_odds.shape[1] and log_odds[row + i, column + j] == 0
+            if 0 <= row + i < log_odds.shape[0]
+            and 0 <= column + j < log_odds.shape[1]
+            and log_odds[row + i, column + j] == 0
         ]
         towards = np.mean(beside, axis=0) if beside else np.asarray(choice.frontier_cell)
         return math.atan2(towards[0] - choice.cell[0], towards[1] - choice.cell[1])
@@ -186,8 +199,16 @@ class FrontierExplorer(ABC):
         clusters = navigation.frontiers.clusters(belief.map_origin)
         if not len(clusters):
             return "no_frontier"
-        found = search(navigation.space, navigation.log_odds, navigation.clearance, self.start_cell(agent), self.footprint)
-        left = approach(clusters, found, navigation.log_odds, default_reach(self.footprint, navigation.resolution))
+        found = search(
+            navigation.space,
+            navigation.log_odds,
+            navigation.clearance,
+            self.start_cell(agent),
+            self.footprint,
+        )
+        left = approach(
+            clusters, found, navigation.log_odds, default_reach(self.footprint, navigation.resolution)
+        )
         shares = self._unreached and navigation is self.navigation(self._unreached[0].agent)
         if not shares:
             for k, reason in enumerate(left.reasons):
@@ -220,7 +241,9 @@ class NearestFrontier(FrontierExplorer):
         for frontiers in (navigation.long_frontiers(self._minimum_size), navigation.frontiers):
             if not len(frontiers):
                 continue
-            found = nearest_frontier(frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, self.footprint)
+            found = nearest_frontier(
+                frontiers, navigation.space, navigation.log_odds, navigation.clearance, start, self.footprint
+            )
             if found is not None:
                 return Choice(found.cell, found.frontier_cell)
         return None
@@ -277,7 +300,9 @@ class ExploreLite(FrontierExplorer):
             return None
         # Beyond this no frontier can make up for the way by its size.
         slack = self._gain_scale * float(clusters.sizes.max()) / self._potential_scale + 0.1
-        reach = reach_of(clusters, navigation, self.start_cell(agent), self.footprint, self._minimum_size, slack)
+        reach = reach_of(
+            clusters, navigation, self.start_cell(agent), self.footprint, self._minimum_size, slack
+        )
         costs = self._potential_scale * reach.costs - self._gain_scale * clusters.sizes
         long_enough = np.where(clusters.sizes >= self._minimum_size, costs, math.inf)
         ranked = long_enough if np.isfinite(long_enough).any() else costs
@@ -288,8 +313,8 @@ class ExploreLite(FrontierExplorer):
 class UtilityFrontier(FrontierExplorer):
     """The team shares its frontiers out by utility less cost (Burgard, Moors, Stachniss, Schneider 2005).
 
-    Every frontier has utility 1; when a robot takes one, the utility of the others falls with the chance that they are seen
-    from there: 1 less their distance over the laser's range, where there is a line of sight.
+    Every frontier has utility 1; when a robot takes one, the utility of the others falls with the chance that
+    they are seen from there: 1 less their distance over the laser's range, where there is a line of sight.
 
     Parameters
     ----------
@@ -303,7 +328,13 @@ class UtilityFrontier(FrontierExplorer):
         Whether robots explore on the team's map.
     """
 
-    def __init__(self, cost_weight: float = 0.05, sensor_range: float = 5.6, minimum_size: float = 0.5, shares_map: bool = True) -> None:
+    def __init__(
+        self,
+        cost_weight: float = 0.05,
+        sensor_range: float = 5.6,
+        minimum_size: float = 0.5,
+        shares_map: bool = True,
+    ) -> None:
         super().__init__(shares_map)
         self._cost_weight, self._range, self._minimum_size = cost_weight, sensor_range, minimum_size
 
@@ -331,7 +362,9 @@ class UtilityFrontier(FrontierExplorer):
         while unsure:
             for agent in unsure:
                 start = self.start_cell(agent)
-                reach = reach_of(clusters, navigation, start, self.footprint, self._minimum_size, slacks[agent])
+                reach = reach_of(
+                    clusters, navigation, start, self.footprint, self._minimum_size, slacks[agent]
+                )
                 reaches[agent] = replace(reach, beyond=math.inf) if slacks[agent] >= most else reach
                 slacks[agent] = min(2.0 * slacks[agent], most)
             chosen, unsure = self._share_out(agents, reaches, clusters, navigation)
@@ -362,7 +395,9 @@ class UtilityFrontier(FrontierExplorer):
                 utility[best] = min(utility[best], -1.0)
         return chosen, []
 
-    def _seen_share(self, clusters: Clusters, target: NDArray[np.int64], navigation: NavigationMap) -> NDArray[np.float64]:
+    def _seen_share(
+        self, clusters: Clusters, target: NDArray[np.int64], navigation: NavigationMap
+    ) -> NDArray[np.float64]:
         """Return by how much each cluster's utility falls when a robot goes to a target."""
         cells = clusters.representatives
         place = (int(target[0]), int(target[1]))

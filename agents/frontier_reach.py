@@ -1,7 +1,7 @@
 """What frontiers cost a robot, as far as a choice among them needs to know.
 
-A search over a whole floor costs more than all else that an explorer does, and hardly any choice needs it: beyond some
-cost no frontier can make up for the way to it.
+A search over a whole floor costs more than all else that an explorer does, and hardly any choice needs it:
+beyond some cost no frontier can make up for the way to it.
 """
 
 import math
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.frontier_approach import approach, default_reach
-from lidarium.mapping.frontiers import Clusters
-from lidarium.mapping.grid_planning import Cell, Footprint, search
+from lidarium.mapping.planning.frontier_approach import approach, default_reach
+from lidarium.mapping.planning.frontiers import Clusters
+from lidarium.mapping.planning.grid_planning import Cell, Footprint, search
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +43,26 @@ class Reach:
     beyond: float
 
     def may_hold(self, utility: NDArray[np.float64], cost_weight: float, value: float) -> bool:
-        """Whether a cluster beyond may have as much utility less cost as ``value``; utility (K,), cost_weight [1/m]."""
+        """Whether a cluster beyond may have as much utility less cost as ``value``.
+
+        Utility (K,), cost_weight [1/m].
+        """
         out = ~np.isfinite(self.costs)
-        return math.isfinite(self.beyond) and bool(out.any()) and float(utility[out].max()) - cost_weight * self.beyond >= value
+        return (
+            math.isfinite(self.beyond)
+            and bool(out.any())
+            and float(utility[out].max()) - cost_weight * self.beyond >= value
+        )
 
 
-def reach_of(clusters: Clusters, navigation: NavigationMap, start: Cell, footprint: Footprint, minimum_size: float, slack: float) -> Reach:
+def reach_of(
+    clusters: Clusters,
+    navigation: NavigationMap,
+    start: Cell,
+    footprint: Footprint,
+    minimum_size: float,
+    slack: float,
+) -> Reach:
     """Look for the clusters that cost a robot no more than ``slack`` [m] above the cheapest one.
 
     The cheapest one is that of at least ``minimum_size`` [m]; of any size, where no such one is in reach.
@@ -76,14 +90,24 @@ def reach_of(clusters: Clusters, navigation: NavigationMap, start: Cell, footpri
         if not len(frontiers):
             continue
         targets = frontiers.targets(distance)
-        found = search(navigation.space, navigation.log_odds, navigation.clearance, start, footprint, targets=targets, beyond=slack)
+        found = search(
+            navigation.space,
+            navigation.log_odds,
+            navigation.clearance,
+            start,
+            footprint,
+            targets=targets,
+            beyond=slack,
+        )
         if not len(found.hits):
             continue
         most = found.cost((int(found.hits[0, 0]), int(found.hits[0, 1]))) + slack
         near = approach(clusters, found, navigation.log_odds, distance)
         costs = np.where(near.reachable & (near.costs <= most), near.costs, math.inf)
         choices = [
-            Choice((int(cell[0]), int(cell[1])), (int(seen[0]), int(seen[1]))) if math.isfinite(cost) else None
+            Choice((int(cell[0]), int(cell[1])), (int(seen[0]), int(seen[1])))
+            if math.isfinite(cost)
+            else None
             for cost, cell, seen in zip(costs, near.cells, near.frontier_cells, strict=True)
         ]
         ended_early = found.settled * found.unit < most

@@ -1,4 +1,7 @@
-"""What a policy is: it sees observations and beliefs, and decides. And the register of those that come with the package."""
+"""What a policy is: it sees observations and beliefs, and decides.
+
+And the register of those that come with the package.
+"""
 
 import difflib
 from collections.abc import Callable, Mapping
@@ -10,8 +13,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.onboard.reports import Report
-from lidarium.envs.onboard.state import DriveState, OperatingState, Order, Target
+from lidarium.envs.radio.messages import DriveState, OperatingState, Order, Target
+from lidarium.envs.station.reports import Report
 from lidarium.mapping.merging.fusion import FusedMap
 
 
@@ -61,20 +64,29 @@ class Team(Protocol):
         ...
 
     def report(self, agent: str) -> Report | None:
-        """Return what last reached the station of an agent, an ended one too; None where nothing ever did."""
+        """Return what last reached the station of an agent, an ended one too.
+
+        None where nothing ever did.
+        """
         ...
 
     def tell(self, agent: str, others: FusedMap | None) -> bool:
-        """Tell an agent that does not know its start what others know, in its map frame; return whether that reached it.
+        """Tell an agent that does not know its start what others know, in its map frame.
 
-        It plans and explores on that from now on, where its policy looks at the shared map. None takes back what was told.
+        Return whether that reached it.
+
+        It plans and explores on that from now on, where its policy looks at the shared map. None takes back
+        what was told.
         """
         ...
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        """Tell an agent where another robot drove, (N, 2) in its map frame [m]; return whether that reached it.
+        """Tell an agent where another robot drove, (N, 2) in its map frame [m].
 
-        The walls that it has drawn there may be that robot: it forgets them, and sees for itself. What is at the trail's end stays.
+        Return whether that reached it.
+
+        The walls that it has drawn there may be that robot: it forgets them, and sees for itself. What is at
+        the trail's end stays.
         """
         ...
 
@@ -85,8 +97,9 @@ class Policy(Protocol):
     Attributes
     ----------
     level : str
-        What it decides: ``velocity`` (shares of the limits, for a step), ``waypoint`` (a ``Target``, None to stay, or two
-        shares, for a decision period) or ``frontier`` (the number of a frontier on offer, for a decision period).
+        What it decides: ``velocity`` (shares of the limits, for a step), ``waypoint`` (a ``Target``, None to
+        stay, or two shares, for a decision period) or ``frontier`` (the number of a frontier on offer, for a
+        decision period).
     shares_map : bool
         Whether the robots plan on the team's map, where it reaches them, or on their own.
     """
@@ -116,8 +129,9 @@ class GivenUp:
     size_m : float
         How long the frontier is [m].
     reason : str
-        ``unseen`` (nothing new is seen from as near as the body comes), ``hidden`` (behind something occupied), ``narrow`` or
-        ``blocked`` (no way for the body), ``no_progress`` (the way is there, but the robot does not get on).
+        ``unseen`` (nothing new is seen from as near as the body comes), ``hidden`` (behind something
+        occupied), ``narrow`` or ``blocked`` (no way for the body), ``no_progress`` (the way is there, but the
+        robot does not get on).
     """
 
     agent: str
@@ -232,7 +246,9 @@ class _Alone:
 
     def belief(self, agent: str) -> Belief:
         if agent != self._agent:
-            raise ValueError(f"{self._agent} asked for the belief of {agent}; a decentralised policy sees its own robot only")
+            raise ValueError(
+                f"{self._agent} asked for the belief of {agent}; a decentralised policy sees its own robot only"
+            )
         return self._team.belief(agent)
 
     def drive_state(self, agent: str) -> DriveState:
@@ -245,10 +261,16 @@ class _Alone:
         return self._team.last_order(agent)
 
     def report(self, agent: str) -> Report | None:
-        raise ValueError(f"{self._agent} asked for the report of {agent}; a decentralised policy has no station")
+        raise ValueError(
+            f"{self._agent} asked for the report of {agent}; a decentralised policy has no station"
+        )
 
     def tell(self, agent: str, others: FusedMap | None) -> bool:
-        raise ValueError(f"{self._agent} would tell {agent} what others know; a decentralised policy has no station")
+        raise ValueError(
+            f"{self._agent} would tell {agent} what others know; a decentralised policy has no station"
+        )
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        raise ValueError(f"{self._agent} would tell {agent} where others drove; a decentralised policy has no station")
+        raise ValueError(
+            f"{self._agent} would tell {agent} where others drove; a decentralised policy has no station"
+        )

@@ -38,7 +38,9 @@ class RandomWalk:
         self._team = team
         self._generators = {
             agent: np.random.default_rng(child)
-            for agent, child in zip(team.agents, np.random.SeedSequence(seed).spawn(len(team.agents)), strict=True)
+            for agent, child in zip(
+                team.agents, np.random.SeedSequence(seed).spawn(len(team.agents)), strict=True
+            )
         }
         self._headings = dict.fromkeys(team.agents)
 
@@ -50,15 +52,20 @@ class RandomWalk:
         ValueError
             Where the observations lack what the walk looks at.
         """
-        missing = [name for name in NEEDED if any(name not in observation for observation in observations.values())]
+        missing = [
+            name for name in NEEDED if any(name not in observation for observation in observations.values())
+        ]
         if missing:
-            raise ValueError(f"a random walk needs {', '.join(missing)}, which the robots do not observe; add to settings.observe")
+            raise ValueError(
+                f"a random walk needs {', '.join(missing)}, which the robots do not observe; add to settings.observe"
+            )
         return {agent: self._decide(agent, observation) for agent, observation in observations.items()}
 
     def _decide(self, agent: str, observation: Observation) -> Action:
         scan, heading = observation["scan"], float(observation["pose"][2])
         ahead = len(scan) // 2
-        # The beams of the middle, whatever the field of view: a share of the scan about as wide as the body near by.
+        # The beams of the middle, whatever the field of view: a share of the scan about as wide as the body
+        # near by.
         half = max(len(scan) // 7, 1)
         is_near = bool((scan[ahead - half : ahead + half + 1] < self._team.belief(agent).radius + NEAR).any())
         wanted = self._headings[agent]

@@ -11,26 +11,29 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from lidarium.envs.episodes import Beginning, begin, goal_of_robots, make_world, map_frames
+from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_world, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.onboard.reports import Station
 from lidarium.envs.onboard.software import Software
-from lidarium.envs.onboard.state import Order
-from lidarium.envs.options import FloorChoice, read_options
-from lidarium.envs.scorer import Scorer, is_near
-from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.arrays import ENDED
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.envs.radio.messages import Order
+from lidarium.envs.scoring.scorer import Scorer, is_near
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.reset_options import FloorChoice, read_options
+from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.station.reports import Station
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 Observation = dict[str, NDArray[Any]]
 
 
 @kernel
 def scale_shares(commands: Array, limits: Array) -> bool:
-    """Turn shares within [-1, 1] into speeds and turn rates; False where one is nan or infinite."""
+    """Turn shares within [-1, 1] into speeds and turn rates.
+
+    False where one is nan or infinite.
+    """
     for robot in range(commands.shape[0]):
         for axis in range(2):
             share = commands[robot, axis]
@@ -46,8 +49,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     Parameters
     ----------
     floor : str, Path or Floor
-        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor. Of a set, each reset
-        draws one.
+        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor. Of a
+        set, each reset draws one.
     settings : ExplorationSettings
         Every knob.
     render_mode : str or None
@@ -62,8 +65,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     Notes
     -----
-    Observations, actions, infos and endings are described in docs/reference/environments.md. ``reset`` takes the options
-    ``floor``, ``starts`` (robots, 3) and ``goal`` (2,).
+    Observations, actions, infos and endings are described in docs/reference/environments.md. ``reset`` takes
+    the options ``floor``, ``starts`` (robots, 3) and ``goal`` (2,).
 
     Raises
     ------
@@ -71,7 +74,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         Where the floor or an option cannot be used.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012 (PettingZoo's contract)
+    metadata: dict[str, Any] = {  # noqa: RUF012
         "name": "lidarium_exploration_v0",
         "render_modes": ["human", "rgb_array"],
         "render_fps": 10,
@@ -95,8 +98,12 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._choice = FloorChoice(floor, image_resolution)
         self.has_goal = self._choice.has_goal
         space = observation_space(self.settings, self.has_goal)
-        self.observation_spaces: dict[str, spaces.Space[Any]] = {agent: copy.deepcopy(space) for agent in self.possible_agents}
-        self.action_spaces: dict[str, spaces.Space[Any]] = {agent: action_space() for agent in self.possible_agents}
+        self.observation_spaces: dict[str, spaces.Space[Any]] = {
+            agent: copy.deepcopy(space) for agent in self.possible_agents
+        }
+        self.action_spaces: dict[str, spaces.Space[Any]] = {
+            agent: action_space() for agent in self.possible_agents
+        }
         self._rows = {agent: row for row, agent in enumerate(self.possible_agents)}
         self.world = make_world(self.settings)
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
@@ -104,7 +111,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._generator: np.random.Generator | None = None
         self._offsets = np.zeros((self.settings.robots, 2))
         self._goals = np.full((self.settings.robots, 2), np.nan)
-        self._writer = ObservationWriter(self.world, self.settings, self._offsets, self._goals if self.has_goal else None)
+        self._writer = ObservationWriter(
+            self.world, self.settings, self._offsets, self._goals if self.has_goal else None
+        )
         self._commands = np.zeros((self.settings.robots, 2))
         self._window: Any = None
         self.floor: Floor | None = None
@@ -113,7 +122,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.scorer = Scorer(self.world, self.settings)
         self.perception = Perception(self.world, self.settings, self._offsets)
         self._software = Software(self.perception, self.settings)
-        # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a tenth of a step.
+        # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a
+        # tenth of a step.
         self._step = self._software.step if self._software.is_staged else self.world.step
         self._may_fail, self._is_battery_limited = self.settings.may_fail, self.settings.battery.is_limited
         self._meters = self.perception.meters = Meters(self.world, self.settings)
@@ -137,9 +147,11 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         Parameters
         ----------
         seed : int or None
-            Where all draws of this and the later episodes come from; None goes on with the generator of the last seed.
+            Where all draws of this and the later episodes come from; None goes on with the generator of the
+            last seed.
         options : dict or None
-            ``floor``, ``starts`` (robots, 3) in the floor's frame [m, rad], ``goal`` (2,) [m]; others are ignored.
+            ``floor``, ``starts`` (robots, 3) in the floor's frame [m, rad], ``goal`` (2,) [m]; others are
+            ignored.
         """
         chosen = read_options(options, self.settings.robots)
         if seed is not None or self._generator is None:
@@ -147,7 +159,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return self.start(begin(self._generator, self._choice, chosen, self.settings))
 
     def start(self, beginning: Beginning) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Start an episode that begins as was drawn, or as one did before; returns what ``reset`` returns."""
+        """Start an episode that begins as was drawn, or as one did before.
+
+        Returns what ``reset`` returns.
+        """
         self.seed, self.floor, self.goal = beginning.seed, beginning.floor, beginning.goal
         self.world.place(0, beginning.tables, beginning.starts, beginning.seed, self.settings.known_starts)
         self._offsets[:] = map_frames(beginning, self.settings)
@@ -167,7 +182,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def step(
         self, actions: dict[str, Any]
-    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+    ) -> tuple[
+        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
+    ]:
         """Drive for one time step.
 
         Parameters
@@ -178,7 +195,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         Returns
         -------
         observations, rewards, terminations, truncations, infos : dict
-            By agent. ``infos[agent]["truth"]`` is for scoring only; ``infos[agent]["ended_because"]`` says why an agent ended.
+            By agent. ``infos[agent]["truth"]`` is for scoring only; ``infos[agent]["ended_because"]`` says
+            why an agent ended.
         """
         if not self.agents:
             if self.floor is None:
@@ -188,7 +206,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return self.outcome()
 
     def drive(self, actions: dict[str, Any]) -> None:
-        """Run one time step of the world without building observations; ``outcome`` tells what came of it."""
+        """Run one time step of the world without building observations.
+
+        ``outcome`` tells what came of it.
+        """
         commands, rows = self._commands, self._rows
         for agent in self.agents:
             row, action = rows[agent], actions.get(agent)
@@ -199,10 +220,14 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                 raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
             shares = action if isinstance(action, np.ndarray) else np.asarray(action, np.float64)
             if shares.shape != (2,):
-                raise ValueError(f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and turn rate")
+                raise ValueError(
+                    f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and turn rate"
+                )
             commands[row] = shares
         if not scale_shares(commands, self._limits):
-            raise ValueError(f"an action is nan or infinite ({actions}); want two finite numbers within [-1, 1] for each agent")
+            raise ValueError(
+                f"an action is nan or infinite ({actions}); want two finite numbers within [-1, 1] for each agent"
+            )
         self.drive_at(commands)
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
@@ -222,7 +247,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     @property
     def energy_j(self) -> NDArray[np.float64]:
-        """What the robots have used of their batteries, (robots,) [J]; 0 where these have no limit."""
+        """What the robots have used of their batteries, (robots,) [J].
+
+        0 where these have no limit.
+        """
         return self._meters.used_j.copy()
 
     @property
@@ -232,7 +260,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def outcome(
         self,
-    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+    ) -> tuple[
+        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
+    ]:
         """Return what ``step`` returns for the time since the last outcome, and let ended agents leave."""
         live = self.agents
         self.operating.is_interrupting = False
@@ -247,7 +277,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                 if agent in endings:
                     terminations[agent], truncations[agent] = True, False
                 if agent in endings or is_truncated:
-                    infos[agent]["ended_because"] = self.scorer.ended_because[agent] = endings.get(agent, "horizon")
+                    infos[agent]["ended_because"] = self.scorer.ended_because[agent] = endings.get(
+                        agent, "horizon"
+                    )
                     self.world.moves[rows[agent]] = 0
                     self.world.flags[rows[agent]] |= ENDED
                     self._note_ending(agent, infos[agent])
@@ -257,7 +289,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return observations, rewards, terminations, truncations, infos
 
     def _note_ending(self, agent: str, info: dict[str, Any]) -> None:
-        """Let a robot's state follow from why it ended; an empty battery takes its sensors and its radio as well."""
+        """Let a robot's state follow from why it ended.
+
+        An empty battery takes its sensors and its radio as well.
+        """
         row = self._rows[agent]
         self.operating.end(row, info["ended_because"])
         info["state"] = self.operating.states[row].value
@@ -268,12 +303,16 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         """Whether the next outcome ends all agents (covered or at the horizon)."""
         horizon, cover = self._horizon, self.settings.stop_coverage
         steps = int(self.world.steps[0])
-        return (horizon is not None and steps >= horizon) or (cover is not None and self.scorer.coverage >= cover)
+        return (horizon is not None and steps >= horizon) or (
+            cover is not None and self.scorer.coverage >= cover
+        )
 
     def has_event(self) -> bool:
         """Whether something happened to an agent: the goal reached, a collision, a fault, no energy left, a pause by itself."""
         settings = self.settings
-        is_at_goal = self.goal is not None and any(self._is_at_goal(self._rows[agent]) for agent in self.agents)
+        is_at_goal = self.goal is not None and any(
+            self._is_at_goal(self._rows[agent]) for agent in self.agents
+        )
         has_failed = self._may_fail and self._is_any_live(self.world.failed)
         is_empty = self._meters.is_active and self._is_any_live(self._meters.is_empty)
         has_touched = settings.stop_on_contact and bool(self.scorer.touched.any())
@@ -285,7 +324,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def _is_at_goal(self, row: int) -> bool:
         assert self.goal is not None
-        return bool(is_near(self.world.poses[row, 0], self.world.poses[row, 1], *self.goal, self.settings.goal_radius))
+        return bool(
+            is_near(self.world.poses[row, 0], self.world.poses[row, 1], *self.goal, self.settings.goal_radius)
+        )
 
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason that its policy gives (such as ``no_frontier``)."""
@@ -294,11 +335,13 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._stopping[agent] = reason
 
     def order(self, agent: str, order: Order) -> None:
-        """Send an agent an order from the station; see docs/reference/station.md for what each does.
+        """Send an agent an order from the station.
 
-        It takes effect at once or, over a radio that is not ideal, when it arrives; one that does not reach the robot, or that the robot
-        does not take, is noted in ``operating.events``. An agent that was given an order may be left out of the actions of later steps:
-        it then goes on as it was told.
+        See docs/reference/station.md for what each does.
+
+        It takes effect at once or, over a radio that is not ideal, when it arrives; one that does not reach
+        the robot, or that the robot does not take, is noted in ``operating.events``. An agent that was given
+        an order may be left out of the actions of later steps: it then goes on as it was told.
 
         Raises
         ------
@@ -314,7 +357,11 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         settings = self.settings
         if settings.stop_coverage is not None and self.scorer.coverage >= settings.stop_coverage:
             return dict.fromkeys(live, "covered"), False
-        endings = {agent: reason for agent, reason in self._stopping.items() if agent in live} if self._stopping else {}
+        endings = (
+            {agent: reason for agent, reason in self._stopping.items() if agent in live}
+            if self._stopping
+            else {}
+        )
         self._stopping.clear()
         if self.goal is not None:
             for agent in live:
@@ -340,7 +387,12 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def _infos(self, agents: Sequence[str]) -> dict[str, dict[str, Any]]:
         """Return what a learner may not see, and the operating states, by agent."""
-        rows, coverage, poses, seen = self._rows, self.scorer.coverage, self.world.poses.copy(), self.world.seen.tolist()
+        rows, coverage, poses, seen = (
+            self._rows,
+            self.scorer.coverage,
+            self.world.poses.copy(),
+            self.world.seen.tolist(),
+        )
         states, orders = self.operating.states, self.operating.orders
         infos: dict[str, dict[str, Any]] = {}
         for agent in agents:
@@ -362,7 +414,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the floor, what is explored, the robots and their scans: an image (rows, columns, 3), or the window."""
-        from lidarium.envs.rendering import FrameWindow, draw_frame
+        from lidarium.envs.drawing.rendering import FrameWindow, draw_frame
 
         if self.render_mode is None:
             return None

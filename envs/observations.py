@@ -12,13 +12,14 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lidarium.envs.settings import OBSERVABLES, ExplorationSettings
-from lidarium.envs.simulation.arrays import grid_of, table_of, vector_of, world_at
-from lidarium.envs.simulation.kinematic import ROWS_FOR_THREADS, KinematicWorld
-from lidarium.envs.simulation.stages import RANGE_GAP
-from lidarium.mapping.kernels import Array, grid_at, int8_grid_at, kernel, use_threads, word_grid_at
-from lidarium.mapping.map_crops import crop_levels, crop_turned
-from lidarium.mapping.pooled_maps import forget_touched, pool_touched, touched_words
+from lidarium.envs.settings.exploration import OBSERVABLES, ExplorationSettings
+from lidarium.envs.simulation.kinematic.arrays import grid_of, table_of, vector_of, world_at
+from lidarium.envs.simulation.kinematic.stages import RANGE_GAP
+from lidarium.envs.simulation.kinematic.world import ROWS_FOR_THREADS, KinematicWorld
+from lidarium.mapping.grids.map_crops import crop_levels, crop_turned
+from lidarium.mapping.grids.pooled_maps import forget_touched, pool_touched, touched_words
+from lidarium.mapping.kernels.compilation import Array, kernel, use_threads
+from lidarium.mapping.kernels.views import grid_at, int8_grid_at, word_grid_at
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
@@ -27,7 +28,10 @@ KEYS = (*OBSERVABLES, "goal")
 """All that is ever observed, in the order in which the kernel takes the arrays."""
 
 Arrays = tuple[Array, ...]
-"""Arrays that go to the kernel together; a tuple costs no more than its arrays alone, where a named one costs twice as much."""
+"""Arrays that go to the kernel together.
+
+A tuple costs no more than its arrays alone, where a named one costs twice as much.
+"""
 
 
 def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:
@@ -54,7 +58,9 @@ def _boxes(settings: ExplorationSettings) -> dict[str, spaces.Box]:
         "velocity": spaces.Box(-velocity_limit, velocity_limit, dtype=np.float32),
         "bumper": spaces.Box(0, 1, (3,), np.int8),
         "map": spaces.Box(0, 255, (1, cells, cells), np.uint8),
-        "egocentric_map": spaces.Box(0, 255, (len(settings.egocentric_scales), own_cells, own_cells), np.uint8),
+        "egocentric_map": spaces.Box(
+            0, 255, (len(settings.egocentric_scales), own_cells, own_cells), np.uint8
+        ),
         "goal": spaces.Box(-FARTHEST, FARTHEST, (2,), np.float32),
     }
 
@@ -66,8 +72,15 @@ def action_space() -> spaces.Box:
 
 @kernel(borrowing=True)
 def write_row(row: int, sources: Array, observed: Arrays) -> None:
-    """Write a row of the arrays of ``KEYS``; those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``."""
-    world, offsets, goals = world_at(grid_of(sources, 0, np.int64)), grid_of(sources, 1, np.float64), grid_of(sources, 2, np.float64)
+    """Write a row of the arrays of ``KEYS``.
+
+    Those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``.
+    """
+    world, offsets, goals = (
+        world_at(grid_of(sources, 0, np.int64)),
+        grid_of(sources, 1, np.float64),
+        grid_of(sources, 2, np.float64),
+    )
     numbers, scales = vector_of(sources, 4, np.float64), vector_of(sources, 5, np.int64)
     ranges, believed, velocities, bumpers = world.ranges, world.believed, world.measured, world.bumpers
     beliefs, origins = world.maps, world.origins
@@ -79,7 +92,9 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
         for beam in range(ranges.shape[1]):
             value = ranges[row, beam]
             hit = min(value, longest)
-            scans[row, beam] = no_return if value > no_return else (hit if value == value else np.float32(0.0))
+            scans[row, beam] = (
+                no_return if value > no_return else (hit if value == value else np.float32(0.0))
+            )
     if poses.size > 0:
         for axis in range(2):
             local = np.float32(believed[row, axis] - offsets[row, axis])
@@ -94,9 +109,14 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
     if observed_goals.size > 0:
         for axis in range(2):
             local = np.float32(goals[row, axis] - offsets[row, axis])
-            observed_goals[row, axis] = min(max(local, -farthest), farthest) if local == local else np.float32(0.0)
+            observed_goals[row, axis] = (
+                min(max(local, -farthest), farthest) if local == local else np.float32(0.0)
+            )
     if maps.size > 0 or egocentric_maps.size > 0:
-        x, y = (believed[row, 0] - origins[row, 0]) / resolution, (believed[row, 1] - origins[row, 1]) / resolution
+        x, y = (
+            (believed[row, 0] - origins[row, 0]) / resolution,
+            (believed[row, 1] - origins[row, 1]) / resolution,
+        )
         log_odds = int8_grid_at(beliefs[row, 0], beliefs[row, 1], beliefs[row, 2])
         if maps.size > 0:
             crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
@@ -105,7 +125,9 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
             pools = grid_at(sources[3, 0] + row * sources[3, 2] * 8, scales.shape[0], 3, np.int64)
             for k in range(scales.shape[0]):
                 if scales[k] > 1:
-                    pool_touched(log_odds, touched, scales[k], int8_grid_at(pools[k, 0], pools[k, 1], pools[k, 2]))
+                    pool_touched(
+                        log_odds, touched, scales[k], int8_grid_at(pools[k, 0], pools[k, 1], pools[k, 2])
+                    )
             forget_touched(touched, log_odds.shape[0])
             crop_turned(pools, x, y, believed[row, 2], scales, egocentric_maps[row])
 
@@ -136,8 +158,8 @@ class ObservationWriter:
     offsets : (rows, 2) float64
         Origin of each robot's map frame in the frame of its believed pose [m]; read at each call.
     goals : (rows, 2) float64 or None
-        Each robot's goal in the frame of its believed pose [m], nan where it does not know one; read at each call. None where there are
-        no goals, which are not observed then.
+        Each robot's goal in the frame of its believed pose [m], nan where it does not know one; read at each
+        call. None where there are no goals, which are not observed then.
 
     Attributes
     ----------
@@ -147,7 +169,8 @@ class ObservationWriter:
     Raises
     ------
     ValueError
-        Where the offsets or goals are of another type, or the world does not pool its maps at the scales that are observed.
+        Where the offsets or goals are of another type, or the world does not pool its maps at the scales that
+        are observed.
     """
 
     def __init__(
@@ -161,9 +184,13 @@ class ObservationWriter:
         self.rows = len(world.believed)
         for name, array in (("offsets", offsets), ("goals", offsets if goals is None else goals)):
             if array.shape != (self.rows, 2) or array.dtype != np.float64 or not array.flags.c_contiguous:
-                raise ValueError(f"{name} are {array.dtype} {array.shape}; want float64 {(self.rows, 2)}, contiguous")
+                raise ValueError(
+                    f"{name} are {array.dtype} {array.shape}; want float64 {(self.rows, 2)}, contiguous"
+                )
         if "egocentric_map" in self.keys and world.scales != settings.egocentric_scales:
-            raise ValueError(f"the world pools its maps at scales {world.scales}; want those of the settings, {settings.egocentric_scales}")
+            raise ValueError(
+                f"the world pools its maps at scales {world.scales}; want those of the settings, {settings.egocentric_scales}"
+            )
         kinds = {name: ((self.rows, *box.shape), box.dtype) for name, box in _boxes(settings).items()}
         self._kinds = [kinds[name] for name in self.keys]
         # The kernel takes the arrays of all keys, in their order; what is not observed stands behind what is.
@@ -172,21 +199,34 @@ class ObservationWriter:
         self._in_order = itemgetter(*((*self.keys, *absent).index(name) for name in KEYS))
         robot = settings.robot
         # The space's bounds are float32, and so are those to which values are clipped.
-        limits = [float(np.float32(limit)) for limit in (settings.lidar.range_max, robot.max_speed, robot.max_turn_rate)]
+        limits = [
+            float(np.float32(limit))
+            for limit in (settings.lidar.range_max, robot.max_speed, robot.max_turn_rate)
+        ]
         self._world = world
         self._told = (
-            offsets, offsets if goals is None else goals, world.pool_rows,
-            np.array([settings.occupancy.resolution, *limits]), np.array(settings.egocentric_scales, np.int64),
-        )  # fmt: skip
+            offsets,
+            offsets if goals is None else goals,
+            world.pool_rows,
+            np.array([settings.occupancy.resolution, *limits]),
+            np.array(settings.egocentric_scales, np.int64),
+        )
         self._sources: NDArray[np.int64] | None = None
         self._everyone = np.ones(self.rows, np.bool_)
-        self._threads = min(settings.threads, int(os.cpu_count() or 1)) if self.rows >= ROWS_FOR_THREADS else 1
+        self._threads = (
+            min(settings.threads, int(os.cpu_count() or 1)) if self.rows >= ROWS_FOR_THREADS else 1
+        )
 
     def buffers(self) -> dict[str, NDArray[Any]]:
-        """Return new arrays for the observations, by key; what they hold is undefined until it is written."""
+        """Return new arrays for the observations, by key.
+
+        What they hold is undefined until it is written.
+        """
         return {name: np.empty(*kind) for name, kind in zip(self.keys, self._kinds, strict=True)}
 
-    def write(self, out: Mapping[str, NDArray[Any]] | None = None, active: NDArray[np.bool_] | None = None) -> Mapping[str, NDArray[Any]]:
+    def write(
+        self, out: Mapping[str, NDArray[Any]] | None = None, active: NDArray[np.bool_] | None = None
+    ) -> Mapping[str, NDArray[Any]]:
         """Write one observation a row.
 
         Parameters
@@ -244,6 +284,8 @@ class ObservationWriter:
             if array is None:
                 raise ValueError(f"out has no array for {name}; want {', '.join(self.keys)}")
             if array.shape != shape or array.dtype != dtype or not array.flags.carray:
-                raise ValueError(f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous and writeable")
+                raise ValueError(
+                    f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous and writeable"
+                )
             arrays.append(array)
         return arrays

@@ -13,17 +13,17 @@ class Bench(Command):
     effort: Literal["quick", "moderate", "full"] = "moderate"
     """how long to measure: coarse figures, figures to look at, or those to publish"""
     only: tuple[str, ...] = ()
-    """questions to ask, all where left out: kernel_step, ray_casting, range_error, map_update, exploration_projects,
-    environment_step, batch_step, learning_preset, waypoint_decision, cached_start"""
+    """questions to ask, all where left out: kernel_step, ray_casting, range_error, map_update,
+    exploration_projects, environment_step, batch_step, learning_preset, waypoint_decision, cached_start"""
 
 
 def execute(command: Bench) -> Answer:
     """Measure, tell, and write ``speed.md`` and ``speed.json`` where asked to."""
     from lidarium.benchmarks.speed.all import QUESTIONS, ask, result_of
+    from lidarium.benchmarks.speed.harness.report import write_speed
+    from lidarium.benchmarks.speed.harness.timing import EFFORTS
     from lidarium.benchmarks.speed.peers.catalogue import missing_peers
-    from lidarium.benchmarks.speed.report import write_speed
-    from lidarium.benchmarks.speed.timing import EFFORTS
-    from lidarium.evaluation.output import check_writable
+    from lidarium.evaluation.episodes.output import check_writable
 
     for name in command.only:
         if name not in QUESTIONS:
@@ -51,5 +51,7 @@ def execute(command: Bench) -> Answer:
     if command.out is not None:
         write_speed(result, lines, command.out)
     shown = table([line.cells for line in lines], ("line", "ours", "beside", "ratio", "to reach", "reached"))
-    text = "\n".join([f"{result['machine']}, lidarium {result['versions']['lidarium']}", shown, *missing_peers()])
+    text = "\n".join(
+        [f"{result['machine']}, lidarium {result['versions']['lidarium']}", shown, *missing_peers()]
+    )
     return Answer(result, text, INTERRUPTED if is_interrupted else 0)

@@ -51,11 +51,17 @@ class TeamCommand(Command):
     odometry: str | None = None
     """how well wheels tell the way: ideal, good, typical or poor"""
     localization: str | None = None
-    """who says where a robot is: truth, odometry or a localizer; `lidarium show localizers` lists them"""
+    """who says where a robot is: truth, odometry or a localizer.
+
+    `lidarium show localizers` lists them
+    """
     radio: str | None = None
     """how robots reach each other: all, none, range, line_of_sight or signal"""
     battery: str | None = None
-    """what energy the robots have: none (no limit) or kobuki; `lidarium show batteries` lists them"""
+    """what energy the robots have: none (no limit) or kobuki.
+
+    `lidarium show batteries` lists them
+    """
     pauses_when_blocked: bool = False
     """robots that touch something, or whose way is blocked, pause until they are told to resume"""
     unknown_starts: bool = False
@@ -65,7 +71,10 @@ class TeamCommand(Command):
 
     @property
     def team_options(self) -> dict[str, Any]:
-        """What the options say of a team, as ``make_settings`` takes it; what was left out is left out."""
+        """What the options say of a team, as ``make_settings`` takes it.
+
+        What was left out is left out.
+        """
         given = {
             name: getattr(self, name)
             for name in ("noise", "odometry", "localization", "radio", "battery")
@@ -74,9 +83,14 @@ class TeamCommand(Command):
         starts = {"known_starts": False} if self.unknown_starts else {}
         pauses = {"pauses_when_blocked": True} if self.pauses_when_blocked else {}
         return {
-            "robot": self.robot, "lidar": self.lidar, "realism": self.realism, **given, **starts, **pauses,
+            "robot": self.robot,
+            "lidar": self.lidar,
+            "realism": self.realism,
+            **given,
+            **starts,
+            **pauses,
             "resolution": self.map_resolution,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +119,7 @@ def tell(message: str) -> None:
 
 def tell_of_compiling() -> None:
     """Tell, at the first start, why nothing happens for a while."""
-    from lidarium.mapping.kernels import is_cache_empty
+    from lidarium.mapping.kernels.compilation import is_cache_empty
 
     if is_cache_empty():
         tell("compiling the kernels, a minute or two; later starts find them")
@@ -128,10 +142,15 @@ def _aligned(cell: str, width: int, is_number: bool) -> str:
 
 def file_name(name: str) -> str:
     """Return a name with what does not belong in a file's name replaced."""
-    return "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-") or "floor"
+    return (
+        "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name).strip(".-")
+        or "floor"
+    )
 
 
-def counted(items: Iterable[T], total: int, what: str, is_quiet: bool, clock: Callable[[], float] = time.monotonic) -> Iterator[T]:
+def counted(
+    items: Iterable[T], total: int, what: str, is_quiet: bool, clock: Callable[[], float] = time.monotonic
+) -> Iterator[T]:
     """Pass items on and tell how many there were: a bar on a terminal, else a line every few seconds, on standard error.
 
     Parameters
@@ -178,7 +197,9 @@ class Progress:
             from tqdm import tqdm
 
             bar_format = "explored {percentage:5.1f} %|{bar:40}| {desc} [{elapsed}]"
-            self._bar = tqdm(total=100.0, file=sys.stderr, bar_format=bar_format, leave=False, dynamic_ncols=True)
+            self._bar = tqdm(
+                total=100.0, file=sys.stderr, bar_format=bar_format, leave=False, dynamic_ncols=True
+            )
 
     def tell(self, env: "ExplorationEnv") -> None:
         """Tell where the episode is."""

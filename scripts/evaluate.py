@@ -12,31 +12,40 @@ from tyro.conf import Positional
 from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, table, tell
 
 if TYPE_CHECKING:
-    from lidarium.evaluation.campaign import Campaign
-    from lidarium.evaluation.suite import Suite
+    from lidarium.evaluation.suites.campaign import Campaign
+    from lidarium.evaluation.suites.suite import Suite
 
 DEFAULT_FOLDER = Path("runs/evaluation")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate(TeamCommand):
-    """Run policies x floors x robots x seeds; finished episodes are kept, and the same command goes on where it stopped."""
+    """Run policies x floors x robots x seeds.
+
+    Finished episodes are kept, and the same command goes on where it stopped.
+    """
 
     suite: Positional[Path | None] = None
     """TOML file that says what to run, in place of the options below"""
     preset: str | None = None
-    """evaluate as another project does: explore-bench, ariadne, chen, ir2, marvel, maexp, mapex or houseexpo; settings, teams and
-    stop rule are then its own, and its floors, too, unless --floors names others"""
+    """evaluate as another project does: explore-bench, ariadne, chen, ir2, marvel, maexp, mapex or houseexpo;
+    settings, teams and stop rule are then its own, and its floors, too, unless --floors names others"""
     data: Path | None = None
     """folder of real floors, for presets"""
     policies: tuple[str, ...] = ("nearest_frontier", "utility_frontier", "explore_lite")
     """who decides; `lidarium show policies` lists them"""
     floors: tuple[str, ...] = ()
-    """floors as for `lidarium run`, apartment where left out; set:NAME for all floors of a set, set:NAME:COUNT for its first ones"""
+    """floors as for `lidarium run`, apartment where left out.
+
+    Set:NAME for all floors of a set, set:NAME:COUNT for its first ones
+    """
     robots: tuple[int, ...] = (1, 2, 3)
     """sizes of teams"""
     seeds: int = 3
-    """how many seeds, from --seed on; the same seed draws the same starts for every policy"""
+    """how many seeds, from --seed on.
+
+    The same seed draws the same starts for every policy
+    """
     horizon_s: float = 1800.0
     """simulated time after which an episode is cut [s]"""
     stop_coverage: float = 0.99
@@ -57,14 +66,16 @@ def execute(command: Evaluate) -> Answer:
     ValueError, FileNotFoundError, OSError
         Where the input or ``--out`` is no good; what was finished before is kept.
     """
-    from lidarium.evaluation.campaign import Campaign
-    from lidarium.evaluation.output import check_writable
+    from lidarium.evaluation.episodes.output import check_writable
+    from lidarium.evaluation.suites.campaign import Campaign
 
     if command.workers < 0:
         raise ValueError(f"--workers is {command.workers}; want 0 for as many as there are cores, or more")
     folder = command.out or DEFAULT_FOLDER
     check_writable(folder)
-    campaign = Campaign(_suite(command), folder, command.workers or len(os.sched_getaffinity(0)), command.records)
+    campaign = Campaign(
+        _suite(command), folder, command.workers or len(os.sched_getaffinity(0)), command.records
+    )
     is_interrupted = False
     runs = campaign.run()
     try:
@@ -79,7 +90,7 @@ def execute(command: Evaluate) -> Answer:
 
 
 def _suite(command: Evaluate) -> "Suite":
-    from lidarium.evaluation.suite import DEFAULT_VARIANT, Suite, read_suite
+    from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite, read_suite
 
     if command.suite is not None:
         return read_suite(command.suite)
@@ -87,7 +98,7 @@ def _suite(command: Evaluate) -> "Suite":
         raise ValueError(f"--seeds is {command.seeds}; want at least 1")
     seeds = tuple(range(command.seed, command.seed + command.seeds))
     if command.preset is not None:
-        from lidarium.evaluation.presets import preset_suite
+        from lidarium.evaluation.suites.presets import preset_suite
 
         return preset_suite(command.preset, command.policies, seeds, command.data, command.floors)
     settings = {
@@ -106,8 +117,8 @@ def _suite(command: Evaluate) -> "Suite":
 
 
 def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
-    from lidarium.evaluation.campaign import EPISODES_FILE
-    from lidarium.evaluation.episodes_file import read_episodes
+    from lidarium.evaluation.suites.campaign import EPISODES_FILE
+    from lidarium.evaluation.suites.episodes_file import read_episodes
 
     for trial, error in campaign.failures:
         tell(f"{trial.key}: {type(error).__name__}: {error}")
@@ -118,7 +129,10 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
         "folder": str(folder),
         "episodes": campaign.total,
         "finished": campaign.done,
-        "failed": [{"key": trial.key, "error": f"{type(error).__name__}: {error}"} for trial, error in campaign.failures],
+        "failed": [
+            {"key": trial.key, "error": f"{type(error).__name__}: {error}"}
+            for trial, error in campaign.failures
+        ],
         "interrupted": is_interrupted,
         "summary": rows,
     }
@@ -127,7 +141,20 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
     text = "\n".join(
         [
             f"{campaign.done} of {campaign.total} episodes finished, {len(campaign.failures)} failed{how}",
-            table(shown, ("settings", "policy", "robots", "episodes", "t99 median [s]", "not reached", "coverage", "path [m]", "overlap")),
+            table(
+                shown,
+                (
+                    "settings",
+                    "policy",
+                    "robots",
+                    "episodes",
+                    "t99 median [s]",
+                    "not reached",
+                    "coverage",
+                    "path [m]",
+                    "overlap",
+                ),
+            ),
             f"  {folder}; `lidarium report {folder}` makes tables with intervals, and plots",
         ]
     )
@@ -136,12 +163,17 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
 
 
 def summary_of(episodes: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return medians by settings, policy and size of the team; a median time is None where half did not reach it."""
+    """Return medians by settings, policy and size of the team.
+
+    A median time is None where half did not reach it.
+    """
     groups: dict[tuple[str, str, int], list[Mapping[str, Any]]] = {}
     for episode in episodes:
         groups.setdefault((episode["variant"], episode["policy"], episode["robots"]), []).append(episode)
     rows = []
-    for (variant, policy, robots), group in sorted(groups.items(), key=lambda item: (item[0][0], item[0][2], item[0][1])):
+    for (variant, policy, robots), group in sorted(
+        groups.items(), key=lambda item: (item[0][0], item[0][2], item[0][1])
+    ):
         times = [episode["t99_s"] if episode["t99_s"] is not None else float("inf") for episode in group]
         median = statistics.median_high(times)
         rows.append(

@@ -10,7 +10,16 @@ from tyro.conf import subcommand
 
 from lidarium.scripts import bench, evaluate, floors, merge, replay, report, reproduce, run, show, slam
 from lidarium.scripts.bench import Bench
-from lidarium.scripts.common import BAD_INPUT, DEFECT, DONE, INTERRUPTED, Answer, Command, tell, tell_of_compiling
+from lidarium.scripts.common import (
+    BAD_INPUT,
+    DEFECT,
+    DONE,
+    INTERRUPTED,
+    Answer,
+    Command,
+    tell,
+    tell_of_compiling,
+)
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
 from lidarium.scripts.merge import Merge
@@ -66,7 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 2 bad input, 3 the answer is no, 130 interrupted (finished parts are kept), 1 a defect of ours.
+        Exit code: 0 done, 2 bad input, 3 the answer is no, 130 interrupted (finished parts are kept), 1 a
+        defect of ours.
     """
     try:
         return _answered(_command(arguments))
@@ -76,17 +86,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         tell("interrupted")
         return INTERRUPTED
     except BrokenPipeError:
-        # The reader of our output has left: nobody is there to be told, and Python shall not complain at exit.
+        # The reader of our output has left: nobody is there to be told, and Python shall not complain at
+        # exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
     except (ValueError, OSError) as error:
         tell(f"lidarium: {_message(error)}")
         return BAD_INPUT
     except MemoryError:
-        tell("lidarium: this needs more memory than there is; try a smaller floor, a coarser --resolution or --map-resolution")
+        tell(
+            "lidarium: this needs more memory than there is; try a smaller floor, a coarser --resolution or --map-resolution"
+        )
         return BAD_INPUT
     except Exception:
-        tell("lidarium: this is a defect of lidarium, not of your input. Please report it with the command line and the lines below.\n")
+        tell(
+            "lidarium: this is a defect of lidarium, not of your input. Please report it with the command line and the lines below.\n"
+        )
         traceback.print_exc()
         return DEFECT
 
@@ -102,7 +117,7 @@ def _command(arguments: Sequence[str] | None) -> Command:
 
 
 def _answered(command: Command) -> int:
-    from lidarium.evaluation.output import as_json
+    from lidarium.evaluation.episodes.output import as_json
 
     if isinstance(command, _WITH_KERNELS):
         tell_of_compiling()

@@ -9,21 +9,27 @@ from tyro.conf import Positional
 from lidarium.scripts.common import DONE, NO, Answer, Command, file_name, table
 
 if TYPE_CHECKING:
-    from lidarium.mapping.map_files import MapImage
+    from lidarium.mapping.files.map_files import MapImage
+    from lidarium.mapping.geometry.rigid import Transform
     from lidarium.mapping.merging.merger import Merged
-    from lidarium.mapping.rigid import Transform
 
 DEFAULT_FOLDER = Path("merged")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Merge(Command):
-    """Merge maps into one; writes the fused map, transforms.json and a picture. Where maps do not join, it says why of each pair."""
+    """Merge maps into one; writes the fused map, transforms.json and a picture.
+
+    Where maps do not join, it says why of each pair.
+    """
 
     maps: Positional[tuple[Path, ...]]
     """two maps or more: ROS maps (yaml with its image), or images with --resolution"""
     resolution: float | None = None
-    """metres per pixel of maps that are plain images; dark is occupied, light is free, what lies between unknown"""
+    """metres per pixel of maps that are plain images.
+
+    Dark is occupied, light is free, what lies between unknown
+    """
     mode: str = "default"
     """rules of merging: default, or thesis for those of the thesis as they were printed"""
 
@@ -43,7 +49,7 @@ def execute(command: Merge) -> Answer:
     ValueError, FileNotFoundError, OSError
         Where a map or ``--out`` is no good; nothing is written then.
     """
-    from lidarium.evaluation.output import check_writable
+    from lidarium.evaluation.episodes.output import check_writable
     from lidarium.mapping.merging.merger import merge_maps
     from lidarium.mapping.merging.settings import merge_settings
 
@@ -60,14 +66,16 @@ def execute(command: Merge) -> Answer:
 
 def _read(command: Merge) -> "dict[str, MapImage]":
     """Return the maps by their files' stems, numbered where these are the same."""
-    from lidarium.mapping.map_files import read_grey_map, read_ros_map
+    from lidarium.mapping.files.map_files import read_grey_map, read_ros_map
 
     images: dict[str, MapImage] = {}
     for path in command.maps:
         if path.suffix.lower() in (".yaml", ".yml"):
             image = read_ros_map(path)
         elif command.resolution is None:
-            raise ValueError(f"{path} is an image without a scale; pass --resolution with its metres per pixel")
+            raise ValueError(
+                f"{path} is an image without a scale; pass --resolution with its metres per pixel"
+            )
         else:
             image = read_grey_map(path, command.resolution)
         stem, name, number = file_name(path.stem), file_name(path.stem), 1
@@ -80,7 +88,7 @@ def _read(command: Merge) -> "dict[str, MapImage]":
 
 def _corner(image: "MapImage") -> "Transform":
     """Return the transform from cells' metres into the map's ROS frame."""
-    from lidarium.mapping.rigid import Transform
+    from lidarium.mapping.geometry.rigid import Transform
 
     return Transform(*image.origin)
 
@@ -101,8 +109,14 @@ def _result(merged: "Merged", images: "dict[str, MapImage]") -> dict[str, Any]:
     used = {(edge.a, edge.b) for edge in merged.tree.edges}
     for (a, b), found in merged.pairs.items():
         is_used = (a, b) in used
-        between = None if found.a_from_b is None else _corner(images[a]) @ found.a_from_b @ _corner(images[b]).inverse()
-        reason = "contradicts stronger pairs of the group" if found.is_accepted and not is_used else found.reason
+        between = (
+            None
+            if found.a_from_b is None
+            else _corner(images[a]) @ found.a_from_b @ _corner(images[b]).inverse()
+        )
+        reason = (
+            "contradicts stronger pairs of the group" if found.is_accepted and not is_used else found.reason
+        )
         pairs.append(
             {
                 "a": a,
@@ -127,10 +141,10 @@ def _numbers(transform: "Transform | None") -> dict[str, float | None]:
 
 def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, Any], out: Path) -> list[str]:
     """Write transforms, the picture and the fused map of each group in the ROS frame of its first map."""
-    from lidarium.evaluation.merge_picture import save_merge_picture
-    from lidarium.evaluation.output import write_json
-    from lidarium.mapping.map_files import write_ros_map
-    from lidarium.mapping.rigid import Transform
+    from lidarium.evaluation.drawing.merge_picture import save_merge_picture
+    from lidarium.evaluation.episodes.output import write_json
+    from lidarium.mapping.files.map_files import write_ros_map
+    from lidarium.mapping.geometry.rigid import Transform
 
     files = []
     joined = [group for group in merged.groups() if len(group) > 1]
@@ -146,7 +160,10 @@ def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, An
 
 
 def _summary(merged: "Merged", files: list[str], out: Path) -> str:
-    lines = [f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}" for group in merged.groups()]
+    lines = [
+        f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}"
+        for group in merged.groups()
+    ]
     dropped = {(edge.a, edge.b) for edge in merged.tree.dropped}
     rows = []
     for (a, b), found in merged.pairs.items():
@@ -158,4 +175,12 @@ def _summary(merged: "Merged", files: list[str], out: Path) -> str:
         else:
             reason = f"refused: {found.reason}"
         rows.append((a, b, reason))
-    return "\n".join([*lines, "", table(rows), "", f"written to {out}: {', '.join(files)}" if files else "nothing was written"])
+    return "\n".join(
+        [
+            *lines,
+            "",
+            table(rows),
+            "",
+            f"written to {out}: {', '.join(files)}" if files else "nothing was written",
+        ]
+    )

@@ -22,9 +22,15 @@ class Replay(Command):
     floor: str | None = None
     """the floor that was recorded, where the one that the record names is not found"""
     picture: Path | None = None
-    """draw the record as a PNG file instead of running it again; works for records of other versions too"""
+    """draw the record as a PNG file instead of running it again.
+
+    Works for records of other versions too
+    """
     video: Path | None = None
-    """film the record as an mp4 file instead of running it again; works for records of other versions too"""
+    """film the record as an mp4 file instead of running it again.
+
+    Works for records of other versions too
+    """
     video_speed: float = 10.0
     """simulated seconds per second of the film"""
 
@@ -37,10 +43,13 @@ def execute(command: Replay) -> Answer:
     ValueError, FileNotFoundError, OSError
         Where the record, its floor or a place to write to is no good; nothing is written then.
     """
-    from lidarium.evaluation.output import check_writable, write_json
+    from lidarium.evaluation.episodes.output import check_writable, write_json
     from lidarium.evaluation.record import read_record
 
-    for folder in (command.out, *(path.parent for path in (command.picture, command.video) if path is not None)):
+    for folder in (
+        command.out,
+        *(path.parent for path in (command.picture, command.video) if path is not None),
+    ):
         if folder is not None:
             check_writable(folder)
     record = read_record(command.file)
@@ -58,8 +67,8 @@ def _about(command: Replay, record: "EpisodeRecord") -> dict[str, Any]:
 
 
 def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
-    from lidarium.evaluation.record.drawing import save_track_film, save_track_picture
-    from lidarium.evaluation.video import check_speed
+    from lidarium.evaluation.drawing.record_frames import save_track_film, save_track_picture
+    from lidarium.evaluation.drawing.video import check_speed
 
     check_speed(command.video_speed)
     files = []
@@ -78,7 +87,10 @@ def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
         "files": files,
     }
     facts = [
-        ("explored", f"{100.0 * result['coverage_final']:.2f} % in {result['time_s']:.1f} s of simulated time"),
+        (
+            "explored",
+            f"{100.0 * result['coverage_final']:.2f} % in {result['time_s']:.1f} s of simulated time",
+        ),
         ("files", ", ".join(files)),
     ]
     return Answer(result, "\n".join([_title(result), table(facts)]))
@@ -97,15 +109,23 @@ def _run_again(command: Replay, record: "EpisodeRecord") -> Answer:
         "recorded_sha256": record.header["final_sha256"],
         **_figures(env),
     }
-    verdict = "the same as recorded, to the bit" if same else f"not as recorded: {first_difference(record, env)}"
+    verdict = (
+        "the same as recorded, to the bit" if same else f"not as recorded: {first_difference(record, env)}"
+    )
     ended = [
         (agent, reason or "still at work", f"{length:.1f} m")
         for (agent, reason), length in zip(result["ended_because"].items(), result["path_m"], strict=True)
     ]
     facts = [
         ("final state", verdict),
-        ("explored", f"{100.0 * result['coverage_final']:.2f} % in {result['time_s']:.1f} s of simulated time"),
-        ("together", f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions"),
+        (
+            "explored",
+            f"{100.0 * result['coverage_final']:.2f} % in {result['time_s']:.1f} s of simulated time",
+        ),
+        (
+            "together",
+            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions",
+        ),
         ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
     ]
     text = "\n".join([_title(result), table(facts), "", table(ended, ("robot", "ended because", "drove"))])
@@ -114,9 +134,9 @@ def _run_again(command: Replay, record: "EpisodeRecord") -> Answer:
 
 def _figures(env: "ExplorationEnv") -> dict[str, Any]:
     """Return the main figures of an episode, as ``result.json`` has them."""
-    from lidarium.envs.scorer import THRESHOLDS
+    from lidarium.envs.scoring.scorer import THRESHOLDS
+    from lidarium.evaluation.episodes.result import map_figures
     from lidarium.evaluation.metrics import overlap
-    from lidarium.evaluation.result import map_figures
 
     scorer, world = env.scorer, env.world
     times = {f"t{round(100 * share)}_s": scorer.times.get(share) for share in THRESHOLDS}

@@ -11,12 +11,18 @@ from lidarium.scripts.common import Answer, Command, table
 
 @dataclass(frozen=True, kw_only=True)
 class Report(Command):
-    """Compare policies over the episodes of a directory; writes report.md, report.json and plots to --out, or to DIR/report."""
+    """Compare policies over the episodes of a directory.
+
+    Writes report.md, report.json and plots to --out, or to DIR/report.
+    """
 
     directory: Positional[Path]
     """folder with episodes.jsonl that `lidarium evaluate` wrote"""
     baseline: str | None = None
-    """policy that the others are compared with; nearest_frontier where it is there, else the first of the alphabet"""
+    """policy that the others are compared with.
+
+    Nearest_frontier where it is there, else the first of the alphabet
+    """
 
 
 def execute(command: Report) -> Answer:
@@ -36,15 +42,30 @@ def execute(command: Report) -> Answer:
 
 def _summary(result: dict[str, Any], out: Path) -> str:
     """Tell the most important figures of each group."""
-    lines = [f"{result['episodes']} episodes, {result['records']} recorded; compared with {result['baseline']}"]
+    lines = [
+        f"{result['episodes']} episodes, {result['records']} recorded; compared with {result['baseline']}"
+    ]
     for group in result["groups"]:
         robots = f"{group['robots']} robot{'s' if group['robots'] != 1 else ''}"
         rows = [
-            (policy, figure["size"], f"{100.0 * figure['success']['estimate']:.0f} %", _seconds(figure["median"], group["horizon_s"]))
+            (
+                policy,
+                figure["size"],
+                f"{100.0 * figure['success']['estimate']:.0f} %",
+                _seconds(figure["median"], group["horizon_s"]),
+            )
             for policy, figure in group["times"]["t99_s"].items()
         ]
-        lines += ["", f"{robots}, {group['floor_set']}", table(rows, ("policy", "runs", "reached 99 %", "median s"))]
-    lines += ["", *(f"careful: {warning}" for warning in result["warnings"]), f"written to {out}: report.md, report.json and plots"]
+        lines += [
+            "",
+            f"{robots}, {group['floor_set']}",
+            table(rows, ("policy", "runs", "reached 99 %", "median s")),
+        ]
+    lines += [
+        "",
+        *(f"careful: {warning}" for warning in result["warnings"]),
+        f"written to {out}: report.md, report.json and plots",
+    ]
     return "\n".join(lines)
 
 

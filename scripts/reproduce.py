@@ -12,7 +12,7 @@ from tyro.conf import Positional
 from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, Command, counted, tell
 
 if TYPE_CHECKING:
-    from lidarium.evaluation.campaign import Campaign
+    from lidarium.evaluation.suites.campaign import Campaign
 
 DEFAULT_FOLDER = Path("docs/results")
 SECONDS_BETWEEN_NEWS = 10.0
@@ -20,7 +20,10 @@ SECONDS_BETWEEN_NEWS = 10.0
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce(Command):
-    """Run what a page of docs/results shows, and write the page to --out; what has been run before is not run again."""
+    """Run what a page of docs/results shows, and write the page to --out.
+
+    What has been run before is not run again.
+    """
 
     name: Positional[Literal["leaderboard", "merging", "srt", "supervisor"]]
     """which page"""
@@ -46,12 +49,14 @@ def execute(command: Reproduce) -> Answer:
     ValueError, FileNotFoundError, OSError
         Where the input or ``--out`` is no good; what was finished before is kept.
     """
-    from lidarium.evaluation.campaign import Campaign
-    from lidarium.evaluation.experiments import EXPERIMENTS
-    from lidarium.evaluation.output import check_writable, write_text
+    from lidarium.benchmarks.studies import EXPERIMENTS
+    from lidarium.evaluation.episodes.output import check_writable, write_text
+    from lidarium.evaluation.suites.campaign import Campaign
 
     if command.every < 1 or command.workers < 0:
-        raise ValueError(f"--every is {command.every} and --workers {command.workers}; want at least 1, and at least 0")
+        raise ValueError(
+            f"--every is {command.every} and --workers {command.workers}; want at least 1, and at least 0"
+        )
     every = _every(command)
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
@@ -59,12 +64,15 @@ def execute(command: Reproduce) -> Answer:
     folder = command.runs / command.name
     workers = command.workers or len(os.sched_getaffinity(0))
     campaigns = {
-        name: Campaign(suite, folder / name, workers, command.records) for name, suite in experiment.suites(command.data, every).items()
+        name: Campaign(suite, folder / name, workers, command.records)
+        for name, suite in experiment.suites(command.data, every).items()
     }
     for name, campaign in campaigns.items():
         if not _ran(campaign, name, command.json):
             return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
-    if experiment.work is not None and not _worked(experiment.work(folder, command.data, every, workers), command.json):
+    if experiment.work is not None and not _worked(
+        experiment.work(folder, command.data, every, workers), command.json
+    ):
         return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
     if experiment.pictures is not None:
         experiment.pictures(folder, out)
@@ -102,7 +110,10 @@ def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
 
 
 def _worked(work: Iterator[tuple[str, int, int]], is_quiet: bool) -> bool:
-    """Do an experiment's own work, and tell of it now and then; False where the user broke it off."""
+    """Do an experiment's own work, and tell of it now and then.
+
+    False where the user broke it off.
+    """
     before, told_at = "", 0.0
     try:
         for what, done, total in work:
@@ -116,14 +127,22 @@ def _worked(work: Iterator[tuple[str, int, int]], is_quiet: bool) -> bool:
 
 def _told(campaigns: dict[str, "Campaign"]) -> dict[str, Any]:
     parts = {
-        name: {"episodes": campaign.total, "finished": campaign.done, "failed": [trial.key for trial, _ in campaign.failures]}
+        name: {
+            "episodes": campaign.total,
+            "finished": campaign.done,
+            "failed": [trial.key for trial, _ in campaign.failures],
+        }
         for name, campaign in campaigns.items()
     }
     return {"suites": parts}
 
 
 def _command_line(command: Reproduce) -> str:
-    data = "" if command.data is None else f" --data {command.data.name if command.data.is_absolute() else command.data}"
+    data = (
+        ""
+        if command.data is None
+        else f" --data {command.data.name if command.data.is_absolute() else command.data}"
+    )
     part = f" --every {command.every}" if command.every > 1 else ""
     if command.share is not None:
         part = f" --share {command.share:g}"

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidarium.envs.exploration import ExplorationEnv
-    from lidarium.envs.settings import ExplorationSettings
-    from lidarium.evaluation.history import History
+    from lidarium.envs.settings.exploration import ExplorationSettings
+    from lidarium.evaluation.episodes.history import History
+    from lidarium.evaluation.episodes.runner import Episode
+    from lidarium.evaluation.episodes.watching import WatchedExploration
     from lidarium.evaluation.record import Recorder
-    from lidarium.evaluation.runner import Episode
-    from lidarium.evaluation.watching import WatchedExploration
 
 DEFAULT_FOLDER = Path("runs")
 
@@ -30,26 +30,39 @@ STOP_COVERAGE = 0.99
 """Share of the floor at which a run without a goal ends."""
 
 NAMED_GIVEN_UP = 5
-"""How many of the frontiers given up are named in the summary; result.json has all."""
+"""How many of the frontiers given up are named in the summary.
+
+Result.json has all.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run(TeamCommand):
-    """Let a team explore a floor; writes its figures, its map, a picture and, if asked for, a record and a film."""
+    """Let a team explore a floor.
+
+    Writes its figures, its map, a picture and, if asked for, a record and a film.
+    """
 
     floor: str = "apartment"
     """name in the catalogue, building:SEED, set:NAME, or a file of any format that the importers know"""
     robots: int = 3
     """number of robots"""
     policy: str | None = None
-    """who decides; `lidarium show policies` lists them. Left out, a team is supervised: it does not know its starts, finds out where it
-    is by SLAM, and merges its maps; one robot, or robots with a goal, drive to the nearest frontier as the options say"""
+    """who decides; `lidarium show policies` lists them. Left out, a team is supervised: it does not know its
+    starts, finds out where it is by SLAM, and merges its maps; one robot, or robots with a goal, drive to the
+    nearest frontier as the options say"""
     resolution: float | None = None
     """metres per pixel, where the floor is a plain image"""
     horizon_s: float | None = None
-    """simulated time after which the run is cut [s]; without it the run ends when the explorers do"""
+    """simulated time after which the run is cut [s].
+
+    Without it the run ends when the explorers do
+    """
     stop_coverage: float | None = None
-    """share of the floor at which the run ends; 0.99 where left out, and none on a floor with a goal"""
+    """share of the floor at which the run ends.
+
+    0.99 where left out, and none on a floor with a goal
+    """
     starts: str | None = None
     """where the robots start: x,y,theta of each in metres and radians, separated by semicolons"""
     record: bool = False
@@ -74,7 +87,7 @@ def execute(command: Run) -> Answer:
         Where the input or ``--out`` is no good; nothing is written then.
     """
     import lidarium
-    from lidarium.evaluation.output import check_writable
+    from lidarium.evaluation.episodes.output import check_writable
 
     check_writable(command.out or DEFAULT_FOLDER)
     command = _completed(command)
@@ -85,34 +98,42 @@ def execute(command: Run) -> Answer:
     episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
     assert env.floor is not None
     folder = _folder(command, env.floor.name)
-    from lidarium.evaluation.result import result_of
+    from lidarium.evaluation.episodes.result import result_of
 
     result = result_of(episode, command.chosen_policy, history)
     files = _write(command, episode, result, folder, recorder)
-    return Answer(result, _summary(command, episode, result, folder, files), INTERRUPTED if episode.is_interrupted else 0)
+    return Answer(
+        result,
+        _summary(command, episode, result, folder, files),
+        INTERRUPTED if episode.is_interrupted else 0,
+    )
 
 
 def _completed(command: Run) -> Run:
     """Return a command with what it leaves out: who decides, and for supervised robots a world in which they need each other's maps."""
-    from lidarium.envs.options import FloorChoice
+    from lidarium.envs.settings.reset_options import FloorChoice
 
     if command.policy is not None:
         return command
     if command.robots == 1 or FloorChoice(command.floor, command.resolution).has_goal:
         return replace(command, policy=LONE_POLICY)
     team = replace(command, policy=TEAM_POLICY, unknown_starts=True)
-    is_world_given = command.realism != "ideal" or any(getattr(command, name) is not None for name in TEAM_WORLD)
+    is_world_given = command.realism != "ideal" or any(
+        getattr(command, name) is not None for name in TEAM_WORLD
+    )
     return team if is_world_given else replace(team, **TEAM_WORLD)
 
 
 def _settings(command: Run) -> "ExplorationSettings":
-    from lidarium.envs.options import FloorChoice
-    from lidarium.envs.settings import make_settings
+    from lidarium.envs.settings.exploration import make_settings
+    from lidarium.envs.settings.reset_options import FloorChoice
 
     stop = command.stop_coverage
     if stop is None and not FloorChoice(command.floor, command.resolution).has_goal:
         stop = STOP_COVERAGE
-    return make_settings(robots=command.robots, horizon_s=command.horizon_s, stop_coverage=stop, **command.team_options)
+    return make_settings(
+        robots=command.robots, horizon_s=command.horizon_s, stop_coverage=stop, **command.team_options
+    )
 
 
 def _recorder(command: Run) -> "Recorder | None":
@@ -124,23 +145,29 @@ def _recorder(command: Run) -> "Recorder | None":
 
 
 def _environment(command: Run, recorder: "Recorder | None") -> "tuple[WatchedExploration, History]":
-    from lidarium.evaluation.history import History
-    from lidarium.evaluation.watching import WatchedExploration, Watcher
+    from lidarium.evaluation.episodes.history import History
+    from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 
     history = History()
     watchers: list[Watcher] = [history] if recorder is None else [history, recorder]
-    return WatchedExploration(command.floor, _settings(command), image_resolution=command.resolution, watchers=watchers), history
+    return WatchedExploration(
+        command.floor, _settings(command), image_resolution=command.resolution, watchers=watchers
+    ), history
 
 
 def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
     import numpy as np
 
     try:
-        starts = np.array([[float(value) for value in start.split(",")] for start in text.strip("; ").split(";")])
+        starts = np.array(
+            [[float(value) for value in start.split(",")] for start in text.strip("; ").split(";")]
+        )
     except ValueError:
         starts = np.zeros((0, 0))
     if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():
-        raise ValueError(f"--starts is {text!r}; want x,y,theta of each robot, separated by semicolons, as in '1.0,2.5,0;4,2,1.57'")
+        raise ValueError(
+            f"--starts is {text!r}; want x,y,theta of each robot, separated by semicolons, as in '1.0,2.5,0;4,2,1.57'"
+        )
     if len(starts) != robots:
         raise ValueError(f"--starts has {len(starts)} starts for {robots} robots; want one for each")
     return starts
@@ -148,7 +175,7 @@ def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
 
 def _explore(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any]) -> "Episode":  # noqa: ANN401
     """Run the episode under a progress bar and, if asked for, a camera."""
-    from lidarium.evaluation.runner import run_episode
+    from lidarium.evaluation.episodes.runner import run_episode
 
     progress = Progress(is_quiet=command.json)
     try:
@@ -159,16 +186,23 @@ def _explore(command: Run, policy: Any, env: "WatchedExploration", options: dict
         progress.close()
 
 
-def _film(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any], progress: Progress) -> "Episode":  # noqa: ANN401
-    from lidarium.evaluation.runner import run_episode
-    from lidarium.evaluation.supervision import recent_supervision
-    from lidarium.evaluation.video import Film, film
+def _film(
+    command: Run,
+    policy: Any,  # noqa: ANN401
+    env: "WatchedExploration",
+    options: dict[str, Any],
+    progress: Progress,
+) -> "Episode":
+    from lidarium.evaluation.drawing.supervision_marks import recent_supervision
+    from lidarium.evaluation.drawing.video import Film, film
+    from lidarium.evaluation.episodes.runner import run_episode
 
     with ExitStack() as stack:
         camera: list[Film] = []
 
         def on_decision(current: "ExplorationEnv") -> None:
-            # The folder is named by the floor, which a set draws at the reset; nothing is written before that.
+            # The folder is named by the floor, which a set draws at the reset; nothing is written before
+            # that.
             if not camera:
                 over = recent_supervision(policy)
                 assert current.floor is not None
@@ -189,14 +223,19 @@ def _folder(command: Run, floor: str) -> Path:
     return command.out or DEFAULT_FOLDER / file_name(f"{floor}-{command.chosen_policy}-{command.seed}")
 
 
-def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, recorder: "Recorder | None") -> list[str]:
-    """Write the figures first, then the record, the map and the picture; return the files' names."""
-    from lidarium.evaluation.beliefs import team_log_odds
-    from lidarium.evaluation.output import write_json, write_text
-    from lidarium.evaluation.pictures import save_run_picture
-    from lidarium.evaluation.supervision import decision_lines, is_supervised
-    from lidarium.mapping.map_files import write_ros_map
-    from lidarium.mapping.occupancy import three_levels
+def _write(
+    command: Run, episode: "Episode", result: dict[str, Any], folder: Path, recorder: "Recorder | None"
+) -> list[str]:
+    """Write the figures first, then the record, the map and the picture.
+
+    Return the files' names.
+    """
+    from lidarium.evaluation.drawing.run_picture import save_run_picture
+    from lidarium.evaluation.episodes.output import write_json, write_text
+    from lidarium.evaluation.episodes.supervision import decision_lines, is_supervised
+    from lidarium.evaluation.truth.beliefs import team_log_odds
+    from lidarium.mapping.files.map_files import write_ros_map
+    from lidarium.mapping.grids.occupancy import three_levels
 
     write_json(folder / "result.json", result)
     if recorder is not None:
@@ -219,23 +258,37 @@ def _write(command: Run, episode: "Episode", result: dict[str, Any], folder: Pat
 def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]) -> str:
     env = episode.env
     area = float(env.world.counted[0]) * env.settings.occupancy.resolution**2
-    thresholds = [f"{share} % at {result[f't{share}_s']:.1f} s" for share in (85, 90, 95, 99) if result[f"t{share}_s"] is not None]
+    thresholds = [
+        f"{share} % at {result[f't{share}_s']:.1f} s"
+        for share in (85, 90, 95, 99)
+        if result[f"t{share}_s"] is not None
+    ]
     counted = max(int(env.world.counted[0]), 1)
     ended = [
         (agent, reason or "still at work", f"{length:.1f} m", f"{100.0 * seen / counted:.1f} %")
-        for (agent, reason), length, seen in zip(result["ended_because"].items(), result["path_m"], env.world.seen, strict=True)
+        for (agent, reason), length, seen in zip(
+            result["ended_because"].items(), result["path_m"], env.world.seen, strict=True
+        )
     ]
     facts = [
-        ("explored", f"{100.0 * result['coverage_final']:.2f} % of {area:.1f} m2 in {result['time_s']:.1f} s of simulated time"),
+        (
+            "explored",
+            f"{100.0 * result['coverage_final']:.2f} % of {area:.1f} m2 in {result['time_s']:.1f} s of simulated time",
+        ),
         ("reached", ", ".join(thresholds) or "not 85 %"),
-        ("together", f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions"),
+        (
+            "together",
+            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions",
+        ),
         ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
         ("given up", _given_up(result["given_up"])),
         ("speed", f"{episode.wall_seconds:.1f} s, {result['steps_per_s'] or 0.0:,.0f} steps/s"),
         ("files", f"{folder}: {', '.join(files)}"),
     ]
     how = " (interrupted)" if episode.is_interrupted else ""
-    title = f"{result['floor']}: {command.chosen_policy}, seed {command.seed}, realism {result['realism']}{how}"
+    title = (
+        f"{result['floor']}: {command.chosen_policy}, seed {command.seed}, realism {result['realism']}{how}"
+    )
     return "\n".join([title, table(facts), "", table(ended, ("robot", "ended because", "drove", "saw"))])
 
 
@@ -244,6 +297,9 @@ def _given_up(entries: list[dict[str, Any]]) -> str:
     if not entries:
         return "nothing"
     longest = sorted(entries, key=lambda entry: -float(entry["size_m"]))[:NAMED_GIVEN_UP]
-    named = ", ".join(f"{entry['reason']} at ({entry['x']:.1f}, {entry['y']:.1f}) {entry['size_m']:.2f} m" for entry in longest)
+    named = ", ".join(
+        f"{entry['reason']} at ({entry['x']:.1f}, {entry['y']:.1f}) {entry['size_m']:.2f} m"
+        for entry in longest
+    )
     more = len(entries) - len(longest)
     return f"{len(entries)} on the way: {named}{f', and {more} shorter' if more else ''}"

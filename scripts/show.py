@@ -13,14 +13,25 @@ class Show(Command):
     """Tell what can be chosen, all settings with their defaults, or the supervisor's decision tree, with --out as a picture too."""
 
     what: Positional[
-        Literal["policies", "robots", "lidars", "realism", "odometry", "localizers", "radios", "batteries", "settings", "supervisor"]
+        Literal[
+            "policies",
+            "robots",
+            "lidars",
+            "realism",
+            "odometry",
+            "localizers",
+            "radios",
+            "batteries",
+            "settings",
+            "supervisor",
+        ]
     ]
     """what to list"""
 
 
 def execute(command: Show) -> Answer:
     """List what there is of a kind."""
-    from lidarium.evaluation.output import check_writable, write_json
+    from lidarium.evaluation.episodes.output import check_writable, write_json
 
     if command.out is not None:
         check_writable(command.out)
@@ -28,7 +39,7 @@ def execute(command: Show) -> Answer:
     if command.out is not None:
         write_json(command.out / f"{command.what}.json", result)
         if command.what == "supervisor":
-            from lidarium.evaluation.tree_picture import save_tree_picture
+            from lidarium.evaluation.drawing.tree_picture import save_tree_picture
 
             save_tree_picture(command.out / "supervisor.png")
     return Answer(result, text)
@@ -42,45 +53,66 @@ def _policies() -> tuple[dict[str, Any], str]:
 
 
 def _robots() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.simulation.robots import ROBOTS
+    from lidarium.envs.settings.robots import ROBOTS
 
     header = ("robot", "radius [m]", "height [m]", "cruise [m/s]", "max [m/s]", "turn [rad/s]")
-    rows = [(name, robot.radius, robot.height, robot.cruise_speed, robot.max_speed, robot.max_turn_rate) for name, robot in ROBOTS.items()]
+    rows = [
+        (name, robot.radius, robot.height, robot.cruise_speed, robot.max_speed, robot.max_turn_rate)
+        for name, robot in ROBOTS.items()
+    ]
     return {"robots": {name: asdict(robot) for name, robot in ROBOTS.items()}}, table(rows, header, indent="")
 
 
 def _lidars() -> tuple[dict[str, Any], str]:
     import math
 
-    from lidarium.envs.settings import LIDARS, NOISE
+    from lidarium.envs.settings.exploration import LIDARS, NOISE
 
     header = ("lidar", "beams", "view [deg]", "from [m]", "to [m]", "height [m]")
     rows = [
-        (name, lidar.beams, round(math.degrees(lidar.field_of_view), 1), lidar.range_min, lidar.range_max, lidar.height)
+        (
+            name,
+            lidar.beams,
+            round(math.degrees(lidar.field_of_view), 1),
+            lidar.range_min,
+            lidar.range_max,
+            lidar.height,
+        )
         for name, lidar in LIDARS.items()
     ]
-    noises = [(name, f"{least:g} m or {share:g} of the range, the larger") for name, (least, share) in NOISE.items()]
+    noises = [
+        (name, f"{least:g} m or {share:g} of the range, the larger") for name, (least, share) in NOISE.items()
+    ]
     result = {
         "lidars": {name: asdict(lidar) for name, lidar in LIDARS.items()},
-        "noise": {name: {"noise_floor": least, "noise_share": share} for name, (least, share) in NOISE.items()},
+        "noise": {
+            name: {"noise_floor": least, "noise_share": share} for name, (least, share) in NOISE.items()
+        },
     }
     return result, table(rows, header, indent="") + "\n\nnoise, standard deviation\n" + table(noises)
 
 
 def _settings() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.settings import ExplorationSettings
+    from lidarium.envs.settings.exploration import ExplorationSettings
 
     values = asdict(ExplorationSettings())
     rows = []
     for name, value in values.items():
-        entries = {f"{name}.{part}": part_value for part, part_value in value.items()} if isinstance(value, dict) else {name: value}
-        rows += [(entry, "none" if part_value is None else str(part_value)) for entry, part_value in entries.items()]
+        entries = (
+            {f"{name}.{part}": part_value for part, part_value in value.items()}
+            if isinstance(value, dict)
+            else {name: value}
+        )
+        rows += [
+            (entry, "none" if part_value is None else str(part_value))
+            for entry, part_value in entries.items()
+        ]
     return {"settings": values}, "\n".join(f"{entry:<32}{value}" for entry, value in rows)
 
 
 def _realism() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.settings import REALISM, make_settings
-    from lidarium.envs.simulation.faults import KINDS
+    from lidarium.envs.settings.exploration import REALISM, make_settings
+    from lidarium.envs.settings.faults import KINDS
 
     header = ("realism", "noise", "odometry", "localization", "radio", "faults [1/h]")
     rows, values = [], {}
@@ -88,27 +120,31 @@ def _realism() -> tuple[dict[str, Any], str]:
         settings = make_settings(realism=name)
         rates = {kind: rate for kind in KINDS[1:] if (rate := getattr(settings.faults, kind)) > 0.0}
         faults = ", ".join(f"{kind} {rate:g}" for kind, rate in rates.items()) or "none"
-        rows.append((name, preset["noise"], preset["odometry"], settings.localization, settings.radio.kind, faults))
-        values[name] = {part: asdict(settings)[part] for part in ("lidar", "odometry", "localization", "radio", "faults")}
+        rows.append(
+            (name, preset["noise"], preset["odometry"], settings.localization, settings.radio.kind, faults)
+        )
+        values[name] = {
+            part: asdict(settings)[part] for part in ("lidar", "odometry", "localization", "radio", "faults")
+        }
     return {"realism": values}, table(rows, header, indent="")
 
 
 def _odometry() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.simulation.odometry import ODOMETRY
+    from lidarium.envs.settings.odometry import ODOMETRY
 
     values = {name: asdict(odometry) for name, odometry in ODOMETRY.items()}
     return {"odometry": values}, _side_by_side(values)
 
 
 def _radios() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.simulation.radio import RADIO
+    from lidarium.envs.settings.radio import RADIO
 
     values = {name: asdict(radio) for name, radio in RADIO.items()}
     return {"radios": values}, _side_by_side(values)
 
 
 def _batteries() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.simulation.battery import BATTERIES
+    from lidarium.envs.settings.battery import BATTERIES
 
     values = {name: asdict(battery) for name, battery in BATTERIES.items()}
     return {"batteries": values}, _side_by_side(values)
@@ -135,10 +171,22 @@ def _supervisor() -> tuple[dict[str, Any], str]:
 def _side_by_side(values: dict[str, dict[str, Any]]) -> str:
     """Return a table of settings, a column for each name."""
     fields = next(iter(values.values()))
-    return table([(field, *(str(named[field]) for named in values.values())) for field in fields], ("", *values), indent="")
+    return table(
+        [(field, *(str(named[field]) for named in values.values())) for field in fields],
+        ("", *values),
+        indent="",
+    )
 
 
 _LISTS = {
-    "policies": _policies, "robots": _robots, "lidars": _lidars, "realism": _realism, "odometry": _odometry, "localizers": _localizers,
-    "radios": _radios, "batteries": _batteries, "settings": _settings, "supervisor": _supervisor,
-}  # fmt: skip
+    "policies": _policies,
+    "robots": _robots,
+    "lidars": _lidars,
+    "realism": _realism,
+    "odometry": _odometry,
+    "localizers": _localizers,
+    "radios": _radios,
+    "batteries": _batteries,
+    "settings": _settings,
+    "supervisor": _supervisor,
+}

@@ -15,16 +15,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidarium.evaluation.metrics.relations import Relations
-    from lidarium.mapping.laser_logs import LaserLog
-    from lidarium.mapping.localization.following import Followed
-    from lidarium.mapping.localization.settings import SlamSettings
+    from lidarium.mapping.files.laser_logs import LaserLog
+    from lidarium.mapping.localization.matching.settings import SlamSettings
+    from lidarium.mapping.localization.slam.following import Followed
 
 DEFAULT_FOLDER = Path("slam")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Slam(Command):
-    """Make a map of a log of laser scans; writes map.yaml, map.pgm, trajectory.tum and slam.json."""
+    """Make a map of a log of laser scans.
+
+    Writes map.yaml, map.pgm, trajectory.tum and slam.json.
+    """
 
     log: Positional[Path]
     """CARMEN log (.log, .clf, also .gz) with FLASER or ROBOTLASER1 lines, or .npz with ranges, stamp and pose_odom"""
@@ -41,7 +44,10 @@ class Slam(Command):
     ignore_odometry: bool = False
     """do without the log's odometry: scans are matched around the last motion"""
     clear_without_return: bool = False
-    """a beam without return says that its way is free, as in simulation; else it says nothing"""
+    """a beam without return says that its way is free, as in simulation.
+
+    Else it says nothing
+    """
     reference: Path | None = None
     """true trajectory (TUM); ATE and RPE are computed against it"""
     relations: Path | None = None
@@ -74,9 +80,9 @@ def execute(command: Slam) -> Answer:
     ValueError, FileNotFoundError, OSError
         Where the log, the reference, the relations or ``--out`` is no good; nothing is written then.
     """
-    from lidarium.evaluation.output import check_writable
-    from lidarium.mapping.localization.following import follow
-    from lidarium.mapping.trajectories import read_tum
+    from lidarium.evaluation.episodes.output import check_writable
+    from lidarium.mapping.files.trajectories import read_tum
+    from lidarium.mapping.localization.slam.following import follow
 
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
@@ -89,7 +95,9 @@ def execute(command: Slam) -> Answer:
 
     followed = follow(log, settings_of(command), watch)
     if not len(followed.slam.key_scans.poses):
-        raise ValueError(f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or another log")
+        raise ValueError(
+            f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or another log"
+        )
     result = _result(command, log, followed)
     if reference is not None:
         result |= _against_reference(command, log, followed.poses, reference)
@@ -101,7 +109,7 @@ def execute(command: Slam) -> Answer:
 
 def settings_of(command: Slam) -> "SlamSettings":
     """Return the settings that a command asks for."""
-    from lidarium.mapping.localization.following import LOG_SETTINGS
+    from lidarium.mapping.localization.slam.following import LOG_SETTINGS
 
     matching = replace(
         LOG_SETTINGS.matching,
@@ -110,13 +118,15 @@ def settings_of(command: Slam) -> "SlamSettings":
         beam_interval_s=command.beam_interval,
     )
     submaps = replace(LOG_SETTINGS.submaps, resolution=command.resolution)
-    return replace(LOG_SETTINGS, uses_odometry=not command.ignore_odometry, matching=matching, submaps=submaps)
+    return replace(
+        LOG_SETTINGS, uses_odometry=not command.ignore_odometry, matching=matching, submaps=submaps
+    )
 
 
 def _log(command: Slam) -> "LaserLog":
     """Read the log and tell what was left out of it."""
-    from lidarium.mapping.carmen_logs import read_carmen_log
-    from lidarium.mapping.laser_logs import read_npz_log
+    from lidarium.mapping.files.carmen_logs import read_carmen_log
+    from lidarium.mapping.files.laser_logs import read_npz_log
 
     log = read_npz_log(command.log) if command.log.suffix == ".npz" else read_carmen_log(command.log)
     for reason, count in log.skipped.items():
@@ -134,7 +144,10 @@ def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, A
     data_s = float(log.stamps[-1] - log.stamps[0])
     cpu_s = float(followed.scan_s.sum() + followed.finish_s)
     steps = np.diff(followed.poses[:, :2], axis=0)
-    settings = asdict(settings_of(command)) | {"range_m": command.range, "clear_without_return": command.clear_without_return}
+    settings = asdict(settings_of(command)) | {
+        "range_m": command.range,
+        "clear_without_return": command.clear_without_return,
+    }
     return {
         "log": command.log.name,
         "scans": len(log.stamps),
@@ -143,7 +156,10 @@ def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, A
         "data_s": round(data_s, 3),
         "cpu_s": round(cpu_s, 3),
         "cpu_over_data": round(cpu_s / data_s, 6) if data_s > 0.0 else None,
-        "scan_ms": {f"p{percent}": round(1e3 * float(np.percentile(followed.scan_s, percent)), 3) for percent in (50, 95)},
+        "scan_ms": {
+            f"p{percent}": round(1e3 * float(np.percentile(followed.scan_s, percent)), 3)
+            for percent in (50, 95)
+        },
         "path_m": round(float(np.hypot(steps[:, 0], steps[:, 1]).sum()), 3),
         **asdict(followed.slam.counts),
         "settings": settings,
@@ -152,13 +168,16 @@ def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, A
 
 
 def _against_reference(
-    command: Slam, log: "LaserLog", poses: "NDArray[np.float64]", reference: "tuple[NDArray[np.float64], NDArray[np.float64]]"
+    command: Slam,
+    log: "LaserLog",
+    poses: "NDArray[np.float64]",
+    reference: "tuple[NDArray[np.float64], NDArray[np.float64]]",
 ) -> dict[str, Any]:
     """Return ATE, and RPE over about a second."""
     import numpy as np
 
     from lidarium.evaluation.metrics.poses import absolute_error, relative_error
-    from lidarium.mapping.trajectories import interpolated
+    from lidarium.mapping.files.trajectories import interpolated
 
     stamps, true = reference
     times = log.stamps + command.clock_shift
@@ -187,13 +206,17 @@ def _relations(command: Slam, log: "LaserLog") -> "Relations":
     try:
         found = covered(every, log.stamps + command.clock_shift)
     except ValueError as error:
-        raise ValueError(f"{command.relations}: {error} with --clock-shift, which is {command.clock_shift}") from error
+        raise ValueError(
+            f"{command.relations}: {error} with --clock-shift, which is {command.clock_shift}"
+        ) from error
     if len(found.begin) < len(every.begin):
         tell(f"{command.relations}: left out: {len(every.begin) - len(found.begin)} of times beyond the log")
     return found
 
 
-def _against_relations(command: Slam, log: "LaserLog", poses: "NDArray[np.float64]", relations: "Relations") -> dict[str, float]:
+def _against_relations(
+    command: Slam, log: "LaserLog", poses: "NDArray[np.float64]", relations: "Relations"
+) -> dict[str, float]:
     from lidarium.evaluation.metrics.relations import log_relation_errors
 
     errors = log_relation_errors(log, poses, relations, command.clock_shift, command.relation_poses)
@@ -201,9 +224,9 @@ def _against_relations(command: Slam, log: "LaserLog", poses: "NDArray[np.float6
 
 
 def _write(command: Slam, out: Path, log: "LaserLog", followed: "Followed", result: dict[str, Any]) -> None:
-    from lidarium.evaluation.output import write_json
-    from lidarium.mapping.map_files import cropped, write_ros_map
-    from lidarium.mapping.trajectories import write_tum
+    from lidarium.evaluation.episodes.output import write_json
+    from lidarium.mapping.files.map_files import cropped, write_ros_map
+    from lidarium.mapping.files.trajectories import write_tum
 
     grid = followed.slam.map
     levels, origin = cropped(grid.levels(), grid.origin, grid.settings.resolution)
@@ -215,7 +238,10 @@ def _write(command: Slam, out: Path, log: "LaserLog", followed: "Followed", resu
 def _summary(result: dict[str, Any], out: Path) -> str:
     rows = [
         ("scans", f"{result['scans']:,} over {result['data_s']:.0f} s and {result['path_m']:.0f} m"),
-        ("CPU time", f"{result['cpu_s']:.1f} s, {result['scan_ms']['p50']:.1f} ms a scan (95 %: {result['scan_ms']['p95']:.1f} ms)"),
+        (
+            "CPU time",
+            f"{result['cpu_s']:.1f} s, {result['scan_ms']['p50']:.1f} ms a scan (95 %: {result['scan_ms']['p95']:.1f} ms)",
+        ),
         ("closures", f"{result['closures']} in {result['corrections']} corrections"),
         ("failed matches", f"{result['failures']} of {result['failures'] + result['matches']}"),
     ]

@@ -6,8 +6,8 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-# The first example may have to wait until kernels are compiled. The same tests draw the same examples, so that a run of the suite can be
-# repeated; `pytest --hypothesis-profile=search` draws others each time.
+# The first example may have to wait until kernels are compiled. The same tests draw the same examples, so
+# that a run of the suite can be repeated; `pytest --hypothesis-profile=search` draws others each time.
 hypothesis.settings.register_profile("lidarium", deadline=None, derandomize=True)
 hypothesis.settings.register_profile("search", deadline=None)
 hypothesis.settings.load_profile("lidarium")

@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
-from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.geometry.rigid import Transform
 
 RESOLUTION = 0.05
 SPREAD = 320
@@ -29,9 +29,22 @@ def apartment():
     room(levels, 73, 10, 75, 48)
     room(levels, 58, 83, 40, 60)
     room(levels, 101, 61, 47, 127)
-    for box in ((30, 80, 50, 83), (55, 110, 58, 128), (70, 20, 73, 38), (120, 58, 140, 61), (98, 100, 101, 118)):
+    for box in (
+        (30, 80, 50, 83),
+        (55, 110, 58, 128),
+        (70, 20, 73, 38),
+        (120, 58, 140, 61),
+        (98, 100, 101, 118),
+    ):
         levels[box[0] : box[2], box[1] : box[3]] = FREE
-    for box in ((10, 45, 22, 58), (38, 150, 46, 170), (90, 40, 112, 50), (130, 100, 136, 112), (101, 170, 115, 188), (10, 120, 16, 124)):
+    for box in (
+        (10, 45, 22, 58),
+        (38, 150, 46, 170),
+        (90, 40, 112, 50),
+        (130, 100, 136, 112),
+        (101, 170, 115, 188),
+        (10, 120, 16, 124),
+    ):
         levels[box[0] : box[2], box[1] : box[3]] = OCCUPIED
     return levels
 

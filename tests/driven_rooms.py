@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lidarium.mapping.localization.localizer import Sensing
-from lidarium.mapping.rigid import composed, relative
-from lidarium.mapping.scans import ScanGeometry
+from lidarium.mapping.geometry.rigid import composed, relative
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 
 GEOMETRY = ScanGeometry(beams=241, field_of_view=math.radians(240.0), range_min=0.02, range_max=5.6)
 
@@ -32,9 +32,27 @@ def odd_room():
 def ring():
     """A corridor 1.8 m wide round a block of 7 m by 4 m, with niches by which its sides differ."""
     hull = outline(
-        (0, 0), (4, 0), (4, -0.6), (5, -0.6), (5, 0), (10.6, 0), (10.6, 2), (11.3, 2), (11.3, 3.2), (10.6, 3.2), (10.6, 7.6), (0, 7.6)
+        (0, 0),
+        (4, 0),
+        (4, -0.6),
+        (5, -0.6),
+        (5, 0),
+        (10.6, 0),
+        (10.6, 2),
+        (11.3, 2),
+        (11.3, 3.2),
+        (10.6, 3.2),
+        (10.6, 7.6),
+        (0, 7.6),
     )
-    return np.concatenate([hull, outline((1.8, 1.8), (8.8, 1.8), (8.8, 5.8), (6, 5.8), (6, 5.4), (4.5, 5.4), (4.5, 5.8), (1.8, 5.8))])
+    return np.concatenate(
+        [
+            hull,
+            outline(
+                (1.8, 1.8), (8.8, 1.8), (8.8, 5.8), (6, 5.8), (6, 5.4), (4.5, 5.4), (4.5, 5.8), (1.8, 5.8)
+            ),
+        ]
+    )
 
 
 def twins():
@@ -44,8 +62,17 @@ def twins():
     for door in (2.6, 8.6):
         walls += [(at, 1.6, door - 0.5, 1.6)]
         left, right = door - 1.6, door + 1.6
-        walls += [(door - 0.5, 1.6, door - 0.5, 1.8), (door + 0.5, 1.6, door + 0.5, 1.8), (left, 1.8, door - 0.5, 1.8)]
-        walls += [(door + 0.5, 1.8, right, 1.8), (left, 1.8, left, 5), (right, 1.8, right, 5), (left, 5, right, 5)]
+        walls += [
+            (door - 0.5, 1.6, door - 0.5, 1.8),
+            (door + 0.5, 1.6, door + 0.5, 1.8),
+            (left, 1.8, door - 0.5, 1.8),
+        ]
+        walls += [
+            (door + 0.5, 1.8, right, 1.8),
+            (left, 1.8, left, 5),
+            (right, 1.8, right, 5),
+            (left, 5, right, 5),
+        ]
         at = door + 0.5
     walls += [(at, 1.6, 12, 1.6)]
     return np.concatenate([np.array(walls, float), box(2.0, 3.6, 0.6, 0.4), box(8.0, 3.6, 0.6, 0.4)])
@@ -81,7 +108,10 @@ def through(points, speed=0.4, turn_rate=0.8, period=0.2):
     for target in points[1:]:
         gap = np.array(target, float) - pose[:2]
         turn = math.remainder(math.atan2(gap[1], gap[0]) - pose[2], 2.0 * math.pi)
-        turns, steps = math.ceil(abs(turn) / (turn_rate * period)), math.ceil(np.hypot(*gap) / (speed * period))
+        turns, steps = (
+            math.ceil(abs(turn) / (turn_rate * period)),
+            math.ceil(np.hypot(*gap) / (speed * period)),
+        )
         poses += [pose + np.array([0.0, 0.0, turn * (k + 1) / turns]) for k in range(turns)]
         pose = poses[-1]
         poses += [pose + np.array([*(gap * (k + 1) / steps), 0.0]) for k in range(steps)]
@@ -98,7 +128,9 @@ def driven(walls, points, seed=0, noise=0.01, drift=(0.03, 0.02), period=0.2):
         if k:
             motion = relative(poses[k - 1], pose)
             distance = np.hypot(motion[0], motion[1])
-            wrong = np.array([motion[0] * (1.0 + drift[0]), motion[1], motion[2] * (1.0 + drift[0]) + drift[1] * distance])
+            wrong = np.array(
+                [motion[0] * (1.0 + drift[0]), motion[1], motion[2] * (1.0 + drift[0]) + drift[1] * distance]
+            )
             odometry = composed(odometry, wrong)
         ranges = cast(walls, pose)
         ranges = ranges + generator.normal(0.0, noise, len(ranges)).astype(np.float32)

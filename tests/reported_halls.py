@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from lidarium.envs.onboard.reports import Report
-from lidarium.envs.onboard.state import DriveState, OperatingState, Target
+from lidarium.envs.radio.messages import DriveState, OperatingState, Target
+from lidarium.envs.station.reports import Report
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.incremental import GrowingMap
-from lidarium.mapping.rigid import Transform
 
 RESOLUTION, RADIUS = 0.05, 0.18
 

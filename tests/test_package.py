@@ -83,20 +83,32 @@ def test_layers_import_downwards_only():
 
 def test_the_import_linter_keeps_its_contract(tmp_path):
     """On the package as it is installed, made of links: the linter looks for folders, not for editable installs."""
-    command = shutil.which("lint-imports", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
+    command = shutil.which(
+        "lint-imports", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    )
     if command is None:
         pytest.skip("import-linter is not installed")
     shutil.copytree(
-        ROOT / "src" / "lidarium", tmp_path / "lidarium", copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__")
+        ROOT / "src" / "lidarium",
+        tmp_path / "lidarium",
+        copy_function=os.symlink,
+        ignore=shutil.ignore_patterns("__pycache__"),
     )
     for folder in FOLDERS:
         shutil.copytree(
-            ROOT / folder, tmp_path / "lidarium" / folder, copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__")
+            ROOT / folder,
+            tmp_path / "lidarium" / folder,
+            copy_function=os.symlink,
+            ignore=shutil.ignore_patterns("__pycache__"),
         )
     result = subprocess.run(
-        [command, "--config", str(ROOT / ".importlinter"), "--no-cache"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [command, "--config", str(ROOT / ".importlinter"), "--no-cache"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert result.returncode == 0, result.stdout + result.stderr
     assert "1 kept, 0 broken" in result.stdout
 
@@ -127,7 +139,9 @@ def test_every_public_function_and_class_is_documented():
                     f"{module.__name__}.{name}.{attribute}"
                     for attribute, value in vars(plain).items()
                     if not attribute.startswith("_")
-                    and (inspect.isfunction(value) or isinstance(value, (property, classmethod, staticmethod)))
+                    and (
+                        inspect.isfunction(value) or isinstance(value, (property, classmethod, staticmethod))
+                    )
                     and not inspect.getdoc(getattr(value, "__func__", value))
                 ]
     assert not missing
@@ -137,9 +151,17 @@ def test_every_public_function_outside_of_kernels_has_type_hints():
     bare = []
     for path, source in SOURCES.items():
         for node in ast.walk(ast.parse(source)):
-            if isinstance(node, ast.FunctionDef) and not any("kernel" in ast.unparse(each) for each in node.decorator_list):
-                arguments = [each for each in (*node.args.args, *node.args.kwonlyargs) if each.arg not in ("self", "cls")]
-                if not node.name.startswith("_") and (node.returns is None or any(each.annotation is None for each in arguments)):
+            if isinstance(node, ast.FunctionDef) and not any(
+                "kernel" in ast.unparse(each) for each in node.decorator_list
+            ):
+                arguments = [
+                    each
+                    for each in (*node.args.args, *node.args.kwonlyargs)
+                    if each.arg not in ("self", "cls")
+                ]
+                if not node.name.startswith("_") and (
+                    node.returns is None or any(each.annotation is None for each in arguments)
+                ):
                     bare.append(f"{path}: {node.name}")
     assert not bare
 
@@ -154,7 +176,10 @@ def test_nothing_is_left_undone_in_the_sources():
 
 
 def test_no_module_draws_from_the_global_random_state():
-    names = re.compile(r"np\.random\.(?!default_rng|Generator|SeedSequence|BitGenerator)\w+|^import random|^from random", re.MULTILINE)
+    names = re.compile(
+        r"np\.random\.(?!default_rng|Generator|SeedSequence|BitGenerator)\w+|^import random|^from random",
+        re.MULTILINE,
+    )
     assert not [path for path, source in SOURCES.items() if names.search(source)]
 
 

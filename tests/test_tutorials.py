@@ -14,7 +14,9 @@ TUTORIALS = Path(__file__).parents[1] / "docs" / "tutorials"
 
 def code_of(name):
     """Return all Python of a tutorial, in one piece."""
-    return "\n".join(re.findall(r"```python\n(.*?)```", (TUTORIALS / name).read_text(encoding="utf-8"), re.DOTALL))
+    return "\n".join(
+        re.findall(r"```python\n(.*?)```", (TUTORIALS / name).read_text(encoding="utf-8"), re.DOTALL)
+    )
 
 
 def test_the_policy_of_the_tutorial_explores_the_apartment(monkeypatch, capsys):
@@ -40,5 +42,9 @@ def known_commands():
 @pytest.mark.parametrize("name", sorted(path.name for path in TUTORIALS.glob("*.md")))
 def test_commands_of_tutorials_exist(name):
     text = (TUTORIALS / name).read_text(encoding="utf-8")
-    named = set(re.findall(r"lidarium (?!-)([a-z][a-z-]+)", " ".join(re.findall(r"```bash\n(.*?)```", text, re.DOTALL))))
+    named = set(
+        re.findall(
+            r"lidarium (?!-)([a-z][a-z-]+)", " ".join(re.findall(r"```bash\n(.*?)```", text, re.DOTALL))
+        )
+    )
     assert named <= known_commands()

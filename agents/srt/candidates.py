@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.frontier_arcs import Opening, least_opening
-from lidarium.agents.srt.intent import Intent
 from lidarium.agents.srt.memory import Memory
+from lidarium.agents.srt.progress import Intent
 from lidarium.agents.srt.safe_region import DIRECTIONS, UNIT
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
@@ -28,8 +28,8 @@ STANDS = (1, 3, 5)
 
 
 ATTEMPTS, PATCH, ATTEMPT_REACH = 3, 0.3, 1.5
-"""How often robots look at a patch beyond openings before it counts as one that cannot be seen, its side [m], and how far from what
-they came for a look counts [m]."""
+"""How often robots look at a patch beyond openings before it counts as one that cannot be seen, its side [m],
+and how far from what they came for a look counts [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,9 @@ class CandidateSource:
                 middle = int(points[len(points) // 2])
                 inwards = opening.points[middle] - opening.beyond[middle]
                 places = [opening.points[middle] + steps * inwards for steps in STANDS]
-                candidates += [Candidate(node.number, place, opening, opening.points[middle]) for place in places]
+                candidates += [
+                    Candidate(node.number, place, opening, opening.points[middle]) for place in places
+                ]
         return [candidate for candidate in candidates if not self._was_tried(candidate)]
 
     def is_open(self, candidate: Candidate, node: Node, memory: Memory) -> bool:
@@ -133,7 +135,9 @@ class CandidateSource:
             is_done[unseen] = [self._attempts[patch] >= ATTEMPTS for patch in _patches(points[unseen])]
         return is_done
 
-    def _through(self, node: Node, opening: Opening, points: NDArray[np.int64], others: list[Node]) -> Candidate | None:
+    def _through(
+        self, node: Node, opening: Opening, points: NDArray[np.int64], others: list[Node]
+    ) -> Candidate | None:
         """Return the first valid candidate of an opening, from its middle or its longest ray outwards."""
         settings = self._settings
         share = 1.0 if settings.candidates == "farthest" else settings.step_share
@@ -141,7 +145,10 @@ class CandidateSource:
         for index in self._order(node, opening, points):
             candidate = self._at(node, opening, index, share)
             if self.is_valid(candidate, node, others):
-                if not opening.is_gap or math.dist(candidate.place, node.place) >= NEARLY * opening.reaches[index]:
+                if (
+                    not opening.is_gap
+                    or math.dist(candidate.place, node.place) >= NEARLY * opening.reaches[index]
+                ):
                     return candidate
                 if best is None or math.dist(candidate.place, node.place) > math.dist(best.place, node.place):
                     best = candidate
@@ -155,10 +162,14 @@ class CandidateSource:
             order = np.argsort(-node.safe.radii[opening.directions[points]], kind="stable")
         else:
             order = np.argsort(np.abs(points - np.median(points)), kind="stable")
-        chosen = np.unique(np.linspace(0, len(order) - 1, min(self._settings.tries, len(order))).astype(np.int64))
+        chosen = np.unique(
+            np.linspace(0, len(order) - 1, min(self._settings.tries, len(order))).astype(np.int64)
+        )
         return [int(points[index]) for index in order[chosen]]
 
-    def _drawn(self, node: Node, found: list[tuple[Opening, NDArray[np.int64]]], others: list[Node]) -> list[Candidate]:
+    def _drawn(
+        self, node: Node, found: list[tuple[Opening, NDArray[np.int64]]], others: list[Node]
+    ) -> list[Candidate]:
         """Draw an opening by its width and a point of it, until one is valid."""
         widths = np.array([opening.width for opening, _ in found]) + 1e-9
         rivals = others if self._settings.memory == "regions" else []
@@ -191,7 +202,8 @@ class CandidateSource:
         if not node.safe.contains(candidate.place):
             return False
         for other in (node, *others):
-            # Where a region is empty, as beside a wall, the distance alone keeps a robot from coming again and again.
+            # Where a region is empty, as beside a wall, the distance alone keeps a robot from coming again
+            # and again.
             if math.dist(candidate.place, other.place) <= self._settings.least_step:
                 return False
             if bool(other.safe.contains(candidate.place)) and not np.array_equal(other.place, node.place):
@@ -200,7 +212,8 @@ class CandidateSource:
 
     def _was_tried(self, candidate: Candidate) -> bool:
         return any(
-            math.dist(place, candidate.place) < TRIED_NEAR and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
+            math.dist(place, candidate.place) < TRIED_NEAR
+            and math.dist(focus, candidate.focus) < 2.0 * TRIED_NEAR
             for place, focus in self._tried
         )
 

@@ -14,7 +14,7 @@ from lidarium.agents.srt.memory import Memory
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node, Tree, way_to
-from lidarium.mapping.rigid import wrapped
+from lidarium.mapping.geometry.rigid import wrapped
 
 LAST_FRONTIER = 0.3
 """Frontiers of the map of at least this length are gone to when nothing else is left [m]."""
@@ -56,9 +56,12 @@ def choose(
 ) -> list[Choice]:
     """Return the legs of the way to take from a node, none where nothing is left to go for.
 
-    Nodes are looked at along the tree's ways, nearest first; with ``backtrack`` ``parent`` only the node itself is.
+    Nodes are looked at along the tree's ways, nearest first; with ``backtrack`` ``parent`` only the node
+    itself is.
     """
-    lengths, before = tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
+    lengths, before = (
+        tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
+    )
     reached = [tree.nodes[number] for number in lengths]
     goal = senses.goal
     if goal is not None:
@@ -125,7 +128,9 @@ def tour_way(
     return []
 
 
-def _across(nodes: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
+def _across(
+    nodes: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]
+) -> list[Choice]:
     """Return the way across the map to the nearest opening that no straight way from its node leads to."""
     found = [candidate for each in nodes for candidate in source.beside(each, memory)]
     for candidate in sorted(_left_by(targets, found), key=lambda each: senses.distance_to(each.place)):
@@ -135,7 +140,9 @@ def _across(nodes: list[Node], source: CandidateSource, memory: Memory, senses: 
     return []
 
 
-def home_way(tree: Tree, start: int, root: int, known: set[int], senses: Senses, memory: Memory) -> list[Choice]:
+def home_way(
+    tree: Tree, start: int, root: int, known: set[int], senses: Senses, memory: Memory
+) -> list[Choice]:
     """Return the legs of the shortest way to the first node, along the tree or else across the map; none where there is no way."""
     legs = _legs(tree, way_to(root, tree.ways(start, known)[1]))
     if not legs and start != root:
@@ -154,14 +161,20 @@ def _left_by(targets: Sequence[Candidate], found: list[Candidate]) -> list[Candi
         each
         for each in found
         if not any(
-            (each.opening is not None and each.opening is target.opening) or math.dist(each.focus, target.focus) < MATE_SAME
+            (each.opening is not None and each.opening is target.opening)
+            or math.dist(each.focus, target.focus) < MATE_SAME
             for target in targets
         )
     ]
 
 
 def _weighed(
-    way: float, first: NDArray[np.float64], last: NDArray[np.float64], settings: SrtSettings, senses: Senses, limits: Limits
+    way: float,
+    first: NDArray[np.float64],
+    last: NDArray[np.float64],
+    settings: SrtSettings,
+    senses: Senses,
+    limits: Limits,
 ) -> float:
     """Return what a way costs [m]: its length, the turn towards its first place, and how far from the goal it ends."""
     gap = first - senses.pose[:2]
@@ -171,7 +184,13 @@ def _weighed(
 
 
 def _to_frontier(
-    node: Node, memory: Memory, least: float, settings: SrtSettings, senses: Senses, targets: Sequence[Candidate], limits: Limits
+    node: Node,
+    memory: Memory,
+    least: float,
+    settings: SrtSettings,
+    senses: Senses,
+    targets: Sequence[Candidate],
+    limits: Limits,
 ) -> list[Choice]:
     """Return the way to the map's frontier of at least a length [m] that costs least, where it is no teammate's."""
     found = memory.frontiers(senses.pose[:2], least, MOST)
@@ -181,7 +200,11 @@ def _to_frontier(
     def cost_of(k: int) -> float:
         return _weighed(float(found.costs[k]), found.legs(k)[0], found.focuses[k], settings, senses, limits)
 
-    left = [k for k, focus in enumerate(found.focuses) if all(math.dist(focus, target.focus) >= MATE_SAME for target in targets)]
+    left = [
+        k
+        for k, focus in enumerate(found.focuses)
+        if all(math.dist(focus, target.focus) >= MATE_SAME for target in targets)
+    ]
     best = min(left, key=cost_of, default=None)
     return [] if best is None else _to_focus(node, found.legs(best), found.focuses[best])
 

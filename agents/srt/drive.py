@@ -1,4 +1,7 @@
-"""Driving to a place in sight: turn, advance, done; or the best of a list of controls. Both stop before what the laser sees ahead."""
+"""Driving to a place in sight: turn, advance, done.
+
+Or the best of a list of controls. Both stop before what the laser sees ahead.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -9,9 +12,9 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.safe_region import no_return
 from lidarium.agents.srt.settings import SrtSettings
-from lidarium.envs.simulation.robots import Robot
-from lidarium.mapping.rigid import wrapped
-from lidarium.mapping.scans import ScanGeometry
+from lidarium.envs.settings.robots import Robot
+from lidarium.mapping.geometry.rigid import wrapped
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 GAP = 0.03
 """The robot stops this far before what it sees ahead [m]."""
@@ -101,7 +104,8 @@ def free_way(scan: NDArray[np.float32], geometry: ScanGeometry, radius: float, h
     is_hit = (ranges >= geometry.range_min) & (ranges < no_return(geometry))
     angles = geometry.angles[is_hit] - heading
     along, across = ranges[is_hit] * np.cos(angles), ranges[is_hit] * np.sin(angles)
-    # Past what a robot stands beside already it gets as near: along a wall it must not take the wall for an end of its way.
+    # Past what a robot stands beside already it gets as near: along a wall it must not take the wall for an
+    # end of its way.
     half = min(radius + SIDE, max(radius, float(ranges[is_hit].min(initial=math.inf)) - ALONG))
     is_ahead = (along > 0.0) & (np.abs(across) < half)
     reach = along[is_ahead] - np.sqrt(half * half - across[is_ahead] ** 2)
@@ -114,7 +118,12 @@ def stopping_speed(distance: float, deceleration: float) -> float:
 
 
 def driven(
-    drive: Drive, pose: NDArray[np.float64], free: float, limits: Limits, settings: SrtSettings, arrived: float
+    drive: Drive,
+    pose: NDArray[np.float64],
+    free: float,
+    limits: Limits,
+    settings: SrtSettings,
+    arrived: float,
 ) -> tuple[Drive, float, float]:
     """Return the next state of a drive, and the speed [m/s] and turn rate [rad/s] for one step.
 
@@ -137,7 +146,11 @@ def driven(
     distance, error = math.hypot(*gap), wrapped(math.atan2(gap[1], gap[0]) - float(pose[2]))
     if distance <= arrived:
         return replace(drive, phase=Phase.DONE), 0.0, 0.0
-    fastest = min(limits.speed, stopping_speed(distance, limits.deceleration), stopping_speed(free - GAP, limits.deceleration))
+    fastest = min(
+        limits.speed,
+        stopping_speed(distance, limits.deceleration),
+        stopping_speed(free - GAP, limits.deceleration),
+    )
     if settings.drive == "controls":
         speed, turn_rate = best_control(pose, drive.target, fastest, limits)
         return replace(drive, phase=Phase.ADVANCE if speed > 0.0 else Phase.TURN), speed, turn_rate
@@ -150,7 +163,9 @@ def driven(
     return replace(drive, phase=Phase.ADVANCE), fastest * math.cos(error), turn_rate
 
 
-def best_control(pose: NDArray[np.float64], target: NDArray[np.float64], fastest: float, limits: Limits) -> tuple[float, float]:
+def best_control(
+    pose: NDArray[np.float64], target: NDArray[np.float64], fastest: float, limits: Limits
+) -> tuple[float, float]:
     """Return the speed and turn rate of the list of controls whose predicted pose is closest to a target, looking at it.
 
     Parameters
@@ -173,7 +188,9 @@ def best_control(pose: NDArray[np.float64], target: NDArray[np.float64], fastest
             x = float(pose[0]) + speed * FORESIGHT_S * math.cos(middle)
             y = float(pose[1]) + speed * FORESIGHT_S * math.sin(middle)
             gap_x, gap_y = float(target[0]) - x, float(target[1]) - y
-            cost = math.hypot(gap_x, gap_y) + HEADING_WEIGHT * abs(wrapped(math.atan2(gap_y, gap_x) - heading))
+            cost = math.hypot(gap_x, gap_y) + HEADING_WEIGHT * abs(
+                wrapped(math.atan2(gap_y, gap_x) - heading)
+            )
             if cost < least - 1e-12:
                 best, least = (speed, turn_rate), cost
     return best

@@ -16,9 +16,9 @@ from lidarium.agents.srt.safe_region import SafeRegion, joined_views, safe_regio
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node, Tree, sees_back_and_forth
-from lidarium.envs.simulation.lidar import Lidar
-from lidarium.envs.simulation.robots import Robot
-from lidarium.mapping.rigid import wrapped
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.robots import Robot
+from lidarium.mapping.geometry.rigid import wrapped
 
 BLIND_S = 10.0
 """A robot whose laser tells nothing for this long gives up [s]."""
@@ -85,7 +85,15 @@ class Explorer:
         Whether it has ended its work and is back where it began, or as near as it gets.
     """
 
-    def __init__(self, agent: str, tree: Tree, settings: SrtSettings, robot: Robot, lidar: Lidar, generator: np.random.Generator) -> None:
+    def __init__(
+        self,
+        agent: str,
+        tree: Tree,
+        settings: SrtSettings,
+        robot: Robot,
+        lidar: Lidar,
+        generator: np.random.Generator,
+    ) -> None:
         self.agent, self.known = agent, set[int]()
         self.ending: str | None = None
         self.is_home = False
@@ -117,7 +125,10 @@ class Explorer:
         return self._root
 
     def step(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> Command:
-        """Return speed [m/s] and turn rate [rad/s] for one step; ``targets`` are those of teammates in contact."""
+        """Return speed [m/s] and turn rate [rad/s] for one step.
+
+        ``targets`` are those of teammates in contact.
+        """
         if senses.is_blind(self._lidar):
             return self._wait_for_sight(senses)
         self._blind_since = -math.inf
@@ -150,7 +161,9 @@ class Explorer:
     def _add_node(self, senses: Senses, parent: int | None, pose: NDArray[np.float64], memory: Memory) -> int:
         """Add a node where the robot is, and return its number."""
         view = view_of(senses.scan, self._lidar, float(senses.pose[2]))
-        node = Node(len(self._tree.nodes), self.agent, np.array(pose), *self._regions(pose, view), parent, view)
+        node = Node(
+            len(self._tree.nodes), self.agent, np.array(pose), *self._regions(pose, view), parent, view
+        )
         self._insert(node, memory)
         return node.number
 
@@ -167,10 +180,14 @@ class Explorer:
         self._node = node.number
         self._own_nodes += 1
 
-    def _regions(self, pose: NDArray[np.float64], view: NDArray[np.float64]) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
+    def _regions(
+        self, pose: NDArray[np.float64], view: NDArray[np.float64]
+    ) -> tuple[SafeRegion, SafeRegion, list[Opening]]:
         """Return where the robot is safe, what it has seen, and the openings, of a view."""
         settings, place = self._settings, np.array(pose[:2])
-        safe = safe_region(place, view, float(pose[2]), settings.shape, self._body, self._perception, settings.turn_room)
+        safe = safe_region(
+            place, view, float(pose[2]), settings.shape, self._body, self._perception, settings.turn_room
+        )
         openings = openings_of(place, view, self._perception, self._body, with_blind=settings.memory == "map")
         return safe, seen_region(place, view, self._perception), openings
 
@@ -181,10 +198,15 @@ class Explorer:
         if not self._settings.looks_around or self._lidar.beams == 1 or turns > 8:
             return
         heading = float(senses.pose[2])
-        self._looks = [wrapped(heading + (2.0 * math.pi - field) * (turn + 1) / turns) for turn in range(turns)]
+        self._looks = [
+            wrapped(heading + (2.0 * math.pi - field) * (turn + 1) / turns) for turn in range(turns)
+        ]
 
     def _look(self, senses: Senses, memory: Memory) -> Command | None:
-        """Turn to the next heading to look at; None when all were seen, which the node then knows."""
+        """Turn to the next heading to look at.
+
+        None when all were seen, which the node then knows.
+        """
         error = wrapped(self._looks[0] - float(senses.pose[2]))
         if abs(error) > self._settings.turning_ends and not self._progress.is_stuck(senses):
             return 0.0, max(-self._limits.turn_rate, min(self._limits.turn_rate, 2.0 * error))
@@ -205,21 +227,35 @@ class Explorer:
         is_direct = len(self._route) == 1
         departed = senses.distance_to(self._tree.nodes[self._node].place)
         in_sight = senses.goal is not None and memory.way(senses.pose[:2], senses.goal) is not None
-        # Every step sees a little more beyond free rays: a target there stands until the robot has got on; so does one towards a goal.
+        # Every step sees a little more beyond free rays: a target there stands until the robot has got on; so
+        # does one towards a goal.
         is_along_rays = candidate.opening is not None and not candidate.opening.is_gap
-        may_drop = departed >= (GOT_ON if is_along_rays or senses.goal is not None else self._settings.least_step)
+        may_drop = departed >= (
+            GOT_ON if is_along_rays or senses.goal is not None else self._settings.least_step
+        )
         has_passed = departed >= self._settings.passing_distance
-        is_dropped = may_drop and not self._source.is_open(candidate, self._tree.nodes[candidate.node], memory)
+        is_dropped = may_drop and not self._source.is_open(
+            candidate, self._tree.nodes[candidate.node], memory
+        )
         if in_sight or is_dropped:
             self._source.intent.settle()
             self._pause(senses, memory)
             return
         if has_passed and (is_direct or candidate.is_frontier):
             self._add_node(senses, self._node, senses.pose, memory)
-        # Without a goal what was seen since may make another way the better one; towards a goal it seldom does.
+        # Without a goal what was seen since may make another way the better one; towards a goal it seldom
+        # does.
         was_drawn = self._settings.random_share > 0.0 and not candidate.is_frontier
         if not was_drawn and senses.distance_to(self._chose_at) >= GOT_ON_ANEW:
-            way = tour_way(self._tree.nodes[self._node], self._source, memory, self._settings, senses, targets, self._limits)
+            way = tour_way(
+                self._tree.nodes[self._node],
+                self._source,
+                memory,
+                self._settings,
+                senses,
+                targets,
+                self._limits,
+            )
             if way:
                 self._set_out(way, senses)
 
@@ -239,7 +275,18 @@ class Explorer:
             self._go_home(self.ending if self.ending in FINAL else "budget", senses, memory)
             return
         node = self._tree.nodes[self._node]
-        way = choose(node, self._tree, self.known, self._source, memory, self._settings, self._generator, senses, targets, self._limits)
+        way = choose(
+            node,
+            self._tree,
+            self.known,
+            self._source,
+            memory,
+            self._settings,
+            self._generator,
+            senses,
+            targets,
+            self._limits,
+        )
         if way:
             self.ending, self.is_home, self._asides = None, False, 0
             self._set_out(way, senses)
@@ -252,7 +299,12 @@ class Explorer:
             self._go_home("explored" if senses.goal is None else "unreachable", senses, memory)
 
     def _may_look(self, node: Node) -> bool:
-        return self._settings.memory == "regions" and self._settings.looks_around and not node.has_looked and node.number != self._root
+        return (
+            self._settings.memory == "regions"
+            and self._settings.looks_around
+            and not node.has_looked
+            and node.number != self._root
+        )
 
     def _is_spent(self, senses: Senses) -> bool:
         return self._own_nodes >= self._settings.nodes or senses.time_s >= self._settings.time_s
@@ -282,7 +334,9 @@ class Explorer:
         leg = self._route[0]
         free = free_way(senses.scan, self._lidar, self._limits.radius)
         arrived = EXACTLY if leg.is_goal else self._settings.arrived
-        self._drive, speed, turn_rate = driven(self._drive, senses.pose, free, self._limits, self._settings, arrived)
+        self._drive, speed, turn_rate = driven(
+            self._drive, senses.pose, free, self._limits, self._settings, arrived
+        )
         if self._drive.phase is Phase.DONE:
             self._arrive(leg, senses, memory)
             return REST
@@ -315,7 +369,10 @@ class Explorer:
                     self._look_at(leg.candidate.focus, senses)
 
     def _look_at(self, focus: NDArray[np.float64], senses: Senses) -> None:
-        """Turn to a frontier that is not seen through from where the robot came for it; what stays unseen then is given up."""
+        """Turn to a frontier that is not seen through from where the robot came for it.
+
+        What stays unseen then is given up.
+        """
         gap = focus - senses.pose[:2]
         self._looks, self._looked_at = [math.atan2(gap[1], gap[0])], focus
 
@@ -365,11 +422,18 @@ class Explorer:
         """Go to a place in sight that is drawn, so that of two robots that block each other one lets the other pass."""
         node = self._tree.nodes[self._node]
         region = safe_region(
-            senses.pose[:2], view_of(senses.scan, self._lidar, float(senses.pose[2])), float(senses.pose[2]), "radial",
-            self._limits.radius, self._perception,
-        )  # fmt: skip
+            senses.pose[:2],
+            view_of(senses.scan, self._lidar, float(senses.pose[2])),
+            float(senses.pose[2]),
+            "radial",
+            self._limits.radius,
+            self._perception,
+        )
         for _ in range(self._settings.tries):
-            angle, distance = float(self._generator.uniform(-math.pi, math.pi)), float(self._generator.uniform(0.3, 1.2))
+            angle, distance = (
+                float(self._generator.uniform(-math.pi, math.pi)),
+                float(self._generator.uniform(0.3, 1.2)),
+            )
             if region.radius_at(angle) >= distance:
                 place = region.place + distance * np.array([math.cos(angle), math.sin(angle)])
                 self._set_out([Choice(place, None, Candidate(node.number, place, None, place))], senses)

@@ -1,7 +1,8 @@
 """Openings of what is seen from a place: arcs of free rays, gaps beside edges that hide something, and the border of a blind sector.
 
-An opening is kept as points along it, each with a point just beyond. It stays open as long as enough of what lies beyond was not
-seen, whoever looked; so openings are found once, when their node is made, and are only looked up afterwards.
+An opening is kept as points along it, each with a point just beyond. It stays open as long as enough of what
+lies beyond was not seen, whoever looked; so openings are found once, when their node is made, and are only
+looked up afterwards.
 """
 
 import math
@@ -39,7 +40,8 @@ class Opening:
     lengths : (n,) float64
         How much of the border each point stands for [m].
     directions : (m,) int64
-        Directions of a view in which a robot may go: to each point of a free arc; past the edge, ever wider of it, of a gap.
+        Directions of a view in which a robot may go: to each point of a free arc; past the edge, ever wider
+        of it, of a gap.
     reaches : (m,) float64
         How far it goes at most [m].
     is_gap : bool
@@ -63,7 +65,10 @@ class Opening:
     is_tried: bool = False
 
     def open_points(self, is_seen: IsSeen, least: float) -> NDArray[np.int64]:
-        """Return the numbers of the points that are open; none, for good, once less than ``least`` [m] of it is."""
+        """Return the numbers of the points that are open.
+
+        None, for good, once less than ``least`` [m] of it is.
+        """
         if not (self.is_closed or self.is_tried):
             is_open = ~is_seen(self.beyond)
             if self.lengths[is_open].sum() >= least:
@@ -72,7 +77,9 @@ class Opening:
         return np.zeros(0, np.int64)
 
 
-def openings_of(place: NDArray[np.float64], view: NDArray[np.float64], perception: float, body: float, with_blind: bool) -> list[Opening]:
+def openings_of(
+    place: NDArray[np.float64], view: NDArray[np.float64], perception: float, body: float, with_blind: bool
+) -> list[Opening]:
     """Return the openings of what is seen from a place.
 
     Parameters
@@ -122,8 +129,14 @@ def _runs(is_free: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
 def _free_arc(place: NDArray[np.float64], run: NDArray[np.int64], perception: float) -> Opening:
     lengths, reaches = np.full(len(run), perception * STEP), np.full(len(run), perception)
     return Opening(
-        place + perception * UNIT[run], place + (perception + BEYOND) * UNIT[run], lengths, run, reaches, False, len(run) * STEP
-    )  # fmt: skip
+        place + perception * UNIT[run],
+        place + (perception + BEYOND) * UNIT[run],
+        lengths,
+        run,
+        reaches,
+        False,
+        len(run) * STEP,
+    )
 
 
 def _gap(place: NDArray[np.float64], ranges: NDArray[np.float64], direction: int, body: float) -> Opening:
@@ -135,11 +148,14 @@ def _gap(place: NDArray[np.float64], ranges: NDArray[np.float64], direction: int
     count = max(round((far_range - near_range) / SPACING), 1)
     distances = near_range + (far_range - near_range) * (np.arange(count) + 0.5) / count
     hidden = -side * np.array([-UNIT[far, 1], UNIT[far, 0]])
-    # The body has to pass beside the edge, on the side of the longer ray, and goes until it sees what lies behind.
+    # The body has to pass beside the edge, on the side of the longer ray, and goes until it sees what lies
+    # behind.
     aside = math.asin(min(body / near_range, 1.0)) if near_range > 0.0 else 0.0
     offsets = aside + WIDER * np.arange(1, WIDER_COUNT + 1)
     towards = np.round(far + side * offsets / STEP).astype(np.int64) % DIRECTIONS
     middle = min(0.5 * (near_range + far_range), near_range + PAST_EDGE)
     points = place + distances[:, None] * UNIT[far]
     lengths = np.full(count, (far_range - near_range) / count)
-    return Opening(points, points + BEYOND * hidden, lengths, towards, np.full(WIDER_COUNT, middle), True, aside)
+    return Opening(
+        points, points + BEYOND * hidden, lengths, towards, np.full(WIDER_COUNT, middle), True, aside
+    )

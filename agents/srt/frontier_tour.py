@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.drive import Limits
-from lidarium.agents.srt.intent import KEPT_NEAR, Intent
 from lidarium.agents.srt.memory import Legs, Memory, Place
+from lidarium.agents.srt.progress import KEPT_NEAR, Intent
 from lidarium.agents.srt.senses import Senses
-from lidarium.agents.srt.tour import shortest_tour
-from lidarium.mapping.rigid import wrapped
+from lidarium.mapping.geometry.rigid import wrapped
+from lidarium.mapping.planning.tours import shortest_tour
 
 MOST = 14
 """Tours go past so many frontiers at most, the nearest ones."""
@@ -31,7 +31,8 @@ def first_on_tour(
 ) -> tuple[Legs, Place] | None:
     """Return the way to the frontier that the shortest tour begins with, and what to look at there.
 
-    A robot turns on the spot before it sets out, so the turn counts, too, as the way that it could have driven in the time.
+    A robot turns on the spot before it sets out, so the turn counts, too, as the way that it could have
+    driven in the time.
 
     Parameters
     ----------
@@ -49,18 +50,25 @@ def first_on_tour(
     Returns
     -------
     tuple or None
-        The ends of the legs, and a place on the frontier; None where there is none in reach that is no teammate's.
+        The ends of the legs, and a place on the frontier; None where there is none in reach that is no
+        teammate's.
     """
     frontiers = memory.frontiers(senses.pose[:2], least, MOST)
     if frontiers is None:
         return None
-    to_mates = np.array([[math.dist(focus, mate) for mate in of_mates] for focus in frontiers.focuses]).min(axis=1, initial=math.inf)
+    to_mates = np.array([[math.dist(focus, mate) for mate in of_mates] for focus in frontiers.focuses]).min(
+        axis=1, initial=math.inf
+    )
     is_left = to_mates >= MATE_SAME
     if not is_left.any():
         return None
     gap = frontiers.ahead - senses.pose[:2]
-    turns = np.abs([wrapped(float(angle)) for angle in np.arctan2(gap[:, 1], gap[:, 0]) - float(senses.pose[2])])
-    first = frontiers.costs + turns * limits.speed / limits.turn_rate + np.maximum(MATE_SPREAD - to_mates, 0.0)
+    turns = np.abs(
+        [wrapped(float(angle)) for angle in np.arctan2(gap[:, 1], gap[:, 0]) - float(senses.pose[2])]
+    )
+    first = (
+        frontiers.costs + turns * limits.speed / limits.turn_rate + np.maximum(MATE_SPREAD - to_mates, 0.0)
+    )
     first -= WAY_OF_SIZE * frontiers.sizes
     if intent.latest is not None:
         first -= intent.kept * _are_near(frontiers.cells, intent.latest)

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.tree import Node
+from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.envs.onboard.team_driver import footprint_of
-from lidarium.mapping.frontier_approach import approach, default_reach
-from lidarium.mapping.frontiers import FRONTIER
-from lidarium.mapping.grid_planning import Cell, centres_of, plan, search
-from lidarium.mapping.search_targets import Targets
+from lidarium.mapping.planning.frontier_approach import approach, default_reach
+from lidarium.mapping.planning.frontiers import FRONTIER
+from lidarium.mapping.planning.grid_planning import Cell, centres_of, plan, search
+from lidarium.mapping.planning.search_targets import Targets
 
 CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
@@ -47,7 +47,8 @@ class Frontiers:
     ahead : (n, 2) float64
         A place at the beginning of the way to each [m].
     between : callable
-        Takes the numbers of some, shape (m,), and returns what the ways from place to place cost, shape (m, m) [m].
+        Takes the numbers of some, shape (m,), and returns what the ways from place to place cost, shape (m,
+        m) [m].
     legs : callable
         Takes the number of one, and returns the ends of the straight legs of the way to it.
     """
@@ -62,7 +63,10 @@ class Frontiers:
 
 
 class Memory(Protocol):
-    """What a robot remembers; places (..., 2) are in the frame of the map's first cell [m]."""
+    """What a robot remembers.
+
+    Places (..., 2) are in the frame of the map's first cell [m].
+    """
 
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
         """Whether points (n, 2) beyond the border of what was seen from a node were seen, shape (n,)."""
@@ -77,7 +81,10 @@ class Memory(Protocol):
         ...
 
     def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
-        """Return the nearest frontiers of at least a length [m], so many at most; None where there is none."""
+        """Return the nearest frontiers of at least a length [m], so many at most.
+
+        None where there is none.
+        """
         ...
 
     def is_frontier(self, focus: Place) -> bool:
@@ -112,7 +119,9 @@ class MapMemory:
     def is_clear(self, start: Place, end: Place) -> bool:
         """Whether all cells on a way are free, with room for the robot."""
         count = max(math.ceil(math.dist(start, end) / (0.5 * self._map.resolution)), 1)
-        rows, columns, is_inside = self._cells(start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None])
+        rows, columns, is_inside = self._cells(
+            start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None]
+        )
         clearance = self._clearance(rows, columns)
         # Where the robot starts it may stand nearer to a wall than it would go.
         is_near_start = np.arange(count + 1) * 0.5 * self._map.resolution < self._body
@@ -125,7 +134,14 @@ class MapMemory:
         if not is_inside.all() or self._map.log_odds[rows[1], columns[1]] >= 0:
             return None
         cells = [(int(row), int(column)) for row, column in zip(rows, columns, strict=True)]
-        found = plan(self._map.space, self._map.log_odds, self._map.clearance, cells[0], cells[1], footprint_of(self._radius))
+        found = plan(
+            self._map.space,
+            self._map.log_odds,
+            self._map.clearance,
+            cells[0],
+            cells[1],
+            footprint_of(self._radius),
+        )
         return None if found is None else self._legs(start, [*self._centres(found[1])[1:-1], end])
 
     def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
@@ -136,7 +152,13 @@ class MapMemory:
         if not (is_inside.all() and len(clusters)):
             return None
         footprint = footprint_of(self._body)
-        found = search(self._map.space, self._map.log_odds, self._map.clearance, (int(rows[0]), int(columns[0])), footprint)
+        found = search(
+            self._map.space,
+            self._map.log_odds,
+            self._map.clearance,
+            (int(rows[0]), int(columns[0])),
+            footprint,
+        )
         near = approach(clusters, found, self._map.log_odds, default_reach(footprint, self._map.resolution))
         reached = np.flatnonzero(near.reachable)
         if not len(reached):
@@ -165,9 +187,15 @@ class MapMemory:
             targets.mask[stand] = 0
             # There is always the way past where the robot is: nothing beyond it needs to be looked at.
             found = search(
-                self._map.space, self._map.log_odds, self._map.clearance, stand, footprint,
-                targets=targets, count=len(set(stands[k + 1 :]) - {stand}), maximum_cost=float(costs[k] + costs.max()),
-            )  # fmt: skip
+                self._map.space,
+                self._map.log_odds,
+                self._map.clearance,
+                stand,
+                footprint,
+                targets=targets,
+                count=len(set(stands[k + 1 :]) - {stand}),
+                maximum_cost=float(costs[k] + costs.max()),
+            )
             for other in range(k + 1, len(stands)):
                 table[k, other] = table[other, k] = min(found.cost(stands[other]), costs[k] + costs[other])
         return table
@@ -178,7 +206,9 @@ class MapMemory:
 
     def give_up(self, focus: Place) -> None:
         """Ignore the frontier around the cell, as frontier explorers do."""
-        self._map.frontiers.ignore_near(self._cell(focus), default_reach(footprint_of(self._radius), self._map.resolution))
+        self._map.frontiers.ignore_near(
+            self._cell(focus), default_reach(footprint_of(self._radius), self._map.resolution)
+        )
 
     def _legs(self, start: Place, places: Legs) -> Legs:
         """Return a way with places left out wherever the straight way past them is clear."""
@@ -200,10 +230,17 @@ class MapMemory:
     def _clearance(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the distance of cells from what is occupied [m]."""
         field = self._map.clearance
-        return np.sqrt(field.limit - field.closeness[rows, columns].astype(np.float64)) * 0.5 * field.resolution
+        return (
+            np.sqrt(field.limit - field.closeness[rows, columns].astype(np.float64)) * 0.5 * field.resolution
+        )
 
-    def _cells(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Return rows and columns of points, and which of them lie on the map; the others get the nearest cell."""
+    def _cells(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Return rows and columns of points, and which of them lie on the map.
+
+        The others get the nearest cell.
+        """
         cells = np.floor(points / self._map.resolution).astype(np.int64)
         rows, columns = self._map.log_odds.shape
         row, column = np.clip(cells[..., 1], 0, rows - 1), np.clip(cells[..., 0], 0, columns - 1)
@@ -211,7 +248,9 @@ class MapMemory:
 
 
 class RegionMemory:
-    """The nodes tell: space is seen where it lies in another node's safe region; a way is clear within one node's safe region.
+    """The nodes tell: space is seen where it lies in another node's safe region.
+
+    A way is clear within one node's safe region.
 
     Parameters
     ----------
@@ -233,7 +272,9 @@ class RegionMemory:
 
     def is_clear(self, start: Place, end: Place) -> bool:
         """Whether a way begins at a node and ends within its safe region."""
-        return any(math.dist(node.place, start) <= 0.05 and bool(node.safe.contains(end)) for node in self._nodes)
+        return any(
+            math.dist(node.place, start) <= 0.05 and bool(node.safe.contains(end)) for node in self._nodes
+        )
 
     def way(self, start: Place, end: Place) -> Legs | None:
         """Return None: regions know no way but the tree's."""

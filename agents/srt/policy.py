@@ -17,8 +17,9 @@ from lidarium.envs.exploration import Observation
 class SensorBasedRandomTree:
     """Grows a tree of places with the safe regions seen from them, towards the goal where there is one.
 
-    Each robot drives by its own scans. Robots that know each other's starts and are in contact share one graph, whose trees are
-    joined by bridges, and leave each other what they go for. A robot without work goes home; all stop when none has work.
+    Each robot drives by its own scans. Robots that know each other's starts and are in contact share one
+    graph, whose trees are joined by bridges, and leave each other what they go for. A robot without work goes
+    home; all stop when none has work.
 
     Parameters
     ----------
@@ -49,7 +50,9 @@ class SensorBasedRandomTree:
         for agent, child in zip(team.agents, children, strict=True):
             belief = team.belief(agent)
             generator = np.random.default_rng(child)
-            self._explorers[agent] = Explorer(agent, self.tree, self.settings, belief.robot, belief.lidar, generator)
+            self._explorers[agent] = Explorer(
+                agent, self.tree, self.settings, belief.robot, belief.lidar, generator
+            )
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Drive every robot for a step.
@@ -60,7 +63,9 @@ class SensorBasedRandomTree:
             Where the observations lack the scan.
         """
         if any("scan" not in observation for observation in observations.values()):
-            raise ValueError("a sensor-based random tree needs scan, which the robots do not observe; add it to settings.observe")
+            raise ValueError(
+                "a sensor-based random tree needs scan, which the robots do not observe; add it to settings.observe"
+            )
         actions: dict[str, Action] = {}
         for agent, observation in observations.items():
             explorer, belief = self._explorers[agent], self._team.belief(agent)
@@ -69,8 +74,12 @@ class SensorBasedRandomTree:
                 mate.known |= explorer.known
                 explorer.known |= mate.known
             targets = [mate.target for mate in in_contact if mate.target is not None]
-            memory = memory_of(belief, [self.tree.nodes[number] for number in sorted(explorer.known)], self.settings)
-            speed, turn_rate = explorer.step(senses_of(self._team.time_s, observation, belief), memory, targets)
+            memory = memory_of(
+                belief, [self.tree.nodes[number] for number in sorted(explorer.known)], self.settings
+            )
+            speed, turn_rate = explorer.step(
+                senses_of(self._team.time_s, observation, belief), memory, targets
+            )
             actions[agent] = _shares(speed / belief.robot.max_speed, turn_rate / belief.robot.max_turn_rate)
         explorers = [self._explorers[agent] for agent in observations]
         if all(explorer.is_home for explorer in explorers):
@@ -82,7 +91,11 @@ class SensorBasedRandomTree:
         belief = self._team.belief(agent)
         if belief.shared_map is None:
             return []
-        return [name for name, mate in belief.teammates.items() if mate.age_s <= NEWS_S and name in self._explorers]
+        return [
+            name
+            for name, mate in belief.teammates.items()
+            if mate.age_s <= NEWS_S and name in self._explorers
+        ]
 
 
 def _shares(speed: float, turn_rate: float) -> NDArray[np.float32]:

@@ -1,7 +1,7 @@
 """Safe regions: the space around a place in which, by what was seen from there, the robot can stand.
 
-All that was seen from a place is kept as one *view*: a range for each of ``DIRECTIONS`` directions of the full circle, along the
-axes of the map frame, so that scans taken at several headings are one.
+All that was seen from a place is kept as one *view*: a range for each of ``DIRECTIONS`` directions of the
+full circle, along the axes of the map frame, so that scans taken at several headings are one.
 """
 
 import math
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.settings import SHAPES
-from lidarium.mapping.scans import ScanGeometry
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 DIRECTIONS = 1080
 """Directions of a view: a third of a degree each, about a beam of the URG-04LX."""
@@ -46,7 +46,8 @@ def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -
     Parameters
     ----------
     scan : (beams,) float32
-        Ranges [m]; 0, nan or below the laser's least where invalid, its greatest range or inf where nothing was met.
+        Ranges [m]; 0, nan or below the laser's least where invalid, its greatest range or inf where nothing
+        was met.
     geometry : ScanGeometry
         The laser.
     heading : float
@@ -78,7 +79,9 @@ def region_of(angle: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the laser region in which an angle against the heading lies [rad]: 0 right to 4 left, 5 to 7 behind."""
     turned = (angle - REGION_FIRST) % (2.0 * math.pi)
     behind = 5 + np.floor((turned - 5.0 * REGION_WIDTH) / math.radians(40.0) + 1e-9)
-    return np.where(turned < 5.0 * REGION_WIDTH - 1e-9, np.floor(turned / REGION_WIDTH + 1e-9), np.minimum(behind, 7)).astype(np.int64)
+    return np.where(
+        turned < 5.0 * REGION_WIDTH - 1e-9, np.floor(turned / REGION_WIDTH + 1e-9), np.minimum(behind, 7)
+    ).astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +140,8 @@ def safe_region(
     heading : float
         Heading of the laser regions [rad].
     shape : str
-        ``ball`` (the least radius in all directions), ``star`` (the least of each laser region) or ``radial`` (the disc fits along
-        each ray). A ball lies within the star, and the star within the radial region.
+        ``ball`` (the least radius in all directions), ``star`` (the least of each laser region) or ``radial``
+        (the disc fits along each ray). A ball lies within the star, and the star within the radial region.
     body : float
         Radius of the disc with its margin [m].
     perception : float
@@ -170,17 +173,25 @@ def safe_region(
     return SafeRegion(np.array(place[:2], np.float64), radii)
 
 
-def _nearest_of_regions(ranges: NDArray[np.float64], regions: NDArray[np.int64], seen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the least range of each laser region, (regions,) [m]; inf where nothing of it was seen."""
+def _nearest_of_regions(
+    ranges: NDArray[np.float64], regions: NDArray[np.int64], seen: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the least range of each laser region, (regions,) [m].
+
+    Inf where nothing of it was seen.
+    """
     nearest = np.full(REGIONS, np.inf)
     np.minimum.at(nearest, regions[seen], ranges[seen])
     return nearest
 
 
 def _radial(ranges: NDArray[np.float64], body: float) -> NDArray[np.float64]:
-    """Return how far a disc can go along each direction, (directions,) [m]; 0 where ``ranges`` are nan, which stop no other ray.
+    """Return how far a disc can go along each direction, (directions,) [m].
 
-    Along a ray the disc meets the end of another one, at an angle off and a range, where it comes within its radius of it.
+    0 where ``ranges`` are nan, which stop no other ray.
+
+    Along a ray the disc meets the end of another one, at an angle off and a range, where it comes within its
+    radius of it.
     """
     reach = np.nanmax(ranges, initial=0.0)
     nearest = np.nanmin(ranges, initial=np.inf)

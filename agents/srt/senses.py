@@ -12,7 +12,7 @@ from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
-from lidarium.mapping.scans import ScanGeometry
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 NEWS_S = 1.0
 """Robots whose news are at most this old are in contact [s]."""

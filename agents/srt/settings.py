@@ -27,33 +27,35 @@ class SrtSettings:
     shape : str
         Shape of the safe regions: ``ball``, ``star`` or ``radial``.
     algorithm : str
-        ``integrated`` goes where the border of what was seen is open; ``base`` goes in random directions, wherever no other safe
-        region lies.
+        ``integrated`` goes where the border of what was seen is open; ``base`` goes in random directions,
+        wherever no other safe region lies.
     candidates : str
-        Where to go next: ``goal`` (least way, and least distance to the goal where there is one), ``random`` (an opening by its
-        angular width) or ``farthest`` (the longest ray of an opening).
+        Where to go next: ``goal`` (least way, and least distance to the goal where there is one), ``random``
+        (an opening by its angular width) or ``farthest`` (the longest ray of an opening).
     backtrack : str
-        Where to go from a node without openings: ``open`` (the cheapest node that has one, along the tree and its bridges) or
-        ``parent``.
+        Where to go from a node without openings: ``open`` (the cheapest node that has one, along the tree and
+        its bridges) or ``parent``.
     memory : str
         What tells space that was seen: ``map`` (the robot's map) or ``regions`` (the nodes' own scans).
     drive : str
         ``turn_advance`` (turn, advance, done) or ``controls`` (the best of a list of controls).
     places_nodes_at_targets : bool
-        Whether a node is placed where the robot wanted to go, as printed in the thesis, and not where it takes itself to be.
+        Whether a node is placed where the robot wanted to go, as printed in the thesis, and not where it
+        takes itself to be.
     repeats_nodes : bool
         Whether a node is added again when the robot comes back to it, as printed in the thesis.
     step_share : float
         Share of the safe radius that the robot goes, in (0, 1).
     random_share : float
-        Share of random choices among those of least cost. The tree is complete without: frontiers of the map are gone to in the end.
+        Share of random choices among those of least cost. The tree is complete without: frontiers of the map
+        are gone to in the end.
     way_weight : float
         What a metre of way counts against a metre of distance to the goal.
     least_step : float
         Candidates lie farther than this from their node [m].
     least_frontier : float
-        With ``candidates`` ``goal`` and ``memory`` ``map``, frontiers of the map of at least this length are gone to; shorter ones when
-        nothing else is left [m].
+        With ``candidates`` ``goal`` and ``memory`` ``map``, frontiers of the map of at least this length are
+        gone to; shorter ones when nothing else is left [m].
     tries : int
         How many candidates are drawn at a node.
     nodes : int
@@ -65,13 +67,16 @@ class SrtSettings:
     margin : float
         Safe radii end this far before what was met, beside the robot's radius [m].
     turn_room : float
-        A laser region with a return nearer than the robot's radius, the margin and this is not safe [m]; 0 for off.
+        A laser region with a return nearer than the robot's radius, the margin and this is not safe [m]; 0
+        for off.
     passing_distance : float
         On its way a robot adds a node after this distance [m].
     looks_around : bool
-        Whether a robot turns to see what lies behind it, at its first node and at nodes that are left without openings.
+        Whether a robot turns to see what lies behind it, at its first node and at nodes that are left without
+        openings.
     turning_starts, turning_ends : float
-        The robot turns on the spot where its heading is off by more than the first, until it is off by less than the second [rad].
+        The robot turns on the spot where its heading is off by more than the first, until it is off by less
+        than the second [rad].
     speed : float
         Greatest speed [m/s]; the robot's cruise speed where that is lower.
     turn_rate : float
@@ -110,7 +115,9 @@ class SrtSettings:
     def __post_init__(self) -> None:
         for name, words in CHOICES.items():
             if getattr(self, name) not in words:
-                raise ValueError(f"{name} of the tree is {getattr(self, name)!r}; want one of {', '.join(words)}")
+                raise ValueError(
+                    f"{name} of the tree is {getattr(self, name)!r}; want one of {', '.join(words)}"
+                )
         for name in (
             "way_weight",
             "least_step",
@@ -160,7 +167,10 @@ THESIS: dict[str, Any] = {
     "speed": 0.3,
     "turn_rate": 0.8,
 }
-"""What ``mode="thesis"`` stands for; settings that are given themselves come first."""
+"""What ``mode="thesis"`` stands for.
+
+Settings that are given themselves come first.
+"""
 
 
 def make_srt_settings(mode: str = "default", **settings: Any) -> SrtSettings:  # noqa: ANN401

@@ -1,7 +1,7 @@
 """The tree of a team: nodes with what was seen from them, their parents, bridges between them, and ways along both.
 
-Robots that share a map share the graph; its places are in the frame of the map's first cell, which is common to all of them. A robot
-that hears of others only now and then knows the nodes that reached it.
+Robots that share a map share the graph; its places are in the frame of the map's first cell, which is common
+to all of them. A robot that hears of others only now and then knows the nodes that reached it.
 """
 
 import heapq

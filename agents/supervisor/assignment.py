@@ -20,7 +20,9 @@ def best_goal(costs: NDArray[np.float64], utility: NDArray[np.float64], cost_wei
         Utility that a metre of way costs [1/m].
     """
     # Where there is no weight, a way that does not exist still counts.
-    values = np.where(np.isfinite(costs), utility - cost_weight * np.where(np.isfinite(costs), costs, 0.0), -np.inf)
+    values = np.where(
+        np.isfinite(costs), utility - cost_weight * np.where(np.isfinite(costs), costs, 0.0), -np.inf
+    )
     return int(np.argmax(values)) if len(values) and np.isfinite(values.max()) else NOBODY
 
 
@@ -52,7 +54,9 @@ def assign_by_cost(costs: NDArray[np.float64]) -> NDArray[np.int64]:
 def assign_by_utility(
     costs: NDArray[np.float64], seen: NDArray[np.float64], utility: NDArray[np.float64], cost_weight: float
 ) -> NDArray[np.int64]:
-    """Give robots goals, best pair of robot and goal first; the worth of what is seen from a goal that is taken falls.
+    """Give robots goals, best pair of robot and goal first.
+
+    The worth of what is seen from a goal that is taken falls.
 
     After Burgard, Moors, Stachniss, Schneider, Coordinated multi-robot exploration, IEEE T-RO 2005.
 

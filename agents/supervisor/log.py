@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from lidarium.agents.supervisor.tree import RobotInputs
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +77,9 @@ class StationEvent:
     time_s : float
         When [s].
     event : str
-        ``found`` (two maps were found to be of one place, which is to be confirmed), ``joined``, ``dropped`` (a join that is believed no
-        more), ``excluded`` (a robot has failed), ``late`` (a report that is older than the last one), ``unusable`` (a map of nothing).
+        ``found`` (two maps were found to be of one place, which is to be confirmed), ``joined``, ``dropped``
+        (a join that is believed no more), ``excluded`` (a robot has failed), ``late`` (a report that is older
+        than the last one), ``unusable`` (a map of nothing).
     agents : tuple of str
         Whom it is about.
     words : str
@@ -92,7 +93,12 @@ class StationEvent:
 
     def as_dict(self) -> dict[str, Any]:
         """Return what JSON can hold of it."""
-        return {"event": self.event, "time_s": round(self.time_s, 6), "agents": list(self.agents), "words": self.words}
+        return {
+            "event": self.event,
+            "time_s": round(self.time_s, 6),
+            "agents": list(self.agents),
+            "words": self.words,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,5 +132,10 @@ class Join:
 
 def _inputs(inputs: RobotInputs) -> dict[str, Any]:
     values = asdict(inputs)
-    finite = {name: value if not isinstance(value, float) or math.isfinite(value) else None for name, value in values.items()}
-    return {name: round(value, 4) if isinstance(value, float) else value for name, value in finite.items()} | {"state": inputs.state.value}
+    finite = {
+        name: value if not isinstance(value, float) or math.isfinite(value) else None
+        for name, value in values.items()
+    }
+    return {
+        name: round(value, 4) if isinstance(value, float) else value for name, value in finite.items()
+    } | {"state": inputs.state.value}

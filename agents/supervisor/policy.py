@@ -16,14 +16,14 @@ from lidarium.agents.supervisor.log import Decision, Join, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
+from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.onboard.reports import Report
-from lidarium.envs.onboard.state import DriveState, OperatingState, Order, OrderKind
-from lidarium.envs.onboard.team_driver import footprint_of
-from lidarium.mapping.frontiers import FRONTIER
-from lidarium.mapping.grid_planning import cells_of
+from lidarium.envs.radio.messages import DriveState, OperatingState, Order, OrderKind
+from lidarium.envs.station.reports import Report
 from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.mapping.planning.frontiers import FRONTIER
+from lidarium.mapping.planning.grid_planning import cells_of
 
 PATIENCE_S = 20.0
 """A robot that was sent somewhere and has not moved for this long explores by itself again [s]."""
@@ -50,7 +50,8 @@ class _Errand:
 class Supervised:
     """A supervisor over a policy: robots explore by that policy, the station merges their maps, and the tree redirects and stops them.
 
-    Robots that are joined are told what the others know, so the policy explores on the merged map where it looks at the shared one.
+    Robots that are joined are told what the others know, so the policy explores on the merged map where it
+    looks at the shared one.
 
     Parameters
     ----------
@@ -68,19 +69,25 @@ class Supervised:
     decisions, events, joins : list
         What was decided, what happened at the station, and how the robots' frames lie as it found.
     tick_seconds, merge_seconds : list of float
-        Wall time of each look at the tree, its merge and what the robots are told included, and of each merge between looks [s].
+        Wall time of each look at the tree, its merge and what the robots are told included, and of each merge
+        between looks [s].
 
     Raises
     ------
     ValueError
-        Where the policy decides speeds, or a setting cannot be used; at the reset, where starts are to be trusted that nobody knows.
+        Where the policy decides speeds, or a setting cannot be used; at the reset, where starts are to be
+        trusted that nobody knows.
     """
 
     def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
         if policy.level not in ("waypoint", "frontier"):
-            raise ValueError(f"a policy of level {policy.level!r} goes to no goals; want one of level 'waypoint' or 'frontier'")
+            raise ValueError(
+                f"a policy of level {policy.level!r} goes to no goals; want one of level 'waypoint' or 'frontier'"
+            )
         if settings is not None and options:
-            raise ValueError(f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other")
+            raise ValueError(
+                f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other"
+            )
         self.policy, self.settings = policy, settings or SupervisorSettings(**options)
         self.level, self.shares_map = policy.level, True
         self.has_begun = False
@@ -152,14 +159,19 @@ class Supervised:
                 if (action := self._sent(agent)) is not None:
                     actions[agent] = action
             elif agent in standing:
-                actions[agent] = self._rest(agent, observations[agent]) if is_work_left else Stop("no_frontier")
+                actions[agent] = (
+                    self._rest(agent, observations[agent]) if is_work_left else Stop("no_frontier")
+                )
             elif is_work_left and isinstance(actions[agent], Stop):
                 # It may have to move aside, or get work when the others find more.
                 actions[agent] = self._rest(agent, observations[agent])
         return actions
 
     def _supervise(self) -> dict[str, Action]:
-        """Take in reports, merge and look at the tree where it is time; return the robots that stop."""
+        """Take in reports, merge and look at the tree where it is time.
+
+        Return the robots that stop.
+        """
         now = self._team.time_s
         is_look, is_merge = now >= self._look_due, now >= self._merge_due
         if not (is_look or is_merge):
@@ -192,17 +204,28 @@ class Supervised:
         for agent in station.agents:
             report = self._team.report(agent)
             station.receive(agent, report, now)
-            if report is not None and report is station.reports.get(agent) and math.isclose(report.time_s, now, abs_tol=1e-6):
+            if (
+                report is not None
+                and report is station.reports.get(agent)
+                and math.isclose(report.time_s, now, abs_tol=1e-6)
+            ):
                 places = [(entry.x, entry.y) for entry in self.given_up if entry.agent == agent]
                 self._given_up[agent] = np.array(places, np.float64).reshape(-1, 2)
 
     def _tell(self) -> None:
-        """Tell each robot what the others of its group know; take it back from one that is joined no more.
+        """Tell each robot what the others of its group know.
 
-        Of one that has failed they learn where it drove: its images in their maps bar ways that are free, and hide frontiers.
+        Take it back from one that is joined no more.
+
+        Of one that has failed they learn where it drove: its images in their maps bar ways that are free, and
+        hide frontiers.
         """
         station = self._supervisor.station
-        station.left_behind = [(agent, trail) for agent, trail in station.left_behind if not self._team.forget_walls(agent, trail)]
+        station.left_behind = [
+            (agent, trail)
+            for agent, trail in station.left_behind
+            if not self._team.forget_walls(agent, trail)
+        ]
         for group in station.groups():
             for agent in group:
                 others = [mate for mate in group if mate != agent]
@@ -244,11 +267,18 @@ class Supervised:
         if state is DriveState.GIVING_WAY or math.dist((x, y), errand.place) > MOVED_M:
             errand.since_s, errand.place = self._team.time_s, (x, y)
         is_stuck = self._team.time_s - errand.since_s > PATIENCE_S
-        if state in (DriveState.ARRIVED, DriveState.NO_PATH) or is_stuck or not _is_frontier(belief, errand.command.looks_at):
+        if (
+            state in (DriveState.ARRIVED, DriveState.NO_PATH)
+            or is_stuck
+            or not _is_frontier(belief, errand.command.looks_at)
+        ):
             del self._errands[agent]
 
     def _is_away(self, agent: str) -> bool:
-        """Whether a robot is on an errand or gets the order now; until it has taken the order the policy drives it."""
+        """Whether a robot is on an errand or gets the order now.
+
+        Until it has taken the order the policy drives it.
+        """
         errand = self._errands.get(agent)
         return errand is not None and (errand.is_new or errand.is_taken)
 
@@ -303,7 +333,10 @@ class _Led:
 
 
 def supervised(**options: Any) -> Supervised:  # noqa: ANN401
-    """Return nearest-frontier explorers under a supervisor; options are those of ``SupervisorSettings``."""
+    """Return nearest-frontier explorers under a supervisor.
+
+    Options are those of ``SupervisorSettings``.
+    """
     return Supervised(NearestFrontier(), **options)
 
 
@@ -332,5 +365,7 @@ def _is_frontier(belief: Belief, place: tuple[float, float] | None) -> bool:
     navigation = belief.map if belief.shared_map is None else belief.shared_map
     row, column = cells_of(np.asarray(place), belief.map_origin, navigation.resolution).tolist()
     reach = round(0.3 / navigation.resolution)
-    around = navigation.frontiers.flags[max(row - reach, 0) : max(row + reach + 1, 0), max(column - reach, 0) : max(column + reach + 1, 0)]
+    around = navigation.frontiers.flags[
+        max(row - reach, 0) : max(row + reach + 1, 0), max(column - reach, 0) : max(column + reach + 1, 0)
+    ]
     return bool((around == FRONTIER).any())

@@ -18,8 +18,8 @@ class SupervisorSettings:
     merge_period_s : float
         Simulated time between two merges of the maps [s].
     searches_per_merge : int
-        For how many pairs of maps a merge searches at most; the others wait for their turn. With a look there is no search: it has work
-        of its own.
+        For how many pairs of maps a merge searches at most; the others wait for their turn. With a look there
+        is no search: it has work of its own.
     merge_resolution_m : float
         Maps are compared in cells of this side, or of theirs where that is more [m].
     confirmation_growth_m2 : float
@@ -33,18 +33,22 @@ class SupervisorSettings:
     least_left_m : float
         The work of a group is done when no frontier of this length is left on its map within reach [m].
     unbalanced_share : float
-        A robot whose share of the map is smaller than this part of its teammates' mean is sent where there is more to map.
+        A robot whose share of the map is smaller than this part of its teammates' mean is sent where there is
+        more to map.
     enclosed_way_m, enclosed_gain_m2_per_m : float
-        A robot that has mapped less than this on each metre of its last way of this length is enclosed [m, m2/m].
+        A robot that has mapped less than this on each metre of its last way of this length is enclosed [m,
+        m2/m].
     cost_weight : float
         Utility of a goal that a metre of way costs [1/m].
     sensor_range_m : float
         What a robot at its goal sees, and how far around the map there may be more of it [m].
     assignment : str
-        Who is given goals: ``pairs`` those robots alone that the rules redirect, one after the other; ``hungarian`` all robots of a group
-        at each look, by the least sum of costs; ``utility`` likewise, best pair of robot and goal first.
+        Who is given goals: ``pairs`` those robots alone that the rules redirect, one after the other;
+        ``hungarian`` all robots of a group at each look, by the least sum of costs; ``utility`` likewise,
+        best pair of robot and goal first.
     is_stop_final : bool
-        Whether a robot that the rules stop while its teammates work has ended; otherwise it stands by and goes on when there is a goal.
+        Whether a robot that the rules stop while its teammates work has ended; otherwise it stands by and
+        goes on when there is a goal.
     avoids_rendezvous : bool
         Whether robots are separated that are about to meet at goals near each other.
     rendezvous_m : float
@@ -52,9 +56,11 @@ class SupervisorSettings:
     returns_home : bool
         Whether the robots drive to where they began when the work is done.
     battery_margin : float
-        A robot turns back when what its battery holds is less than this many times what the way home costs; 0 for never.
+        A robot turns back when what its battery holds is less than this many times what the way home costs; 0
+        for never.
     trusts_starts : bool
-        Whether robots that know how their frames lie in a common one are joined by that; nothing is searched for then.
+        Whether robots that know how their frames lie in a common one are joined by that; nothing is searched
+        for then.
 
     Raises
     ------
@@ -89,12 +95,22 @@ class SupervisorSettings:
             value = getattr(self, field.name)
             if field.type is bool and not isinstance(value, bool):
                 raise ValueError(f"{field.name} of the supervisor is {value!r}; want true or false")
-            if field.type is float and not (isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0):
+            if field.type is float and not (
+                isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0
+            ):
                 raise ValueError(f"{field.name} of the supervisor is {value!r}; want a number of at least 0")
-        if isinstance(self.searches_per_merge, bool) or not isinstance(self.searches_per_merge, int) or self.searches_per_merge < 1:
-            raise ValueError(f"searches_per_merge of the supervisor is {self.searches_per_merge!r}; want a whole number of at least 1")
+        if (
+            isinstance(self.searches_per_merge, bool)
+            or not isinstance(self.searches_per_merge, int)
+            or self.searches_per_merge < 1
+        ):
+            raise ValueError(
+                f"searches_per_merge of the supervisor is {self.searches_per_merge!r}; want a whole number of at least 1"
+            )
         for name in ("period_s", "merge_period_s", "enclosed_way_m", "sensor_range_m"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} of the supervisor is 0; want a positive number")
         if self.assignment not in get_args(Assignment):
-            raise ValueError(f"assignment of the supervisor is {self.assignment!r}; want one of {', '.join(get_args(Assignment))}")
+            raise ValueError(
+                f"assignment of the supervisor is {self.assignment!r}; want one of {', '.join(get_args(Assignment))}"
+            )

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from lidarium.agents.supervisor.log import Join, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
-from lidarium.envs.onboard.reports import Report
-from lidarium.envs.onboard.state import OperatingState
+from lidarium.envs.radio.messages import OperatingState
+from lidarium.envs.station.reports import Report
 from lidarium.envs.wrappers.merged_maps import TEAM_VALIDATION
-from lidarium.mapping.merging.described_map import resampled
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging.description.described_map import resampled
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
@@ -21,12 +23,12 @@ from lidarium.mapping.merging.merger import Merged, placed
 from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.validation import ValidationSettings
-from lidarium.mapping.occupancy import UNKNOWN
-from lidarium.mapping.rigid import Transform
 
 Pair = tuple[str, str]
 
-TEAM_CONFIRMATION = ValidationSettings(most_contradiction_m=0.3, least_across_share=0.2, least_evidence_per_m2=0.3)
+TEAM_CONFIRMATION = ValidationSettings(
+    most_contradiction_m=0.3, least_across_share=0.2, least_evidence_per_m2=0.3
+)
 """When robots are led by a merge: rooms of one plan, corridors and halls agree well enough to be found, but hardly ever so well."""
 
 
@@ -99,9 +101,13 @@ class MergeStation:
         if report is None or report is before:
             return
         if before is not None and report.time_s < before.time_s:
-            self._note(time_s, "late", (agent,), f"of {report.time_s:.1f} s, there is one of {before.time_s:.1f} s")
+            self._note(
+                time_s, "late", (agent,), f"of {report.time_s:.1f} s, there is one of {before.time_s:.1f} s"
+            )
             return
-        has_failed = report.state is OperatingState.FAILED and (before is None or before.state is not OperatingState.FAILED)
+        has_failed = report.state is OperatingState.FAILED and (
+            before is None or before.state is not OperatingState.FAILED
+        )
         self.reports[agent] = report
         self._trails[agent].append((report.pose.x, report.pose.y))
         if has_failed:
@@ -118,7 +124,11 @@ class MergeStation:
     def known_m2(self, agent: str) -> float:
         """Return how much a robot's own map knows [m2], 0 where it never reported."""
         report = self.reports.get(agent)
-        return 0.0 if report is None else float(np.count_nonzero(report.map.levels != UNKNOWN)) * self.resolution**2
+        return (
+            0.0
+            if report is None
+            else float(np.count_nonzero(report.map.levels != UNKNOWN)) * self.resolution**2
+        )
 
     def is_enclosed(self, agent: str) -> bool:
         """Whether a robot has mapped too little on the last of its way."""
@@ -129,14 +139,23 @@ class MergeStation:
         return gain < self.settings.enclosed_gain_m2_per_m * way
 
     def merge(self, time_s: float, may_search: bool = True) -> None:
-        """Merge the maps of all robots that have not failed; what was found is verified alone where there is no time for searches."""
+        """Merge the maps of all robots that have not failed.
+
+        What was found is verified alone where there is no time for searches.
+        """
         used = {agent: self.reports[agent] for agent in self.agents if self._is_used(agent)}
         if self.settings.trusts_starts:
             self._join_by_starts(used)
         elif used:
-            merged = self._merger.update({agent: self._own_map(agent) for agent in used}, may_search=may_search)
+            merged = self._merger.update(
+                {agent: self._own_map(agent) for agent in used}, may_search=may_search
+            )
             self._tree = merged.tree
-            self._middles = {pair: self._middle(pair, result) for pair, result in merged.pairs.items() if result.is_accepted}
+            self._middles = {
+                pair: self._middle(pair, result)
+                for pair, result in merged.pairs.items()
+                if result.is_accepted
+            }
             self._note_found(merged, time_s)
         self._note_joins(time_s, used)
 
@@ -161,8 +180,15 @@ class MergeStation:
         return self._tree.lookup(target, source) if target in names and source in names else None
 
     def fused(self, agents: list[str], into: str) -> FusedMap | None:
-        """Return the map of some joined robots in the frame of one of their group; None where nobody knows anything."""
-        frames = {agent: frame for agent in agents if self._is_used(agent) and (frame := self.lookup(into, agent)) is not None}
+        """Return the map of some joined robots in the frame of one of their group.
+
+        None where nobody knows anything.
+        """
+        frames = {
+            agent: frame
+            for agent in agents
+            if self._is_used(agent) and (frame := self.lookup(into, agent)) is not None
+        }
         if not frames:
             return None
         maps = [self._map_without_bodies(agent) for agent in frames]
@@ -173,17 +199,24 @@ class MergeStation:
         """Return a robot's map as it is compared with others."""
         whole = self.reports[agent].map
         coarse = GrowingMap(resampled(whole.levels, self.resolution, self._merge_resolution), whole.origin)
-        # A third robot's image on the one map would contradict the floor on which the other one saw it drive on.
+        # A third robot's image on the one map would contradict the floor on which the other one saw it drive
+        # on.
         bare = without_bodies(coarse, self._mates_trails(agent), self._radius, self._merge_resolution)
         return without_own_trail(bare, self._trail(agent), self._radius, self._merge_resolution)
 
     def _map_without_bodies(self, agent: str) -> GrowingMap:
         """Return a robot's map without what it may have drawn of those that it is joined with."""
-        return without_bodies(self.reports[agent].map, self._mates_trails(agent), self._radius, self.resolution)
+        return without_bodies(
+            self.reports[agent].map, self._mates_trails(agent), self._radius, self.resolution
+        )
 
     def _mates_trails(self, agent: str) -> list[NDArray[np.float64]]:
         """Return where those have been that a robot is joined with, in its map frame [m]."""
-        mates = {mate: frame for mate in self.agents if mate != agent and (frame := self.lookup(agent, mate)) is not None}
+        mates = {
+            mate: frame
+            for mate in self.agents
+            if mate != agent and (frame := self.lookup(agent, mate)) is not None
+        }
         return [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
 
     def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
@@ -201,7 +234,11 @@ class MergeStation:
     def _is_used(self, agent: str) -> bool:
         """Whether a robot's map is used: it has reported something, and has not failed (rules 1 and 2)."""
         report = self.reports.get(agent)
-        return report is not None and report.state is not OperatingState.FAILED and bool((report.map.levels != UNKNOWN).any())
+        return (
+            report is not None
+            and report.state is not OperatingState.FAILED
+            and bool((report.map.levels != UNKNOWN).any())
+        )
 
     def _join_by_starts(self, used: Mapping[str, Report]) -> None:
         """Join all robots that know how their frames lie in a common one."""
@@ -220,7 +257,9 @@ class MergeStation:
             if result.a_from_b is None or self.lookup(a, b) is not None:
                 continue
             first, second = (placed(self.reports[name].map.origin) for name in (a, b))
-            self.joins.append(Join(time_s, a, b, first @ result.a_from_b @ second.inverse(), self._middles[a, b], False))
+            self.joins.append(
+                Join(time_s, a, b, first @ result.a_from_b @ second.inverse(), self._middles[a, b], False)
+            )
             self._note(time_s, "found", (a, b), f"{result.agreement.evidence_m:.1f} m of walls speak for it")
         self._found = found
 
@@ -234,7 +273,12 @@ class MergeStation:
             if (a, b) not in self._joined:
                 middle = self._middles.get((a, b), self._place(b))
                 self.joins.append(Join(time_s, a, b, frame, middle, True, self._tree.has_edge(a, b)))
-                self._note(time_s, "joined", (a, b), f"x {frame.x:.2f} m, y {frame.y:.2f} m, theta {frame.theta:.3f} rad")
+                self._note(
+                    time_s,
+                    "joined",
+                    (a, b),
+                    f"x {frame.x:.2f} m, y {frame.y:.2f} m, theta {frame.theta:.3f} rad",
+                )
         self._joined = set(joined)
 
     def _note(self, time_s: float, event: str, agents: tuple[str, ...], words: str) -> None:

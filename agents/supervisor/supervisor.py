@@ -11,9 +11,19 @@ from lidarium.agents.supervisor.assignment import NOBODY, assign_by_cost, assign
 from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.survey import Survey
-from lidarium.agents.supervisor.tree import HOME, OTHER, RICH, Case, Leaf, Node, RobotInputs, decide, decision_tree
-from lidarium.envs.onboard.state import OperatingState, OrderKind, Target
-from lidarium.mapping.grid_planning import Footprint
+from lidarium.agents.supervisor.tree import (
+    HOME,
+    OTHER,
+    RICH,
+    Case,
+    Leaf,
+    Node,
+    RobotInputs,
+    decide,
+    decision_tree,
+)
+from lidarium.envs.radio.messages import OperatingState, OrderKind, Target
+from lidarium.mapping.planning.grid_planning import Footprint
 
 STICKINESS_M = 1.0
 """Where all robots get goals at once, the one that a robot has counts as so much nearer [m]."""
@@ -121,9 +131,13 @@ class Supervisor:
             self._log(time_s, (agent,), _judged(case, self._tree))
         elif agent not in self._silent:
             self._silent.add(agent)
-            self.station.events.append(StationEvent(time_s, "silent", (agent,), "it has not reported yet, and gets no orders"))
+            self.station.events.append(
+                StationEvent(time_s, "silent", (agent,), "it has not reported yet, and gets no orders")
+            )
 
-    def _look_at(self, group: list[str], time_s: float, given_up: Mapping[str, NDArray[np.float64]]) -> list[Command]:
+    def _look_at(
+        self, group: list[str], time_s: float, given_up: Mapping[str, NDArray[np.float64]]
+    ) -> list[Command]:
         """Decide about the robots of a group."""
         station = self.station
         workers = [agent for agent in group if station.reports[agent].state is OperatingState.OPERATING]
@@ -131,7 +145,11 @@ class Supervisor:
         frames = {agent: frame for agent in group if (frame := station.lookup(group[0], agent)) is not None}
         if fused is None:
             return []
-        places = [frames[agent].apply(given_up[agent]) for agent in group if agent in given_up and len(given_up[agent])]
+        places = [
+            frames[agent].apply(given_up[agent])
+            for agent in group
+            if agent in given_up and len(given_up[agent])
+        ]
         all_given_up = np.concatenate(places) if places else np.zeros((0, 2))
         survey = Survey(fused, frames, station.reports, workers, all_given_up, self.footprint, self._settings)
         judged: dict[str, _Judged] = {}
@@ -143,9 +161,15 @@ class Supervisor:
                 taken[agent] = one.goal
         if self._settings.assignment != "pairs":
             self._assign_all(judged, workers, survey)
-        return [command for one in judged.values() if (command := self._command(one, survey, time_s, tuple(group))) is not None]
+        return [
+            command
+            for one in judged.values()
+            if (command := self._command(one, survey, time_s, tuple(group))) is not None
+        ]
 
-    def _judge(self, agent: str, group: list[str], workers: list[str], survey: Survey, taken: Mapping[str, int]) -> _Judged:
+    def _judge(
+        self, agent: str, group: list[str], workers: list[str], survey: Survey, taken: Mapping[str, int]
+    ) -> _Judged:
         """Put a robot before the tree, and choose its goal where it is to get another."""
         inputs = self._inputs(agent, survey.known_area_m2)
         if agent not in workers:
@@ -155,7 +179,9 @@ class Supervisor:
         if agent in self.standing_by and rival is not None:
             # It has no path of its own; what counts is its way to the goal of the other.
             goal = survey.going[rival.agent]
-            inputs = replace(inputs, remaining_m=float(survey.goals.costs[row, goal]) if goal != NOBODY else math.inf)
+            inputs = replace(
+                inputs, remaining_m=float(survey.goals.costs[row, goal]) if goal != NOBODY else math.inf
+            )
         others = [mate for mate in workers if mate != agent]
         worth = np.where(survey.is_goal(), 1.0, -np.inf)
         for mate in others:
@@ -169,15 +195,22 @@ class Supervisor:
         costs, weight = survey.goals.costs[row], self._settings.cost_weight
         other = best_goal(costs, worth, weight)
         areas = survey.goals.areas
-        richer = best_goal(costs, np.where(np.isfinite(worth), areas / max(float(areas.max(initial=0.0)), 1e-9), -np.inf), weight)
+        richer = best_goal(
+            costs,
+            np.where(np.isfinite(worth), areas / max(float(areas.max(initial=0.0)), 1e-9), -np.inf),
+            weight,
+        )
         going = survey.going[agent]
         case = Case(
             robot=inputs,
             rival=rival,
-            opponent=self._opponent(agent, others, survey) if rival is None and self._settings.avoids_rendezvous else None,
+            opponent=self._opponent(agent, others, survey)
+            if rival is None and self._settings.avoids_rendezvous
+            else None,
             has_frontier=survey.has_frontier(),
             has_other_goal=other != NOBODY,
-            has_richer_goal=richer not in (NOBODY, going) and (going == NOBODY or areas[richer] > areas[going]),
+            has_richer_goal=richer not in (NOBODY, going)
+            and (going == NOBODY or areas[richer] > areas[going]),
             is_behind=self._is_behind(agent, group),
             is_enclosed=self.station.is_enclosed(agent),
             is_battery_low=self._settings.battery_margin > 0.0 and self._is_battery_low(agent, survey),
@@ -192,25 +225,36 @@ class Supervisor:
         return RobotInputs(agent, report.path_left_m, report.state, min(share, 1.0), report.travelled_m)
 
     def _rival(self, agent: str, workers: list[str], survey: Survey) -> RobotInputs | None:
-        """Return the nearest other robot with the same goal; to a robot that stands by, the nearest one that has any goal."""
+        """Return the nearest other robot with the same goal.
+
+        To a robot that stands by, the nearest one that has any goal.
+        """
         is_waiting = agent in self.standing_by
         mates = [
             self._inputs(mate, survey.known_area_m2)
             for mate in workers
             if mate != agent
             and mate not in self.standing_by
-            and (survey.places[mate] is not None if is_waiting else survey.is_same_goal(agent, mate, self._settings.same_goal_m))
+            and (
+                survey.places[mate] is not None
+                if is_waiting
+                else survey.is_same_goal(agent, mate, self._settings.same_goal_m)
+            )
         ]
         return min(mates, key=lambda mate: (mate.remaining_m, mate.agent), default=None)
 
     def _opponent(self, agent: str, others: list[str], survey: Survey) -> RobotInputs | None:
         """Return the nearest robot that an agent is about to meet."""
-        mates = [self._inputs(mate, survey.known_area_m2) for mate in others if survey.are_meeting(agent, mate)]
+        mates = [
+            self._inputs(mate, survey.known_area_m2) for mate in others if survey.are_meeting(agent, mate)
+        ]
         return min(mates, key=lambda mate: (mate.remaining_m, mate.agent), default=None)
 
     def _is_behind(self, agent: str, group: list[str]) -> bool:
         known = [self.station.known_m2(mate) for mate in group if mate != agent]
-        return bool(known) and self.station.known_m2(agent) < self._settings.unbalanced_share * float(np.mean(known))
+        return bool(known) and self.station.known_m2(agent) < self._settings.unbalanced_share * float(
+            np.mean(known)
+        )
 
     def _is_battery_low(self, agent: str, survey: Survey) -> bool:
         """Whether what is left would soon not bring a robot home, as metres have cost it until now."""
@@ -235,12 +279,15 @@ class Supervisor:
         for row, agent in enumerate(exploring):
             going = survey.going[agent]
             if going != NOBODY:
-                # What has become short while a robot drives to it is still its goal: else it is left for later, which costs another way.
+                # What has become short while a robot drives to it is still its goal: else it is left for
+                # later, which costs another way.
                 costs[row, going], is_goal[going] = max(ways[row, going] - STICKINESS_M, 0.0), True
         if self._settings.assignment == "hungarian":
             goals = assign_by_cost(costs)
         else:
-            goals = assign_by_utility(costs, survey.seen(), is_goal.astype(np.float64), self._settings.cost_weight)
+            goals = assign_by_utility(
+                costs, survey.seen(), is_goal.astype(np.float64), self._settings.cost_weight
+            )
         for agent, goal in zip(exploring, goals.tolist(), strict=True):
             one = judged[agent]
             if goal == NOBODY:
@@ -277,11 +324,19 @@ class Supervisor:
         pose = self.station.reports[case.robot.agent].pose
         self.decisions.append(
             Decision(
-                time_s, case.robot.agent, group, case.robot, case.rival or case.opponent, one.answers, leaf.rule,
-                None if leaf.order is None else leaf.order.value, leaf.why, (pose.x, pose.y),
+                time_s,
+                case.robot.agent,
+                group,
+                case.robot,
+                case.rival or case.opponent,
+                one.answers,
+                leaf.rule,
+                None if leaf.order is None else leaf.order.value,
+                leaf.why,
+                (pose.x, pose.y),
                 None if target is None else (target.x, target.y),
             )
-        )  # fmt: skip
+        )
 
 
 def _judged(case: Case, tree: Node) -> _Judged:

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.envs.onboard.reports import Report
-from lidarium.mapping.frontier_approach import approach, default_reach
-from lidarium.mapping.grid_lines import visible
-from lidarium.mapping.grid_planning import Cell, Footprint, cells_of, centres_of, search
+from lidarium.envs.station.reports import Report
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.grid_lines import visible
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.mapping.occupancy import FREE, OCCUPIED
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.planning.frontier_approach import approach, default_reach
+from lidarium.mapping.planning.grid_planning import Cell, Footprint, cells_of, centres_of, search
 
 NONE = -1
 _MARGIN = 1
@@ -52,7 +52,9 @@ class Goals:
 
 
 class Survey:
-    """What the merged map of a group offers to its robots. All is in the frame of the map, that of the group's first robot.
+    """What the merged map of a group offers to its robots.
+
+    All is in the frame of the map, that of the group's first robot.
 
     Parameters
     ----------
@@ -82,11 +84,19 @@ class Survey:
         footprint: Footprint,
         settings: SupervisorSettings,
     ) -> None:
-        self.frames, self.workers, self._settings, self._footprint = dict(frames), list(workers), settings, footprint
+        self.frames, self.workers, self._settings, self._footprint = (
+            dict(frames),
+            list(workers),
+            settings,
+            footprint,
+        )
         levels = np.pad(fused.levels, _MARGIN, constant_values=127)
         log_odds = (levels == OCCUPIED).astype(np.int8) - (levels == FREE).astype(np.int8)
         self.resolution = fused.resolution
-        self.origin = (fused.origin[0] - _MARGIN * fused.resolution, fused.origin[1] - _MARGIN * fused.resolution)
+        self.origin = (
+            fused.origin[0] - _MARGIN * fused.resolution,
+            fused.origin[1] - _MARGIN * fused.resolution,
+        )
         self._map = NavigationMap(log_odds, fused.resolution)
         self._map.changed((0, log_odds.shape[0], 0, log_odds.shape[1]))
         reach = default_reach(footprint, fused.resolution)
@@ -107,7 +117,9 @@ class Survey:
     def known_area_m2(self) -> float:
         """Area of the box around what the map knows, made wider by the laser's range on all sides [m2]."""
         height, width = ((int(side) - 2 * _MARGIN) * self.resolution for side in self._map.log_odds.shape)
-        return float((height + 2.0 * self._settings.sensor_range_m) * (width + 2.0 * self._settings.sensor_range_m))
+        return float(
+            (height + 2.0 * self._settings.sensor_range_m) * (width + 2.0 * self._settings.sensor_range_m)
+        )
 
     def has_frontier(self) -> bool:
         """Whether any of the robots can reach what is left to explore."""
@@ -123,7 +135,9 @@ class Survey:
         first, second = self.places[a], self.places[b]
         if first is None or second is None:
             return False
-        return math.dist(first, second) < distance_m or (self.going[a] != NONE and self.going[a] == self.going[b])
+        return math.dist(first, second) < distance_m or (
+            self.going[a] != NONE and self.going[a] == self.going[b]
+        )
 
     def are_meeting(self, a: str, b: str) -> bool:
         """Whether the goals of two robots lie near and in sight of each other, and both come nearer to the other by going there."""
@@ -150,7 +164,10 @@ class Survey:
     def stand(self, agent: str, goal: int) -> tuple[float, float, float]:
         """Return where a robot stands to see a goal, and its heading, in its own map frame [m, rad]."""
         row = self.workers.index(agent)
-        place, look = (centres_of(cells[row, goal], self.origin, self.resolution) for cells in (self.goals.stands, self.goals.looks))
+        place, look = (
+            centres_of(cells[row, goal], self.origin, self.resolution)
+            for cells in (self.goals.stands, self.goals.looks)
+        )
         own = self.frames[agent].inverse()
         x, y = own.apply(place).tolist()
         looked_at = own.apply(look)
@@ -159,32 +176,61 @@ class Survey:
     def looks_at(self, agent: str, goal: int) -> tuple[float, float]:
         """Return the frontier cell of a goal that a robot looks at, in its own map frame [m]."""
         row = self.workers.index(agent)
-        x, y = self.frames[agent].inverse().apply(centres_of(self.goals.looks[row, goal], self.origin, self.resolution)).tolist()
+        x, y = (
+            self.frames[agent]
+            .inverse()
+            .apply(centres_of(self.goals.looks[row, goal], self.origin, self.resolution))
+            .tolist()
+        )
         return x, y
 
     def way_home_m(self, agent: str, home: Transform) -> float:
         """Return what a robot's way to a pose of its own map frame costs [m], inf where there is none."""
         at = self.frames[agent] @ home
         found = search(
-            self._map.space, self._map.log_odds, self._map.clearance, self._cell_of(agent), self._footprint,
+            self._map.space,
+            self._map.log_odds,
+            self._map.clearance,
+            self._cell_of(agent),
+            self._footprint,
             goal=self._inside((at.x, at.y)),
-        )  # fmt: skip
+        )
         return found.cost(self._inside((at.x, at.y)))
 
     def _goals(self, reach: float) -> Goals:
         clusters = self._map.frontiers.clusters(self.origin)
         count, robots = len(clusters), len(self.workers)
         costs = np.full((robots, count), math.inf)
-        stands, looks = np.full((robots, count, 2), NONE, np.int64), np.full((robots, count, 2), NONE, np.int64)
+        stands, looks = (
+            np.full((robots, count, 2), NONE, np.int64),
+            np.full((robots, count, 2), NONE, np.int64),
+        )
         for row, agent in enumerate(self.workers):
             if not count:
                 break
-            found = search(self._map.space, self._map.log_odds, self._map.clearance, self._cell_of(agent), self._footprint)
+            found = search(
+                self._map.space,
+                self._map.log_odds,
+                self._map.clearance,
+                self._cell_of(agent),
+                self._footprint,
+            )
             near = approach(clusters, found, self._map.log_odds, reach)
             costs[row] = np.where(near.reachable, near.costs, math.inf)
             stands[row], looks[row] = near.cells, near.frontier_cells
-        areas = _unknown_around(self._map.log_odds, clusters.representatives, self._settings.sensor_range_m / 2.0, self.resolution)
-        return Goals(clusters.cells, clusters.starts, clusters.representatives, clusters.sizes, areas, costs, stands, looks)
+        areas = _unknown_around(
+            self._map.log_odds, clusters.representatives, self._settings.sensor_range_m / 2.0, self.resolution
+        )
+        return Goals(
+            clusters.cells,
+            clusters.starts,
+            clusters.representatives,
+            clusters.sizes,
+            areas,
+            costs,
+            stands,
+            looks,
+        )
 
     def _goal_at(self, place: tuple[float, ...] | None) -> int:
         """Return the goal that a robot at a place [m] looks at, -1 for none."""
@@ -216,12 +262,22 @@ class Survey:
         return min(max(int(cell[0]), 0), rows - 1), min(max(int(cell[1]), 0), columns - 1)
 
 
-def _unknown_around(log_odds: NDArray[np.int8], cells: NDArray[np.int64], half_side_m: float, resolution: float) -> NDArray[np.float64]:
-    """Return the unknown area in the square around each cell [m2]; what lies beyond the map is unknown."""
+def _unknown_around(
+    log_odds: NDArray[np.int8], cells: NDArray[np.int64], half_side_m: float, resolution: float
+) -> NDArray[np.float64]:
+    """Return the unknown area in the square around each cell [m2].
+
+    What lies beyond the map is unknown.
+    """
     half = max(round(half_side_m / resolution), 1)
     sums = np.zeros((log_odds.shape[0] + 1, log_odds.shape[1] + 1), np.int64)
     sums[1:, 1:] = (log_odds != 0).cumsum(axis=0, dtype=np.int64).cumsum(axis=1)
     low = np.maximum(cells - half, 0)
     high = np.minimum(cells + half + 1, log_odds.shape)
-    known = sums[high[:, 0], high[:, 1]] - sums[low[:, 0], high[:, 1]] - sums[high[:, 0], low[:, 1]] + sums[low[:, 0], low[:, 1]]
+    known = (
+        sums[high[:, 0], high[:, 1]]
+        - sums[low[:, 0], high[:, 1]]
+        - sums[high[:, 0], low[:, 1]]
+        + sums[low[:, 0], low[:, 1]]
+    )
     return np.asarray(((2 * half + 1) ** 2 - known) * resolution**2, np.float64)

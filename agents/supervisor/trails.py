@@ -1,7 +1,7 @@
 """Where robots have been: no walls are there, but others may have mapped the robots themselves as such.
 
-Robots that do not know where the others are draw their bodies into their maps. To a merger these are walls that contradict the free
-floor on which the other one drove, and on a merged map they bar the way.
+Robots that do not know where the others are draw their bodies into their maps. To a merger these are walls
+that contradict the free floor on which the other one drove, and on a merged map they bar the way.
 """
 
 from collections.abc import Iterable
@@ -9,12 +9,14 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.grids.occupancy import OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.incremental import GrowingMap
-from lidarium.mapping.occupancy import OCCUPIED, UNKNOWN
-from lidarium.mapping.swept import swept
+from lidarium.mapping.planning.footprint_masks import swept
 
 
-def without_own_trail(one: GrowingMap, trail: NDArray[np.float64], radius: float, resolution: float) -> GrowingMap:
+def without_own_trail(
+    one: GrowingMap, trail: NDArray[np.float64], radius: float, resolution: float
+) -> GrowingMap:
     """Return a map that claims nothing of where its robot has been, so that its image on other maps is no contradiction.
 
     Parameters
@@ -31,7 +33,9 @@ def without_own_trail(one: GrowingMap, trail: NDArray[np.float64], radius: float
     return GrowingMap(levels, one.origin)
 
 
-def without_bodies(one: GrowingMap, trails: Iterable[NDArray[np.float64]], radius: float, resolution: float) -> GrowingMap:
+def without_bodies(
+    one: GrowingMap, trails: Iterable[NDArray[np.float64]], radius: float, resolution: float
+) -> GrowingMap:
     """Return a map without walls where other robots have been.
 
     Parameters
@@ -45,5 +49,7 @@ def without_bodies(one: GrowingMap, trails: Iterable[NDArray[np.float64]], radiu
     """
     levels = one.levels.copy()
     for trail in trails:
-        levels[swept(one.levels.shape, one.origin, trail, radius, resolution) & (levels == OCCUPIED)] = UNKNOWN
+        levels[swept(one.levels.shape, one.origin, trail, radius, resolution) & (levels == OCCUPIED)] = (
+            UNKNOWN
+        )
     return GrowingMap(levels, one.origin)

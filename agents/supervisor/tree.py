@@ -1,25 +1,28 @@
 """The decision tree, as data: what is asked of a robot, and what follows from the answers.
 
-The rules are those of the thesis, reconstructed from its prose, as its figure is lost; they keep their numbers:
+The rules are those of the thesis, reconstructed from its prose, as its figure is lost; they keep their
+numbers:
 
 1. A robot that has failed is left out: its map is not used, it gets no order.
-2. The maps of all others are merged, but only robots that operate get orders: one that is paused or stopped may stand against
-   something that moves, and would draw that into its map and trap itself.
-3. Of two robots with one goal the nearer one, by the length of its path, keeps it. The other one gets another goal on the merged map,
-   or is stopped where there is none. (In the thesis's reported run the nearer robot was diverted; see the tests.)
-4. A robot that knows much less of the map than the others is sent where there is more to map. One that is enclosed, having driven far
-   for little, is stopped where there is no such way.
+2. The maps of all others are merged, but only robots that operate get orders: one that is paused or stopped
+   may stand against something that moves, and would draw that into its map and trap itself.
+3. Of two robots with one goal the nearer one, by the length of its path, keeps it. The other one gets another
+   goal on the merged map, or is stopped where there is none. (In the thesis's reported run the nearer robot
+   was diverted; see the tests.)
+4. A robot that knows much less of the map than the others is sent where there is more to map. One that is
+   enclosed, having driven far for little, is stopped where there is no such way.
 5. Where the merged map has no frontier left the work is done, and all stop.
 
-Beyond the thesis, each only where it is switched on: 6. all robots of a group get goals at once; 7. robots that would meet are
-separated; 8. robots drive home when the work is done; 9. a robot turns back before its battery is too low for that.
+Beyond the thesis, each only where it is switched on: 6. all robots of a group get goals at once; 7. robots
+that would meet are separated; 8. robots drive home when the work is done; 9. a robot turns back before its
+battery is too low for that.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.onboard.state import OperatingState, OrderKind
+from lidarium.envs.radio.messages import OperatingState, OrderKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +98,10 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """What follows: by which rule, the order or None, and why. ``aim`` says what an order to go leads to."""
+    """What follows: by which rule, the order or None, and why.
+
+    ``aim`` says what an order to go leads to.
+    """
 
     rule: int
     order: OrderKind | None
@@ -113,20 +119,33 @@ class Node:
 
 
 def _keeps_before(robot: RobotInputs, other: RobotInputs | None) -> bool:
-    """Whether a robot is nearer than another; of two equally near ones the first by name."""
+    """Whether a robot is nearer than another.
+
+    Of two equally near ones the first by name.
+    """
     return other is None or (robot.remaining_m, robot.agent) <= (other.remaining_m, other.agent)
 
 
 FAILED = Question("failed", "has it failed?", lambda case: case.robot.state is OperatingState.FAILED)
-OPERATING = Question("operating", "does it operate?", lambda case: case.robot.state is OperatingState.OPERATING)
-FRONTIER = Question("frontier", "does the merged map have a frontier left in reach?", lambda case: case.has_frontier)
-SAME_GOAL = Question("same_goal", "has another robot of its group the same goal?", lambda case: case.rival is not None)
+OPERATING = Question(
+    "operating", "does it operate?", lambda case: case.robot.state is OperatingState.OPERATING
+)
+FRONTIER = Question(
+    "frontier", "does the merged map have a frontier left in reach?", lambda case: case.has_frontier
+)
+SAME_GOAL = Question(
+    "same_goal", "has another robot of its group the same goal?", lambda case: case.rival is not None
+)
 NEARER = Question("nearer", "is it nearer to the goal?", lambda case: _keeps_before(case.robot, case.rival))
-OTHER_GOAL = Question("other_goal", "does the merged map offer another goal?", lambda case: case.has_other_goal)
+OTHER_GOAL = Question(
+    "other_goal", "does the merged map offer another goal?", lambda case: case.has_other_goal
+)
 BEHIND = Question("behind", "does it know much less of the map than its group?", lambda case: case.is_behind)
 RICHER = Question("richer", "is there a way with more to map?", lambda case: case.has_richer_goal)
 ENCLOSED = Question("enclosed", "has it driven far and mapped little?", lambda case: case.is_enclosed)
-LOW_BATTERY = Question("low_battery", "is its battery just enough to get home?", lambda case: case.is_battery_low)
+LOW_BATTERY = Question(
+    "low_battery", "is its battery just enough to get home?", lambda case: case.is_battery_low
+)
 MEETING = Question(
     "meeting",
     "would it meet a nearer robot, and has another goal on offer?",
@@ -150,7 +169,9 @@ def decision_tree(settings: SupervisorSettings) -> Node:
         goes_on,
     )
     if settings.avoids_rendezvous:
-        balance = Node(MEETING, Leaf(7, OrderKind.GO_TO, "it would meet a robot that is nearer", OTHER), balance)
+        balance = Node(
+            MEETING, Leaf(7, OrderKind.GO_TO, "it would meet a robot that is nearer", OTHER), balance
+        )
     rivals = Node(
         NEARER,
         Leaf(3, None, "it is the nearer one and keeps the goal"),
@@ -165,7 +186,9 @@ def decision_tree(settings: SupervisorSettings) -> Node:
         done = Leaf(8, OrderKind.GO_TO, "no frontier is left, it drives home", HOME)
     work = Node(FRONTIER, Node(SAME_GOAL, rivals, balance), done)
     if settings.battery_margin > 0.0:
-        work = Node(LOW_BATTERY, Leaf(9, OrderKind.GO_TO, "its battery is just enough to get home", HOME), work)
+        work = Node(
+            LOW_BATTERY, Leaf(9, OrderKind.GO_TO, "its battery is just enough to get home", HOME), work
+        )
     operating = Node(OPERATING, work, Leaf(2, None, "its map is merged, it gets no order"))
     return Node(FAILED, Leaf(1, None, "it has failed and is left out"), operating)
 
@@ -195,7 +218,11 @@ def words_of(leaf: Leaf) -> str:
     """Return a leaf in one line."""
     rule = f"rule {leaf.rule}: " if leaf.rule else ""
     aims = {OTHER: "another goal", RICH: "where there is more to map", HOME: "home"}
-    order = "no order" if leaf.order is None else " ".join([leaf.order.value.replace("_", " "), *([aims[leaf.aim]] if leaf.aim else [])])
+    order = (
+        "no order"
+        if leaf.order is None
+        else " ".join([leaf.order.value.replace("_", " "), *([aims[leaf.aim]] if leaf.aim else [])])
+    )
     return f"{rule}{order} ({leaf.why})"
 
 
@@ -203,12 +230,22 @@ def tree_text(tree: Node | Leaf, indent: str = "") -> str:
     """Return the tree as indented lines, as `lidarium show supervisor` prints it."""
     if isinstance(tree, Leaf):
         return indent + words_of(tree)
-    branches = [(answer, tree_text(branch, indent + "    ").lstrip()) for answer, branch in (("yes", tree.yes), ("no", tree.no))]
-    return "\n".join([indent + tree.question.words, *(f"{indent}  {answer}: {text}" for answer, text in branches)])
+    branches = [
+        (answer, tree_text(branch, indent + "    ").lstrip())
+        for answer, branch in (("yes", tree.yes), ("no", tree.no))
+    ]
+    return "\n".join(
+        [indent + tree.question.words, *(f"{indent}  {answer}: {text}" for answer, text in branches)]
+    )
 
 
 def tree_data(tree: Node | Leaf) -> dict[str, object]:
     """Return the tree as a dictionary for JSON."""
     if isinstance(tree, Leaf):
         return {"rule": tree.rule, "order": None if tree.order is None else tree.order.value, "why": tree.why}
-    return {"test": tree.question.name, "question": tree.question.words, "yes": tree_data(tree.yes), "no": tree_data(tree.no)}
+    return {
+        "test": tree.question.name,
+        "question": tree.question.words,
+        "yes": tree_data(tree.yes),
+        "no": tree_data(tree.no),
+    }

@@ -1,1 +1,4 @@
-"""How fast the package is, beside other simulators, and how its speed grows; ``all`` runs every question."""
+"""How fast the package is, beside other simulators, and how its speed grows.
+
+``all`` runs every question.
+"""

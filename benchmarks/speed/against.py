@@ -2,8 +2,8 @@
 
     python benchmarks/speed/against.py OTHER_PYTHON [--threads 1] [--rounds 3] [--blocks 40]
 
-OTHER_PYTHON is the interpreter of a virtual environment in which the other checkout is installed. Each runs in a process of its own, and
-they take turns block by block, so that both meet the same noise of the machine.
+OTHER_PYTHON is the interpreter of a virtual environment in which the other checkout is installed. Each runs
+in a process of its own, and they take turns block by block, so that both meet the same noise of the machine.
 """
 
 import argparse
@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lidarium.benchmarks.speed.batches import OBSERVED, DrivenBatch
-from lidarium.benchmarks.speed.floors import straight_floor
+from lidarium.benchmarks.speed.harness.batches import OBSERVED, DrivenBatch
+from lidarium.benchmarks.speed.scenes.floors import straight_floor
 
 KINDS = ("all observations", "without egocentric maps")
 STEPS = 20
@@ -28,7 +28,10 @@ def serve(threads: int) -> None:
     preset = {"lidar": "lidar_360_6m", "resolution": 0.05}
     plain = tuple(name for name in OBSERVED if name != "egocentric_map")
     floor = straight_floor()
-    batches = {KINDS[0]: DrivenBatch(floor, threads, **preset), KINDS[1]: DrivenBatch(floor, threads, **preset, observe=plain)}
+    batches = {
+        KINDS[0]: DrivenBatch(floor, threads, **preset),
+        KINDS[1]: DrivenBatch(floor, threads, **preset, observe=plain),
+    }
     for line in sys.stdin:
         kind, _, place = line.strip().partition(" from ")
         if place:
@@ -42,7 +45,10 @@ def serve(threads: int) -> None:
 def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[str, np.ndarray]:
     """Return the times an agent step [us] of each kind, shape (pythons, rounds * blocks)."""
     command = [str(Path(__file__).resolve()), "--serve", "--threads", str(threads)]
-    processes = [subprocess.Popen([python, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for python in pythons]
+    processes = [
+        subprocess.Popen([python, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        for python in pythons
+    ]
     found: dict[str, np.ndarray] = {kind: np.zeros((len(pythons), rounds * blocks)) for kind in KINDS}
     try:
         for block in range(rounds * blocks):
@@ -52,7 +58,9 @@ def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[st
                 for k, process in enumerate(processes):
                     answer = _answer(process, f"{kind}{place}\n")
                     if not answer:
-                        raise RuntimeError(f"{pythons[k]} has ended; is lidarium with its benchmarks installed there?")
+                        raise RuntimeError(
+                            f"{pythons[k]} has ended; is lidarium with its benchmarks installed there?"
+                        )
                     found[kind][k, block] = float(answer)
     finally:
         for process in processes:
@@ -73,8 +81,12 @@ def _answer(process: "subprocess.Popen[str]", question: str) -> str:
 
 def main() -> None:
     """Compare two checkouts and print medians with quartiles."""
-    parser = argparse.ArgumentParser(description="The learning preset of this code beside that of another checkout.")
-    parser.add_argument("other", nargs="?", help="interpreter of a virtual environment with the other checkout")
+    parser = argparse.ArgumentParser(
+        description="The learning preset of this code beside that of another checkout."
+    )
+    parser.add_argument(
+        "other", nargs="?", help="interpreter of a virtual environment with the other checkout"
+    )
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--rounds", type=int, default=3, help="each begins with blank maps")
     parser.add_argument("--blocks", type=int, default=40, help=f"blocks of {STEPS} steps in a round")
@@ -85,7 +97,9 @@ def main() -> None:
         return
     if options.other is None or min(options.threads, options.rounds, options.blocks) < 1:
         parser.error("want the other checkout's interpreter, and threads, rounds and blocks of at least 1")
-    for kind, (ours, other) in times([sys.executable, options.other], options.threads, options.rounds, options.blocks).items():
+    for kind, (ours, other) in times(
+        [sys.executable, options.other], options.threads, options.rounds, options.blocks
+    ).items():
         low, middle, high = np.quantile(ours / other, [0.25, 0.5, 0.75])
         rates = f"{np.median(ours):.2f} us an agent step, the other {np.median(other):.2f}"
         print(f"{kind}: {rates}; {middle:.3f} of its time (quartiles {low:.3f} to {high:.3f})")

@@ -3,7 +3,8 @@
     python benchmarks/speed/all.py                  # writes docs/results/speed.md and speed.json
     python benchmarks/speed/all.py --effort quick
 
-``lidarium bench`` measures the same. The peers take part where they are installed, see ``peers/catalogue.py``.
+``lidarium bench`` measures the same. The peers take part where they are installed, see
+``peers/catalogue.py``.
 """
 
 import argparse
@@ -12,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from lidarium.benchmarks.speed import (
+from lidarium.benchmarks.speed.cases import (
     batch_step,
     cached_start,
     environment_step,
@@ -24,10 +25,10 @@ from lidarium.benchmarks.speed import (
     ray_casting,
     waypoint_decision,
 )
-from lidarium.benchmarks.speed.lines import Line, table
+from lidarium.benchmarks.speed.harness.lines import Line, table
+from lidarium.benchmarks.speed.harness.report import speed_result, with_effort, write_speed
+from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, on_cores
 from lidarium.benchmarks.speed.peers.catalogue import missing_peers
-from lidarium.benchmarks.speed.report import speed_result, with_effort, write_speed
-from lidarium.benchmarks.speed.timing import EFFORTS, Effort, on_cores
 
 _MODULES: tuple[ModuleType, ...] = (
     kernel_step,
@@ -68,7 +69,9 @@ def result_of(names: Sequence[str], lines: Sequence[Line], command: str, effort:
 def main() -> None:
     """Measure, print and write."""
     parser = with_effort(argparse.ArgumentParser(description="All speed benchmarks in one run."))
-    parser.add_argument("--out", type=Path, default=Path("docs/results"), help="folder of speed.md and speed.json")
+    parser.add_argument(
+        "--out", type=Path, default=Path("docs/results"), help="folder of speed.md and speed.json"
+    )
     chosen = parser.parse_args()
     effort = EFFORTS[chosen.effort]
     lines: list[Line] = []

@@ -9,13 +9,17 @@ import statistics
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from lidarium.benchmarks.speed.floors import BenchFloor, straight_floor, turned_floor
-from lidarium.benchmarks.speed.report import about, heading, with_effort
+from lidarium.benchmarks.speed.harness.report import about, heading, with_effort
+from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, interleaved, on_cores, repeated
+from lidarium.benchmarks.speed.scenes.floors import BenchFloor, straight_floor, turned_floor
 from lidarium.benchmarks.speed.step_parts import ROBOTS, StepParts
-from lidarium.benchmarks.speed.timing import EFFORTS, Effort, interleaved, on_cores, repeated
-from lidarium.evaluation.output import check_writable, write_text
+from lidarium.evaluation.episodes.output import check_writable, write_text
 
-WHOLE, OBSERVATION, REST = "whole step of the kernel", "observation", "rest: teammates in the beams, ranges as told, sharing out, the call"
+WHOLE, OBSERVATION, REST = (
+    "whole step of the kernel",
+    "observation",
+    "rest: teammates in the beams, ranges as told, sharing out, the call",
+)
 
 
 def profile(floor: BenchFloor, effort: Effort) -> tuple[dict[str, float], float, float]:
@@ -23,8 +27,16 @@ def profile(floor: BenchFloor, effort: Effort) -> tuple[dict[str, float], float,
     step = StepParts(floor)
     contenders = {**step.parts, WHOLE: step.whole, OBSERVATION: step.observation}
     seconds = interleaved({name: repeated(function, ROBOTS) for name, function in contenders.items()}, effort)
-    rest = [whole - sum(parts) for whole, *parts in zip(seconds[WHOLE], *(seconds[name] for name in step.parts), strict=True)]
-    ordered = {**{name: seconds[name] for name in step.parts}, REST: rest, WHOLE: seconds[WHOLE], OBSERVATION: seconds[OBSERVATION]}
+    rest = [
+        whole - sum(parts)
+        for whole, *parts in zip(seconds[WHOLE], *(seconds[name] for name in step.parts), strict=True)
+    ]
+    ordered = {
+        **{name: seconds[name] for name in step.parts},
+        REST: rest,
+        WHOLE: seconds[WHOLE],
+        OBSERVATION: seconds[OBSERVATION],
+    }
     return {name: 1e6 * statistics.median(values) for name, values in ordered.items()}, step.rays, step.cells
 
 
@@ -34,7 +46,10 @@ def profile_table(profiles: Mapping[str, tuple[Mapping[str, float], float, float
     header = "".join(f" {floor}: us per agent step | share of the whole |" for floor in profiles)
     lines = [f"| part |{header}", f"|---|{'---:|---:|' * len(profiles)}"]
     for name in names:
-        cells = "".join(f" {spent[name]:.2f} | {100.0 * spent[name] / spent[WHOLE]:.0f} % |" for spent, _, _ in profiles.values())
+        cells = "".join(
+            f" {spent[name]:.2f} | {100.0 * spent[name] / spent[WHOLE]:.0f} % |"
+            for spent, _, _ in profiles.values()
+        )
         lines.append(f"| {name} |{cells}")
     return "\n".join(lines)
 
@@ -51,7 +66,9 @@ def rates(profiles: Mapping[str, tuple[Mapping[str, float], float, float]]) -> S
 
 def main() -> None:
     """Measure, print, and write where asked to."""
-    parser = with_effort(argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter))
+    parser = with_effort(
+        argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    )
     parser.add_argument("--out", type=Path, help="folder of profile.md")
     chosen = parser.parse_args()
     if chosen.out is not None:
@@ -59,7 +76,10 @@ def main() -> None:
     effort = EFFORTS[chosen.effort]
     straight = straight_floor()
     with on_cores(1):
-        profiles = {name: profile(floor, effort) for name, floor in (("straight", straight), ("turned", turned_floor(straight)))}
+        profiles = {
+            name: profile(floor, effort)
+            for name, floor in (("straight", straight), ("turned", turned_floor(straight)))
+        }
     print(profile_table(profiles), *rates(profiles), sep="\n")
     if chosen.out is not None:
         command = f"python benchmarks/speed/profile_step.py --effort {chosen.effort} --out {chosen.out}"
@@ -67,7 +87,9 @@ def main() -> None:
         write_text(chosen.out / "profile.md", profile_page(profiles, effort, command))
 
 
-def profile_page(profiles: Mapping[str, tuple[Mapping[str, float], float, float]], effort: Effort, command: str) -> str:
+def profile_page(
+    profiles: Mapping[str, tuple[Mapping[str, float], float, float]], effort: Effort, command: str
+) -> str:
     """Write the page of the profile."""
     return "\n".join(
         [

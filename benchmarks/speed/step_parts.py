@@ -5,21 +5,22 @@ from functools import partial
 
 import numpy as np
 
-from lidarium.benchmarks.speed.batches import OBSERVED
-from lidarium.benchmarks.speed.floors import BenchFloor
-from lidarium.benchmarks.speed.teams import DrivenTeam
-from lidarium.envs.coverage import mark_seen
+from lidarium.benchmarks.speed.harness.batches import OBSERVED
+from lidarium.benchmarks.speed.scenes.floors import BenchFloor
+from lidarium.benchmarks.speed.scenes.teams import DrivenTeam
 from lidarium.envs.observations import ObservationWriter
-from lidarium.envs.settings import ExplorationSettings, make_settings
-from lidarium.envs.simulation.lidar import cast_scan
-from lidarium.envs.simulation.motion import move_robots
+from lidarium.envs.scoring.coverage import mark_seen
+from lidarium.envs.settings.exploration import ExplorationSettings, make_settings
+from lidarium.envs.simulation.kinematic.motion import move_robots
+from lidarium.envs.simulation.kinematic.ray_casting import cast_scan
+from lidarium.envs.simulation.kinematic.stages import _window_corner
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE, fill_gaussian
-from lidarium.envs.simulation.stages import _window_corner
-from lidarium.mapping.kernels import Array, int8_grid_at, kernel, word_grid_at
-from lidarium.mapping.occupancy import integrate_scan
-from lidarium.mapping.pooled_maps import touched_words
-from lidarium.mapping.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
-from lidarium.mapping.scans import beam_directions
+from lidarium.mapping.grids.occupancy import integrate_scan
+from lidarium.mapping.grids.pooled_maps import touched_words
+from lidarium.mapping.grids.scan_geometry import beam_directions
+from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import int8_grid_at, word_grid_at
 
 ROBOTS, WARM_STEPS = 16, 30
 
@@ -31,9 +32,27 @@ def _directions(poses: Array, unit_vectors: Array, directions: Array) -> None:
 
 
 @kernel
-def _rays(floor: Array, places: Array, directions: Array, angle_first: float, increment: float, reach: float, lengths: Array) -> None:
+def _rays(
+    floor: Array,
+    places: Array,
+    directions: Array,
+    angle_first: float,
+    increment: float,
+    reach: float,
+    lengths: Array,
+) -> None:
     for row in range(places.shape[0]):
-        cast_scan(floor, places[row, 0], places[row, 1], places[row, 2], angle_first, increment, directions[row], reach, lengths[row])
+        cast_scan(
+            floor,
+            places[row, 0],
+            places[row, 1],
+            places[row, 2],
+            angle_first,
+            increment,
+            directions[row],
+            reach,
+            lengths[row],
+        )
 
 
 @kernel
@@ -43,7 +62,9 @@ def _noise(table: Array, draws: Array) -> None:
 
 
 @kernel
-def _fill(lengths: Array, directions: Array, places: Array, increment: float, ends: Array, bits: Array, boxes: Array) -> None:
+def _fill(
+    lengths: Array, directions: Array, places: Array, increment: float, ends: Array, bits: Array, boxes: Array
+) -> None:
     """Fill the areas seen, with their end points and the clearing of the bits."""
     for row in range(lengths.shape[0]):
         bits[row] = 0
@@ -63,15 +84,33 @@ def _score(masks: Array, bits: Array, boxes: Array, corners: Array, news: Array)
 
 
 @kernel
-def _map(maps: Array, bits: Array, boxes: Array, ends: Array, is_hit: Array, corners: Array, increments: Array, hit_bits: Array) -> None:
+def _map(
+    maps: Array,
+    bits: Array,
+    boxes: Array,
+    ends: Array,
+    is_hit: Array,
+    corners: Array,
+    increments: Array,
+    hit_bits: Array,
+) -> None:
     for row in range(bits.shape[0]):
         hit_bits[row] = 0
         log_odds = int8_grid_at(maps[row, 0], maps[row, 1], maps[row, 2])
         box = (boxes[row, 0], boxes[row, 1], boxes[row, 2], boxes[row, 3])
         touched = word_grid_at(maps[row, 3], maps[row, 4], touched_words(maps[row, 2]))
         integrate_scan(
-            log_odds, bits[row], box, ends[row], is_hit[row], corners[row, 0], corners[row, 1], increments, hit_bits[row], touched
-        )  # fmt: skip
+            log_odds,
+            bits[row],
+            box,
+            ends[row],
+            is_hit[row],
+            corners[row, 0],
+            corners[row, 1],
+            increments,
+            hit_bits[row],
+            touched,
+        )
 
 
 class StepParts:
@@ -107,19 +146,38 @@ class StepParts:
         directions, lengths = np.empty((ROBOTS, 4, beams)), np.empty((ROBOTS, beams))
         noisy = np.minimum(world.ranges.astype(np.float64) / floor.resolution, reach)
         is_hit = np.isfinite(world.ranges)
-        clean_bits, noisy_bits, hit_bits = (np.zeros((ROBOTS, window_rows(reach), window_words(reach)), np.uint64) for _ in range(3))
+        clean_bits, noisy_bits, hit_bits = (
+            np.zeros((ROBOTS, window_rows(reach), window_words(reach)), np.uint64) for _ in range(3)
+        )
         clean_boxes, noisy_boxes, news = (np.zeros((ROBOTS, 4), np.int64) for _ in range(3))
         clean_ends, noisy_ends = np.empty((ROBOTS, 2, beams)), np.empty((ROBOTS, 2, beams))
         moved, speeds = poses.copy(), velocities.copy()
-        bumpers, contacts, touched = np.zeros((ROBOTS, 3), np.int8), np.zeros(ROBOTS, np.uint8), np.zeros(ROBOTS, np.int64)
+        bumpers, contacts, touched = (
+            np.zeros((ROBOTS, 3), np.int8),
+            np.zeros(ROBOTS, np.uint8),
+            np.zeros(ROBOTS, np.int64),
+        )
         floor_row = world._floor_rows[0]
 
         def move() -> None:
             moved[:], speeds[:] = poses, velocities
             move_robots(
-                floor_row[8], floor_row[9], floor_row[1], floor_row[2], world._frames[0], world.bodies, world.moves, moved, speeds,
-                commands, world.time_step, bumpers, contacts, np.zeros(ROBOTS), touched,
-            )  # fmt: skip
+                floor_row[8],
+                floor_row[9],
+                floor_row[1],
+                floor_row[2],
+                world._frames[0],
+                world.bodies,
+                world.moves,
+                moved,
+                speeds,
+                commands,
+                world.time_step,
+                bumpers,
+                contacts,
+                np.zeros(ROBOTS),
+                touched,
+            )
 
         def step() -> None:
             world.poses[:], world.velocities[:] = poses, velocities
@@ -129,13 +187,27 @@ class StepParts:
         self.parts: dict[str, Callable[[], object]] = {
             "motion and contact": move,
             "directions of the beams": partial(_directions, poses, lidar.unit_vectors, directions),
-            "ray casting": partial(_rays, floor_row, places, directions, lidar.angle_first, increment, reach, lengths),
+            "ray casting": partial(
+                _rays, floor_row, places, directions, lidar.angle_first, increment, reach, lengths
+            ),
             "noise": partial(_noise, GAUSSIAN_TABLE, np.empty((ROBOTS, beams), np.float32)),
-            "area seen by the true beams": partial(_fill, lengths, directions, inside, increment, clean_ends, clean_bits, clean_boxes),
+            "area seen by the true beams": partial(
+                _fill, lengths, directions, inside, increment, clean_ends, clean_bits, clean_boxes
+            ),
             "scorer": partial(_score, world._mask_rows, clean_bits, clean_boxes, corners, news),
-            "area seen through noise": partial(_fill, noisy, directions, inside, increment, noisy_ends, noisy_bits, noisy_boxes),
+            "area seen through noise": partial(
+                _fill, noisy, directions, inside, increment, noisy_ends, noisy_bits, noisy_boxes
+            ),
             "map update": partial(
-                _map, world.belief_rows, noisy_bits, noisy_boxes, noisy_ends, is_hit, corners, world._increments, hit_bits
+                _map,
+                world.belief_rows,
+                noisy_bits,
+                noisy_boxes,
+                noisy_ends,
+                is_hit,
+                corners,
+                world._increments,
+                hit_bits,
             ),
         }
         self.whole: Callable[[], object] = step

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.kinematic import KinematicWorld
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
 
 REASONS = ("", "covered", "reached", "collision", "horizon", "no_frontier", "frontier_unreachable", "failed")
 """Why a robot ended, by number; 0 where it has not."""
@@ -39,7 +39,10 @@ def endings(
     if goals is not None:
         away = world.poses[:, :2] - np.repeat(goals, robots, axis=0)
         with np.errstate(invalid="ignore"):
-            is_there = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] <= settings.goal_radius * settings.goal_radius
+            is_there = (
+                away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1]
+                <= settings.goal_radius * settings.goal_radius
+            )
         reasons[live & is_there] = REACHED
     if settings.stop_on_contact:
         reasons[live & (world.contacts != 0)] = COLLISION

@@ -25,17 +25,17 @@ from lidarium.envs.batch.running import (
     run_parallel,
     run_serial,
 )
-from lidarium.envs.episodes import Beginning, begin, goal_of_robots, make_world, map_frames
+from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_world, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, observation_space
-from lidarium.envs.onboard.operating import state_after
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
-from lidarium.envs.onboard.state import OperatingState
-from lidarium.envs.options import FloorChoice, ResetOptions
-from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.arrays import ENDED
-from lidarium.mapping.turns import new_turns
+from lidarium.envs.radio.messages import OperatingState
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
+from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.station.operating import state_after
+from lidarium.mapping.kernels.work_queue import new_turns
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -121,7 +121,9 @@ class EpisodeBatch:
         self.perception = Perception(self.world, settings, self._offsets)
         self._software = Software(self.perception, settings)
         self.level = make_level(level, self.perception, settings)
-        self._writer = ObservationWriter(self.world, settings, self._offsets, self._goals if self._choice.has_goal else None)
+        self._writer = ObservationWriter(
+            self.world, settings, self._offsets, self._goals if self._choice.has_goal else None
+        )
         known = observation_space(settings, self._choice.has_goal).spaces
         self.observation_space = spaces.Dict({**known, **self.level.boxes})
         self.action_space = self.level.action_space
@@ -136,15 +138,25 @@ class EpisodeBatch:
         self._generators: list[np.random.Generator | None] = [None] * self.episodes
         horizon, cover = settings.horizon_steps, settings.stop_coverage
         bounds = (
-            np.inf if horizon is None else horizon, np.inf if cover is None else cover, settings.goal_radius, settings.stop_on_contact
-        )  # fmt: skip
+            np.inf if horizon is None else horizon,
+            np.inf if cover is None else cover,
+            settings.goal_radius,
+            settings.stop_on_contact,
+        )
         self._tally = Tally(
-            self.world.counted, np.full((self.episodes, 2), np.nan),
-            np.array(bounds, np.float64), self.live, np.zeros(self.rows, np.bool_),
-        )  # fmt: skip
+            self.world.counted,
+            np.full((self.episodes, 2), np.nan),
+            np.array(bounds, np.float64),
+            self.live,
+            np.zeros(self.rows, np.bool_),
+        )
         self._commands = np.zeros((self.rows, 2))
-        # What is told of all rows alike at most steps is one array that cannot be written to, not a new one each time.
-        self.everyone, self._no_orders = _frozen(np.ones(self.rows, np.bool_)), _frozen(np.full(self.rows, "", object))
+        # What is told of all rows alike at most steps is one array that cannot be written to, not a new one
+        # each time.
+        self.everyone, self._no_orders = (
+            _frozen(np.ones(self.rows, np.bool_)),
+            _frozen(np.full(self.rows, "", object)),
+        )
         self._states = _frozen(np.full(self.rows, OperatingState.OPERATING.value, object))
         self._orders = [np.arange(self.episodes), np.arange(self.episodes)[::-1].copy()]
 
@@ -184,7 +196,8 @@ class EpisodeBatch:
         options : mapping or None
             Options by episode.
         is_same_step : bool
-            Whether this goes on with the step of the call before: observations are then written over that one's.
+            Whether this goes on with the step of the call before: observations are then written over that
+            one's.
 
         Raises
         ------
@@ -192,7 +205,8 @@ class EpisodeBatch:
             Where an action or an option cannot be used; nothing has run then.
         """
         robots = self.robots
-        # Most steps are of episodes of which none begins or has lost a robot: what concerns others costs nothing then.
+        # Most steps are of episodes of which none begins or has lost a robot: what concerns others costs
+        # nothing then.
         begins = len(beginning) > 0
         is_plain = actions is not None and not begins and self.is_whole
         modes = np.full(self.episodes, STEPS if is_plain else WAITS, np.int8)
@@ -204,8 +218,14 @@ class EpisodeBatch:
         if begins:
             for episode, start in self._draw(beginning, seeds, options or {}).items():
                 self._place(episode, start)
-            self.is_whole, self._has_goals = bool(self.live.all()), not bool(np.isnan(self._tally.goals[:, 0]).all())
-            self._note_states(np.repeat(np.isin(np.arange(self.episodes), beginning), robots), OperatingState.OPERATING.value)
+            self.is_whole, self._has_goals = (
+                bool(self.live.all()),
+                not bool(np.isnan(self._tally.goals[:, 0]).all()),
+            )
+            self._note_states(
+                np.repeat(np.isin(np.arange(self.episodes), beginning), robots),
+                OperatingState.OPERATING.value,
+            )
             modes[beginning] = LOOKS
         seen = acted
         if begins:
@@ -217,7 +237,9 @@ class EpisodeBatch:
         if not is_plain:
             self.world.rewards[~acted] = 0.0
         self.acted = acted
-        self.reasons = endings(self.world, self.settings, self._tally.goals if self._has_goals else None, acted, stopping)
+        self.reasons = endings(
+            self.world, self.settings, self._tally.goals if self._has_goals else None, acted, stopping
+        )
         self.has_endings = bool(self.reasons.any())
         if self.has_endings:
             ended = self.reasons != 0
@@ -227,8 +249,12 @@ class EpisodeBatch:
             self.world.flags[ended] |= ENDED
         self._tell(seen)
 
-    def run_kernel(self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]) -> None:
-        """Run episodes by the kernel alone, without beginnings, endings and infos; ``run`` is made of it.
+    def run_kernel(
+        self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]
+    ) -> None:
+        """Run episodes by the kernel alone, without beginnings, endings and infos.
+
+        ``run`` is made of it.
 
         Parameters
         ----------
@@ -248,12 +274,24 @@ class EpisodeBatch:
         self._orders.reverse()
         run = run_parallel if threads > 1 else run_serial
         run(
-            self.world.table, self.robots, modes, commands, self.level.drives, self.level.following, self._tally,
-            self.settings.decision_steps, seen, *self._writer.arguments(self.observations),
-            self._orders[0], new_turns(), threads,
-        )  # fmt: skip
+            self.world.table,
+            self.robots,
+            modes,
+            commands,
+            self.level.drives,
+            self.level.following,
+            self._tally,
+            self.settings.decision_steps,
+            seen,
+            *self._writer.arguments(self.observations),
+            self._orders[0],
+            new_turns(),
+            threads,
+        )
 
-    def _run_staged(self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]) -> None:
+    def _run_staged(
+        self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]
+    ) -> None:
         """Run episodes as the kernel does, step by step with what runs on board between the stages of a step; ``modes`` is used up."""
         decides = modes == DECIDES
         left = np.where(decides, self.settings.decision_steps, 1)
@@ -263,7 +301,14 @@ class EpisodeBatch:
             self._software.step(commands, moves_bodies=False, runs=looks)
             modes[looks] = WAITS
         while (runs := modes != WAITS).any():
-            follow_some(runs & decides, self.robots, self.world.table, self.level.drives, self.level.following, commands)
+            follow_some(
+                runs & decides,
+                self.robots,
+                self.world.table,
+                self.level.drives,
+                self.level.following,
+                commands,
+            )
             self._software.step(commands, runs=runs)
             note_ends(modes, self.robots, self.world.table, self.level.drives, self._tally)
             left[runs] -= 1
@@ -271,7 +316,10 @@ class EpisodeBatch:
         self._writer.write(self.observations, seen)
 
     def _draw(
-        self, beginning: NDArray[np.int64], seeds: Sequence[int | None] | None, options: Mapping[int, ResetOptions]
+        self,
+        beginning: NDArray[np.int64],
+        seeds: Sequence[int | None] | None,
+        options: Mapping[int, ResetOptions],
     ) -> dict[int, Beginning]:
         """Draw how episodes begin, before anything of them is changed."""
         drawn: dict[int, Beginning] = {}
@@ -281,7 +329,9 @@ class EpisodeBatch:
             generator = generators[episode]
             if seed is not None or generator is None:
                 generator = np.random.default_rng(seed)
-            drawn[episode] = begin(generator, self._choice, options.get(episode, ResetOptions()), self.settings)
+            drawn[episode] = begin(
+                generator, self._choice, options.get(episode, ResetOptions()), self.settings
+            )
             generators[episode] = generator
         self._generators = [generators[episode] for episode in range(self.episodes)]
         return drawn
@@ -301,10 +351,19 @@ class EpisodeBatch:
 
     def _new_buffers(self) -> Arrays:
         arrays = self._writer.buffers()
-        return {**arrays, **{name: np.zeros((self.rows, *(box.shape or ())), box.dtype) for name, box in self.level.boxes.items()}}
+        return {
+            **arrays,
+            **{
+                name: np.zeros((self.rows, *(box.shape or ())), box.dtype)
+                for name, box in self.level.boxes.items()
+            },
+        }
 
     def _turn_buffers(self, seen: NDArray[np.bool_], is_same_step: bool) -> None:
-        """Choose the arrays for the observations of this step; rows that are not seen repeat their last one."""
+        """Choose the arrays for the observations of this step.
+
+        Rows that are not seen repeat their last one.
+        """
         before = self.observations
         if self._copy:
             self.observations = self._new_buffers()
@@ -336,7 +395,10 @@ class EpisodeBatch:
         self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
 
     def _note_states(self, rows: NDArray[np.bool_], states: str | list[str]) -> None:
-        """Note the operating states of some rows; those that were told of before stay as they are."""
+        """Note the operating states of some rows.
+
+        Those that were told of before stay as they are.
+        """
         changed = self._states.copy()
         changed[rows] = states
         self._states = _frozen(changed)

@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 
 from lidarium.envs.batch.endings import FRONTIER_UNREACHABLE, NO_FRONTIER
 from lidarium.envs.batch.running import DECIDES, STEPS
+from lidarium.envs.driving.drives import DRIVE_STATES, Drives, Following, no_drives
+from lidarium.envs.driving.path_following import FORESIGHT_TIMES
+from lidarium.envs.driving.team_driver import TeamDriver
 from lidarium.envs.exploration import scale_shares
+from lidarium.envs.levels.frontier_offers import CANDIDATES, REASONS, FrontierOffers
+from lidarium.envs.levels.frontiers import frontier_boxes
 from lidarium.envs.observations import action_space
-from lidarium.envs.onboard.drives import DRIVE_STATES, Drives, Following, no_drives
-from lidarium.envs.onboard.driving import FORESIGHT_TIMES
-from lidarium.envs.onboard.frontier_offers import CANDIDATES, REASONS, FrontierOffers
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.onboard.state import Orders
-from lidarium.envs.onboard.team_driver import TeamDriver
-from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.wrappers.frontiers import frontier_boxes
+from lidarium.envs.radio.messages import Orders
+from lidarium.envs.settings.exploration import ExplorationSettings
 
 Rows = NDArray[np.bool_]
 """Which rows are meant, (rows,)."""
@@ -46,7 +46,9 @@ class Level(Protocol):
         """Begin an episode."""
         ...
 
-    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8] | None:
+    def take(
+        self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]
+    ) -> NDArray[np.int8] | None:
         """Take the actions of live rows: write ``commands`` or orders, and in ``modes`` how the episodes run.
 
         Returns
@@ -56,14 +58,16 @@ class Level(Protocol):
         """
         ...
 
-    def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
+    def look(
+        self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
+    ) -> None:
         """Write what the level adds to observations and infos, after the episodes have run.
 
         Parameters
         ----------
         acted, live, seen : (rows,) bool
-            Who took part in a step, who of those that are seen has not ended, and whose observations are written: of all that acted
-            or began anew.
+            Who took part in a step, who of those that are seen has not ended, and whose observations are
+            written: of all that acted or began anew.
         out : dict of arrays
             Where observations are written.
         infos : dict
@@ -85,7 +89,9 @@ def check_actions(actions: NDArray[Any], shape: tuple[int, ...], live: Rows, wan
     except ValueError as error:  # rows of different lengths
         raise ValueError(f"actions are {actions!r}; want an array {shape}: {wanted} for each row") from error
     if array.shape != shape:
-        raise ValueError(f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots + robot")
+        raise ValueError(
+            f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots + robot"
+        )
     if array.dtype.kind not in "biuf":
         raise ValueError(f"actions are of type {array.dtype}; want {wanted} for each row")
     is_finite = np.isfinite(array)
@@ -100,21 +106,29 @@ def check_actions(actions: NDArray[Any], shape: tuple[int, ...], live: Rows, wan
 class VelocityLevel:
     """An action is speed and turn rate, as shares of the robot's limits."""
 
-    boxes: dict[str, spaces.Space[Any]] = {}  # noqa: RUF012 (never written)
+    boxes: dict[str, spaces.Space[Any]] = {}  # noqa: RUF012
 
     def __init__(self, settings: ExplorationSettings) -> None:
         self.action_space: spaces.Space[Any] = action_space()
         self._limits = np.array([settings.robot.max_speed, settings.robot.max_turn_rate])
         self.drives = no_drives(1)
         self.following = Following(
-            settings.lidar.unit_vectors, np.zeros(1), np.zeros(4), False, np.zeros((1, 1), np.uint8), np.zeros((1, 3)),
-            np.zeros(1, np.uint8), FORESIGHT_TIMES,
-        )  # fmt: skip
+            settings.lidar.unit_vectors,
+            np.zeros(1),
+            np.zeros(4),
+            False,
+            np.zeros((1, 1), np.uint8),
+            np.zeros((1, 3)),
+            np.zeros(1, np.uint8),
+            FORESIGHT_TIMES,
+        )
 
     def start(self, episode: int) -> None:
         """Begin an episode."""
 
-    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> None:
+    def take(
+        self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]
+    ) -> None:
         """Scale the shares; no robot ends of itself."""
         shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]")
         np.copyto(commands, shares)
@@ -122,14 +136,16 @@ class VelocityLevel:
             commands[~live] = 0.0
         scale_shares(commands, self._limits)
 
-    def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
+    def look(
+        self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
+    ) -> None:
         """Add nothing."""
 
 
 class WaypointLevel:
     """An action is a point within the observed map, as for ``WaypointExploration``."""
 
-    boxes: dict[str, spaces.Space[Any]] = {}  # noqa: RUF012 (never written)
+    boxes: dict[str, spaces.Space[Any]] = {}  # noqa: RUF012
 
     def __init__(self, perception: Perception, settings: ExplorationSettings) -> None:
         self.action_space: spaces.Space[Any] = action_space()
@@ -142,9 +158,13 @@ class WaypointLevel:
         """Begin an episode: no robot has a target."""
         self.driver.start(episode)
 
-    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> None:
+    def take(
+        self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]
+    ) -> None:
         """Give the robots their targets and plan."""
-        shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]").astype(np.float64)
+        shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]").astype(
+            np.float64
+        )
         places = self._perception.world.believed[:, :2] - self._perception.offsets
         targets = places + np.clip(shares, -1.0, 1.0) * self._half_side
         self.carry_out(Orders(live, targets, np.full(len(live), np.nan)), live, modes)
@@ -155,7 +175,9 @@ class WaypointLevel:
         self.driver.prepare(np.flatnonzero(modes == STEPS))
         modes[modes == STEPS] = DECIDES
 
-    def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
+    def look(
+        self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
+    ) -> None:
         """Tell what the robots' driving is about."""
         _tell(infos, "drive", acted, self.driver.states(), lambda number: DRIVE_STATES[number])
 
@@ -176,14 +198,18 @@ class FrontierLevel:
         self._waypoints.start(episode)
         self._offers.start(episode)
 
-    def take(self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]) -> NDArray[np.int8]:
+    def take(
+        self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]
+    ) -> NDArray[np.int8]:
         """Take the choices; where no robot of an episode is offered any frontier, all end."""
         wanted = f"a whole number from 0 to {CANDIDATES}"
         numbers = check_actions(actions, (len(live),), live, wanted)
         is_bad = live & ((numbers < 0) | (numbers > CANDIDATES) | (numbers != np.floor(numbers)))
         if is_bad.any():
             bad = int(np.flatnonzero(is_bad)[0])
-            raise ValueError(f"the action of row {bad} is {numbers[bad]}; want {wanted}, {CANDIDATES} to stay")
+            raise ValueError(
+                f"the action of row {bad} is {numbers[bad]}; want {wanted}, {CANDIDATES} to stay"
+            )
         orders = self._offers.choose(live, np.where(live, numbers, CANDIDATES).astype(np.int64))
         has_work = (live & (self._offers.offers.counts > 0)).reshape(-1, self._robots).any(axis=1)
         is_idle = (modes == STEPS) & ~has_work
@@ -197,16 +223,29 @@ class FrontierLevel:
         commands[np.repeat(is_idle, self._robots)] = 0.0
         return stopping
 
-    def look(self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]) -> None:
+    def look(
+        self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
+    ) -> None:
         """Give up what was chosen in vain, offer anew, and tell of both."""
         reasons = self._offers.renew(live, seen)
-        for name, array in (("frontiers", self._offers.offers.tables), ("action_mask", self._offers.offers.masks)):
+        for name, array in (
+            ("frontiers", self._offers.offers.tables),
+            ("action_mask", self._offers.offers.masks),
+        ):
             out[name][seen] = array[seen]
         self._waypoints.look(acted, live, seen, out, infos)
-        _tell(infos, "given_up", reasons != 0, np.arange(len(reasons)), lambda row: (self._offers.target(row), REASONS[reasons[row]]))
+        _tell(
+            infos,
+            "given_up",
+            reasons != 0,
+            np.arange(len(reasons)),
+            lambda row: (self._offers.target(row), REASONS[reasons[row]]),
+        )
 
 
-def _tell(infos: dict[str, Any], name: str, rows: Rows, values: NDArray[Any], describe: Callable[[int], Any]) -> None:
+def _tell(
+    infos: dict[str, Any], name: str, rows: Rows, values: NDArray[Any], describe: Callable[[int], Any]
+) -> None:
     """Add an info for some rows, with the mask that Gymnasium's vector environments put beside it."""
     if rows.any():
         told = np.full(len(rows), None, object)

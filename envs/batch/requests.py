@@ -6,24 +6,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.options import ResetOptions, read_options
-from lidarium.envs.settings import ExplorationSettings, make_settings
-from lidarium.mapping.kernels import available_threads
+from lidarium.envs.settings.exploration import ExplorationSettings, make_settings
+from lidarium.envs.settings.reset_options import ResetOptions, read_options
+from lidarium.mapping.kernels.compilation import available_threads
 
 
 def settings_of(options: dict[str, Any]) -> ExplorationSettings:
-    """Return the settings of a batch from the options of ``lidarium.parallel_env``; all threads of the machine where none are named."""
+    """Return the settings of a batch from the options of ``lidarium.parallel_env``.
+
+    All threads of the machine where none are named.
+    """
     names_threads = "threads" in options or options.get("settings") is not None
     return make_settings(**(options if names_threads else {**options, "threads": available_threads()}))
 
 
-def seeds_of(seed: int | Sequence[int | None] | NDArray[np.integer] | None, episodes: int) -> list[int | None]:
+def seeds_of(
+    seed: int | Sequence[int | None] | NDArray[np.integer] | None, episodes: int
+) -> list[int | None]:
     """Return a seed for each episode.
 
     Parameters
     ----------
     seed : int, sequence or None
-        ``s`` gives episode e the seed s + e; a sequence has one entry per episode; None goes on with the episodes' generators.
+        ``s`` gives episode e the seed s + e; a sequence has one entry per episode; None goes on with the
+        episodes' generators.
     episodes : int
         How many.
 
@@ -38,7 +44,9 @@ def seeds_of(seed: int | Sequence[int | None] | NDArray[np.integer] | None, epis
         first = _checked_seed(seed)
         return [first + episode for episode in range(episodes)]
     if len(seed) != episodes:
-        raise ValueError(f"seed has {len(seed)} entries; want one number, or one entry for each of the {episodes} episodes")
+        raise ValueError(
+            f"seed has {len(seed)} entries; want one number, or one entry for each of the {episodes} episodes"
+        )
     return [None if one is None else _checked_seed(one) for one in seed]
 
 
@@ -61,14 +69,19 @@ def episodes_of(options: dict[str, Any] | None, episodes: int) -> NDArray[np.int
         return np.arange(episodes)
     chosen = np.asarray(mask)
     if chosen.shape != (episodes,) or chosen.dtype != np.bool_ or not chosen.any():
-        raise ValueError(f"option episodes is {mask!r}; want a mask of {episodes} booleans, at least one of them True")
+        raise ValueError(
+            f"option episodes is {mask!r}; want a mask of {episodes} booleans, at least one of them True"
+        )
     return np.flatnonzero(chosen)
 
 
-def options_of(options: dict[str, Any] | None, chosen: NDArray[np.int64], episodes: int, robots: int) -> dict[int, ResetOptions]:
+def options_of(
+    options: dict[str, Any] | None, chosen: NDArray[np.int64], episodes: int, robots: int
+) -> dict[int, ResetOptions]:
     """Return the options of each chosen episode.
 
-    Each of ``floor``, ``starts`` and ``goal`` is one for all or a sequence with one for every episode of the batch.
+    Each of ``floor``, ``starts`` and ``goal`` is one for all or a sequence with one for every episode of the
+    batch.
 
     Raises
     ------
@@ -79,7 +92,8 @@ def options_of(options: dict[str, Any] | None, chosen: NDArray[np.int64], episod
         return {}
     return {
         int(episode): read_options(
-            {name: _entry(name, options[name], int(episode), episodes) for name in _KNOWN if name in options}, robots
+            {name: _entry(name, options[name], int(episode), episodes) for name in _KNOWN if name in options},
+            robots,
         )
         for episode in chosen
     }
@@ -94,12 +108,17 @@ def _entry(name: str, value: Any, episode: int, episodes: int) -> Any:  # noqa: 
     if _is_for_all(name, value):
         return value
     if len(value) != episodes:
-        raise ValueError(f"option {name} has {len(value)} entries; want one for all, or one for each of the {episodes} episodes")
+        raise ValueError(
+            f"option {name} has {len(value)} entries; want one for all, or one for each of the {episodes} episodes"
+        )
     return value[episode]
 
 
 def _is_for_all(name: str, value: Any) -> bool:  # noqa: ANN401
-    """Whether an option's value is that of all episodes; otherwise it is a sequence with an entry, or None, for each."""
+    """Whether an option's value is that of all episodes.
+
+    Otherwise it is a sequence with an entry, or None, for each.
+    """
     names_none = isinstance(value, Sequence) and any(entry is None for entry in value)
     return _depth(value) <= _KNOWN[name] and not names_none
 

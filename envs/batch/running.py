@@ -6,17 +6,17 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.driving.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
 from lidarium.envs.observations import Arrays, write_row
-from lidarium.envs.onboard.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
-from lidarium.envs.scorer import is_near
-from lidarium.envs.simulation.arrays import WorldArrays, world_at
-from lidarium.envs.simulation.stepping import step_episode
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.turns import take_turn
+from lidarium.envs.scoring.scorer import is_near
+from lidarium.envs.simulation.kinematic.arrays import WorldArrays, world_at
+from lidarium.envs.simulation.kinematic.stepping import step_episode
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.work_queue import take_turn
 
 WAITS, LOOKS, STEPS, DECIDES = range(4)
-"""What an episode does in a call: nothing; it takes the scan at the start; one step by the commands given; or up to the longest
-decision along the robots' paths."""
+"""What an episode does in a call: nothing; it takes the scan at the start; one step by the commands given; or
+up to the longest decision along the robots' paths."""
 
 
 class Tally(NamedTuple):
@@ -29,7 +29,8 @@ class Tally(NamedTuple):
     goals : (episodes, 2) float64
         Goal in the floor's frame [m], nan for none.
     bounds : (4,) float64
-        Steps of the horizon and coverage at which all end (inf for none), radius of the goal [m], and whether a contact ends.
+        Steps of the horizon and coverage at which all end (inf for none), radius of the goal [m], and whether
+        a contact ends.
     live : (rows,) bool
         Which robots have not ended.
     waiting : (rows,) bool
@@ -44,7 +45,15 @@ class Tally(NamedTuple):
 
 
 @kernel(borrowing=True)
-def _is_interrupted(poses: Array, contacts: Array, failed: Array, live: Array, goal: Array, radius: float, stops_on_contact: bool) -> bool:
+def _is_interrupted(
+    poses: Array,
+    contacts: Array,
+    failed: Array,
+    live: Array,
+    goal: Array,
+    radius: float,
+    stops_on_contact: bool,
+) -> bool:
     """Whether something happened to a robot of the episode that ends it: the goal reached, a collision, a failure."""
     for robot in range(live.shape[0]):
         if live[robot] and failed[robot] != 0:
@@ -64,9 +73,14 @@ def _ends(world: WorldArrays, episode: int, robots: int, drives: Drives, tally: 
     if world.steps[episode] >= tally.bounds[0] or coverage >= tally.bounds[1]:
         return True
     if _is_interrupted(
-        world.poses[first:last], world.contacts[first:last], world.failed[first:last], tally.live[first:last], tally.goals[episode],
-        tally.bounds[2], tally.bounds[3] != 0.0,
-    ):  # fmt: skip
+        world.poses[first:last],
+        world.contacts[first:last],
+        world.failed[first:last],
+        tally.live[first:last],
+        tally.goals[episode],
+        tally.bounds[2],
+        tally.bounds[3] != 0.0,
+    ):
         return True
     return bool(decides and any_newly_done(drives, first, last, tally.live, tally.waiting))
 
@@ -80,13 +94,17 @@ def begin_decisions(decides: Array, robots: int, drives: Drives, tally: Tally) -
 
 
 @kernel
-def follow_some(decides: Array, robots: int, table: Array, drives: Drives, following: Following, commands: Array) -> None:
+def follow_some(
+    decides: Array, robots: int, table: Array, drives: Drives, following: Following, commands: Array
+) -> None:
     """Give the robots of the episodes that ``decides`` (episodes,) names the speeds that follow their paths."""
     world = world_at(table)
     for episode in range(decides.shape[0]):
         if decides[episode]:
             first, last = episode * robots, (episode + 1) * robots
-            follow_team(drives, following, first, last, world.believed, world.measured, world.ranges, commands)
+            follow_team(
+                drives, following, first, last, world.believed, world.measured, world.ranges, commands
+            )
 
 
 @kernel
@@ -94,18 +112,28 @@ def note_ends(modes: Array, robots: int, table: Array, drives: Drives, tally: Ta
     """Let the episodes wait whose run ends with the step that was just taken."""
     world = world_at(table)
     for episode in range(modes.shape[0]):
-        if modes[episode] != WAITS and _ends(world, episode, robots, drives, tally, modes[episode] == DECIDES):
+        if modes[episode] != WAITS and _ends(
+            world, episode, robots, drives, tally, modes[episode] == DECIDES
+        ):
             modes[episode] = WAITS
 
 
 @kernel(borrowing=True)
 def _run_episode(
-    table: Array, robots: int, episode: int, mode: int, commands: Array, drives: Drives, following: Following, tally: Tally, longest: int
+    table: Array,
+    robots: int,
+    episode: int,
+    mode: int,
+    commands: Array,
+    drives: Drives,
+    following: Following,
+    tally: Tally,
+    longest: int,
 ) -> None:
     """Run one episode for a step, or for a decision of at most ``longest`` steps.
 
-    A decision ends before when the episode is over, when something happens to a robot, or when a robot with a target has newly
-    arrived or found no way.
+    A decision ends before when the episode is over, when something happens to a robot, or when a robot with a
+    target has newly arrived or found no way.
     """
     world = world_at(table)
     first, last = episode * robots, (episode + 1) * robots
@@ -113,7 +141,9 @@ def _run_episode(
         mark_waiting(drives, first, last, tally.waiting)
     for _ in range(longest if mode == DECIDES else 1):
         if mode == DECIDES:
-            follow_team(drives, following, first, last, world.believed, world.measured, world.ranges, commands)
+            follow_team(
+                drives, following, first, last, world.believed, world.measured, world.ranges, commands
+            )
         step_episode(table, episode, robots, commands, mode != LOOKS, True)
         if _ends(world, episode, robots, drives, tally, mode == DECIDES):
             break
@@ -137,8 +167,8 @@ def _run_episodes(
 ) -> None:
     """Run the episodes by their ``modes`` (episodes,), on so many threads, and write the observations of ``seen`` rows.
 
-    An episode's observations are written right after its run, while its maps are in the thread's cache. Threads take the episodes by
-    ``new_turns`` in the ``order`` (episodes,) int64.
+    An episode's observations are written right after its run, while its maps are in the thread's cache.
+    Threads take the episodes by ``new_turns`` in the ``order`` (episodes,) int64.
     """
     for _ in numba.prange(threads):
         turn = take_turn(turns)
@@ -146,7 +176,9 @@ def _run_episodes(
             episode = order[turn]
             turn = take_turn(turns)
             if modes[episode] != WAITS:
-                _run_episode(table, robots, episode, modes[episode], commands, drives, following, tally, longest)
+                _run_episode(
+                    table, robots, episode, modes[episode], commands, drives, following, tally, longest
+                )
                 for row in range(episode * robots, (episode + 1) * robots):
                     if seen[row]:
                         write_row(row, sources, observed)

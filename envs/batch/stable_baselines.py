@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from lidarium.envs.batch.episodes import Arrays, EpisodeBatch
 from lidarium.envs.batch.requests import options_of, seeds_of, settings_of
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.options import ResetOptions, read_options
+from lidarium.envs.settings.reset_options import ResetOptions, read_options
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise ImportError('sb3_vec_env needs stable-baselines3; install it with: pip install "lidarium[rl]"') from error
+    raise ImportError(
+        'sb3_vec_env needs stable-baselines3; install it with: pip install "lidarium[rl]"'
+    ) from error
 
 Infos = list[dict[str, Any]]
 
@@ -23,11 +25,11 @@ Infos = list[dict[str, Any]]
 class ExplorationVecEnv(VecEnv):
     """Teams of lidar robots explore floors, many episodes in one kernel call (stable-baselines3).
 
-    Row = episode * robots + robot; one policy drives all rows. A robot that ends before its team is done once; its row then repeats
-    its last observation with reward 0 and ``infos[row]["active"]`` False. Where the last robot of an episode ends, the rows that
-    repeat are done as well, truncated, and the episode begins anew in the same step. In every row that is done,
-    ``infos[row]["terminal_observation"]`` is what the robot saw last, and ``infos[row]["TimeLimit.truncated"]`` tells the horizon
-    from an ending.
+    Row = episode * robots + robot; one policy drives all rows. A robot that ends before its team is done
+    once; its row then repeats its last observation with reward 0 and ``infos[row]["active"]`` False. Where
+    the last robot of an episode ends, the rows that repeat are done as well, truncated, and the episode
+    begins anew in the same step. In every row that is done, ``infos[row]["terminal_observation"]`` is what
+    the robot saw last, and ``infos[row]["TimeLimit.truncated"]`` tells the horizon from an ending.
 
     Parameters
     ----------
@@ -36,8 +38,8 @@ class ExplorationVecEnv(VecEnv):
 
     Notes
     -----
-    Observations are written into two sets of arrays that take turns: what a step returns is overwritten by the step after the next
-    one. Replay and rollout buffers copy what they keep.
+    Observations are written into two sets of arrays that take turns: what a step returns is overwritten by
+    the step after the next one. Replay and rollout buffers copy what they keep.
 
     Raises
     ------
@@ -84,7 +86,8 @@ class ExplorationVecEnv(VecEnv):
         Parameters
         ----------
         options : dict, sequence of dict or None
-            As for ``ExplorationVectorEnv.reset``; or a dict for each row, of which an episode takes that of its first robot.
+            As for ``ExplorationVectorEnv.reset``; or a dict for each row, of which an episode takes that of
+            its first robot.
 
         Raises
         ------
@@ -96,8 +99,13 @@ class ExplorationVecEnv(VecEnv):
             self._chosen = options_of(options, np.arange(batch.episodes), batch.episodes, batch.robots)
             return
         if len(options) != batch.rows:
-            raise ValueError(f"options has {len(options)} entries; want one dict, or one for each of the {batch.rows} rows")
-        self._chosen = {episode: read_options(chosen, batch.robots) for episode, chosen in enumerate(options[:: batch.robots])}
+            raise ValueError(
+                f"options has {len(options)} entries; want one dict, or one for each of the {batch.rows} rows"
+            )
+        self._chosen = {
+            episode: read_options(chosen, batch.robots)
+            for episode, chosen in enumerate(options[:: batch.robots])
+        }
 
     def _reset_options(self) -> None:
         self._chosen = {}
@@ -125,7 +133,9 @@ class ExplorationVecEnv(VecEnv):
         for row, info in enumerate(infos):
             info["TimeLimit.truncated"], info["active"] = bool(truncated[row]), not masked[row]
             if dones[row]:
-                info["terminal_observation"] = {name: array[row].copy() for name, array in batch.observations.items()}
+                info["terminal_observation"] = {
+                    name: array[row].copy() for name, array in batch.observations.items()
+                }
         self._begin_anew(np.flatnonzero(batch.is_over))
         return batch.observations, rewards, dones, infos
 
@@ -162,9 +172,14 @@ class ExplorationVecEnv(VecEnv):
 
     @property
     def action_masks(self) -> NDArray[np.bool_]:
-        """Which actions each row may choose now, (rows, 17); at the level of frontiers only."""
+        """Which actions each row may choose now, (rows, 17).
+
+        At the level of frontiers only.
+        """
         if "action_mask" not in self.batch.observations:
-            raise AttributeError("action_masks are there at the level of frontiers only; make the environment with level='frontier'")
+            raise AttributeError(
+                "action_masks are there at the level of frontiers only; make the environment with level='frontier'"
+            )
         return self.batch.observations["action_mask"].astype(np.bool_)
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
@@ -173,7 +188,9 @@ class ExplorationVecEnv(VecEnv):
 
     def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:  # noqa: ANN401
         """Refuse: rows share everything."""
-        raise AttributeError(f"{attr_name} cannot be set for single rows: all rows share one batch; make a new environment instead")
+        raise AttributeError(
+            f"{attr_name} cannot be set for single rows: all rows share one batch; make a new environment instead"
+        )
 
     def env_method(
         self,
@@ -182,13 +199,18 @@ class ExplorationVecEnv(VecEnv):
         indices: int | Iterable[int] | None = None,
         **method_kwargs: Any,  # noqa: ANN401
     ) -> list[Any]:
-        """Return rows of ``action_masks``, which sb3-contrib's MaskablePPO asks for; rows have no other methods."""
+        """Return rows of ``action_masks``, which sb3-contrib's MaskablePPO asks for.
+
+        Rows have no other methods.
+        """
         if method_name != "action_masks":
             raise AttributeError(f"{method_name} cannot be called on single rows: all rows share one batch")
         masks = self.action_masks
         return [masks[row] for row in self._get_indices(indices)]
 
-    def env_is_wrapped(self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None) -> list[bool]:
+    def env_is_wrapped(
+        self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None
+    ) -> list[bool]:
         """Return False for each row: there are no environments below to be wrapped."""
         return [False for _ in self._get_indices(indices)]
 

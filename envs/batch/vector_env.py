@@ -21,10 +21,11 @@ Step = tuple[Arrays, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], 
 class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
     """Teams of lidar robots explore floors, many episodes in one kernel call (Gymnasium).
 
-    Row = episode * robots + robot. A robot that ends before its team returns terminated once; its row then repeats its last
-    observation with reward 0 and ``infos["active"]`` False. When the last robot of an episode ends, the rows that repeat return
-    truncated, and the next step begins the episode anew whatever its actions (``AutoresetMode.NEXT_STEP``). Every row sees, earns
-    and ends as the robot of an ``ExplorationEnv`` with the same seed, to the bit.
+    Row = episode * robots + robot. A robot that ends before its team returns terminated once; its row then
+    repeats its last observation with reward 0 and ``infos["active"]`` False. When the last robot of an
+    episode ends, the rows that repeat return truncated, and the next step begins the episode anew whatever
+    its actions (``AutoresetMode.NEXT_STEP``). Every row sees, earns and ends as the robot of an
+    ``ExplorationEnv`` with the same seed, to the bit.
 
     Parameters
     ----------
@@ -37,8 +38,8 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
     image_resolution : float or None
         Side of a pixel [m] where the floor is a plain image.
     copy : bool
-        Whether each step returns new arrays. Otherwise two sets take turns: what a step returns is overwritten by the step after
-        the next one.
+        Whether each step returns new arrays. Otherwise two sets take turns: what a step returns is
+        overwritten by the step after the next one.
     render_mode : None
         Batches are not drawn.
     **options
@@ -50,7 +51,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
         Where an option cannot be used.
     """
 
-    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}  # noqa: RUF012 (Gymnasium's contract)
+    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}  # noqa: RUF012
 
     def __init__(
         self,
@@ -63,12 +64,17 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
         **options: Any,  # noqa: ANN401
     ) -> None:
         if render_mode is not None:
-            raise ValueError(f"render_mode is {render_mode!r}; a batch is not drawn, use lidarium.parallel_env to look at an episode")
+            raise ValueError(
+                f"render_mode is {render_mode!r}; a batch is not drawn, use lidarium.parallel_env to look at an episode"
+            )
         settings = settings_of(options)
         self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy)
         self.settings, self.render_mode = settings, None
         self.num_envs = self.batch.rows
-        self.single_observation_space, self.single_action_space = self.batch.observation_space, self.batch.action_space
+        self.single_observation_space, self.single_action_space = (
+            self.batch.observation_space,
+            self.batch.action_space,
+        )
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.closed = False
@@ -81,20 +87,29 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
         Parameters
         ----------
         seed : int, sequence or None
-            ``s`` gives episode e the seed s + e; a sequence has one entry per episode; None goes on with the episodes' generators.
+            ``s`` gives episode e the seed s + e; a sequence has one entry per episode; None goes on with the
+            episodes' generators.
         options : dict or None
-            ``floor``, ``starts``, ``goal`` as for ``ExplorationEnv.reset``, one for all or a sequence with one per episode, and
-            ``episodes`` (episodes,) bool: which ones begin, all by default. Others are ignored.
+            ``floor``, ``starts``, ``goal`` as for ``ExplorationEnv.reset``, one for all or a sequence with
+            one per episode, and ``episodes`` (episodes,) bool: which ones begin, all by default. Others are
+            ignored.
         """
         self._check_open()
         batch = self.batch
         chosen = episodes_of(options, batch.episodes)
         seeds = seeds_of(seed, batch.episodes)
-        batch.run(None, chosen, [seeds[episode] for episode in chosen], options_of(options, chosen, batch.episodes, batch.robots))
+        batch.run(
+            None,
+            chosen,
+            [seeds[episode] for episode in chosen],
+            options_of(options, chosen, batch.episodes, batch.robots),
+        )
         return batch.observations, self._infos(batch.live.copy())
 
     def step(self, actions: NDArray[Any]) -> Step:
-        """Run all episodes for one step (velocity) or decision; those that are over begin anew.
+        """Run all episodes for one step (velocity) or decision.
+
+        Those that are over begin anew.
 
         Parameters
         ----------
@@ -109,7 +124,13 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
             raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
         if batch.is_whole:
             batch.run(actions, _NO_EPISODES)
-            return batch.observations, batch.rewards.copy(), batch.terminated, batch.truncated, self._infos(batch.everyone)
+            return (
+                batch.observations,
+                batch.rewards.copy(),
+                batch.terminated,
+                batch.truncated,
+                self._infos(batch.everyone),
+            )
         over = batch.is_over
         masked = ~batch.live & ~np.repeat(over, batch.robots)
         batch.run(actions, np.flatnonzero(over))
@@ -138,5 +159,7 @@ def make_vector_env(num_envs: int, **options: Any) -> ExplorationVectorEnv:  # n
         Where more than one robot is asked for, or an option cannot be used.
     """
     if options.setdefault("robots", 1) != 1:
-        raise ValueError(f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.vector_env for teams")
+        raise ValueError(
+            f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.vector_env for teams"
+        )
     return ExplorationVectorEnv(num_envs, **options)

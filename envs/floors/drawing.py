@@ -1,7 +1,8 @@
 """Exact drawing of polygons and thin walls into grids of cells.
 
-A shape is a set of closed rings; a cell belongs to it if its centre is inside by the even-odd rule. A centre that lies
-exactly on an edge belongs to the shape on its right and above, so that two shapes that share an edge share no cell.
+A shape is a set of closed rings; a cell belongs to it if its centre is inside by the even-odd rule. A centre
+that lies exactly on an edge belongs to the shape on its right and above, so that two shapes that share an
+edge share no cell.
 """
 
 import math
@@ -9,11 +10,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels.compilation import kernel
 
 Rings = list[NDArray[np.float64]]
 
-# Corners are rounded to a millionth of a cell, so that a wall on a cell's centre line is drawn alike on all machines.
+# Corners are rounded to a millionth of a cell, so that a wall on a cell's centre line is drawn alike on all
+# machines.
 _SNAP = 1e6
 
 
@@ -34,7 +36,11 @@ def ring_edges(ring: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def fill_shapes(
-    cells: NDArray[np.uint8], origin: tuple[float, float], resolution: float, shapes: list[NDArray[np.float64]], value: int
+    cells: NDArray[np.uint8],
+    origin: tuple[float, float],
+    resolution: float,
+    shapes: list[NDArray[np.float64]],
+    value: int,
 ) -> None:
     """Set the cells whose centre is inside a shape (even-odd), in place.
 
@@ -57,7 +63,11 @@ def fill_shapes(
 
 
 def draw_segments(
-    cells: NDArray[np.uint8], origin: tuple[float, float], resolution: float, segments: NDArray[np.float64], value: int
+    cells: NDArray[np.uint8],
+    origin: tuple[float, float],
+    resolution: float,
+    segments: NDArray[np.float64],
+    value: int,
 ) -> None:
     """Set every cell that a segment crosses, in place: the line is 4-connected, so no ray slips through it.
 
@@ -98,7 +108,9 @@ def strip(segment: NDArray[np.float64], thickness: float, overhang: float = 0.0)
 
 
 @kernel
-def _fill(cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np.int64], value: np.uint8) -> None:
+def _fill(
+    cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np.int64], value: np.uint8
+) -> None:
     rows, columns = cells.shape
     first = 0
     for last in ends:
@@ -142,7 +154,8 @@ def _draw_lines(cells: NDArray[np.uint8], segments: NDArray[np.float64], value: 
         i, j, i_end, j_end = math.floor(y), math.floor(x), math.floor(y_end), math.floor(x_end)
         i_step, j_step = (1 if i_end >= i else -1), (1 if j_end >= j else -1)
         dx, dy = abs(x_end - x), abs(y_end - y)
-        # Steps to take are counted beforehand: a walk by distance alone may miss its last cell at a lattice corner.
+        # Steps to take are counted beforehand: a walk by distance alone may miss its last cell at a lattice
+        # corner.
         i_left, j_left = abs(i_end - i), abs(j_end - j)
         to_side = (j + 1 - x) if j_step > 0 else (x - j)
         to_top = (i + 1 - y) if i_step > 0 else (y - i)

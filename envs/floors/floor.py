@@ -1,7 +1,7 @@
 """Floors: what stands in a building, in metres, and its rasters.
 
-A floor is a set of solids (vertical prisms) or, where it comes from an image, a grid of solid cells; never both. The
-laser sees the solids that cut its plane, the body touches those that cut its height.
+A floor is a set of solids (vertical prisms) or, where it comes from an image, a grid of solid cells; never
+both. The laser sees the solids that cut its plane, the body touches those that cut its height.
 """
 
 import hashlib
@@ -18,7 +18,8 @@ from lidarium.envs.floors.drawing import draw_segments, fill_shapes, ring_edges
 
 MAX_RASTER_CELLS = 200_000_000
 
-# Origins of rasters are whole multiples of this [m], so that belief grids of every usual resolution line up with them.
+# Origins of rasters are whole multiples of this [m], so that belief grids of every usual resolution line up
+# with them.
 LATTICE = 0.1
 _PADDING = 8
 
@@ -44,7 +45,9 @@ class Solid:
 
     def __post_init__(self) -> None:
         if not self.z_low < self.z_high:
-            raise ValueError(f"solid from z_low={self.z_low} to z_high={self.z_high} m has no height; want z_low < z_high")
+            raise ValueError(
+                f"solid from z_low={self.z_low} to z_high={self.z_high} m has no height; want z_low < z_high"
+            )
         object.__setattr__(self, "polygon", _ring("polygon", self.polygon))
         object.__setattr__(self, "holes", tuple(_ring("hole", hole) for hole in self.holes))
 
@@ -103,7 +106,8 @@ class Floor:
     cells : Raster or None
         Solid cells of a floor that comes from an image, at the image's own resolution.
     starts : (K, 3) float64
-        Proposed starts x, y, theta [m, rad], far apart from each other; may be empty (then starts are drawn by seed).
+        Proposed starts x, y, theta [m, rad], far apart from each other; may be empty (then starts are drawn
+        by seed).
     goal : (x, y) or None
         Where robots with a goal should go [m].
     """
@@ -118,16 +122,22 @@ class Floor:
     def __post_init__(self) -> None:
         x_min, y_min, x_max, y_max = self.bounds
         if not np.isfinite(self.bounds).all() or x_min >= x_max or y_min >= y_max:
-            raise ValueError(f"floor {self.name!r} has bounds {self.bounds}; want finite x_min < x_max and y_min < y_max in metres")
+            raise ValueError(
+                f"floor {self.name!r} has bounds {self.bounds}; want finite x_min < x_max and y_min < y_max in metres"
+            )
         if self.solids and self.cells is not None:
-            raise ValueError(f"floor {self.name!r} has {len(self.solids)} solids and cells too; want one or the other")
+            raise ValueError(
+                f"floor {self.name!r} has {len(self.solids)} solids and cells too; want one or the other"
+            )
         if self.cells is not None and (self.cells.solid.ndim != 2 or not self.cells.resolution > 0.0):
             raise ValueError(
                 f"floor {self.name!r} has cells of shape {self.cells.solid.shape} at {self.cells.resolution} m; want a grid, resolution > 0"
             )
         starts = np.asarray(self.starts, dtype=np.float64)
         if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():
-            raise ValueError(f"floor {self.name!r} has starts of shape {starts.shape} or not finite; want (K, 3): x, y, theta")
+            raise ValueError(
+                f"floor {self.name!r} has starts of shape {starts.shape} or not finite; want (K, 3): x, y, theta"
+            )
         if self.goal is not None and (len(self.goal) != 2 or not np.isfinite(self.goal).all()):
             raise ValueError(f"floor {self.name!r} has goal {self.goal}; want (x, y) in metres")
         object.__setattr__(self, "starts", starts)
@@ -135,10 +145,10 @@ class Floor:
     def raster(self, resolution: float, z_low: float, z_high: float) -> Raster:
         """Return the solid cells at one height.
 
-        A cell is solid if its centre lies in a solid that cuts the height; solids too thin for that are drawn as
-        4-connected lines, so that no ray leaks between cells. Everything outside of the bounds is solid. The origin is
-        a whole multiple of 0.1 m, rows and columns are multiples of 8. A floor made of cells has them at all heights;
-        the nearest one counts.
+        A cell is solid if its centre lies in a solid that cuts the height; solids too thin for that are drawn
+        as 4-connected lines, so that no ray leaks between cells. Everything outside of the bounds is solid.
+        The origin is a whole multiple of 0.1 m, rows and columns are multiples of 8. A floor made of cells
+        has them at all heights; the nearest one counts.
 
         Parameters
         ----------
@@ -174,7 +184,11 @@ class Floor:
             standing = [part for part in self.solids if part.cuts(z_low, z_high)]
             fill_shapes(solid, origin, resolution, [part.edges for part in standing], 1)
             # Strips narrower than a cell's diagonal may miss centres and leak between diagonal neighbours.
-            thin = [_line(part.polygon) for part in standing if not part.holes and _width(part.polygon) < math.sqrt(2.0) * resolution]
+            thin = [
+                _line(part.polygon)
+                for part in standing
+                if not part.holes and _width(part.polygon) < math.sqrt(2.0) * resolution
+            ]
             if thin:
                 draw_segments(solid, origin, resolution, np.concatenate(thin), 1)
         return Raster(solid, origin, resolution)
@@ -190,7 +204,10 @@ class Floor:
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of what stands there, the starts and the goal, to a micrometre; the name does not count."""
+        """Hash of what stands there, the starts and the goal, to a micrometre.
+
+        The name does not count.
+        """
         digest = hashlib.sha256()
         _hash_numbers(digest, "bounds", self.bounds)
         for solid in self.solids:
@@ -198,7 +215,9 @@ class Floor:
             for ring in (solid.polygon, *solid.holes):
                 _hash_numbers(digest, "ring", ring)
         if self.cells is not None:
-            _hash_numbers(digest, "cells", (*self.cells.origin, self.cells.resolution, *self.cells.solid.shape))
+            _hash_numbers(
+                digest, "cells", (*self.cells.origin, self.cells.resolution, *self.cells.solid.shape)
+            )
             digest.update(np.packbits(self.cells.solid != 0).tobytes())
         _hash_numbers(digest, "starts", self.starts)
         _hash_numbers(digest, "goal", self.goal or ())
@@ -213,7 +232,11 @@ class Floor:
             for ring in (solid.polygon, *solid.holes):
                 digest.update(len(ring).to_bytes(8, "little") + ring.tobytes())
         if self.cells is not None:
-            digest.update(np.array((*self.cells.origin, self.cells.resolution, *self.cells.solid.shape), np.float64).tobytes())
+            digest.update(
+                np.array(
+                    (*self.cells.origin, self.cells.resolution, *self.cells.solid.shape), np.float64
+                ).tobytes()
+            )
             digest.update(np.packbits(self.cells.solid != 0).tobytes())
         return digest.hexdigest()
 
@@ -221,20 +244,28 @@ class Floor:
 def _ring(kind: str, ring: NDArray[np.float64]) -> NDArray[np.float64]:
     corners = np.ascontiguousarray(ring, dtype=np.float64)
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
-        raise ValueError(f"{kind} has shape {corners.shape} or values that are not finite; want at least 3 points (x, y) in metres")
+        raise ValueError(
+            f"{kind} has shape {corners.shape} or values that are not finite; want at least 3 points (x, y) in metres"
+        )
     return corners
 
 
-def _frame(bounds: tuple[float, float, float, float], resolution: float) -> tuple[tuple[float, float], tuple[int, int]]:
+def _frame(
+    bounds: tuple[float, float, float, float], resolution: float
+) -> tuple[tuple[float, float], tuple[int, int]]:
     """Return origin and (rows, columns) of the raster: at least one cell beyond the bounds on all sides."""
     margin = math.ceil(resolution / LATTICE - 1e-9)
     # Divided, not multiplied: 3 / 10 is the double nearest to 0.3, and 3 * 0.1 is not.
     x, y = ((math.floor(low / LATTICE + 1e-9) - margin) / round(1.0 / LATTICE) for low in bounds[:2])
-    columns, rows = (math.ceil((high - low) / resolution - 1e-9) + 1 for low, high in ((x, bounds[2]), (y, bounds[3])))
+    columns, rows = (
+        math.ceil((high - low) / resolution - 1e-9) + 1 for low, high in ((x, bounds[2]), (y, bounds[3]))
+    )
     return (x, y), (-(-rows // _PADDING) * _PADDING, -(-columns // _PADDING) * _PADDING)
 
 
-def _inside(bounds: tuple[float, float, float, float], origin: tuple[float, float], resolution: float) -> tuple[slice, slice]:
+def _inside(
+    bounds: tuple[float, float, float, float], origin: tuple[float, float], resolution: float
+) -> tuple[slice, slice]:
     """Return rows and columns of the cells whose centre is within the bounds."""
     x_low, y_low, x_high, y_high = ((bounds[k] - origin[k % 2]) / resolution - 0.5 for k in range(4))
     return (
@@ -243,12 +274,16 @@ def _inside(bounds: tuple[float, float, float, float], origin: tuple[float, floa
     )
 
 
-def _sample(cells: Raster, origin: tuple[float, float], resolution: float, inside: tuple[slice, slice]) -> NDArray[np.uint8]:
+def _sample(
+    cells: Raster, origin: tuple[float, float], resolution: float, inside: tuple[slice, slice]
+) -> NDArray[np.uint8]:
     """Return the image cell under each cell centre; solid outside of the image."""
     indices = []
     for axis in (0, 1):
         centres = origin[1 - axis] + (np.arange(inside[axis].start, inside[axis].stop) + 0.5) * resolution
-        indices.append(np.floor((centres - cells.origin[1 - axis]) / cells.resolution + 1e-6).astype(np.int64))
+        indices.append(
+            np.floor((centres - cells.origin[1 - axis]) / cells.resolution + 1e-6).astype(np.int64)
+        )
     framed = np.pad((cells.solid != 0).astype(np.uint8), 1, constant_values=1)
     rows, columns = (np.clip(index + 1, 0, framed.shape[axis] - 1) for axis, index in enumerate(indices))
     return np.take(framed[rows], columns, axis=1)
@@ -279,7 +314,9 @@ def _line(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([middles[k], middles[k + 2]])[None]
 
 
-def _hash_numbers(digest: "hashlib._Hash", label: str, numbers: "NDArray[np.float64] | tuple[float, ...]") -> None:
+def _hash_numbers(
+    digest: "hashlib._Hash", label: str, numbers: "NDArray[np.float64] | tuple[float, ...]"
+) -> None:
     """Add numbers in millionths; what is infinite keeps its sign."""
     scaled = np.clip(np.rint(np.asarray(numbers, dtype=np.float64).ravel() * 1e6), -(2.0**62), 2.0**62)
     digest.update(f"{label}:{scaled.size};".encode())

@@ -1,6 +1,7 @@
 """Where a disc fits on a raster, and the free space that it sweeps from its starts.
 
-What follows from the raster and the disc alone is kept with rasters that are read-only, for all episodes that share one.
+What follows from the raster and the disc alone is kept with rasters that are read-only, for all episodes that
+share one.
 """
 
 import math
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Raster
-from lidarium.mapping.kernels import kernel
+from lidarium.mapping.kernels.compilation import kernel
 
 Made = TypeVar("Made")
 
@@ -67,7 +68,8 @@ def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
     box = _box_of_free_cells(raster)
     if box is None:
         return space
-    # The square's nearest point is half a cell nearer than its centre along each axis, except in the same row or column.
+    # The square's nearest point is half a cell nearer than its centre along each axis, except in the same row
+    # or column.
     gaps = np.maximum(np.arange(math.ceil(reach) + 2) - 0.5, 0.0)
     near = gaps[:, None] ** 2 + gaps[None, :] ** 2 < reach**2 - 1e-9
     space[box] = ~_dilated(raster.solid[box] != 0, near) & (raster.solid[box] == 0)
@@ -101,8 +103,8 @@ def swept_free_space(raster: Raster, radius: float, starts: NDArray[np.float64])
     Returns
     -------
     (rows, columns) bool
-        Free cells whose centre is within the radius of a cell centre of the configuration space, in its 4-connected
-        components that hold a start. Read-only.
+        Free cells whose centre is within the radius of a cell centre of the configuration space, in its
+        4-connected components that hold a start. Read-only.
 
     Raises
     ------
@@ -110,7 +112,12 @@ def swept_free_space(raster: Raster, radius: float, starts: NDArray[np.float64])
         If the robot does not fit at a start (nor at a cell beside it).
     """
     found = components(raster, radius)
-    kept = sorted({component_near(raster, found.labels, start, radius) for start in np.asarray(starts, dtype=np.float64)})
+    kept = sorted(
+        {
+            component_near(raster, found.labels, start, radius)
+            for start in np.asarray(starts, dtype=np.float64)
+        }
+    )
 
     def make() -> NDArray[np.bool_]:
         box = _box_of_free_cells(raster)
@@ -134,15 +141,22 @@ def cell_of(raster: Raster, point: NDArray[np.float64]) -> tuple[int, int]:
     return min(max(math.floor(row + 1e-9), 0), rows - 1), min(max(math.floor(column + 1e-9), 0), columns - 1)
 
 
-def component_near(raster: Raster, labels: NDArray[np.unsignedinteger[Any]], start: NDArray[np.float64], radius: float) -> int:
+def component_near(
+    raster: Raster, labels: NDArray[np.unsignedinteger[Any]], start: NDArray[np.float64], radius: float
+) -> int:
     """Return the component at a start, or at the nearest cell beside it where rounding to cells puts the start outside."""
     i, j = cell_of(raster, start)
     if raster.solid[i, j]:
         raise ValueError(f"start ({start[0]:.3f}, {start[1]:.3f}) m is inside a wall; want one in free space")
-    for near in sorted(((i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)), key=lambda cell: abs(cell[0] - i) + abs(cell[1] - j)):
+    for near in sorted(
+        ((i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)),
+        key=lambda cell: abs(cell[0] - i) + abs(cell[1] - j),
+    ):
         if labels[near]:
             return int(labels[near])
-    raise ValueError(f"a robot of radius {radius} m does not fit at start ({start[0]:.3f}, {start[1]:.3f}) m; want more room")
+    raise ValueError(
+        f"a robot of radius {radius} m does not fit at start ({start[0]:.3f}, {start[1]:.3f}) m; want more room"
+    )
 
 
 def _cells_of(raster: Raster, radius: float) -> float:
@@ -157,9 +171,12 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _kept(raster: Raster, key: tuple[Any, ...], make: Callable[[], Made]) -> Made:
-    """Return what a raster keeps, or make it; a raster that can be written to keeps nothing.
+    """Return what a raster keeps, or make it.
 
-    It is kept from the second time on: many floors of large sets are drawn once, and would only fill the memory.
+    A raster that can be written to keeps nothing.
+
+    It is kept from the second time on: many floors of large sets are drawn once, and would only fill the
+    memory.
     """
     if raster.solid.flags.writeable:
         return make()
@@ -197,7 +214,8 @@ def _dilate_rows(mask: NDArray[np.bool_], widths: NDArray[np.int64], result: NDA
     rows, columns = mask.shape
     reach = len(widths) - 1
     far = np.uint16(widths.max() + 1)
-    # Distance along the row to the nearest set cell, for the rows that the shape reaches at once: memory stays in the cache.
+    # Distance along the row to the nearest set cell, for the rows that the shape reaches at once: memory
+    # stays in the cache.
     distances = np.full((2 * reach + 1, columns), far, np.uint16)
     for i in range(-reach, rows):
         ahead = i + reach

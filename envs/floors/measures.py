@@ -60,7 +60,9 @@ def measure_building(floor: Floor) -> BuildingMeasures:
     """
     walls = floor
     if floor.solids:
-        walls = Floor(floor.name, floor.bounds, tuple(solid for solid in floor.solids if solid.z_high == np.inf))
+        walls = Floor(
+            floor.name, floor.bounds, tuple(solid for solid in floor.solids if solid.z_high == np.inf)
+        )
     empty = walls.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
     full = floor.raster(_RESOLUTION, 0.0, _BODY_HEIGHT)
     space = configuration_space(empty, MEASURED_RADIUS)
@@ -68,7 +70,9 @@ def measure_building(floor: Floor) -> BuildingMeasures:
         raise ValueError(f"floor {floor.name!r} has no room for a robot of radius {MEASURED_RADIUS} m")
     largest = _largest_part(space)
     inside = _containing(empty.solid == 0, largest)
-    wide = cv2.distanceTransform(1 - empty.solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _RESOLUTION > HALF_DOOR
+    wide = (
+        cv2.distanceTransform(1 - empty.solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _RESOLUTION > HALF_DOOR
+    )
     between_walls = int(inside.sum())
     free = int((inside & (full.solid == 0)).sum())
     return BuildingMeasures(

@@ -15,13 +15,17 @@ _NO_STARTS = np.zeros((0, 3))
 
 
 def draw_starts(
-    raster: Raster, radius: float, count: int, generator: np.random.Generator, proposed: NDArray[np.float64] = _NO_STARTS
+    raster: Raster,
+    radius: float,
+    count: int,
+    generator: np.random.Generator,
+    proposed: NDArray[np.float64] = _NO_STARTS,
 ) -> NDArray[np.float64]:
     """Return starts for a team: the first proposed ones that fit, the rest drawn uniformly.
 
-    Drawn starts lie at cell centres of one 4-connected component of the configuration space (with a cell to spare):
-    that of the first proposed start that fits, else the largest. They keep two robot diameters, centre to centre, from
-    all others.
+    Drawn starts lie at cell centres of one 4-connected component of the configuration space (with a cell to
+    spare): that of the first proposed start that fits, else the largest. They keep two robot diameters,
+    centre to centre, from all others.
 
     Parameters
     ----------
@@ -34,8 +38,8 @@ def draw_starts(
     generator : numpy.random.Generator
         Source of the draws.
     proposed : (K, 3) float64
-        Starts x, y, theta that come with the floor [m, rad]. One that is free but too near to a wall for this robot, or
-        overlaps a robot on a former one, is passed over.
+        Starts x, y, theta that come with the floor [m, rad]. One that is free but too near to a wall for this
+        robot, or overlaps a robot on a former one, is passed over.
 
     Returns
     -------
@@ -45,15 +49,17 @@ def draw_starts(
     Raises
     ------
     ValueError
-        If the robot fits nowhere, a proposed start is inside a wall, the proposed starts are disconnected for this
-        robot, or more robots are asked for than fit.
+        If the robot fits nowhere, a proposed start is inside a wall, the proposed starts are disconnected for
+        this robot, or more robots are asked for than fit.
     """
     if count < 1:
         raise ValueError(f"number of robots is {count}; want at least 1")
     found = components(raster, radius + raster.resolution)
     labels = found.labels
     if found.areas.size == 1:
-        raise ValueError(f"a robot of radius {radius} m does not fit anywhere on this floor; want a smaller robot or a larger floor")
+        raise ValueError(
+            f"a robot of radius {radius} m does not fit anywhere on this floor; want a smaller robot or a larger floor"
+        )
     taken = _fitting(raster, labels, radius, count, np.asarray(proposed, dtype=np.float64).reshape(-1, 3))
     component = labels[cell_of(raster, taken[0])] if taken else 1 + int(np.argmax(found.areas[1:]))
     allowed = labels == component
@@ -63,7 +69,9 @@ def draw_starts(
         if len(placed) == count:
             return np.array(placed)
         best = max(best, placed, key=len)
-    raise ValueError(f"{count} robots of radius {radius} m do not fit on this floor two diameters apart; {len(best)} did")
+    raise ValueError(
+        f"{count} robots of radius {radius} m do not fit on this floor two diameters apart; {len(best)} did"
+    )
 
 
 def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> None:
@@ -81,14 +89,17 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
     Raises
     ------
     ValueError
-        If the robot does not fit at a start, two robots overlap, or a start cannot be reached from the first one.
+        If the robot does not fit at a start, two robots overlap, or a start cannot be reached from the first
+        one.
     """
     labels = components(raster, radius).labels
     first = 0
     for robot, start in enumerate(starts):
         label = component_near(raster, labels, start, radius)
         if _reaches_into_solid(raster, start, radius):
-            raise ValueError(f"start ({start[0]:.3f}, {start[1]:.3f}) m is nearer than the radius of {radius} m to a wall; want more room")
+            raise ValueError(
+                f"start ({start[0]:.3f}, {start[1]:.3f}) m is nearer than the radius of {radius} m to a wall; want more room"
+            )
         first = first or label
         if label != first:
             raise ValueError(
@@ -97,11 +108,15 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
         for other in range(robot):
             apart = math.dist(start[:2], starts[other][:2])
             if apart < 2.0 * radius:
-                raise ValueError(f"starts of robots {other} and {robot} are {apart:.3f} m apart; want at least {2.0 * radius} m")
+                raise ValueError(
+                    f"starts of robots {other} and {robot} are {apart:.3f} m apart; want at least {2.0 * radius} m"
+                )
 
 
 def check_goal(raster: Raster, goal: tuple[float, float]) -> None:
-    """Check that a goal lies on the floor and outside of all that is solid; whether a robot gets there is for the robot to find out.
+    """Check that a goal lies on the floor and outside of all that is solid.
+
+    Whether a robot gets there is for the robot to find out.
 
     Parameters
     ----------
@@ -129,13 +144,19 @@ def check_goal(raster: Raster, goal: tuple[float, float]) -> None:
 
 
 def _fitting(
-    raster: Raster, labels: NDArray[np.unsignedinteger[Any]], radius: float, count: int, proposed: NDArray[np.float64]
+    raster: Raster,
+    labels: NDArray[np.unsignedinteger[Any]],
+    radius: float,
+    count: int,
+    proposed: NDArray[np.float64],
 ) -> list[NDArray[np.float64]]:
     taken: list[NDArray[np.float64]] = []
     for start in proposed:
         cell = cell_of(raster, start)
         if raster.solid[cell]:
-            raise ValueError(f"proposed start ({start[0]:.3f}, {start[1]:.3f}) m is inside a wall; want one in free space")
+            raise ValueError(
+                f"proposed start ({start[0]:.3f}, {start[1]:.3f}) m is inside a wall; want one in free space"
+            )
         overlaps = any(math.dist(start[:2], other[:2]) < 2.0 * radius for other in taken)
         if labels[cell] == 0 or overlaps or len(taken) == count:
             continue
@@ -149,7 +170,12 @@ def _fitting(
 
 
 def _place(
-    raster: Raster, allowed: NDArray[np.bool_], apart: float, count: int, generator: np.random.Generator, taken: list[NDArray[np.float64]]
+    raster: Raster,
+    allowed: NDArray[np.bool_],
+    apart: float,
+    count: int,
+    generator: np.random.Generator,
+    taken: list[NDArray[np.float64]],
 ) -> list[NDArray[np.float64]]:
     """Draw positions one after the other until there are enough or no cell is left."""
     placed = list(taken)
@@ -173,7 +199,9 @@ def _place(
     return placed
 
 
-def _without_discs(raster: Raster, allowed: NDArray[np.bool_], placed: list[NDArray[np.float64]], apart: float) -> NDArray[np.bool_]:
+def _without_discs(
+    raster: Raster, allowed: NDArray[np.bool_], placed: list[NDArray[np.float64]], apart: float
+) -> NDArray[np.bool_]:
     left = allowed.copy()
     reach = math.ceil(apart / raster.resolution) + 1
     for x, y, _ in placed:
@@ -184,7 +212,9 @@ def _without_discs(raster: Raster, allowed: NDArray[np.bool_], placed: list[NDAr
         )
         dy = raster.origin[1] + (rows + 0.5) * raster.resolution - y
         dx = raster.origin[0] + (columns + 0.5) * raster.resolution - x
-        left[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] &= np.hypot(dx[None, :], dy[:, None]) >= apart - 1e-9
+        left[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] &= (
+            np.hypot(dx[None, :], dy[:, None]) >= apart - 1e-9
+        )
     return left
 
 
@@ -198,7 +228,9 @@ def _reaches_into_solid(raster: Raster, start: NDArray[np.float64], radius: floa
     """Whether the disc at a start, exactly there and not at a cell's centre, enters a solid cell."""
     reach = math.ceil(radius / raster.resolution) + 1
     i, j = cell_of(raster, start)
-    rows, columns = np.nonzero(raster.solid[max(i - reach, 0) : i + reach + 1, max(j - reach, 0) : j + reach + 1])
+    rows, columns = np.nonzero(
+        raster.solid[max(i - reach, 0) : i + reach + 1, max(j - reach, 0) : j + reach + 1]
+    )
     low_x = raster.origin[0] + (columns + max(j - reach, 0)) * raster.resolution
     low_y = raster.origin[1] + (rows + max(i - reach, 0)) * raster.resolution
     gap_x = start[0] - np.clip(start[0], low_x, low_x + raster.resolution)

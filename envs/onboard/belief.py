@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.envs.simulation.lidar import Lidar
-from lidarium.envs.simulation.robots import Robot
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.robots import Robot
 
 if TYPE_CHECKING:
     from lidarium.envs.onboard.perception import Perception
@@ -37,9 +37,12 @@ class Teammate:
 
 
 class Belief:
-    """Read-only handle on what one robot knows; what it shows is valid until the next step.
+    """Read-only handle on what one robot knows.
 
-    All positions are in the robot's map frame: with known starts the floor's axes from the corner of its start cell.
+    What it shows is valid until the next step.
+
+    All positions are in the robot's map frame: with known starts the floor's axes from the corner of its
+    start cell.
 
     Parameters
     ----------
@@ -64,7 +67,10 @@ class Belief:
 
     @property
     def spread(self) -> NDArray[np.float64]:
-        """Standard deviation of the pose as the localizer tells [m, m, rad], shape (3,); zero where it claims to know."""
+        """Standard deviation of the pose as the localizer tells [m, m, rad], shape (3,).
+
+        Zero where it claims to know.
+        """
         return self._perception.spread(self._row)
 
     @property
@@ -94,7 +100,10 @@ class Belief:
 
     @property
     def shared_map(self) -> NavigationMap | None:
-        """The team's map, where it reached this robot; with unknown starts None until the robot is told what others know."""
+        """The team's map, where it reached this robot.
+
+        With unknown starts None until the robot is told what others know.
+        """
         return self._perception.shared_map(self._row)
 
     @property

@@ -8,9 +8,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.arrays import ENDED
-from lidarium.envs.simulation.kinematic import KinematicWorld
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
 
 
 class Meters:
@@ -79,4 +79,6 @@ class Meters:
     def is_empty(self) -> NDArray[np.bool_]:
         """Which robots have no energy left, (robots,)."""
         capacity = self._battery.capacity_j
-        return np.zeros(len(self.used_j), np.bool_) if capacity is None else np.asarray(self.used_j >= capacity)
+        return (
+            np.zeros(len(self.used_j), np.bool_) if capacity is None else np.asarray(self.used_j >= capacity)
+        )

@@ -1,7 +1,8 @@
 """A map with what planning needs of it, and the kernels that bring the maps of many teams up to date.
 
-Kernels find a map through its *record*: a row of whole numbers with the addresses of its arrays. Frontiers are kept from
-the first time that somebody asks for them, so that driving by waypoints never touches their memory.
+Kernels find a map through its *record*: a row of whole numbers with the addresses of its arrays. Frontiers
+are kept from the first time that somebody asks for them, so that driving by waypoints never touches their
+memory.
 """
 
 import math
@@ -10,12 +11,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.cell_blocks import BLOCK, positive_cells, sum_blocks
-from lidarium.mapping.clearance import ClearanceField
-from lidarium.mapping.clearance_updates import Window, changed_cells, list_cells, room_for_cells, update_around
-from lidarium.mapping.frontiers import FrontierMap, update_frontiers
-from lidarium.mapping.grid_planning import SearchSpace
-from lidarium.mapping.kernels import Array, int8_at, int8_grid_at, int32_table_at, kernel, uint8_grid_at, uint16_grid_at
+from lidarium.mapping.grids.cell_blocks import BLOCK, positive_cells, sum_blocks
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import (
+    int8_at,
+    int8_grid_at,
+    int32_table_at,
+    uint8_grid_at,
+    uint16_grid_at,
+)
+from lidarium.mapping.planning.clearance import ClearanceField
+from lidarium.mapping.planning.clearance_updates import (
+    Window,
+    changed_cells,
+    list_cells,
+    room_for_cells,
+    update_around,
+)
+from lidarium.mapping.planning.frontiers import FrontierMap, update_frontiers
+from lidarium.mapping.planning.grid_planning import SearchSpace
 
 CLEARANCE_LIMIT = 0.6
 """Clearance is told exactly up to this [m]."""
@@ -33,7 +47,8 @@ class NavigationMap:
     Parameters
     ----------
     log_odds : (rows, columns) int8
-        The map; it may be written by its owner, who says so by ``changed``. Blank, or followed by a call of ``changed``.
+        The map; it may be written by its owner, who says so by ``changed``. Blank, or followed by a call of
+        ``changed``.
     resolution : float
         Side of a cell [m].
     """
@@ -93,8 +108,16 @@ class NavigationMap:
     def _point(self) -> None:
         """Write the addresses of the arrays into the record."""
         frontiers = self._frontiers
-        flags, tiles = (0, 0) if frontiers is None else (frontiers.flags.ctypes.data, frontiers.tiles.ctypes.data)
-        addresses = (self._log_odds.ctypes.data, *self._log_odds.shape, self.clearance.closeness.ctypes.data, flags, tiles)
+        flags, tiles = (
+            (0, 0) if frontiers is None else (frontiers.flags.ctypes.data, frontiers.tiles.ctypes.data)
+        )
+        addresses = (
+            self._log_odds.ctypes.data,
+            *self._log_odds.shape,
+            self.clearance.closeness.ctypes.data,
+            flags,
+            tiles,
+        )
         self._record[:ROW_LOW] = addresses
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -103,11 +126,16 @@ class NavigationMap:
         self._point()
 
     def long_frontiers(self, minimum_size: float) -> FrontierMap:
-        """Return the frontiers without those shorter than ``minimum_size`` [m]; valid until the next call."""
+        """Return the frontiers without those shorter than ``minimum_size`` [m].
+
+        Valid until the next call.
+        """
         if self._long is None:
             self._long = FrontierMap(self.log_odds.shape, self.resolution)
         self._long.remove(self._long_cells)
-        self._long_cells = self.frontiers.clusters(minimum_cells=max(math.ceil(minimum_size / self.resolution - 1e-9), 1)).cells
+        self._long_cells = self.frontiers.clusters(
+            minimum_cells=max(math.ceil(minimum_size / self.resolution - 1e-9), 1)
+        ).cells
         self._long.add(self._long_cells)
         return self._long
 
@@ -140,7 +168,9 @@ def tiles_of(record: Array) -> Any:  # noqa: ANN401
 def refresh_map(record: Array, limit: int, stamp: Array, window: Array) -> None:
     """Bring clearance, and frontiers where they are kept, up to date in a window (4,) of a map that changed (kernel)."""
     inside = _inside(record, window)
-    _take_in(record, limit, stamp, inside, changed_cells(log_odds_of(record), closeness_of(record), limit, inside))
+    _take_in(
+        record, limit, stamp, inside, changed_cells(log_odds_of(record), closeness_of(record), limit, inside)
+    )
 
 
 @kernel
@@ -199,10 +229,15 @@ def _sum_maps(beliefs: Array, window: Window, total: Array) -> Array:
 
 @kernel(inline=True)
 def _sum_block(beliefs: Array, place: int, total: Array, nothing: Array) -> np.uint64:
-    """Sum a block of the maps; tell which of its cells became occupied or ceased to be."""
+    """Sum a block of the maps.
+
+    Tell which of its cells became occupied or ceased to be.
+    """
     target = total.ctypes.data + place
     before = positive_cells(target)
-    sum_blocks(beliefs[0, 0] + place, beliefs[1, 0] + place if beliefs.shape[0] > 1 else nothing.ctypes.data, target)
+    sum_blocks(
+        beliefs[0, 0] + place, beliefs[1, 0] + place if beliefs.shape[0] > 1 else nothing.ctypes.data, target
+    )
     for k in range(2, beliefs.shape[0]):
         sum_blocks(target, beliefs[k, 0] + place, target)
     changed: np.uint64 = before ^ positive_cells(target)
@@ -232,7 +267,8 @@ class TeamMaps(NamedTuple):
     beliefs : (rows, 3) int64
         Address, rows and columns of each robot's log-odds.
     windows, known : (rows, 4) int64
-        What part of each robot's log-odds has changed since it was last taken in, and the part that ever had until then.
+        What part of each robot's log-odds has changed since it was last taken in, and the part that ever had
+        until then.
     steps, fresh_at : (episodes,) int64
         The step of each episode, and the one at which its maps were last brought up to date.
     limit, stamp : int, (2 k + 1, 2 k + 1 and more) uint16
@@ -255,7 +291,8 @@ class TeamMaps(NamedTuple):
 def sum_maps(record: Array, beliefs: Array, limit: int, stamp: Array, window: Array) -> None:
     """Make the map of a record the sum of maps (maps, 3 or more) of its shape in a window (4,) in which these changed (kernel)."""
     inside = _inside(record, window)
-    # Nobody else writes a sum: where it changed is known without a look at its clearance, which takes twice the memory of a map.
+    # Nobody else writes a sum: where it changed is known without a look at its clearance, which takes twice
+    # the memory of a map.
     _take_in(record, limit, stamp, inside, _sum_maps(beliefs, inside, log_odds_of(record)))
 
 

@@ -1,8 +1,8 @@
 """What the robots' onboard software knows: their poses and maps, and what reached each of the others.
 
-With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. A robot that does not know its
-start can be told what others know, laid over its own map. All maps come with what planning needs (clearance and frontiers), brought
-up to date only where the map has changed.
+With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. A robot
+that does not know its start can be told what others know, laid over its own map. All maps come with what
+planning needs (clearance and frontiers), brought up to date only where the map has changed.
 """
 
 import os
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from lidarium.envs.onboard.belief import Belief as Belief
 from lidarium.envs.onboard.belief import Teammate as Teammate
-from lidarium.envs.onboard.exchange import NEVER, Exchange
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.navigation import (
     CLEARANCE_LIMIT,
@@ -28,16 +27,17 @@ from lidarium.envs.onboard.navigation import (
     sum_maps,
     sum_team,
 )
-from lidarium.envs.settings import ExplorationSettings
-from lidarium.envs.simulation.arrays import ENDED
-from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.mapping.clearance import limit_of, stamp_of
-from lidarium.mapping.frontiers import IGNORED
-from lidarium.mapping.kernels import use_threads
-from lidarium.mapping.localization.localizer import Localizer
+from lidarium.envs.radio.exchange import NEVER, Exchange
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.mapping.kernels.compilation import use_threads
+from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
 from lidarium.mapping.merging.fusion import FusedMap, lay_over
-from lidarium.mapping.path_search import SearchMemory
-from lidarium.mapping.swept import MARGIN_M, passed
+from lidarium.mapping.planning.clearance import limit_of, stamp_of
+from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed
+from lidarium.mapping.planning.frontiers import IGNORED
+from lidarium.mapping.planning.path_search import SearchMemory
 
 
 class Perception:
@@ -68,7 +68,9 @@ class Perception:
         Odometers and battery gauges of the robots of a lone episode; None in batches, which have none.
     """
 
-    def __init__(self, world: KinematicWorld, settings: ExplorationSettings, offsets: NDArray[np.float64]) -> None:
+    def __init__(
+        self, world: KinematicWorld, settings: ExplorationSettings, offsets: NDArray[np.float64]
+    ) -> None:
         self.world, self.settings, self.offsets = world, settings, offsets
         self._robots, self._episodes = settings.robots, world.episodes
         rows = self._robots * self._episodes
@@ -82,9 +84,16 @@ class Perception:
         self._threads = min(settings.threads, int(os.cpu_count() or 1))
         self.memory = SearchMemory(self._threads)
         is_team = settings.known_starts and settings.robots > 1
-        self._shares, self.hears = is_team and settings.radio.is_ideal, is_team and not settings.radio.is_ideal
+        self._shares, self.hears = (
+            is_team and settings.radio.is_ideal,
+            is_team and not settings.radio.is_ideal,
+        )
         self.knows_mates = settings.known_starts and settings.radio.is_ideal
-        self.exchanges = [] if settings.radio.is_ideal else [Exchange(world, settings, episode) for episode in range(self._episodes)]
+        self.exchanges = (
+            []
+            if settings.radio.is_ideal
+            else [Exchange(world, settings, episode) for episode in range(self._episodes)]
+        )
         self.localizers: list[Localizer | None] = [None] * rows
         self.meters: Meters | None = None
         self._heard: list[NavigationMap | None] = [None] * rows
@@ -107,7 +116,9 @@ class Perception:
         self._trails[first:last] = [[] for _ in range(self._robots)]
         self._adds_up = self.hears or any(told is not None for told in self._told)
         self._own_records[first:last], self._shared_records[episode] = 0, 0
-        self._known[first:last] = [(rows, 0, columns, 0) for rows, columns in self.world.belief_rows[first:last, 1:3]]
+        self._known[first:last] = [
+            (rows, 0, columns, 0) for rows, columns in self.world.belief_rows[first:last, 1:3]
+        ]
         self._goals[episode], self._fresh_at[episode] = goal, -2
 
     @property
@@ -124,9 +135,17 @@ class Perception:
         world, resolution = self.world, self.settings.occupancy.resolution
         limit = limit_of(CLEARANCE_LIMIT, resolution)
         return TeamMaps(
-            self._robots, self._own_records, self._shared_records, world.belief_rows, world.windows, self._known, world.steps,
-            self._fresh_at, limit, stamp_of(limit),
-        )  # fmt: skip
+            self._robots,
+            self._own_records,
+            self._shared_records,
+            world.belief_rows,
+            world.windows,
+            self._known,
+            world.steps,
+            self._fresh_at,
+            limit,
+            stamp_of(limit),
+        )
 
     def threads_for(self, episodes: int) -> int:
         """Return the number of threads for kernels over so many episodes, having seen to it that parallel kernels run on as many."""
@@ -161,10 +180,18 @@ class Perception:
         low_row, high_row, low_column, high_column = (int(value) for value in self._known[row])
         rows, columns = self.world.log_odds[row].shape
         low_row, low_column = max(low_row, 0), max(low_column, 0)
-        return low_row, max(min(high_row, rows), low_row), low_column, max(min(high_column, columns), low_column)
+        return (
+            low_row,
+            max(min(high_row, rows), low_row),
+            low_column,
+            max(min(high_column, columns), low_column),
+        )
 
     def shared_map(self, row: int = 0) -> NavigationMap | None:
-        """Return the team's map as it reached a robot, up to date; a lone robot's is its own, with unknown starts what it was told."""
+        """Return the team's map as it reached a robot, up to date.
+
+        A lone robot's is its own, with unknown starts what it was told.
+        """
         if not self.settings.known_starts:
             return None if self._told[row] is None else self._heard_map(row)
         if self.hears:
@@ -185,25 +212,33 @@ class Perception:
         return navigation
 
     def tell(self, row: int, others: FusedMap | None) -> None:
-        """Let a robot that does not know its start know what others know; it plans and explores on that as on its own map.
+        """Let a robot that does not know its start know what others know.
+
+        It plans and explores on that as on its own map.
 
         Parameters
         ----------
         row : int
             Which robot.
         others : FusedMap or None
-            What the others know, in the robot's map frame; it takes the place of what was told before. None takes that back.
+            What the others know, in the robot's map frame; it takes the place of what was told before. None
+            takes that back.
 
         Raises
         ------
         ValueError
-            Where the starts are known, so that the team's map is there anyway, or the sides of the cells differ.
+            Where the starts are known, so that the team's map is there anyway, or the sides of the cells
+            differ.
         """
         resolution = self.settings.occupancy.resolution
         if self.settings.known_starts:
-            raise ValueError("robots that know their starts have the team's map; want robots with unknown starts to be told of others")
+            raise ValueError(
+                "robots that know their starts have the team's map; want robots with unknown starts to be told of others"
+            )
         if others is not None and others.resolution != resolution:
-            raise ValueError(f"the map that is told has cells of {others.resolution} m; want {resolution} m, as the robots' own maps")
+            raise ValueError(
+                f"the map that is told has cells of {others.resolution} m; want {resolution} m, as the robots' own maps"
+            )
         if others is None and self._told[row] is None:
             return
         told = np.zeros(self.world.log_odds[row].shape, np.int8)
@@ -224,7 +259,8 @@ class Perception:
         row : int
             Which robot.
         trail : (N, 2) float64
-            Where the other one was, in the map frame of this [m]; what may show it where it stands at the end is kept.
+            Where the other one was, in the map frame of this [m]; what may show it where it stands at the end
+            is kept.
 
         Raises
         ------
@@ -232,7 +268,9 @@ class Perception:
             Where the trail is not that of a robot: of another shape, without a place, or not finite.
         """
         if trail.ndim != 2 or trail.shape[1] != 2 or not len(trail) or not np.isfinite(trail).all():
-            raise ValueError(f"the trail has shape {trail.shape} and may not be finite; want places (N, 2) in metres, at least one")
+            raise ValueError(
+                f"the trail has shape {trail.shape} and may not be finite; want places (N, 2) in metres, at least one"
+            )
         self._trails[row].append(trail)
         self._forget(row, trail)
 
@@ -245,12 +283,20 @@ class Perception:
         resolution, radius = self.settings.occupancy.resolution, float(self.world.bodies[:, 0].max())
         origin, whole = np.array(self.origin_in_frame(row)), self.world.log_odds[row]
         reach = radius + MARGIN_M + resolution
-        low = np.clip(np.floor((trail.min(axis=0) - reach - origin) / resolution).astype(np.int64), 0, whole.shape[::-1])
-        high = np.clip(np.ceil((trail.max(axis=0) + reach - origin) / resolution).astype(np.int64), low, whole.shape[::-1])
+        low = np.clip(
+            np.floor((trail.min(axis=0) - reach - origin) / resolution).astype(np.int64), 0, whole.shape[::-1]
+        )
+        high = np.clip(
+            np.ceil((trail.max(axis=0) + reach - origin) / resolution).astype(np.int64),
+            low,
+            whole.shape[::-1],
+        )
         (left, bottom), (right, top) = low.tolist(), high.tolist()
         part = whole[bottom:top, left:right]
         x, y = (origin + low * resolution).tolist()
-        self.world.forget(row, passed(part.shape, (x, y), trail, radius, resolution) & (part > 0), (bottom, left))
+        self.world.forget(
+            row, passed(part.shape, (x, y), trail, radius, resolution) & (part > 0), (bottom, left)
+        )
         self._fresh_at[self.episode_of(row)] = -2
 
     def _heard_map(self, row: int) -> NavigationMap:
@@ -279,7 +325,13 @@ class Perception:
             held = [copy.ctypes.data for mate, copy in enumerate(copies) if first + mate != row and copy.size]
         else:
             held = [] if told is None else [told.ctypes.data]
-        beliefs = np.array([(address, *self.world.log_odds[row].shape) for address in (self.world.belief_rows[row, 0], *held)], np.int64)
+        beliefs = np.array(
+            [
+                (address, *self.world.log_odds[row].shape)
+                for address in (self.world.belief_rows[row, 0], *held)
+            ],
+            np.int64,
+        )
         sum_maps(self._heard_records[row], beliefs, self._maps.limit, self._maps.stamp, window)
 
     def planning_map(self, row: int, shares_map: bool) -> NavigationMap:
@@ -290,7 +342,9 @@ class Perception:
         shared = self.shared_map(row) if shares_map else None
         return self.own_map(row) if shared is None else shared
 
-    def provide_records(self, rows: NDArray[np.int64], shares_map: bool, *, with_frontiers: bool = False) -> tuple[NDArray[np.int64], int]:
+    def provide_records(
+        self, rows: NDArray[np.int64], shares_map: bool, *, with_frontiers: bool = False
+    ) -> tuple[NDArray[np.int64], int]:
         """Make the maps that robots plan on where there are none yet, for kernels.
 
         Returns
@@ -361,7 +415,12 @@ class Perception:
         if self.hears:
             return self._heard_teammates(row, first)
         return {
-            agent: Teammate(self.pose_in_frame(other, row), 0.0, self.settings.robot.radius, bool(self.world.flags[other] & ENDED))
+            agent: Teammate(
+                self.pose_in_frame(other, row),
+                0.0,
+                self.settings.robot.radius,
+                bool(self.world.flags[other] & ENDED),
+            )
             for other, agent in enumerate(self.settings.agents, first)
             if other != row
         }
@@ -380,7 +439,10 @@ class Perception:
         return known
 
     def goal_of(self, row: int) -> NDArray[np.float64] | None:
-        """Return the goal in a robot's map frame; None without a goal, and where the robot does not know its start."""
+        """Return the goal in a robot's map frame.
+
+        None without a goal, and where the robot does not know its start.
+        """
         goal = self._goals[self.episode_of(row)]
         if goal is None or not self.settings.known_starts:
             return None
@@ -388,7 +450,11 @@ class Perception:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        kinds = ((self._own, self._own_records), (self._shared, self._shared_records), (self._heard, self._heard_records))
+        kinds = (
+            (self._own, self._own_records),
+            (self._shared, self._shared_records),
+            (self._heard, self._heard_records),
+        )
         for maps, records in kinds:
             for navigation, record in zip(maps, records, strict=True):
                 if navigation is not None:

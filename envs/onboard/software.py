@@ -1,18 +1,18 @@
 """What happens on board between sensing and deciding: who tells where a robot is, and what the radio brings.
 
-In the ideal world the kernels of a step do all of it. Localizers and radios that are not kernels run here, between and after the two
-stages of a step, robot by robot.
+In the ideal world the kernels of a step do all of it. Localizers and radios that are not kernels run here,
+between and after the two stages of a step, robot by robot.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.onboard.exchange import CONTACT_S, NEVER
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.settings import KERNEL_LOCALIZATIONS, ExplorationSettings
-from lidarium.envs.simulation.arrays import ENDED
-from lidarium.envs.simulation.stepping import ranges_without_mates
-from lidarium.mapping.localization.localizer import Sensing
+from lidarium.envs.radio.exchange import CONTACT_S, NEVER
+from lidarium.envs.settings.exploration import KERNEL_LOCALIZATIONS, ExplorationSettings
+from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kinematic.stepping import ranges_without_mates
+from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
 
 LOCALIZER_STREAM = 0x6C6F6361
@@ -42,7 +42,10 @@ class Software:
         self.is_staged = self._localizes or bool(perception.exchanges)
 
     def start(self, episode: int, seed: int) -> None:
-        """Begin an episode, after its robots were placed; whatever is drawn comes from ``seed``."""
+        """Begin an episode, after its robots were placed.
+
+        Whatever is drawn comes from ``seed``.
+        """
         world, robots = self._perception.world, self._settings.robots
         if self._localizes:
             for robot in range(robots):
@@ -54,7 +57,13 @@ class Software:
         if self._perception.exchanges:
             self._perception.exchanges[episode].start(seed)
 
-    def step(self, commands: NDArray[np.float64], *, moves_bodies: bool = True, runs: NDArray[np.bool_] | None = None) -> None:
+    def step(
+        self,
+        commands: NDArray[np.float64],
+        *,
+        moves_bodies: bool = True,
+        runs: NDArray[np.bool_] | None = None,
+    ) -> None:
         """Run a step of the world, as ``KinematicWorld.step``, and what belongs to it on board."""
         world = self._perception.world
         world.step(commands, moves_bodies=moves_bodies, perceives=not self._localizes, runs=runs)
@@ -78,7 +87,9 @@ class Software:
             if localizer is None or world.flags[row] & ENDED:
                 continue
             ranges_without_mates(world.table, row, robots, self._beams)
-            world.believed[row] = localizer.localize(Sensing(time_s, world.odometry[row].copy(), self._beams.copy()))
+            world.believed[row] = localizer.localize(
+                Sensing(time_s, world.odometry[row].copy(), self._beams.copy())
+            )
             correction = localizer.take_correction()
             if correction is not None:
                 world.render_anew(row, correction.poses, correction.ranges)
@@ -86,11 +97,17 @@ class Software:
 
     def _exchange(self, episode: int) -> None:
         """Let the robots of an episode talk, and tell the kernels whom each has heard of lately."""
-        world, settings, exchange = self._perception.world, self._settings, self._perception.exchanges[episode]
+        world, settings, exchange = (
+            self._perception.world,
+            self._settings,
+            self._perception.exchanges[episode],
+        )
         exchange.step()
         if not settings.known_starts:
             return
         rows = slice(episode * settings.robots, (episode + 1) * settings.robots)
         age = int(world.steps[episode]) - exchange.heard_at
-        world.contact[rows] = (exchange.heard_at != NEVER) & (age * settings.time_step <= CONTACT_S + settings.radio.latency_s)
+        world.contact[rows] = (exchange.heard_at != NEVER) & (
+            age * settings.time_step <= CONTACT_S + settings.radio.latency_s
+        )
         world.heard[rows] = exchange.heard.reshape(settings.robots, -1)

@@ -1,22 +1,19 @@
 """Faults of robots: at set times or at a rate, drawn by the episode's seed.
 
-A world holds each robot's faults in a table that its kernels read in every step, so faults act in the midst of decisions that run in a
-kernel, and without faults nothing is read.
+A world holds each robot's faults in a table that its kernels read in every step, so faults act in the midst
+of decisions that run in a kernel, and without faults nothing is read.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.envs.settings.faults import KINDS, MOST_DRAWN, Fault, FaultSettings
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 NO_FAULT, LASER_DROPOUT, BLIND_SECTOR, STUCK_WHEEL, KIDNAPPING, DEAD_ROBOT, DEAD_RADIO = range(7)
 """Kinds of faults by number."""
-
-KINDS = ("", "laser_dropout", "blind_sector", "stuck_wheel", "kidnapping", "dead_robot", "dead_radio")
-"""Kinds of faults by name, in the order of their numbers."""
 
 FAULT_STREAM = 0x66617565
 """Sets the draws of faults apart from others of the same seed."""
@@ -24,113 +21,17 @@ FAULT_STREAM = 0x66617565
 FAULT_NUMBERS = 6
 """Numbers of a fault: kind, first step, step after the last, and what the kind needs."""
 
-MOST_DRAWN = 32
-"""Most faults that rates bring a robot in an episode."""
-
 LONGEST_DRAWN_S = 24 * 3600.0
 """Faults are drawn for this long where an episode has no horizon [s]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fault:
-    """A fault of a robot.
-
-    Attributes
-    ----------
-    kind : str
-        ``laser_dropout`` (no beam is valid), ``blind_sector`` (some are not), ``stuck_wheel``, ``kidnapping`` (the robot is put elsewhere),
-        ``dead_robot`` or ``dead_radio``.
-    robot : int
-        Number of the robot, from 0.
-    at_s : float
-        When it begins [s].
-    lasts_s : float or None
-        How long it lasts [s], None for ever; a robot that is dead stays so.
-    bearing, width : float
-        Middle and width of the blind sector against the heading [rad].
-    wheel : str
-        Which wheel sticks: ``left`` or ``right``.
-    place : (x, y, theta) or None
-        Where a kidnapped robot is put, in the floor's frame [m, rad]; drawn where None.
-    """
-
-    kind: str
-    robot: int = 0
-    at_s: float = 0.0
-    lasts_s: float | None = None
-    bearing: float = 0.0
-    width: float = math.radians(60.0)
-    wheel: str = "left"
-    place: tuple[float, float, float] | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS[1:]:
-            raise ValueError(f"kind of the fault is {self.kind!r}; want one of {', '.join(KINDS[1:])}")
-        if isinstance(self.robot, bool) or not isinstance(self.robot, int) or self.robot < 0:
-            raise ValueError(f"robot of the fault is {self.robot!r}; want the number of a robot, from 0")
-        if not (math.isfinite(self.at_s) and self.at_s >= 0.0):
-            raise ValueError(f"at_s of the fault is {self.at_s}; want a time of 0 s or more")
-        if self.lasts_s is not None and not self.lasts_s > 0.0:
-            raise ValueError(f"lasts_s of the fault is {self.lasts_s}; want more than 0 s, or None for ever")
-        if not (math.isfinite(self.bearing) and 0.0 < self.width <= 2.0 * math.pi):
-            raise ValueError(f"the blind sector is {self.width} rad wide at {self.bearing} rad; want a width above 0 and at most 2 pi")
-        if self.wheel not in ("left", "right"):
-            raise ValueError(f"wheel of the fault is {self.wheel!r}; want left or right")
-        if self.place is not None:
-            place = tuple(float(value) for value in self.place)
-            if len(place) != 3 or not all(math.isfinite(value) for value in place):
-                raise ValueError(f"place of the fault is {self.place!r}; want x, y [m] and theta [rad], or None")
-            object.__setattr__(self, "place", place)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FaultSettings:
-    """What goes wrong with a team.
-
-    Attributes
-    ----------
-    schedule : tuple of Fault
-        Faults at set times.
-    laser_dropout, blind_sector, stuck_wheel, kidnapping, dead_robot, dead_radio : float
-        How often each kind befalls a robot, on average [1/h].
-    lasts_s : float
-        How long those that pass by last, on average [s].
-    """
-
-    schedule: tuple[Fault, ...] = ()
-    laser_dropout: float = 0.0
-    blind_sector: float = 0.0
-    stuck_wheel: float = 0.0
-    kidnapping: float = 0.0
-    dead_robot: float = 0.0
-    dead_radio: float = 0.0
-    lasts_s: float = 3.0
-
-    def __post_init__(self) -> None:
-        faults = tuple(Fault(**fault) if isinstance(fault, dict) else fault for fault in self.schedule)
-        if not all(isinstance(fault, Fault) for fault in faults):
-            raise ValueError(f"schedule of faults is {self.schedule!r}; want faults")
-        object.__setattr__(self, "schedule", faults)
-        for kind in KINDS[1:]:
-            if not 0.0 <= getattr(self, kind) < math.inf:
-                raise ValueError(f"rate of {kind} is {getattr(self, kind)}; want a number an hour of 0 or more")
-        if not 0.0 < self.lasts_s < math.inf:
-            raise ValueError(f"lasts_s of faults is {self.lasts_s}; want more than 0 s")
-
-    @property
-    def rates(self) -> tuple[float, ...]:
-        """How often each kind befalls a robot [1/h], in the order of ``KINDS`` without the first."""
-        return tuple(getattr(self, kind) for kind in KINDS[1:])
-
-    @property
-    def capacity(self) -> int:
-        """Most faults of one robot in an episode."""
-        robots = [fault.robot for fault in self.schedule]
-        return max((robots.count(robot) for robot in robots), default=0) + (MOST_DRAWN if any(self.rates) else 0)
-
-
 def plan_faults(
-    settings: FaultSettings, robots: int, seed: int, time_step: float, horizon_s: float | None, places: NDArray[np.float64]
+    settings: FaultSettings,
+    robots: int,
+    seed: int,
+    time_step: float,
+    horizon_s: float | None,
+    places: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the faults of a team in an episode, as kernels read them.
 
@@ -158,18 +59,26 @@ def plan_faults(
     generator = np.random.default_rng([seed, FAULT_STREAM])
     longest = LONGEST_DRAWN_S if horizon_s is None else horizon_s
     for robot in range(robots):
-        faults = [fault for fault in settings.schedule if fault.robot == robot] + _drawn(settings, robot, longest, generator)
+        faults = [fault for fault in settings.schedule if fault.robot == robot] + _drawn(
+            settings, robot, longest, generator
+        )
         for k, fault in enumerate(faults[: settings.capacity]):
             table[robot, k, 0] = KINDS.index(fault.kind)
             table[robot, k, 1] = math.ceil(fault.at_s / time_step - 1e-9)
             is_for_ever = fault.lasts_s is None or fault.kind == "dead_robot"
             # What lasts less than a step lasts one.
-            table[robot, k, 2] = math.inf if is_for_ever else fault.at_s / time_step + max((fault.lasts_s or 0.0) / time_step, 1.0)
+            table[robot, k, 2] = (
+                math.inf
+                if is_for_ever
+                else fault.at_s / time_step + max((fault.lasts_s or 0.0) / time_step, 1.0)
+            )
             table[robot, k, 3:] = _needs(fault, generator, places)
     return table.reshape(robots, -1)
 
 
-def _drawn(settings: FaultSettings, robot: int, longest: float, generator: np.random.Generator) -> list[Fault]:
+def _drawn(
+    settings: FaultSettings, robot: int, longest: float, generator: np.random.Generator
+) -> list[Fault]:
     """Draw the faults that rates bring a robot, in the order of time."""
     faults: list[Fault] = []
     for kind, rate in zip(KINDS[1:], settings.rates, strict=True):
@@ -180,14 +89,20 @@ def _drawn(settings: FaultSettings, robot: int, longest: float, generator: np.ra
                 break
             faults.append(
                 Fault(
-                    kind=kind, robot=robot, at_s=time, lasts_s=max(generator.exponential(settings.lasts_s), 1e-3),
-                    bearing=generator.uniform(-math.pi, math.pi), wheel="left" if generator.random() < 0.5 else "right",
+                    kind=kind,
+                    robot=robot,
+                    at_s=time,
+                    lasts_s=max(generator.exponential(settings.lasts_s), 1e-3),
+                    bearing=generator.uniform(-math.pi, math.pi),
+                    wheel="left" if generator.random() < 0.5 else "right",
                 )
-            )  # fmt: skip
+            )
     return sorted(faults, key=lambda fault: fault.at_s)[:MOST_DRAWN]
 
 
-def _needs(fault: Fault, generator: np.random.Generator, places: NDArray[np.float64]) -> tuple[float, float, float]:
+def _needs(
+    fault: Fault, generator: np.random.Generator, places: NDArray[np.float64]
+) -> tuple[float, float, float]:
     """Return the three numbers that a fault's kind needs."""
     if fault.kind == "blind_sector":
         return fault.bearing, fault.width, 0.0
@@ -201,10 +116,6 @@ def _needs(fault: Fault, generator: np.random.Generator, places: NDArray[np.floa
     return float(x), float(y), float(generator.uniform(-math.pi, math.pi))
 
 
-NO_FAULTS = FaultSettings()
-"""Nothing goes wrong."""
-
-
 @kernel(inline=True, borrowing=True)
 def _is_active(faults: Array, k: int, kind: int, step: int) -> bool:
     return bool(faults[k] == kind and faults[k + 1] <= step < faults[k + 2])
@@ -213,7 +124,7 @@ def _is_active(faults: Array, k: int, kind: int, step: int) -> bool:
 @kernel(borrowing=True)
 def has_fault(faults: Array, kind: int, step: int) -> bool:
     """Whether a robot with ``faults`` (capacity * 6,) has one of a kind in a step."""
-    for k in range(0, faults.shape[0], FAULT_NUMBERS):  # noqa: SIM110 (kernels know no any())
+    for k in range(0, faults.shape[0], FAULT_NUMBERS):  # noqa: SIM110
         if _is_active(faults, k, kind, step):
             return True
     return False
@@ -232,7 +143,10 @@ def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) ->
 
 @kernel(borrowing=True)
 def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) -> bool:
-    """Put a robot elsewhere if it is time to and the place is free; where a teammate stands there it is put as soon as that has left."""
+    """Put a robot elsewhere if it is time to and the place is free.
+
+    Where a teammate stands there it is put as soon as that has left.
+    """
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
         if faults[k] != KIDNAPPING or step < faults[k + 1]:
             continue
@@ -249,7 +163,9 @@ def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) ->
 
 
 @kernel(borrowing=True)
-def blind_beams(faults: Array, step: int, angle_first: float, increment: float, ranges: Array, lengths: Array) -> None:
+def blind_beams(
+    faults: Array, step: int, angle_first: float, increment: float, ranges: Array, lengths: Array
+) -> None:
     """Make beams invalid that a dropout, a blind sector or death takes away: ``ranges`` nan, ``lengths`` 0."""
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
         is_out = _is_active(faults, k, LASER_DROPOUT, step) or _is_active(faults, k, DEAD_ROBOT, step)

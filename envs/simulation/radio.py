@@ -2,22 +2,19 @@
 
 References
 ----------
-Path loss through obstacles, parameters and threshold of ``signal``: IR2 (Tan et al., "IR2: Implicit Rendezvous for Robotic Exploration
-Teams under Sparse Intermittent Connectivity", IROS 2024); its pixels are taken as 0.1 m.
+Path loss through obstacles, parameters and threshold of ``signal``: IR2 (Tan et al., "IR2: Implicit
+Rendezvous for Robotic Exploration Teams under Sparse Intermittent Connectivity", IROS 2024); its pixels are
+taken as 0.1 m.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Raster
-from lidarium.mapping.checks import check_from_zero, check_positive
-from lidarium.mapping.kernels import Array, kernel
-
-RADIO_KINDS = ("all", "none", "range", "line_of_sight", "signal")
-"""How robots reach each other."""
+from lidarium.envs.settings.radio import RadioSettings
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 RADIO_STREAM = 0x72616469
 """Sets the draws of the radio apart from others of the same seed."""
@@ -26,73 +23,11 @@ OBSTACLE_UNIT = 0.1
 """Length of wall that costs nothing beside the fixed loss of a wall, the unit of the formula's obstacle length [m]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RadioSettings:
-    """How robots of a team reach each other.
-
-    Attributes
-    ----------
-    kind : str
-        ``all``, ``none``, ``range`` (within ``reach``), ``line_of_sight`` (within ``reach`` and nothing solid between) or ``signal``
-        (``power`` less the path loss is above ``threshold``).
-    reach : float
-        Of ``range`` and ``line_of_sight`` [m].
-    power, threshold : float
-        Of the sender, and what the receiver needs [dBm].
-    reference_distance, reference_loss : float
-        Where the loss in free space is known [m], and what it is there [dB].
-    free_exponent, wall_exponent : float
-        How loss grows with the free way and with the way through what is solid [1].
-    wall_loss : float
-        Loss where anything solid is between [dB].
-    shadowing : float
-        Standard deviation of what a link loses or gains by chance, drawn at every exchange [dB].
-    loss : float
-        Probability that a message is lost [1].
-    latency_s : float
-        Time until a message arrives [s].
-    period_s : float
-        Time between exchanges of maps; poses are told in every step [s].
-    """
-
-    kind: str = "all"
-    reach: float = 10.0
-    power: float = -20.0
-    threshold: float = -70.0
-    reference_distance: float = 3.5
-    reference_loss: float = 31.0
-    free_exponent: float = 2.0
-    wall_exponent: float = 4.0
-    wall_loss: float = 6.5
-    shadowing: float = 0.0
-    loss: float = 0.0
-    latency_s: float = 0.0
-    period_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        if self.kind not in RADIO_KINDS:
-            raise ValueError(f"kind of the radio is {self.kind!r}; want one of {', '.join(RADIO_KINDS)}")
-        check_positive(self, "the radio", ("reach", "reference_distance", "period_s"))
-        check_from_zero(self, "the radio", ("free_exponent", "wall_exponent", "wall_loss", "shadowing", "latency_s"))
-        for name in ("power", "threshold", "reference_loss"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"{name} of the radio is {getattr(self, name)}; want a finite number")
-        if not 0.0 <= self.loss < 1.0:
-            raise ValueError(f"loss of the radio is {self.loss}; want a probability in [0, 1)")
-
-    @property
-    def is_ideal(self) -> bool:
-        """Whether every message reaches everybody at once."""
-        return self.kind == "all" and self.loss == 0.0 and self.latency_s == 0.0
-
-
-RADIO: dict[str, RadioSettings] = {kind: RadioSettings(kind=kind) for kind in RADIO_KINDS}
-"""Radios by name."""
-
-
 @kernel
 def solid_length(solid: Array, x: float, y: float, to_x: float, to_y: float) -> float:
-    """Length of a line within solid cells, from x, y to another place, in cells; beyond the raster nothing is solid (kernel).
+    """Length of a line within solid cells, from x, y to another place, in cells.
+
+    Beyond the raster nothing is solid (kernel).
 
     Parameters
     ----------
@@ -132,27 +67,40 @@ def _wall_lengths(solid: Array, places: Array, lengths: Array) -> None:
     for i in range(places.shape[0]):
         lengths[i, i] = 0.0
         for j in range(i):
-            lengths[i, j] = lengths[j, i] = solid_length(solid, places[i, 0], places[i, 1], places[j, 0], places[j, 1])
+            lengths[i, j] = lengths[j, i] = solid_length(
+                solid, places[i, 0], places[i, 1], places[j, 0], places[j, 1]
+            )
 
 
-def path_loss(settings: RadioSettings, distance: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.float64]:
+def path_loss(
+    settings: RadioSettings, distance: NDArray[np.float64], walls: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the loss over a distance of which a part runs through what is solid [dB].
 
     Parameters
     ----------
     settings : RadioSettings
-        Parameters of the formula ``PL = PL0 + 10 g_wall log10(d_wall) + K + 10 g log10(d_free / d0) + X``, without ``X``.
+        Parameters of the formula ``PL = PL0 + 10 g_wall log10(d_wall) + K + 10 g log10(d_free / d0) + X``,
+        without ``X``.
     distance, walls : (...) float64
-        Length of the whole way, and of what is solid of it [m]. Less than ``reference_distance`` of free way loses no less than it does.
+        Length of the whole way, and of what is solid of it [m]. Less than ``reference_distance`` of free way
+        loses no less than it does.
     """
     free = np.maximum(distance - walls, 0.0)
-    loss = settings.reference_loss + 10.0 * settings.free_exponent * np.log10(np.maximum(free / settings.reference_distance, 1.0))
-    through = settings.wall_loss + 10.0 * settings.wall_exponent * np.log10(np.maximum(walls / OBSTACLE_UNIT, 1.0))
+    loss = settings.reference_loss + 10.0 * settings.free_exponent * np.log10(
+        np.maximum(free / settings.reference_distance, 1.0)
+    )
+    through = settings.wall_loss + 10.0 * settings.wall_exponent * np.log10(
+        np.maximum(walls / OBSTACLE_UNIT, 1.0)
+    )
     return np.asarray(loss + np.where(walls > 0.0, through, 0.0), np.float64)
 
 
 def _reached(
-    settings: RadioSettings, distance: NDArray[np.float64], walls: NDArray[np.float64], chance: NDArray[np.float64] | None
+    settings: RadioSettings,
+    distance: NDArray[np.float64],
+    walls: NDArray[np.float64],
+    chance: NDArray[np.float64] | None,
 ) -> NDArray[np.bool_]:
     """Return over which ways a message comes, by their lengths and what of them is solid [m], and the draws for the shadowing."""
     if settings.kind in ("all", "none"):
@@ -172,7 +120,10 @@ def _asks_for_walls(settings: RadioSettings) -> bool:
 
 
 def links(
-    settings: RadioSettings, places: NDArray[np.float64], raster: Raster, chance: NDArray[np.float64] | None = None
+    settings: RadioSettings,
+    places: NDArray[np.float64],
+    raster: Raster,
+    chance: NDArray[np.float64] | None = None,
 ) -> NDArray[np.bool_]:
     """Return which robots reach each other, (robots, robots), none itself.
 
@@ -194,7 +145,10 @@ def links(
         _wall_lengths(raster.solid, (places[:, :2] - raster.origin) / raster.resolution, walls)
         walls *= raster.resolution
     above = None if chance is None else np.triu(chance, 1)
-    return np.asarray(_reached(settings, distance, walls, None if above is None else above + above.T) & ~np.eye(robots, dtype=np.bool_))
+    return np.asarray(
+        _reached(settings, distance, walls, None if above is None else above + above.T)
+        & ~np.eye(robots, dtype=np.bool_)
+    )
 
 
 def links_to(

@@ -11,20 +11,25 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.levels.decisions import boxes_of
+from lidarium.envs.levels.frontiers import FrontierExploration
+from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.observations import FARTHEST
-from lidarium.envs.onboard.state import Order
-from lidarium.envs.onboard.team_mapping import Frames, TeamMapping, crop_around
-from lidarium.envs.wrappers.decisions import boxes_of
-from lidarium.envs.wrappers.frontiers import FrontierExploration
-from lidarium.envs.wrappers.waypoints import WaypointExploration
+from lidarium.envs.radio.messages import Order
+from lidarium.envs.station.team_mapping import Frames, TeamMapping, crop_around
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.validation import ValidationSettings
-from lidarium.mapping.rigid import Transform
 
 CanTalk = Callable[[float, NDArray[np.float64]], NDArray[np.bool_]]
-"""Takes the time [s] and the true poses (robots, 3); returns which robots reach each other, (robots, robots)."""
+"""Takes the time [s] and the true poses (robots, 3).
 
-TEAM_VALIDATION = ValidationSettings(most_contradiction_m=1.0, plenty_of_overlap_m2=0.0, plenty_of_wall_m=10.0, contradiction_share=0.1)
+Returns which robots reach each other, (robots, robots).
+"""
+
+TEAM_VALIDATION = ValidationSettings(
+    most_contradiction_m=1.0, plenty_of_overlap_m2=0.0, plenty_of_wall_m=10.0, contradiction_share=0.1
+)
 """Robots that do not know where the others are map their bodies as walls, so more may contradict than in maps of robots alone."""
 
 OLDEST_S = 3600.0
@@ -84,10 +89,11 @@ class MergeEvent:
 class MergedMaps(ParallelEnv[str, Observation, Any]):
     """Gives each robot the map that it and all it is joined with have made, and where those are.
 
-    The observation has, beside that of the environment below, ``team_map`` uint8 (1, M, M) like ``map``, as of the last exchange, and
-    ``teammates`` float32 (robots - 1, 5), one row for each of the others in their order: x, y [m], theta [rad] in the robot's own map
-    frame, the age of that news [s] and whether there is any; zeros where there is none. ``infos[agent]["merges"]`` lists with whom it
-    was joined in this step, ``infos[agent]["truth"]["merges"]`` the `MergeEvent` of each.
+    The observation has, beside that of the environment below, ``team_map`` uint8 (1, M, M) like ``map``, as
+    of the last exchange, and ``teammates`` float32 (robots - 1, 5), one row for each of the others in their
+    order: x, y [m], theta [rad] in the robot's own map frame, the age of that news [s] and whether there is
+    any; zeros where there is none. ``infos[agent]["merges"]`` lists with whom it was joined in this step,
+    ``infos[agent]["truth"]["merges"]`` the `MergeEvent` of each.
 
     Parameters
     ----------
@@ -96,8 +102,8 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
     settings : MergingSettings or None
         How; the defaults where None.
     can_talk : (robots, robots) bool, callable or None
-        Which robots reach each other, at all times or as a function (see `CanTalk`); where None, those that the environment's radio
-        joins. News are passed on.
+        Which robots reach each other, at all times or as a function (see `CanTalk`); where None, those that
+        the environment's radio joins. News are passed on.
 
     Attributes
     ----------
@@ -135,7 +141,9 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         self._steps = max(round(self.merging.period_s / base.settings.time_step), 1)
         self._due = 0
         self._observation_spaces: dict[str, spaces.Space[Any]] = {
-            agent: spaces.Dict({**boxes_of(env.observation_space(agent)), **team_boxes(robots, base.settings.map_cells)})
+            agent: spaces.Dict(
+                {**boxes_of(env.observation_space(agent)), **team_boxes(robots, base.settings.map_cells)}
+            )
             for agent in self.possible_agents
         }
 
@@ -166,7 +174,9 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
     def step(
         self,
         actions: Any,  # noqa: ANN401
-    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+    ) -> tuple[
+        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
+    ]:
         """Take a step or a decision, and exchange maps where the period is over."""
         observations, rewards, terminations, truncations, infos = self.env.step(actions)
         self.agents = self.env.agents
@@ -204,12 +214,16 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         self._due = steps - steps % self._steps + self._steps
         time_s = self._base.scorer.time
         truth = true_frames(self._base)
-        joined = self.team.exchange(self._clusters(time_s), time_s, truth if self.merging.known_starts else None)
+        joined = self.team.exchange(
+            self._clusters(time_s), time_s, truth if self.merging.known_starts else None
+        )
         for (a, b), (found, at, is_direct) in joined.items():
             if (a, b) in self._joined:
                 continue
             true = truth[a, b]
-            event = MergeEvent(time_s, a, b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), at, is_direct)
+            event = MergeEvent(
+                time_s, a, b, (found.x, found.y, found.theta), (true.x, true.y, true.theta), at, is_direct
+            )
             self.events.append(event)
             for agent, other in ((a, b), (b, a)):
                 if agent in infos:
@@ -226,12 +240,19 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         if self._can_talk is None:
             links = exchanges[0].links | exchanges[0].links.T
         else:
-            links = self._can_talk(time_s, self._base.world.poses.copy()) if callable(self._can_talk) else self._can_talk
+            links = (
+                self._can_talk(time_s, self._base.world.poses.copy())
+                if callable(self._can_talk)
+                else self._can_talk
+            )
         reached = _check_links(np.asarray(links), robots).astype(np.int64) + np.eye(robots, dtype=np.int64)
         for _ in range(robots.bit_length()):
             reached = ((reached @ reached) > 0).astype(np.int64)
         rows = {tuple(row) for row in (reached > 0).tolist()}
-        return [[agent for agent, is_in in zip(self.possible_agents, row, strict=True) if is_in] for row in sorted(rows, reverse=True)]
+        return [
+            [agent for agent, is_in in zip(self.possible_agents, row, strict=True) if is_in]
+            for row in sorted(rows, reverse=True)
+        ]
 
     def _with_team(self, observations: dict[str, Observation]) -> dict[str, Observation]:
         time_s, perception = self._base.scorer.time, self._base.perception
@@ -250,7 +271,13 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
             if news is not None:
                 pose = news.own_from_other @ news.pose
                 age = min(time_s - news.time_s, OLDEST_S)
-                table[row] = (np.clip(pose.x, -FARTHEST, FARTHEST), np.clip(pose.y, -FARTHEST, FARTHEST), pose.theta, age, 1.0)
+                table[row] = (
+                    np.clip(pose.x, -FARTHEST, FARTHEST),
+                    np.clip(pose.y, -FARTHEST, FARTHEST),
+                    pose.theta,
+                    age,
+                    1.0,
+                )
         return table
 
 
@@ -262,7 +289,12 @@ def true_frames(env: ExplorationEnv) -> Frames:
     else:
         frames = [Transform(*start) for start in env.world.starts.tolist()]
     agents = env.possible_agents
-    return {(a, b): frames[i].inverse() @ frames[j] for i, a in enumerate(agents) for j, b in enumerate(agents) if i != j}
+    return {
+        (a, b): frames[i].inverse() @ frames[j]
+        for i, a in enumerate(agents)
+        for j, b in enumerate(agents)
+        if i != j
+    }
 
 
 def team_boxes(robots: int, cells: int) -> dict[str, spaces.Space[Any]]:
@@ -270,11 +302,16 @@ def team_boxes(robots: int, cells: int) -> dict[str, spaces.Space[Any]]:
     turn = float(np.nextafter(np.float32(math.pi), np.float32(4.0)))
     high = np.tile(np.array([FARTHEST, FARTHEST, turn, OLDEST_S, 1.0], np.float32), (robots - 1, 1))
     low = np.tile(np.array([-FARTHEST, -FARTHEST, -turn, 0.0, 0.0], np.float32), (robots - 1, 1))
-    return {"team_map": spaces.Box(0, 255, (1, cells, cells), np.uint8), "teammates": spaces.Box(low, high, dtype=np.float32)}
+    return {
+        "team_map": spaces.Box(0, 255, (1, cells, cells), np.uint8),
+        "teammates": spaces.Box(low, high, dtype=np.float32),
+    }
 
 
 def _check_links(links: NDArray[Any], robots: int) -> NDArray[np.bool_]:
     if links.shape != (robots, robots):
-        raise ValueError(f"can_talk has shape {links.shape}; want ({robots}, {robots}): which robots reach each other")
+        raise ValueError(
+            f"can_talk has shape {links.shape}; want ({robots}, {robots}): which robots reach each other"
+        )
     found = np.asarray(links, np.bool_)
     return found | found.T

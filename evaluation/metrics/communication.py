@@ -2,7 +2,8 @@
 
 References
 ----------
-Connected share and largest cluster: MAES (Andreasen et al., 2022). Connectivity and C_own: IR2 (Tan et al., IROS 2024).
+Connected share and largest cluster: MAES (Andreasen et al., 2022). Connectivity and C_own: IR2 (Tan et al.,
+IROS 2024).
 """
 
 import numpy as np
@@ -14,19 +15,26 @@ from lidarium.evaluation.metrics.progress import time_to
 
 
 def largest_clusters(links: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the robots of the largest cluster at each time, shape (times,); robots are in one cluster where links join them.
+    """Return the robots of the largest cluster at each time, shape (times,).
+
+    Robots are in one cluster where links join them.
 
     Parameters
     ----------
     links : (times, robots, robots) bool
         Whether robot i reaches robot j at each time; a link of either direction joins them.
     """
-    sizes = [np.bincount(connected_components(csr_array(link), directed=False)[1]).max() for link in np.asarray(links, np.bool_)]
+    sizes = [
+        np.bincount(connected_components(csr_array(link), directed=False)[1]).max()
+        for link in np.asarray(links, np.bool_)
+    ]
     return np.array(sizes, np.int64)
 
 
 def connected_share(links: NDArray[np.bool_]) -> float:
-    """Return the share of times at which all robots are in one cluster (MAES, IR2); 1 where there is no time.
+    """Return the share of times at which all robots are in one cluster (MAES, IR2).
+
+    1 where there is no time.
 
     Parameters
     ----------
@@ -62,7 +70,9 @@ def bytes_per_robot_second(sent: ArrayLike, duration: float) -> float:
     return float(np.mean(np.asarray(sent, np.float64))) / duration if duration > 0.0 else 0.0
 
 
-def sharing_lag(times: ArrayLike, own: NDArray[np.float64], team: ArrayLike, share: float = 0.99) -> float | None:
+def sharing_lag(
+    times: ArrayLike, own: NDArray[np.float64], team: ArrayLike, share: float = 0.99
+) -> float | None:
     """Return ``T_p(min_i C_own,i) - T_p(C_team)`` [s]: how much later the last robot knows what the team knows; None where not reached.
 
     Parameters

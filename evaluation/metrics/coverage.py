@@ -1,12 +1,13 @@
 """How much of a floor is explored.
 
-F are the free cells that count: those that the disc of the smallest robot sweeps over its configuration space, connected to
-the starts. S are the truth's occupied cells around them.
+F are the free cells that count: those that the disc of the smallest robot sweeps over its configuration
+space, connected to the starts. S are the truth's occupied cells around them.
 
 References
 ----------
-C_free: Chen et al., Self-learning exploration and mapping (2019), and ARiADNE (Cao et al., ICRA 2023). C_known: Xu et al.,
-Explore-Bench (ICRA 2022). C_valid: Ho et al., MapEx (ICRA 2025). C_own: IR2 (Tan et al., IROS 2024).
+C_free: Chen et al., Self-learning exploration and mapping (2019), and ARiADNE (Cao et al., ICRA 2023).
+C_known: Xu et al., Explore-Bench (ICRA 2022). C_valid: Ho et al., MapEx (ICRA 2025). C_own: IR2 (Tan et al.,
+IROS 2024).
 """
 
 import numpy as np
@@ -44,10 +45,12 @@ def own_coverage(sensed: NDArray[np.bool_], counted: Mask) -> tuple[float, float
 
 
 def known_coverage(known: Mask, knowable: Mask) -> float:
-    """Return ``C_known`` = |known and knowable| / |knowable|; walls count as well (Explore-Bench).
+    """Return ``C_known`` = |known and knowable| / |knowable|.
 
-    Explore-Bench's script divides all known cells by the area of the true map that is not unknown, so that cells known beyond
-    that area count and the share can pass 1; here they do not count.
+    Walls count as well (Explore-Bench).
+
+    Explore-Bench's script divides all known cells by the area of the true map that is not unknown, so that
+    cells known beyond that area count and the share can pass 1; here they do not count.
 
     Parameters
     ----------

@@ -2,7 +2,8 @@
 
 References
 ----------
-Precision and recall of curves within a tolerance: as boundaries are compared in image segmentation (Martin et al., PAMI 2004).
+Precision and recall of curves within a tolerance: as boundaries are compared in image segmentation (Martin et
+al., PAMI 2004).
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 TOLERANCE = 0.05
 """Within this distance a curve tells of a wall [m]."""
@@ -23,7 +24,10 @@ Edges = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class WallError:
-    """How far points of curves lie from the nearest wall: mean and 95 % quantile [m]; nan where there are no points."""
+    """How far points of curves lie from the nearest wall: mean and 95 % quantile [m].
+
+    Nan where there are no points.
+    """
 
     mean: float
     p95: float
@@ -53,7 +57,9 @@ def wall_error(curve_points: Points, edges: Edges) -> WallError:
 
 
 def curve_precision(curve_points: Points, edges: Edges, tolerance: float = TOLERANCE) -> float:
-    """Return the share of the curves' length within a tolerance of a wall; 1 where there are no curves.
+    """Return the share of the curves' length within a tolerance of a wall.
+
+    1 where there are no curves.
 
     Parameters
     ----------
@@ -68,7 +74,9 @@ def curve_precision(curve_points: Points, edges: Edges, tolerance: float = TOLER
 
 
 def wall_recall(wall_points: Points, curve_points: Points, tolerance: float = TOLERANCE) -> float:
-    """Return the share of seen walls within a tolerance of a curve; 1 where nothing was seen.
+    """Return the share of seen walls within a tolerance of a curve.
+
+    1 where nothing was seen.
 
     Parameters
     ----------
@@ -126,7 +134,13 @@ def hits_of_beams(edges: Edges, poses: Points, angles: NDArray[np.float64], rang
         Reach of the laser [m].
     """
     hits = np.empty((len(poses) * len(angles), 2))
-    count = _cast(np.ascontiguousarray(edges, np.float64), np.ascontiguousarray(poses, np.float64), angles, range_max, hits)
+    count = _cast(
+        np.ascontiguousarray(edges, np.float64),
+        np.ascontiguousarray(poses, np.float64),
+        angles,
+        range_max,
+        hits,
+    )
     return hits[:count].copy()
 
 
@@ -138,7 +152,9 @@ def end_point_bytes(points: int) -> int:
 def grid_bytes(bounds: tuple[float, float, float, float], resolution: float = 0.05) -> int:
     """Return the size of a grid of one byte a cell over x_min, y_min, x_max, y_max [bytes]."""
     x_min, y_min, x_max, y_max = bounds
-    return int(np.ceil((x_max - x_min) / resolution - 1e-9)) * int(np.ceil((y_max - y_min) / resolution - 1e-9))
+    return int(np.ceil((x_max - x_min) / resolution - 1e-9)) * int(
+        np.ceil((y_max - y_min) / resolution - 1e-9)
+    )
 
 
 @kernel

@@ -15,7 +15,10 @@ def decision_percentiles(seconds: Sequence[float]) -> dict[str, float | None]:
 
 
 def peak_megabytes() -> float | None:
-    """Return the most memory that this process has held so far [1e6 bytes]; None where the system does not tell."""
+    """Return the most memory that this process has held so far [1e6 bytes].
+
+    None where the system does not tell.
+    """
     try:
         import resource
     except ImportError:

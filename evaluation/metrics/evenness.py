@@ -2,7 +2,8 @@
 
 References
 ----------
-Balance: Xu et al., Explore-Bench (ICRA 2022), "std". Jain index: Jain, Chiu and Hawe, A quantitative measure of fairness (1984).
+Balance: Xu et al., Explore-Bench (ICRA 2022), "std". Jain index: Jain, Chiu and Hawe, A quantitative measure
+of fairness (1984).
 """
 
 import numpy as np
@@ -21,7 +22,9 @@ def balance(shares: ArrayLike) -> float:
 
 
 def path_balance(lengths: ArrayLike) -> float:
-    """Return the population standard deviation of the path lengths over their mean; 0 where nobody moved.
+    """Return the population standard deviation of the path lengths over their mean.
+
+    0 where nobody moved.
 
     Parameters
     ----------

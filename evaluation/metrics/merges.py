@@ -2,7 +2,8 @@
 
 References
 ----------
-What is correct: the tolerances of m-explore's own test of its map merging (Hörner, m-explore, BSD), 1e-2 rad and 2 cells.
+What is correct: the tolerances of m-explore's own test of its map merging (Hörner, m-explore, BSD), 1e-2 rad
+and 2 cells.
 """
 
 import math
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.envs.wrappers.merged_maps import MergeEvent
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
 
 ROTATION_TOLERANCE = 1e-2
 """Largest error of the rotation of a correct merge [rad]."""
@@ -29,7 +30,9 @@ LEAST_OVERLAP = 0.10
 """Share of the area that maps must have in common for a merge to be expected."""
 
 
-def transform_error(found: ArrayLike, true: ArrayLike, at: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
+def transform_error(
+    found: ArrayLike, true: ArrayLike, at: tuple[float, float] = (0.0, 0.0)
+) -> tuple[float, float]:
     """Return ``|T a - T* a|`` [m] and ``|wrap(theta - theta*)|`` [rad] of a transform T that was found for a true one T*.
 
     Parameters
@@ -37,8 +40,8 @@ def transform_error(found: ArrayLike, true: ArrayLike, at: tuple[float, float] =
     found, true : (3,) float64
         x, y, theta [m, m, rad].
     at : (x, y)
-        a, the point at which translations are compared [m]: the centre of what the maps have in common, since at a far origin a small
-        error of the rotation looks like a large one of the translation.
+        a, the point at which translations are compared [m]: the centre of what the maps have in common, since
+        at a far origin a small error of the rotation looks like a large one of the translation.
     """
     points = []
     for x, y, theta in (np.asarray(found, np.float64), np.asarray(true, np.float64)):
@@ -61,7 +64,10 @@ def is_correct(translation_error: float, rotation_error: float, resolution: floa
         Side of a cell of the maps [m].
     """
     # A millionth of a cell, so that an error of exactly two cells is not lost to rounding.
-    return rotation_error <= ROTATION_TOLERANCE and translation_error <= (TRANSLATION_TOLERANCE + 1e-6) * resolution
+    return (
+        rotation_error <= ROTATION_TOLERANCE
+        and translation_error <= (TRANSLATION_TOLERANCE + 1e-6) * resolution
+    )
 
 
 def is_wrong(translation_error: float, rotation_error: float) -> bool:
@@ -92,7 +98,9 @@ class Trajectories:
         """Return how a robot's map lies on the floor around a point of it [m]: as its poses did when it was nearest to there."""
         robot = list(self.agents).index(agent)
         known = max(int(np.searchsorted(self.times, until_s, side="right")), 1)
-        nearest = int(np.argmin(np.linalg.norm(self.believed[:known, robot, :2] - np.asarray(at, np.float64), axis=1)))
+        nearest = int(
+            np.argmin(np.linalg.norm(self.believed[:known, robot, :2] - np.asarray(at, np.float64), axis=1))
+        )
         true, believed = (Transform(*poses[nearest, robot].tolist()) for poses in (self.true, self.believed))
         return true @ believed.inverse()
 
@@ -100,7 +108,8 @@ class Trajectories:
 def drifted_truth(event: MergeEvent, trajectories: Trajectories) -> tuple[float, float, float]:
     """Return how two robots' maps truly lie to each other where they overlap, ``a_from_b``.
 
-    Maps drift: what their starts say of each other is not what is true of two maps where they meet. A merger sees the maps alone.
+    Maps drift: what their starts say of each other is not what is true of two maps where they meet. A merger
+    sees the maps alone.
 
     Parameters
     ----------
@@ -116,7 +125,9 @@ def drifted_truth(event: MergeEvent, trajectories: Trajectories) -> tuple[float,
     return true.x, true.y, true.theta
 
 
-def merge_figures(events: Sequence[MergeEvent], resolution: float, trajectories: Trajectories | None = None) -> dict[str, Any]:
+def merge_figures(
+    events: Sequence[MergeEvent], resolution: float, trajectories: Trajectories | None = None
+) -> dict[str, Any]:
     """Return the entry ``merges`` of ``result.json``.
 
     Parameters
@@ -131,17 +142,23 @@ def merge_figures(events: Sequence[MergeEvent], resolution: float, trajectories:
     Returns
     -------
     dict
-        ``accepted``, ``correct`` and ``false`` (not correct) are numbers of events by what the starts say, ``worst_m`` and ``worst_rad``
-        the largest errors so, and ``off`` is how many err by more than ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``. ``wrong``,
-        ``worst_here_m`` and ``worst_here_rad`` are the same by `drifted_truth` of maps that were laid on each other: where others lie
-        between two maps, what those have drifted and the lever of small angles come to what is between the two, and the merges that
-        join them are judged themselves.
-        ``first_correct_s`` is a time. None where there is nothing to tell.
+        ``accepted``, ``correct`` and ``false`` (not correct) are numbers of events by what the starts say,
+        ``worst_m`` and ``worst_rad`` the largest errors so, and ``off`` is how many err by more than
+        ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``. ``wrong``, ``worst_here_m`` and ``worst_here_rad`` are
+        the same by `drifted_truth` of maps that were laid on each other: where others lie between two maps,
+        what those have drifted and the lever of small angles come to what is between the two, and the merges
+        that join them are judged themselves. ``first_correct_s`` is a time. None where there is nothing to
+        tell.
     """
     accepted = np.ones(len(events), np.bool_)
     errors = [transform_error(one.found, one.true, one.at) for one in events]
     laid = [one for one in events if one.is_direct]
-    here = [transform_error(one.found, one.true if trajectories is None else drifted_truth(one, trajectories), one.at) for one in laid]
+    here = [
+        transform_error(
+            one.found, one.true if trajectories is None else drifted_truth(one, trajectories), one.at
+        )
+        for one in laid
+    ]
     correct = np.array([is_correct(*error, resolution) for error in errors], np.bool_)
     right = int(np.count_nonzero(correct))
     times = [one.time_s for one in events]
@@ -160,7 +177,9 @@ def merge_figures(events: Sequence[MergeEvent], resolution: float, trajectories:
 
 
 def precision(accepted: NDArray[np.bool_], correct: NDArray[np.bool_]) -> float | None:
-    """Return |accepted and correct| / |accepted| over the attempts; None where none was accepted.
+    """Return |accepted and correct| / |accepted| over the attempts.
+
+    None where none was accepted.
 
     Parameters
     ----------
@@ -186,7 +205,9 @@ def recall(accepted: NDArray[np.bool_], correct: NDArray[np.bool_], overlaps: Ar
     return int(np.count_nonzero(accepted & correct & expected)) / total if total else None
 
 
-def first_correct_time(times: Sequence[float], accepted: NDArray[np.bool_], correct: NDArray[np.bool_]) -> float | None:
+def first_correct_time(
+    times: Sequence[float], accepted: NDArray[np.bool_], correct: NDArray[np.bool_]
+) -> float | None:
     """Return when the first correct merge was accepted [s], None where none was.
 
     Parameters
@@ -196,4 +217,7 @@ def first_correct_time(times: Sequence[float], accepted: NDArray[np.bool_], corr
     accepted, correct : (attempts,) bool
         Which attempts were accepted, and which were correct.
     """
-    return min((float(time) for time, is_good in zip(times, accepted & correct, strict=True) if is_good), default=None)
+    return min(
+        (float(time) for time, is_good in zip(times, accepted & correct, strict=True) if is_good),
+        default=None,
+    )

@@ -2,8 +2,8 @@
 
 References
 ----------
-Overlap_EB: Xu et al., Explore-Bench (ICRA 2022). Overlap_MX: Zhu et al., MAexp (ICRA 2024). Overlap_MV: MARVEL (Chiun et al., ICRA
-2025).
+Overlap_EB: Xu et al., Explore-Bench (ICRA 2022). Overlap_MX: Zhu et al., MAexp (ICRA 2024). Overlap_MV:
+MARVEL (Chiun et al., ICRA 2025).
 """
 
 from collections.abc import Sequence
@@ -34,8 +34,8 @@ def overlap(masks: Sequence[NDArray[np.uint64]] | NDArray[np.uint64]) -> float:
 def overlap_of_maps(known_shares: ArrayLike) -> float:
     """Return ``Overlap_EB`` = sum_i C_known,i - 1 (Explore-Bench, at T_0.99).
 
-    A share below 0 says that the maps together hold less than the floor once: it is a measure of overlap where the team's map is
-    nearly whole, and of nothing before.
+    A share below 0 says that the maps together hold less than the floor once: it is a measure of overlap
+    where the team's map is nearly whole, and of nothing before.
 
     Parameters
     ----------

@@ -4,8 +4,8 @@ Poses are x, y, theta [m, m, rad] of one robot at the same times.
 
 References
 ----------
-Best fit: Umeyama (PAMI 1991), without scale. ATE and RPE: Sturm et al., A benchmark for the evaluation of RGB-D SLAM systems (IROS
-2012).
+Best fit: Umeyama (PAMI 1991), without scale. ATE and RPE: Sturm et al., A benchmark for the evaluation of
+RGB-D SLAM systems (IROS 2012).
 """
 
 import math
@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.rigid import composed, fit, relative
+from lidarium.mapping.geometry.rigid import composed, fit, relative
 
 Poses = NDArray[np.float64]
 """Poses in the order of time, (times, 3) float64 [m, m, rad]."""
@@ -51,15 +51,20 @@ def absolute_error(believed: Poses, true: Poses, is_aligned: bool = True) -> flo
     is_aligned : bool
         False where both are in one frame: S is the identity then.
     """
-    fitted = moved(believed, best_transform(believed, true)) if is_aligned else np.asarray(believed, np.float64)
+    fitted = (
+        moved(believed, best_transform(believed, true)) if is_aligned else np.asarray(believed, np.float64)
+    )
     gaps = fitted[:, :2] - np.asarray(true, np.float64)[:, :2]
     return math.sqrt(float((gaps**2).sum(axis=1).mean()))
 
 
 def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, float] | None:
-    """Return RPE: ``sqrt(mean |trans(E_k)|^2)`` [m] and ``mean |angle(E_k)|`` [rad]; None where the poses do not span the steps.
+    """Return RPE: ``sqrt(mean |trans(E_k)|^2)`` [m] and ``mean |angle(E_k)|`` [rad].
 
-    ``E_k = (Q_k^-1 Q_(k+d))^-1 (P_k^-1 P_(k+d))`` of true poses Q and believed ones P; no frames have to agree.
+    None where the poses do not span the steps.
+
+    ``E_k = (Q_k^-1 Q_(k+d))^-1 (P_k^-1 P_(k+d))`` of true poses Q and believed ones P; no frames have to
+    agree.
 
     Parameters
     ----------
@@ -73,7 +78,9 @@ def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, flo
     motion, truth = _motions(believed, steps), _motions(true, steps)
     # The rotation of Q_k^-1 Q_(k+d) turns the gap of translations and leaves its length.
     gaps = motion[:, :2] - truth[:, :2]
-    return math.sqrt(float((gaps**2).sum(axis=1).mean())), float(np.abs(wrapped(motion[:, 2] - truth[:, 2])).mean())
+    return math.sqrt(float((gaps**2).sum(axis=1).mean())), float(
+        np.abs(wrapped(motion[:, 2] - truth[:, 2])).mean()
+    )
 
 
 def _motions(poses: Poses, steps: int) -> Poses:

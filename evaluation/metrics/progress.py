@@ -1,12 +1,15 @@
-"""How soon, in how many decisions and over what way a team gets where it should; runs that do not are censored, not dropped.
+"""How soon, in how many decisions and over what way a team gets where it should.
+
+Runs that do not are censored, not dropped.
 
 Time is simulated time. Coverage over time is a step function: each value holds until the next.
 
 References
 ----------
-T_p: Xu et al., Explore-Bench (ICRA 2022), which takes wall time. D_p as the longest path of the team: MARVEL (Chiun et al., ICRA
-2025) and IR2 (Tan et al., IROS 2024). N_p: decision steps as of IR2. AUC: as of MAexp's curves (Zhu et al., ICRA 2024). Restricted
-time: Royston and Parmar, Restricted mean survival time (BMC Medical Research Methodology, 2013).
+T_p: Xu et al., Explore-Bench (ICRA 2022), which takes wall time. D_p as the longest path of the team: MARVEL
+(Chiun et al., ICRA 2025) and IR2 (Tan et al., IROS 2024). N_p: decision steps as of IR2. AUC: as of MAexp's
+curves (Zhu et al., ICRA 2024). Restricted time: Royston and Parmar, Restricted mean survival time (BMC
+Medical Research Methodology, 2013).
 """
 
 import math
@@ -119,7 +122,9 @@ def area_under_curve(times: ArrayLike, coverage: ArrayLike, horizon: float) -> f
         raise ValueError(f"horizon is {horizon} s; want more than 0 and finite")
     at, values = np.asarray(times, np.float64), np.asarray(coverage, np.float64)
     if at.shape != values.shape or at.ndim != 1 or (np.diff(at) < 0.0).any():
-        raise ValueError(f"times have the shape {at.shape} and coverage {values.shape}; want as many values as times, in the order of time")
+        raise ValueError(
+            f"times have the shape {at.shape} and coverage {values.shape}; want as many values as times, in the order of time"
+        )
     ends = np.minimum(np.append(at, horizon), horizon)
     return float((np.maximum(np.diff(ends), 0.0) * values).sum() / horizon)
 

@@ -2,7 +2,8 @@
 
 References
 ----------
-Kuemmerle et al., On measuring the accuracy of SLAM algorithms (Autonomous Robots 27, 2009), and their files of relations.
+Kuemmerle et al., On measuring the accuracy of SLAM algorithms (Autonomous Robots 27, 2009), and their files
+of relations.
 """
 
 from dataclasses import asdict, dataclass
@@ -12,9 +13,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.laser_logs import LaserLog
-from lidarium.mapping.rigid import relative
-from lidarium.mapping.trajectories import at_readings, interpolated, last_before, read_numbers
+from lidarium.mapping.files.laser_logs import LaserLog
+from lidarium.mapping.files.trajectories import at_readings, interpolated, last_before, read_numbers
+from lidarium.mapping.geometry.rigid import relative
 
 Which = Literal["between", "before"]
 
@@ -71,7 +72,9 @@ class RelationErrors:
 
 
 def read_relations(path: Path) -> Relations:
-    """Read ``t1 t2 dx dy dz roll pitch yaw`` a line, plain or gzipped; what leaves the plane is left out.
+    """Read ``t1 t2 dx dy dz roll pitch yaw`` a line, plain or gzipped.
+
+    What leaves the plane is left out.
 
     Raises
     ------
@@ -109,7 +112,9 @@ def covered(relations: Relations, stamps: NDArray[np.float64]) -> Relations:
     return Relations(relations.begin[is_inside], relations.end[is_inside], relations.motions[is_inside])
 
 
-def relation_errors(begin: NDArray[np.float64], end: NDArray[np.float64], relations: Relations) -> RelationErrors:
+def relation_errors(
+    begin: NDArray[np.float64], end: NDArray[np.float64], relations: Relations
+) -> RelationErrors:
     """Return by how much poses miss relations: the motion between the poses of each, as seen from the true one.
 
     Parameters
@@ -127,9 +132,15 @@ def relation_errors(begin: NDArray[np.float64], end: NDArray[np.float64], relati
 
 
 def log_relation_errors(
-    log: LaserLog, poses: NDArray[np.float64], relations: Relations, clock_shift: float = 0.0, which: Which = "between"
+    log: LaserLog,
+    poses: NDArray[np.float64],
+    relations: Relations,
+    clock_shift: float = 0.0,
+    which: Which = "between",
 ) -> RelationErrors:
-    """Return by how much the poses found for a log's scans miss relations; those of times beyond the log are left out.
+    """Return by how much the poses found for a log's scans miss relations.
+
+    Those of times beyond the log are left out.
 
     Parameters
     ----------
@@ -142,8 +153,9 @@ def log_relation_errors(
     clock_shift : float
         What is added to the log's stamps to compare them with the relations' [s].
     which : str
-        Pose at a relation's time: ``between`` those of the scans around it at constant speed, or ``before``, the last one before,
-        for logs whose scans carry the stamp of the odometry before them; the log's odometry then tells the way between scans.
+        Pose at a relation's time: ``between`` those of the scans around it at constant speed, or ``before``,
+        the last one before, for logs whose scans carry the stamp of the odometry before them; the log's
+        odometry then tells the way between scans.
 
     Raises
     ------
@@ -153,7 +165,16 @@ def log_relation_errors(
     stamps = log.stamps + clock_shift
     relations = covered(relations, stamps)
     if which == "between":
-        return relation_errors(interpolated(stamps, poses, relations.begin), interpolated(stamps, poses, relations.end), relations)
+        return relation_errors(
+            interpolated(stamps, poses, relations.begin),
+            interpolated(stamps, poses, relations.end),
+            relations,
+        )
     if len(log.reading_of_scan):
-        poses, stamps = at_readings(poses, log.reading_of_scan, log.readings), log.readings_stamps + clock_shift
-    return relation_errors(last_before(stamps, poses, relations.begin), last_before(stamps, poses, relations.end), relations)
+        poses, stamps = (
+            at_readings(poses, log.reading_of_scan, log.readings),
+            log.readings_stamps + clock_shift,
+        )
+    return relation_errors(
+        last_before(stamps, poses, relations.begin), last_before(stamps, poses, relations.end), relations
+    )

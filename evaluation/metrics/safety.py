@@ -7,7 +7,9 @@ from numpy.typing import ArrayLike
 
 
 def collisions_per_km(collisions: int, lengths: ArrayLike) -> float | None:
-    """Return collisions over the kilometres that the team drove; None where nobody moved.
+    """Return collisions over the kilometres that the team drove.
+
+    None where nobody moved.
 
     Parameters
     ----------

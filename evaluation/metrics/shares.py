@@ -10,6 +10,9 @@ Mask = NDArray[np.bool_]
 
 
 def share(part: NDArray[Any], whole: NDArray[Any], empty: float = 1.0) -> float:
-    """Return ``|part| / |whole|``, the cells of which are those that are not 0; ``empty`` where the whole has none."""
+    """Return ``|part| / |whole|``, the cells of which are those that are not 0.
+
+    ``empty`` where the whole has none.
+    """
     size = int(np.count_nonzero(whole))
     return int(np.count_nonzero(part)) / size if size else empty

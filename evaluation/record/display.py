@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.level_changes import levels_of_planes
+from lidarium.mapping.grids.map_deltas import levels_of_planes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapChanges:
     """How the team's three-level map changed from sample to sample, beginning with a map of which nothing is known.
 
-    Two planes of bits hold the map, one of known and one of occupied cells; a word has 64 cells of a row, bit 0 the first one.
+    Two planes of bits hold the map, one of known and one of occupied cells; a word has 64 cells of a row, bit
+    0 the first one.
 
     Attributes
     ----------
@@ -67,7 +68,8 @@ class DisplayTrack:
     changes : MapChanges
         The team's map over time, every two seconds and at the end.
     events : list of dict
-        Each with ``time_s``, ``kind``, ``agent`` and keys of its own, in order of time; docs/reference/files.md lists the kinds.
+        Each with ``time_s``, ``kind``, ``agent`` and keys of its own, in order of time;
+        docs/reference/files.md lists the kinds.
     """
 
     times: NDArray[np.float64]
@@ -84,7 +86,9 @@ class DisplayTrack:
 
     def poses_at(self, time_s: float) -> NDArray[np.float64]:
         """Return the last sampled poses up to a time, those of the start before it, shape (robots, 3)."""
-        return np.asarray(self.poses[max(int(np.searchsorted(self.times, time_s + 1e-9, side="right")) - 1, 0)])
+        return np.asarray(
+            self.poses[max(int(np.searchsorted(self.times, time_s + 1e-9, side="right")) - 1, 0)]
+        )
 
     def coverage_at(self, time_s: float) -> float:
         """Return ``C_free`` at a time."""

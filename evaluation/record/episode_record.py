@@ -12,7 +12,10 @@ import lidarium
 from lidarium.evaluation.record.display import DisplayTrack
 
 FORMAT = 1
-"""Number of the format of records that this version writes; it reads this one and those before."""
+"""Number of the format of records that this version writes.
+
+It reads this one and those before.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,7 +25,8 @@ class EpisodeRecord:
     Attributes
     ----------
     header : dict
-        Version, settings, what was drawn at the beginning, endings and the hash of the final state; docs/reference/files.md lists it all.
+        Version, settings, what was drawn at the beginning, endings and the hash of the final state;
+        docs/reference/files.md lists it all.
     commands : (steps, robots, 2) float64
         Speed and turn rate at which each robot was driven in each time step, to the bit [m/s, rad/s].
     display : DisplayTrack
@@ -55,7 +59,12 @@ def _are_numbers(value: Any, count: int) -> bool:  # noqa: ANN401
 
 
 def _is_ending(value: Any) -> bool:  # noqa: ANN401
-    return isinstance(value, list) and len(value) == 3 and _is_count(value[0]) and all(isinstance(word, str) for word in value[1:])
+    return (
+        isinstance(value, list)
+        and len(value) == 3
+        and _is_count(value[0])
+        and all(isinstance(word, str) for word in value[1:])
+    )
 
 
 _WANTED: dict[str, tuple[str, Callable[[Any], bool]]] = {
@@ -70,15 +79,24 @@ _WANTED: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "time_step": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
     "settings": ("an object", lambda value: isinstance(value, dict)),
     "settings_sha256": ("64 hexadecimal digits", _is_hash),
-    "starts": ("a list of x, y, theta", lambda value: isinstance(value, list) and all(_are_numbers(start, 3) for start in value)),
+    "starts": (
+        "a list of x, y, theta",
+        lambda value: isinstance(value, list) and all(_are_numbers(start, 3) for start in value),
+    ),
     "noise_seed": ("a whole number", _is_count),
     "goal": ("x, y or null", lambda value: value is None or _are_numbers(value, 2)),
     "steps": ("a whole number", _is_count),
     "counted_cells": ("a whole number", _is_count),
     "map_origin": ("x, y", lambda value: _are_numbers(value, 2)),
     "map_resolution": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
-    "map_shape": ("two whole numbers", lambda value: _are_numbers(value, 2) and all(_is_count(side) for side in value)),
-    "endings": ("a list of step, robot, reason", lambda value: isinstance(value, list) and all(_is_ending(ending) for ending in value)),
+    "map_shape": (
+        "two whole numbers",
+        lambda value: _are_numbers(value, 2) and all(_is_count(side) for side in value),
+    ),
+    "endings": (
+        "a list of step, robot, reason",
+        lambda value: isinstance(value, list) and all(_is_ending(ending) for ending in value),
+    ),
     "interrupted": ("true or false", lambda value: isinstance(value, bool)),
     "final_sha256": ("64 hexadecimal digits or null", lambda value: value is None or _is_hash(value)),
 }
@@ -86,7 +104,9 @@ _WANTED: dict[str, tuple[str, Callable[[Any], bool]]] = {
 
 
 def check_header(header: Any) -> None:  # noqa: ANN401
-    """Check the header of a record as read from a file; keys that are not known are left alone.
+    """Check the header of a record as read from a file.
+
+    Keys that are not known are left alone.
 
     Raises
     ------

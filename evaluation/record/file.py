@@ -12,15 +12,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.evaluation.output import whole_file
+from lidarium.evaluation.episodes.output import whole_file
 from lidarium.evaluation.record.display import DisplayTrack, MapChanges
 from lidarium.evaluation.record.episode_record import EpisodeRecord, NewerFormatError, check_header
-from lidarium.mapping.map_files import check_file
+from lidarium.mapping.files.map_files import check_file
 
 _HEADER, _EVENTS = "header.json", "events.json"
-_ARRAYS = ("commands", "pose_steps", "poses", "coverage", "map_steps", "map_counts", "map_places", "map_known", "map_occupied")
+_ARRAYS = (
+    "commands",
+    "pose_steps",
+    "poses",
+    "coverage",
+    "map_steps",
+    "map_counts",
+    "map_places",
+    "map_known",
+    "map_occupied",
+)
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-_DAMAGE = (zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError, EOFError, KeyError, ValueError, RuntimeError)
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    tokenize.TokenError,
+    SyntaxError,
+    EOFError,
+    KeyError,
+    ValueError,
+    RuntimeError,
+)
 """What readers of zips, arrays and JSON raise over bytes that are not as they were written."""
 
 _UNITS = 1e3
@@ -79,7 +99,9 @@ def read_record(path: Path) -> EpisodeRecord:
     except NewerFormatError as error:
         raise ValueError(f"{path} {error}") from error
     except _DAMAGE as error:
-        raise ValueError(f"{path} is not a whole episode record: {_reason(error)}; want a file that lidarium run --record wrote") from error
+        raise ValueError(
+            f"{path} is not a whole episode record: {_reason(error)}; want a file that lidarium run --record wrote"
+        ) from error
 
 
 def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -112,7 +134,11 @@ def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
         "pose_steps": _steps(display.times, time_step),
         "poses": np.diff(poses, axis=0, prepend=np.int32(0)),
         "coverage": np.stack(
-            [_steps(display.coverage[:, 0], time_step), np.rint(display.coverage[:, 1] * counted).astype(np.int32)], axis=1
+            [
+                _steps(display.coverage[:, 0], time_step),
+                np.rint(display.coverage[:, 1] * counted).astype(np.int32),
+            ],
+            axis=1,
         ),
         "map_steps": _steps(changes.times, time_step),
         "map_counts": changes.counts.astype(np.int32),
@@ -120,7 +146,9 @@ def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
         "map_known": changes.known,
         "map_occupied": changes.occupied,
     }
-    return {name: np.ascontiguousarray(arrays[name], arrays[name].dtype.newbyteorder("<")) for name in _ARRAYS}
+    return {
+        name: np.ascontiguousarray(arrays[name], arrays[name].dtype.newbyteorder("<")) for name in _ARRAYS
+    }
 
 
 def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any]]) -> EpisodeRecord:  # noqa: ANN401
@@ -143,11 +171,19 @@ def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any
     for name, shape in shapes.items():
         kind = {"commands": np.float64, "map_known": np.uint64, "map_occupied": np.uint64}.get(name, np.int32)
         if arrays[name].shape != shape or arrays[name].dtype != kind:
-            raise ValueError(f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of {np.dtype(kind)}")
+            raise ValueError(
+                f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of {np.dtype(kind)}"
+            )
     places = np.cumsum(arrays["map_places"], dtype=np.int64)
-    if int(arrays["map_counts"].sum()) != changed or (changed and not 0 <= int(places.min()) <= int(places.max()) < rows * words):
+    if int(arrays["map_counts"].sum()) != changed or (
+        changed and not 0 <= int(places.min()) <= int(places.max()) < rows * words
+    ):
         raise ValueError(f"the changes of the map do not fit a map of {rows} x {words} words")
-    if not (poses and samples) or not isinstance(events, list) or not all(_is_event(event) for event in events):
+    if (
+        not (poses and samples)
+        or not isinstance(events, list)
+        or not all(_is_event(event) for event in events)
+    ):
         raise ValueError("it has no poses, no map or no list of events")
     changes = MapChanges(
         rows,
@@ -176,9 +212,16 @@ def _steps(times: NDArray[np.float64], time_step: float) -> NDArray[np.int32]:
 
 def _is_event(event: Any) -> bool:  # noqa: ANN401
     return (
-        isinstance(event, dict) and isinstance(event.get("kind"), str) and isinstance(event.get("time_s"), int | float) and "agent" in event
+        isinstance(event, dict)
+        and isinstance(event.get("kind"), str)
+        and isinstance(event.get("time_s"), int | float)
+        and "agent" in event
     )
 
 
 def _reason(error: Exception) -> str:
-    return str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error) or type(error).__name__
+    return (
+        str(error.args[0])
+        if isinstance(error, KeyError) and error.args
+        else str(error) or type(error).__name__
+    )

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.evaluation.beliefs import cells_beyond
 from lidarium.evaluation.record.display import MapChanges
-from lidarium.mapping.level_changes import note_changes, note_laid_changes
+from lidarium.evaluation.truth.beliefs import cells_beyond
+from lidarium.mapping.grids.map_deltas import note_changes, note_laid_changes
 
 FAR = 1e5
 """How far from a robot a map may have changed that was rendered anew [m]."""
@@ -17,8 +17,8 @@ FAR = 1e5
 class MapSampler:
     """Follows the team's map of an episode; the first sample is taken when it is made.
 
-    The map is the sign of the sum of the robots' log-odds, those that do not know their starts laid over the floor by their true
-    starts, as in ``result.json`` and the map files.
+    The map is the sign of the sum of the robots' log-odds, those that do not know their starts laid over the
+    floor by their true starts, as in ``result.json`` and the map files.
 
     Parameters
     ----------
@@ -41,12 +41,18 @@ class MapSampler:
         assert tables is not None
         self.origin: tuple[float, float] = tables.laser.origin
         self.shape: tuple[int, int] = (world.counted_masks[0].shape[0], world.counted_masks[0].shape[1])
-        self._world, self._time_step, self._resolution = world, settings.time_step, settings.occupancy.resolution
+        self._world, self._time_step, self._resolution = (
+            world,
+            settings.time_step,
+            settings.occupancy.resolution,
+        )
         self._frame = np.array([*self.origin, self._resolution])
         self._known, self._occupied = np.zeros(self.shape, np.uint64), np.zeros(self.shape, np.uint64)
         self._buffer = np.empty((self.shape[0] * self.shape[1], 3), np.uint64)
         # Between two samples a robot gets no further from both places than half of what it can drive.
-        self._reach = settings.lidar.range_max + 0.5 * settings.robot.max_speed * period_s + 4 * self._resolution
+        self._reach = (
+            settings.lidar.range_max + 0.5 * settings.robot.max_speed * period_s + 4 * self._resolution
+        )
         self._last = world.believed[:, :2].copy()
         self._is_laid = not settings.known_starts
         self._maps = world.belief_rows.copy()
@@ -56,7 +62,9 @@ class MapSampler:
                 self._maps[row, 0] += first_row * self._maps[row, 2] + first_column
         self._renderings = world.renderings.copy()
         self._lays = _lays_of(env, self.origin)
-        self._before = [np.zeros(log_odds.shape, np.int8) for log_odds in world.log_odds] if self._is_laid else []
+        self._before = (
+            [np.zeros(log_odds.shape, np.int8) for log_odds in world.log_odds] if self._is_laid else []
+        )
         self._before_at = np.array([log_odds.ctypes.data for log_odds in self._before], np.int64)
         self._steps: list[int] = []
         self._changes: list[NDArray[np.uint64]] = []
@@ -74,7 +82,14 @@ class MapSampler:
         self._renderings[:] = world.renderings
         if self._is_laid:
             count = note_laid_changes(
-                world.belief_rows, self._before_at, self._lays, world.believed, self._last, reach, self._resolution, *planes
+                world.belief_rows,
+                self._before_at,
+                self._lays,
+                world.believed,
+                self._last,
+                reach,
+                self._resolution,
+                *planes,
             )
         else:
             count = note_changes(self._maps, world.believed, self._last, reach, self._frame, *planes)
@@ -86,7 +101,8 @@ class MapSampler:
         changes = np.concatenate(self._changes)
         counts = np.array([len(change) for change in self._changes], np.int64)
         places = changes[:, 0].astype(np.int64)
-        # Words above each other are alike, so that in this order they take less room when they are compressed.
+        # Words above each other are alike, so that in this order they take less room when they are
+        # compressed.
         order = np.lexsort((places, np.repeat(np.arange(len(counts)), counts)))
         times = np.array(self._steps) * self._time_step
         return MapChanges(*self.shape, times, counts, places[order], changes[order, 1], changes[order, 2])
@@ -95,7 +111,9 @@ class MapSampler:
 def _lays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
     """Return how maps in the frames of the starts lie over the floor's lattice, as ``note_laid_changes`` takes it."""
     world = env.world
-    return np.array([
-        (*origin, x, y, math.cos(theta), math.sin(theta), *own_origin)
-        for (x, y, theta), own_origin in zip(world.starts, world.origins, strict=True)
-    ])  # fmt: skip
+    return np.array(
+        [
+            (*origin, x, y, math.cos(theta), math.sin(theta), *own_origin)
+            for (x, y, theta), own_origin in zip(world.starts, world.origins, strict=True)
+        ]
+    )

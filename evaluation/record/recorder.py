@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 import lidarium
 from lidarium.agents.policy import GivenUp
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.onboard.state import Orders
-from lidarium.evaluation.events import operating_events, place_of
+from lidarium.envs.radio.messages import Orders
+from lidarium.evaluation.episodes.events import operating_events, place_of
+from lidarium.evaluation.episodes.result import settings_sha256
 from lidarium.evaluation.record.display import DisplayTrack
 from lidarium.evaluation.record.episode_record import FORMAT, EpisodeRecord
 from lidarium.evaluation.record.map_sampler import MapSampler
 from lidarium.evaluation.record.state import state_sha256
-from lidarium.evaluation.result import settings_sha256
 
 MAP_PERIOD_S = 2.0
 """Time between samples of the team's map [s]."""
@@ -36,18 +36,24 @@ class Recorder:
     seed : int or None
         The seed that the episode was reset with, for the header; what was drawn with it is recorded itself.
     floor : str, Path or None
-        The floor as the user named it, to find it again; without it only floors that are not files are found again by themselves.
+        The floor as the user named it, to find it again; without it only floors that are not files are found
+        again by themselves.
     image_resolution : float or None
         Side of a pixel [m] where the floor is a plain image.
 
     Notes
     -----
-    An episode is what was drawn at its beginning (floor, starts, seed of the noise, goal), the speeds that its robots were driven at, and
-    when robots ended. Nothing else enters the world, so neither the policy nor the onboard software is needed to run it again.
+    An episode is what was drawn at its beginning (floor, starts, seed of the noise, goal), the speeds that
+    its robots were driven at, and when robots ended. Nothing else enters the world, so neither the policy nor
+    the onboard software is needed to run it again.
     """
 
     def __init__(
-        self, policy: str = "", seed: int | None = None, floor: str | Path | None = None, image_resolution: float | None = None
+        self,
+        policy: str = "",
+        seed: int | None = None,
+        floor: str | Path | None = None,
+        image_resolution: float | None = None,
     ) -> None:
         self._about = {
             "policy": policy,
@@ -92,7 +98,9 @@ class Recorder:
         self._live = len(env.agents)
         known = {agent for _, agent, _ in self._endings}
         step = int(env.world.steps[0])
-        self._endings += [(step, agent, reason) for agent, reason in env.scorer.ended_because.items() if agent not in known]
+        self._endings += [
+            (step, agent, reason) for agent, reason in env.scorer.ended_because.items() if agent not in known
+        ]
 
     def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
         """Note where robots were sent anew, and what was given up."""
@@ -134,7 +142,9 @@ class Recorder:
         """
         env = self._env
         if env is None or env.floor is None:
-            raise ValueError("the recorder has seen no episode; let it watch an environment from its reset on")
+            raise ValueError(
+                "the recorder has seen no episode; let it watch an environment from its reset on"
+            )
         settings, world = env.settings, env.world
         steps = int(world.steps[0])
         commands = np.frombuffer(self._commands, np.float64).reshape(-1, settings.robots, 2).copy()
@@ -172,7 +182,8 @@ class Recorder:
         if track[-1][0] < scorer.time:
             track.append((scorer.time, env.world.poses.copy()))
         ended = [
-            {"time_s": round(step * time_step, 6), "kind": "ended", "agent": agent, "reason": why} for step, agent, why in self._endings
+            {"time_s": round(step * time_step, 6), "kind": "ended", "agent": agent, "reason": why}
+            for step, agent, why in self._endings
         ]
         return DisplayTrack(
             np.array([time for time, _ in track]),
@@ -193,13 +204,23 @@ class Recorder:
                 self.note("decision", time_s, agent, **place_of(env, agent, target))
 
     def _note_given_up(self, env: ExplorationEnv, given_up: Sequence[GivenUp], time_s: float) -> None:
-        """Note what is given up for the first time; what was seen later from elsewhere may leave the list, and come back."""
+        """Note what is given up for the first time.
+
+        What was seen later from elsewhere may leave the list, and come back.
+        """
         self._last_given_up = list(given_up)
         for entry in self._last_given_up:
             if entry not in self._given_up:
                 self._given_up.add(entry)
                 place = place_of(env, entry.agent, (entry.x, entry.y))
-                self.note("given_up", time_s, entry.agent, **place, size_m=round(entry.size_m, 3), reason=entry.reason)
+                self.note(
+                    "given_up",
+                    time_s,
+                    entry.agent,
+                    **place,
+                    size_m=round(entry.size_m, 3),
+                    reason=entry.reason,
+                )
 
     def _note_contacts(self, env: ExplorationEnv) -> None:
         collisions = env.world.collisions

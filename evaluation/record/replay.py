@@ -8,19 +8,21 @@ from typing import Any
 import numpy as np
 
 import lidarium
-from lidarium.envs.episodes import Beginning
+from lidarium.envs.episode_start import Beginning
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.floors.catalogue import is_file_name, load_floor
+from lidarium.envs.floors.catalogue.names import is_file_name, load_floor
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.settings import PARTS, ExplorationSettings
-from lidarium.envs.simulation.floor_cache import floor_tables
+from lidarium.envs.settings.exploration import PARTS, ExplorationSettings
+from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+from lidarium.evaluation.episodes.result import settings_sha256
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.state import state_sha256
-from lidarium.evaluation.result import settings_sha256
-from lidarium.evaluation.watching import WatchedExploration, Watcher
 
 
-def rerun(record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()) -> ExplorationEnv:
+def rerun(
+    record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()
+) -> ExplorationEnv:
     """Run a recorded episode again and check that it ends in the same state, to the bit.
 
     Parameters
@@ -40,8 +42,8 @@ def rerun(record: EpisodeRecord, floor: str | Path | Floor | None = None, watche
     Raises
     ------
     ValueError
-        Where the record is of another version, its floor is not found or has changed, its settings are not whole, or the final
-        state is another one.
+        Where the record is of another version, its floor is not found or has changed, its settings are not
+        whole, or the final state is another one.
     """
     env = drive_again(record, floor, watchers)
     if not is_same(record, env):
@@ -49,7 +51,9 @@ def rerun(record: EpisodeRecord, floor: str | Path | Floor | None = None, watche
     return env
 
 
-def drive_again(record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()) -> ExplorationEnv:
+def drive_again(
+    record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()
+) -> ExplorationEnv:
     """Run a recorded episode again, as `rerun`, without a look at how it ends."""
     header = record.header
     if header["version"] != lidarium.__version__:
@@ -58,7 +62,9 @@ def drive_again(record: EpisodeRecord, floor: str | Path | Floor | None = None, 
             f"runs it again, its pictures and films can be drawn by any"
         )
     if header["final_sha256"] is None:
-        raise ValueError("the episode was broken off within a time step, its last state is not known; pictures and films can be drawn")
+        raise ValueError(
+            "the episode was broken off within a time step, its last state is not known; pictures and films can be drawn"
+        )
     settings = settings_of(header)
     there = find_floor(header, floor)
     tables = floor_tables(there, settings.raster_resolution, settings.lidar.height, settings.robot.height)
@@ -106,10 +112,14 @@ def settings_of(header: dict[str, Any]) -> ExplorationSettings:
         parts = {name: kind(**header["settings"][name]) for name, kind in PARTS.items()}
         settings = ExplorationSettings(**{**header["settings"], **parts})
     except (KeyError, TypeError) as error:
-        raise ValueError(f"the settings of the record are not those of lidarium {lidarium.__version__}: {error}") from error
+        raise ValueError(
+            f"the settings of the record are not those of lidarium {lidarium.__version__}: {error}"
+        ) from error
     found = settings_sha256(settings)
     if found != header["settings_sha256"]:
-        raise ValueError(f"the settings of the record have the hash {found}, not {header['settings_sha256']} as recorded")
+        raise ValueError(
+            f"the settings of the record have the hash {found}, not {header['settings_sha256']} as recorded"
+        )
     return settings
 
 
@@ -121,7 +131,11 @@ def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) 
     ValueError
         Where it is not found, or is not the one of the record.
     """
-    names = [floor] if floor is not None else list(dict.fromkeys(name for name in (header["floor_source"], header["floor"]) if name))
+    names = (
+        [floor]
+        if floor is not None
+        else list(dict.fromkeys(name for name in (header["floor_source"], header["floor"]) if name))
+    )
     tried = []
     for name in names:
         is_file = not isinstance(name, Floor) and is_file_name(name)
@@ -133,8 +147,12 @@ def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) 
         if found.sha256 == header["floor_sha256"]:
             return found
         what = f"floor {found.name!r}" if isinstance(name, Floor) else str(name)
-        tried.append(f"{what} has the hash {found.sha256[:12]}, the record's floor has {header['floor_sha256'][:12]}")
-    raise ValueError(f"the floor {header['floor']!r} of the record is not found: {'; '.join(tried)}; name the floor that was recorded")
+        tried.append(
+            f"{what} has the hash {found.sha256[:12]}, the record's floor has {header['floor_sha256'][:12]}"
+        )
+    raise ValueError(
+        f"the floor {header['floor']!r} of the record is not found: {'; '.join(tried)}; name the floor that was recorded"
+    )
 
 
 def _end(env: ExplorationEnv, endings: list[tuple[str, str]]) -> None:

@@ -28,9 +28,9 @@ _ARRAYS = (
 def state_sha256(env: ExplorationEnv) -> str:
     """Return a hash of the state of an environment's world, to the bit.
 
-    It covers the number of steps; true and believed poses, velocities, scans, bumpers and contacts; ways, collisions and counts of
-    seen cells; the scorer's masks and the robots' maps; and why each robot ended. It does not cover what is made of these: observations,
-    plans, clearance.
+    It covers the number of steps; true and believed poses, velocities, scans, bumpers and contacts; ways,
+    collisions and counts of seen cells; the scorer's masks and the robots' maps; and why each robot ended. It
+    does not cover what is made of these: observations, plans, clearance.
     """
     world = env.world
     digest = hashlib.sha256()

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 import lidarium
-from lidarium.evaluation.output import check_writable, write_text
-from lidarium.evaluation.report.episodes import Episodes, name_of, read_episodes
-from lidarium.evaluation.report.groups import grouped
-from lidarium.evaluation.report.records import FOLDER, Entry, Key, read_records, record_key
+from lidarium.evaluation.analysis.episodes import Episodes, name_of, read_episodes
+from lidarium.evaluation.analysis.groups import grouped
+from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
+from lidarium.evaluation.episodes.output import check_writable, write_text
 from lidarium.evaluation.report.sections import Section, tell_group
 
 
@@ -22,11 +22,13 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
     Parameters
     ----------
     directory : Path
-        What `lidarium evaluate --out` wrote: ``episodes.jsonl``, and ``records`` for the plots that show paths and curves.
+        What `lidarium evaluate --out` wrote: ``episodes.jsonl``, and ``records`` for the plots that show
+        paths and curves.
     out : Path
         Folder of the report.
     baseline : str or None
-        Policy that the others are compared with; ``nearest_frontier`` where it is there, else the first of the alphabet.
+        Policy that the others are compared with; ``nearest_frontier`` where it is there, else the first of
+        the alphabet.
     seed : int
         Where the draws of bootstrap intervals come from.
 
@@ -54,12 +56,18 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
         "baseline": baseline,
         "confidence": 0.95,
         "seed": seed,
-        "warnings": [*warnings, *(f"{section.group.title}: {warning}" for section in sections for warning in section.warnings)],
+        "warnings": [
+            *warnings,
+            *(f"{section.group.title}: {warning}" for section in sections for warning in section.warnings),
+        ],
         "groups": [section.numbers for section in sections],
     }
     numbers: dict[str, Any] = jsonable(result)
     # For programs: thousands of numbers, which would stand on a line each otherwise.
-    write_text(out / "report.json", json.dumps(numbers, allow_nan=False, ensure_ascii=False, separators=(",", ":")) + "\n")
+    write_text(
+        out / "report.json",
+        json.dumps(numbers, allow_nan=False, ensure_ascii=False, separators=(",", ":")) + "\n",
+    )
     write_text(out / "report.md", _page(result, sections))
     return numbers
 
@@ -82,7 +90,9 @@ def _baseline(episodes: Episodes, baseline: str | None) -> str:
     if baseline is None:
         return "nearest_frontier" if "nearest_frontier" in policies else policies[0]
     if baseline not in policies:
-        raise ValueError(f"--baseline is {baseline!r}, of which there are no episodes; want one of {', '.join(policies)}")
+        raise ValueError(
+            f"--baseline is {baseline!r}, of which there are no episodes; want one of {', '.join(policies)}"
+        )
     return baseline
 
 
@@ -90,7 +100,13 @@ def _about_names(episodes: Episodes) -> list[str]:
     from lidarium.agents import policy_names
 
     unknown = sorted({str(row["policy"]) for row in episodes.rows} - set(policy_names()))
-    return [f"Policies that this lidarium does not have: {', '.join(unknown)}; their figures are told all the same."] if unknown else []
+    return (
+        [
+            f"Policies that this lidarium does not have: {', '.join(unknown)}; their figures are told all the same."
+        ]
+        if unknown
+        else []
+    )
 
 
 def _about_records(episodes: Episodes, records: dict[Key, Entry]) -> list[str]:

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.evaluation.report import tables
-from lidarium.evaluation.report.episodes import Row
-from lidarium.evaluation.report.figures import (
+from lidarium.evaluation.analysis.episodes import Row
+from lidarium.evaluation.analysis.figures import (
     TIMES,
     VALUES,
     TimeFigure,
@@ -19,10 +18,17 @@ from lidarium.evaluation.report.figures import (
     time_figure,
     value_figure,
 )
-from lidarium.evaluation.report.floor_pictures import recorded_pair, save_paths, save_visits, visits_on
-from lidarium.evaluation.report.groups import Group, paired, repeats, times_to
-from lidarium.evaluation.report.plots import coverage_curves, profiles, save_boxes, save_coverage, save_profiles
-from lidarium.evaluation.report.records import Entry, Key
+from lidarium.evaluation.analysis.groups import Group, paired, repeats, times_to
+from lidarium.evaluation.analysis.records import Entry, Key
+from lidarium.evaluation.drawing.floor_pictures import recorded_pair, save_paths, save_visits, visits_on
+from lidarium.evaluation.drawing.plots import (
+    coverage_curves,
+    profiles,
+    save_boxes,
+    save_coverage,
+    save_profiles,
+)
+from lidarium.evaluation.report import tables
 from lidarium.evaluation.statistics import FEWEST_FOR_NOMINAL, median_interval
 
 PICTURED_FLOORS = 3
@@ -71,7 +77,12 @@ def tell_group(group: Group, records: dict[Key, Entry], out: Path, baseline: str
         Where the draws of bootstrap intervals come from.
     """
     section = Section(group)
-    section.numbers = {"robots": group.robots, "floor_set": group.floor_set, "floors": group.floors, "horizon_s": group.horizon_s}
+    section.numbers = {
+        "robots": group.robots,
+        "floor_set": group.floor_set,
+        "floors": group.floors,
+        "horizon_s": group.horizon_s,
+    }
     _tell_times(section, seed)
     _tell_values(section, seed)
     _tell_comparisons(section, baseline, seed)
@@ -85,13 +96,26 @@ def _tell_times(section: Section, seed: int) -> None:
     group = section.group
     section.numbers["times"] = {}
     for key, title in TIMES.items():
-        figures = {policy: time_figure(rows, key, group.horizon_s, seed) for policy, rows in group.runs.items()}
+        figures = {
+            policy: time_figure(rows, key, group.horizon_s, seed) for policy, rows in group.runs.items()
+        }
         section.numbers["times"][key] = figures
-        section.markdown += [f"### {title[0].upper()}{title[1:]}", tables.times_table(figures, group.horizon_s)]
-        if missed := [_missed(policy, figure) for policy, figure in figures.items() if figure.reached < figure.size]:
+        section.markdown += [
+            f"### {title[0].upper()}{title[1:]}",
+            tables.times_table(figures, group.horizon_s),
+        ]
+        if missed := [
+            _missed(policy, figure) for policy, figure in figures.items() if figure.reached < figure.size
+        ]:
             section.warnings.append(f"{title} was not reached in {', '.join(missed)}.")
-    few = [f"`{policy}` ({len(rows)})" for policy, rows in group.runs.items() if len(rows) < FEWEST_FOR_NOMINAL]
-    if again := [f"{repeats(rows)} of {len(rows)} of `{policy}`" for policy, rows in group.runs.items() if repeats(rows)]:
+    few = [
+        f"`{policy}` ({len(rows)})" for policy, rows in group.runs.items() if len(rows) < FEWEST_FOR_NOMINAL
+    ]
+    if again := [
+        f"{repeats(rows)} of {len(rows)} of `{policy}`"
+        for policy, rows in group.runs.items()
+        if repeats(rows)
+    ]:
         section.warnings.append(
             f"runs that repeat another one on their floor in every figure: {', '.join(again)}. The seed changed nothing there, so they "
             "are no further evidence: intervals are too narrow and p values too small."
@@ -103,7 +127,9 @@ def _tell_times(section: Section, seed: int) -> None:
 def _missed(policy: str, figure: TimeFigure) -> str:
     missed = figure.size - figure.reached
     cut = f", {figure.cut} cut before the horizon" if figure.cut else ""
-    return f"{missed} of {figure.size} runs of `{policy}` ({100.0 * missed / figure.size:.0f} % censored{cut})"
+    return (
+        f"{missed} of {figure.size} runs of `{policy}` ({100.0 * missed / figure.size:.0f} % censored{cut})"
+    )
 
 
 def _tell_values(section: Section, seed: int) -> None:
@@ -113,7 +139,10 @@ def _tell_values(section: Section, seed: int) -> None:
     }
     section.numbers["values"] = figures
     section.markdown += ["### Coverage, paths, overlap", tables.values_table(figures)]
-    further = {policy: {key: further_figure(rows, key) for key in further_keys(rows)} for policy, rows in section.group.runs.items()}
+    further = {
+        policy: {key: further_figure(rows, key) for key in further_keys(rows)}
+        for policy, rows in section.group.runs.items()
+    }
     section.numbers["further_medians"] = further
     if text := tables.further_table(further, section.group.horizon_s):
         section.markdown += ["### Further figures", text]
@@ -124,7 +153,9 @@ def _tell_comparisons(section: Section, baseline: str, seed: int) -> None:
     section.numbers["comparisons"] = []
     others = [policy for policy in group.runs if policy != baseline]
     if baseline not in group.runs:
-        section.warnings.append(f"there are no runs of the baseline `{baseline}` here, so policies are not compared.")
+        section.warnings.append(
+            f"there are no runs of the baseline `{baseline}` here, so policies are not compared."
+        )
         return
     if not others:
         return
@@ -132,7 +163,10 @@ def _tell_comparisons(section: Section, baseline: str, seed: int) -> None:
     section.numbers["comparisons"] = comparisons
     _warn_of_pairs(section, others, baseline)
     if comparisons:
-        section.markdown += [f"### Compared with `{baseline}`, pair by pair", tables.comparisons_table(comparisons)]
+        section.markdown += [
+            f"### Compared with `{baseline}`, pair by pair",
+            tables.comparisons_table(comparisons),
+        ]
         section.markdown.append(
             "Policy less baseline, policy over baseline. Wilcoxon's signed rank test and the sign test leave out pairs that are the same; "
             f"Holm's correction is for the {len(comparisons)} comparisons of this table, and what is beyond chance at 5 % is in bold."
@@ -150,7 +184,9 @@ def _warn_of_pairs(section: Section, others: Sequence[str], baseline: str) -> No
         if left := len(ours) + len(theirs) - 2 * pairs:
             unpaired.append(f"{left} of `{policy}` or `{baseline}`")
     if few:
-        section.warnings.append(f"fewer than {FEWEST_FOR_NOMINAL} pairs with `{baseline}`: {', '.join(few)}: {_OF_FEW}")
+        section.warnings.append(
+            f"fewer than {FEWEST_FOR_NOMINAL} pairs with `{baseline}`: {', '.join(few)}: {_OF_FEW}"
+        )
     if unpaired:
         section.warnings.append(
             f"runs without a partner on the same floor, starts and seed were left out of comparisons: {', '.join(unpaired)}."
@@ -164,9 +200,15 @@ def _draw_plots(section: Section, records: dict[Key, Entry], out: Path) -> None:
     section.numbers["profiles"] = profiles(group)
     section.numbers["pictures"] = []
     if curves:
-        save_coverage(_picture(section, out, f"coverage_{group.slug}.png", "Coverage over time"), group, curves)
+        save_coverage(
+            _picture(section, out, f"coverage_{group.slug}.png", "Coverage over time"), group, curves
+        )
     save_boxes(_picture(section, out, f"boxes_{group.slug}.png", "Times, paths and overlap"), group)
-    save_profiles(_picture(section, out, f"profiles_{group.slug}.png", "Performance profiles"), group, section.numbers["profiles"])
+    save_profiles(
+        _picture(section, out, f"profiles_{group.slug}.png", "Performance profiles"),
+        group,
+        section.numbers["profiles"],
+    )
 
 
 def _draw_floors(section: Section, records: dict[Key, Entry], out: Path) -> None:
@@ -175,14 +217,28 @@ def _draw_floors(section: Section, records: dict[Key, Entry], out: Path) -> None
     recorded = [floor for floor in group.floors if recorded_pair(group, floor, records)]
     for floor in recorded[:PICTURED_FLOORS]:
         name = "".join(letter if letter.isalnum() else "_" for letter in floor)
-        save_paths(_picture(section, out, f"paths_{name}_{group.robots}.png", f"Paths on {floor}"), group, floor, records)
+        save_paths(
+            _picture(section, out, f"paths_{name}_{group.robots}.png", f"Paths on {floor}"),
+            group,
+            floor,
+            records,
+        )
         visits, tracks = visits_on(group, floor, records)
         section.numbers["visits"][floor] = {
-            policy: {"runs": each.runs, "extent_m": each.extent, "seconds": np.round(each.seconds, 2)} for policy, each in visits.items()
+            policy: {"runs": each.runs, "extent_m": each.extent, "seconds": np.round(each.seconds, 2)}
+            for policy, each in visits.items()
         }
-        save_visits(_picture(section, out, f"visits_{name}_{group.robots}.png", f"Visits on {floor}"), group, floor, visits, tracks)
+        save_visits(
+            _picture(section, out, f"visits_{name}_{group.robots}.png", f"Visits on {floor}"),
+            group,
+            floor,
+            visits,
+            tracks,
+        )
     if len(recorded) > PICTURED_FLOORS:
-        section.markdown.append(f"Paths and visits are drawn of the first {PICTURED_FLOORS} of {len(recorded)} recorded floors.")
+        section.markdown.append(
+            f"Paths and visits are drawn of the first {PICTURED_FLOORS} of {len(recorded)} recorded floors."
+        )
 
 
 def _picture(section: Section, out: Path, name: str, title: str) -> Path:
@@ -194,16 +250,27 @@ def _picture(section: Section, out: Path, name: str, title: str) -> Path:
 def _tell_floors(section: Section) -> None:
     group = section.group
     section.numbers["by_floor"] = {
-        floor: {policy: _of_floor(rows, group.horizon_s) for policy, rows in group.on_floor(floor).items() if rows}
+        floor: {
+            policy: _of_floor(rows, group.horizon_s) for policy, rows in group.on_floor(floor).items() if rows
+        }
         for floor in group.floors
     }
     for key, title in TIMES.items():
-        section.markdown += [f"### By floor: {title}, median [s] (runs that got there / runs)", tables.floors_table(group, key)]
+        section.markdown += [
+            f"### By floor: {title}, median [s] (runs that got there / runs)",
+            tables.floors_table(group, key),
+        ]
 
 
 def _of_floor(rows: Sequence[Row], horizon_s: float) -> dict[str, Any]:
-    found: dict[str, Any] = {"runs": len(rows), "coverage_percent": float(np.median([100.0 * row["coverage_final"] for row in rows]))}
+    found: dict[str, Any] = {
+        "runs": len(rows),
+        "coverage_percent": float(np.median([100.0 * row["coverage_final"] for row in rows])),
+    }
     for key in TIMES:
         times = times_to(rows, key, horizon_s)
-        found[key] = {"reached": int(times.is_reached.sum()), "median_s": median_interval(times.or_never).estimate}
+        found[key] = {
+            "reached": int(times.is_reached.sum()),
+            "median_s": median_interval(times.or_never).estimate,
+        }
     return found

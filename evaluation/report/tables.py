@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterable, Sequence
 
-from lidarium.evaluation.report.figures import TIMES, VALUES, Comparison, TimeFigure, ValueFigure
-from lidarium.evaluation.report.groups import Group, times_to
+from lidarium.evaluation.analysis.figures import TIMES, VALUES, Comparison, TimeFigure, ValueFigure
+from lidarium.evaluation.analysis.groups import Group, times_to
 from lidarium.evaluation.statistics import Interval, median_interval
 
 NONE = "–"  # noqa: RUF001
@@ -19,18 +19,25 @@ def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def number(value: float, horizon_s: float | None = None, digits: int = 1) -> str:
-    """Return a number with so many digits behind the point; inf as later than the horizon."""
+    """Return a number with so many digits behind the point.
+
+    Inf as later than the horizon.
+    """
     if math.isinf(value):
         return f"> {horizon_s:.0f}" if value > 0.0 and horizon_s is not None else NONE
     text = f"{value:.{digits}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
-def interval(found: Interval | None, horizon_s: float | None = None, scale: float = 1.0, digits: int = 1) -> str:
+def interval(
+    found: Interval | None, horizon_s: float | None = None, scale: float = 1.0, digits: int = 1
+) -> str:
     """Return an estimate with its interval in brackets, of which unbounded ends are left open."""
     if found is None:
         return NONE
-    estimate, low, high = (number(scale * end, horizon_s, digits) for end in (found.estimate, found.low, found.high))
+    estimate, low, high = (
+        number(scale * end, horizon_s, digits) for end in (found.estimate, found.low, found.high)
+    )
     return f"{estimate} [{low}, {high}]"
 
 
@@ -65,7 +72,10 @@ def values_table(figures: dict[str, dict[str, ValueFigure]]) -> str:
         header.append(f"{value.title}{unit}, {'mean' if value.key in by_mean else 'median'}")
     rows = []
     for policy, by_key in figures.items():
-        shown = [(by_key[value.key].mean if value.key in by_mean else by_key[value.key].median, value.digits) for value in VALUES]
+        shown = [
+            (by_key[value.key].mean if value.key in by_mean else by_key[value.key].median, value.digits)
+            for value in VALUES
+        ]
         cells = [interval(found, digits=digits) for found, digits in shown]
         rows.append([f"`{policy}`", *cells])
     return markdown_table(header, rows)
@@ -75,7 +85,10 @@ def further_table(figures: dict[str, dict[str, Interval]], horizon_s: float) -> 
     """Return the medians of all other figures, one a line, policies side by side."""
     policies = list(figures)
     keys = [key for key in figures[policies[0]] if all(key in by_key for by_key in figures.values())]
-    rows = [[f"`{key}`", *(interval(figures[policy][key], horizon_s, digits=_digits(key)) for policy in policies)] for key in keys]
+    rows = [
+        [f"`{key}`", *(interval(figures[policy][key], horizon_s, digits=_digits(key)) for policy in policies)]
+        for key in keys
+    ]
     return markdown_table(["figure, median", *(f"`{policy}`" for policy in policies)], rows) if rows else ""
 
 
@@ -85,7 +98,17 @@ def _digits(key: str) -> int:
 
 def comparisons_table(comparisons: Sequence[Comparison]) -> str:
     """Return differences, ratios and tests of policies against the baseline."""
-    header = ("policy", "figure", "pairs", "difference", "ratio", "less / more / same", "Wilcoxon p", "p of Holm", "sign p")
+    header = (
+        "policy",
+        "figure",
+        "pairs",
+        "difference",
+        "ratio",
+        "less / more / same",
+        "Wilcoxon p",
+        "p of Holm",
+        "sign p",
+    )
     rows = [
         (
             f"`{each.policy}`",

@@ -2,8 +2,8 @@
 
 References
 ----------
-Interquartile mean: Agarwal et al., Deep reinforcement learning at the edge of the statistical precipice (NeurIPS 2021). Its standard
-error: Tukey and McLaughlin (1963), from the winsorised variance.
+Interquartile mean: Agarwal et al., Deep reinforcement learning at the edge of the statistical precipice
+(NeurIPS 2021). Its standard error: Tukey and McLaughlin (1963), from the winsorised variance.
 """
 
 import math
@@ -11,11 +11,19 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lidarium.evaluation.statistics.resampling import RESAMPLES, Counts, Replicates, in_parts, studentised_interval
+from lidarium.evaluation.statistics.resampling import (
+    RESAMPLES,
+    Counts,
+    Replicates,
+    in_parts,
+    studentised_interval,
+)
 from lidarium.evaluation.statistics.samples import Interval, Values, checked_pairs, checked_values
 
 
-def mean_interval(values: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
+def mean_interval(
+    values: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+) -> Interval:
     """Return the mean and its studentised bootstrap interval.
 
     Parameters
@@ -32,18 +40,30 @@ def mean_interval(values: ArrayLike, confidence: float = 0.95, resamples: int = 
 
 
 def interquartile_mean(values: ArrayLike) -> float:
-    """Return the mean of the middle half; of the values at its ends only the part that lies within counts."""
+    """Return the mean of the middle half.
+
+    Of the values at its ends only the part that lies within counts.
+    """
     ordered = np.sort(checked_values(values))
     return float(_middle_means(np.ones((1, len(ordered)), np.uint16), ordered)[0][0])
 
 
-def interquartile_mean_interval(values: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
-    """Return the interquartile mean and its studentised bootstrap interval; parameters as `mean_interval`."""
+def interquartile_mean_interval(
+    values: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+) -> Interval:
+    """Return the interquartile mean and its studentised bootstrap interval.
+
+    Parameters as `mean_interval`.
+    """
     ordered = np.sort(checked_values(values))
-    return studentised_interval(in_parts(lambda counts: _middle_means(counts, ordered)), len(ordered), confidence, resamples, seed)
+    return studentised_interval(
+        in_parts(lambda counts: _middle_means(counts, ordered)), len(ordered), confidence, resamples, seed
+    )
 
 
-def paired_difference(a: ArrayLike, b: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
+def paired_difference(
+    a: ArrayLike, b: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+) -> Interval:
     """Return the mean of ``a - b`` over pairs and its studentised bootstrap interval.
 
     Parameters
@@ -58,7 +78,9 @@ def paired_difference(a: ArrayLike, b: ArrayLike, confidence: float = 0.95, resa
     return studentised_interval(replicates, len(first), confidence, resamples, seed, is_symmetric=True)
 
 
-def paired_ratio(a: ArrayLike, b: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
+def paired_ratio(
+    a: ArrayLike, b: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+) -> Interval:
     """Return the geometric mean of ``a / b`` over pairs and its studentised bootstrap interval, made of logarithms.
 
     Parameters
@@ -79,7 +101,9 @@ def paired_ratio(a: ArrayLike, b: ArrayLike, confidence: float = 0.95, resamples
             index = int(np.flatnonzero(sample <= 0.0)[0])
             raise ValueError(f"{name}[{index}] is {sample[index]}; want values above 0 for a ratio")
     replicates = in_parts(_means(np.log(first) - np.log(second)))
-    return exponential(studentised_interval(replicates, len(first), confidence, resamples, seed, is_symmetric=True))
+    return exponential(
+        studentised_interval(replicates, len(first), confidence, resamples, seed, is_symmetric=True)
+    )
 
 
 def exponential(interval: Interval) -> Interval:
@@ -119,6 +143,9 @@ def _middle_means(counts: Counts, ordered: Values) -> tuple[Values, Values]:
 
 
 def _errors(shifts: Values, squares: Values, size: int) -> Values:
-    """Return standard errors from means and mean squares; 0 for equal values, of which rounding leaves a little."""
+    """Return standard errors from means and mean squares.
+
+    0 for equal values, of which rounding leaves a little.
+    """
     variances = squares - shifts**2
     return np.asarray(np.sqrt(np.where(variances > 1e-12 * squares, variances, 0.0) / size))

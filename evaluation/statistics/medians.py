@@ -1,13 +1,15 @@
 """Medians with intervals from order statistics.
 
-The interval from the d-th smallest to the d-th largest of n values holds the median with probability 1 - 2 P(Binomial(n, 1/2) < d),
-whatever the distribution. d is whole, so the best of these intervals is wider than asked for; interpolation between it and the
-next narrower one brings the probability close to the one asked for.
+The interval from the d-th smallest to the d-th largest of n values holds the median with probability 1 - 2
+P(Binomial(n, 1/2) < d), whatever the distribution. d is whole, so the best of these intervals is wider than
+asked for; interpolation between it and the next narrower one brings the probability close to the one asked
+for.
 
 References
 ----------
-Hettmansperger and Sheather, Confidence intervals based on interpolated order statistics, Statistics and Probability Letters 4 (1986).
-Nyblom, Note on interpolated order statistics, Statistics and Probability Letters 14 (1992).
+Hettmansperger and Sheather, Confidence intervals based on interpolated order statistics, Statistics and
+Probability Letters 4 (1986). Nyblom, Note on interpolated order statistics, Statistics and Probability
+Letters 14 (1992).
 """
 
 from functools import lru_cache
@@ -25,18 +27,19 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, is_interpolated
     Parameters
     ----------
     values : (n,) array_like
-        The sample; inf stands for the time of what did not happen before the horizon, so medians and ends of intervals
-        may be inf.
+        The sample; inf stands for the time of what did not happen before the horizon, so medians and ends of
+        intervals may be inf.
     confidence : float
         How often the interval shall hold the median.
     is_interpolated : bool
-        Whether to interpolate towards the next narrower interval (about ``confidence``); otherwise the interval between
-        two of the values that holds the median with at least ``confidence``.
+        Whether to interpolate towards the next narrower interval (about ``confidence``); otherwise the
+        interval between two of the values that holds the median with at least ``confidence``.
 
     Returns
     -------
     Interval
-        From -inf to inf where even the least and the greatest value do not hold the median often enough (n < 6 at 0.95).
+        From -inf to inf where even the least and the greatest value do not hold the median often enough (n <
+        6 at 0.95).
     """
     ordered = np.sort(checked_values(values, allow_infinite=True))
     size, tail = len(ordered), 0.5 * (1.0 - checked_confidence(confidence))

@@ -2,8 +2,8 @@
 
 References
 ----------
-Wilcoxon, Biometrics Bulletin 1 (1945). Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of
-Statistics 6 (1979).
+Wilcoxon, Biometrics Bulletin 1 (1945). Holm, A simple sequentially rejective multiple test procedure,
+Scandinavian Journal of Statistics 6 (1979).
 """
 
 from dataclasses import dataclass
@@ -54,7 +54,9 @@ def wilcoxon_test(a: ArrayLike, b: ArrayLike) -> PairedTest:
 
 
 def sign_test(a: ArrayLike, b: ArrayLike) -> PairedTest:
-    """Test whether a is as often below b as above; the size of differences does not count.
+    """Test whether a is as often below b as above.
+
+    The size of differences does not count.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 References
 ----------
-Dolan and More, Benchmarking optimization software with performance profiles, Mathematical Programming 91 (2002). Agarwal et al., Deep
-reinforcement learning at the edge of the statistical precipice (NeurIPS 2021).
+Dolan and More, Benchmarking optimization software with performance profiles, Mathematical Programming 91
+(2002). Agarwal et al., Deep reinforcement learning at the edge of the statistical precipice (NeurIPS 2021).
 """
 
 import numpy as np
@@ -19,7 +19,8 @@ def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
     Parameters
     ----------
     costs : (runs, policies) array_like
-        What each policy needed, 0 or more; inf where it did not succeed. Runs in which none succeeded count for nobody.
+        What each policy needed, 0 or more; inf where it did not succeed. Runs in which none succeeded count
+        for nobody.
     factors : (k,) array_like
         Factors, 1 or more.
 
@@ -37,11 +38,15 @@ def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
     if needed.ndim != 2 or not needed.size:
         raise ValueError(f"costs have shape {needed.shape}; want (runs, policies), one of each at least")
     if np.isnan(needed).any() or (needed < 0.0).any():
-        raise ValueError("costs hold nan or negative values; want 0 or more, and inf where a policy did not succeed")
+        raise ValueError(
+            "costs hold nan or negative values; want 0 or more, and inf where a policy did not succeed"
+        )
     if (within < 1.0).any():
         raise ValueError(f"factors reach down to {within.min():g}; want 1 or more")
     best = needed.min(axis=1)
-    is_good = (needed[:, :, np.newaxis] <= best[:, np.newaxis, np.newaxis] * within) & np.isfinite(needed)[:, :, np.newaxis]
+    is_good = (needed[:, :, np.newaxis] <= best[:, np.newaxis, np.newaxis] * within) & np.isfinite(needed)[
+        :, :, np.newaxis
+    ]
     return np.asarray(is_good.mean(axis=0))
 
 
@@ -64,5 +69,9 @@ def score_profile(scores: ArrayLike, thresholds: ArrayLike, confidence: float = 
     """
     reached, asked = np.sort(checked_values(scores, "scores")), checked_values(thresholds, "thresholds")
     counts = len(reached) - np.searchsorted(reached, asked, side="left")
-    intervals = {int(count): share_interval(int(count), len(reached), confidence) for count in np.unique(counts)}
-    return np.array([[each.estimate, each.low, each.high] for each in (intervals[int(count)] for count in counts)]).T
+    intervals = {
+        int(count): share_interval(int(count), len(reached), confidence) for count in np.unique(counts)
+    }
+    return np.array(
+        [[each.estimate, each.low, each.high] for each in (intervals[int(count)] for count in counts)]
+    ).T

@@ -1,13 +1,14 @@
 """Studentised bootstrap intervals from how often each value is drawn.
 
-A resample of n values is a row of counts that sum to n. Statistics are computed from the counts and the sample itself, which costs
-no copies, and the same rows serve every statistic of samples of one size.
+A resample of n values is a row of counts that sum to n. Statistics are computed from the counts and the
+sample itself, which costs no copies, and the same rows serve every statistic of samples of one size.
 
 References
 ----------
-Efron and Tibshirani, An Introduction to the Bootstrap (1993), section 12.5. Hall, Theoretical comparison of bootstrap confidence
-intervals, Annals of Statistics 16 (1988): with equal tails the studentised interval follows skewness. Hall, On symmetric bootstrap
-confidence intervals, Journal of the Royal Statistical Society B 50 (1988): the symmetric form suits what is nearly symmetric.
+Efron and Tibshirani, An Introduction to the Bootstrap (1993), section 12.5. Hall, Theoretical comparison of
+bootstrap confidence intervals, Annals of Statistics 16 (1988): with equal tails the studentised interval
+follows skewness. Hall, On symmetric bootstrap confidence intervals, Journal of the Royal Statistical Society
+B 50 (1988): the symmetric form suits what is nearly symmetric.
 """
 
 from collections.abc import Callable
@@ -71,18 +72,26 @@ def in_parts(replicates: Replicates) -> Replicates:
 
     def in_turn(counts: Counts) -> tuple[Values, Values]:
         parts = [replicates(counts[first : first + _CHUNK]) for first in range(0, len(counts), _CHUNK)]
-        return np.concatenate([estimates for estimates, _ in parts]), np.concatenate([errors for _, errors in parts])
+        return np.concatenate([estimates for estimates, _ in parts]), np.concatenate(
+            [errors for _, errors in parts]
+        )
 
     return in_turn
 
 
 def studentised_interval(
-    replicates: Replicates, size: int, confidence: float, resamples: int, seed: int, is_symmetric: bool = False
+    replicates: Replicates,
+    size: int,
+    confidence: float,
+    resamples: int,
+    seed: int,
+    is_symmetric: bool = False,
 ) -> Interval:
     """Return an estimate and its interval from the quantiles q of t = (estimate* - estimate) / error* over resamples.
 
-    With equal tails it goes from estimate - q_high error to estimate - q_low error; the symmetric form takes the quantile of |t|
-    on both sides. An error of 0, where all values are equal, gives an interval of no width.
+    With equal tails it goes from estimate - q_high error to estimate - q_low error; the symmetric form takes
+    the quantile of |t| on both sides. An error of 0, where all values are equal, gives an interval of no
+    width.
 
     Parameters
     ----------
@@ -106,7 +115,9 @@ def studentised_interval(
     shifts = estimates - estimate
     # A resample of equal values has no error: it is as far off as can be, or not at all.
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.where(errors > 0.0, shifts / errors, np.where(shifts == 0.0, 0.0, np.copysign(np.inf, shifts)))
+        ratios = np.where(
+            errors > 0.0, shifts / errors, np.where(shifts == 0.0, 0.0, np.copysign(np.inf, shifts))
+        )
     if is_symmetric:
         reach = _ranked(np.abs(ratios), 1.0 - 2.0 * tail)
         return Interval(estimate, estimate - reach * error, estimate + reach * error, confidence, size)

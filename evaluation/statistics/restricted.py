@@ -1,14 +1,16 @@
 """Restricted means of censored times: the mean of min(T, horizon), with studentised bootstrap intervals.
 
-A time that was cut before the event is censored: the event comes later than that, nobody knows when. The restricted mean is the area
-below the Kaplan-Meier curve S up to a horizon. Where all times are known or cut at the horizon itself, it is the plain mean of
-min(T, horizon). Standard errors come from each run's influence on the area, which also gives those of differences and ratios of
-paired runs: there the influences of both partners are subtracted run by run.
+A time that was cut before the event is censored: the event comes later than that, nobody knows when. The
+restricted mean is the area below the Kaplan-Meier curve S up to a horizon. Where all times are known or cut
+at the horizon itself, it is the plain mean of min(T, horizon). Standard errors come from each run's influence
+on the area, which also gives those of differences and ratios of paired runs: there the influences of both
+partners are subtracted run by run.
 
 References
 ----------
-Kaplan and Meier, Journal of the American Statistical Association 53 (1958). Royston and Parmar, Restricted mean survival time, BMC
-Medical Research Methodology 13 (2013). Influence: Reid, Annals of Statistics 9 (1981).
+Kaplan and Meier, Journal of the American Statistical Association 53 (1958). Royston and Parmar, Restricted
+mean survival time, BMC Medical Research Methodology 13 (2013). Influence: Reid, Annals of Statistics 9
+(1981).
 """
 
 import math
@@ -20,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from lidarium.evaluation.statistics.means import exponential
 from lidarium.evaluation.statistics.resampling import RESAMPLES, Counts, studentised_interval
 from lidarium.evaluation.statistics.samples import Interval, Values, checked_values
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 
 class CensoredTimes:
@@ -38,8 +40,8 @@ class CensoredTimes:
     Raises
     ------
     ValueError
-        Where a sample is empty, holds nan or negative times, lengths differ, the horizon is not positive, or the longest time is
-        censored before the horizon, so that the curve is unknown up to there.
+        Where a sample is empty, holds nan or negative times, lengths differ, the horizon is not positive, or
+        the longest time is censored before the horizon, so that the curve is unknown up to there.
     """
 
     def __init__(self, times: ArrayLike, is_observed: ArrayLike, horizon: float) -> None:
@@ -77,7 +79,9 @@ def checked_times(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, NDA
     """
     known, happened = checked_values(times, "times"), np.asarray(is_observed, np.bool_)
     if happened.shape != known.shape:
-        raise ValueError(f"is_observed has shape {happened.shape} and times {known.shape}; want one for each time")
+        raise ValueError(
+            f"is_observed has shape {happened.shape} and times {known.shape}; want one for each time"
+        )
     if (known < 0.0).any():
         raise ValueError(f"times[{int(np.argmin(known))}] is {known.min()}; want 0 or more seconds")
     return known, happened
@@ -92,7 +96,12 @@ def kaplan_meier(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, Valu
 
 
 def restricted_mean(
-    times: ArrayLike, is_observed: ArrayLike, horizon: float, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+    times: ArrayLike,
+    is_observed: ArrayLike,
+    horizon: float,
+    confidence: float = 0.95,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
 ) -> Interval:
     """Return the restricted mean of censored times [s] and its studentised bootstrap interval.
 
@@ -107,7 +116,9 @@ def restricted_mean(
     """
     sample = CensoredTimes(times, is_observed, horizon)
     if not sample.is_observed.any():
-        raise ValueError(f"none of {len(sample)} times was observed up to the horizon of {horizon:g} s; want one at least")
+        raise ValueError(
+            f"none of {len(sample)} times was observed up to the horizon of {horizon:g} s; want one at least"
+        )
 
     def replicates(counts: Counts) -> tuple[Values, Values]:
         return _unzipped(_means_of(counts, *sample.arrays))
@@ -142,7 +153,9 @@ def restricted_difference(
     return studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True)
 
 
-def restricted_ratio(a: CensoredTimes, b: CensoredTimes, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
+def restricted_ratio(
+    a: CensoredTimes, b: CensoredTimes, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
+) -> Interval:
     """Return the restricted mean of ``a`` over that of ``b`` over paired runs and its interval, made of logarithms.
 
     Parameters and errors as `restricted_difference`; also refused where one of the means is 0.
@@ -155,7 +168,9 @@ def restricted_ratio(a: CensoredTimes, b: CensoredTimes, confidence: float = 0.9
     def replicates(counts: Counts) -> tuple[Values, Values]:
         return _unzipped(_differences_of(counts, *a.arrays, *b.arrays, True))
 
-    return exponential(studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True))
+    return exponential(
+        studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True)
+    )
 
 
 def _check_partners(a: CensoredTimes, b: CensoredTimes) -> None:
@@ -164,7 +179,9 @@ def _check_partners(a: CensoredTimes, b: CensoredTimes) -> None:
     if a.horizon != b.horizon:
         raise ValueError(f"the horizon of a is {a.horizon:g} s and that of b {b.horizon:g} s; want the same")
     if not (a.is_observed.any() or b.is_observed.any()):
-        raise ValueError(f"nothing was observed up to the horizon of {a.horizon:g} s, neither in a nor in b; want one time at least")
+        raise ValueError(
+            f"nothing was observed up to the horizon of {a.horizon:g} s, neither in a nor in b; want one time at least"
+        )
 
 
 def _unzipped(pairs: Values) -> tuple[Values, Values]:
@@ -217,12 +234,22 @@ def _differences_of(
 
 
 @kernel
-def _influences_on(counts: Array, times: Array, is_observed: Array, order: Array, horizon: float, areas: Array, influences: Array) -> float:
-    """Return the restricted mean of a resample; write the influence of each run on it, whose squares sum to the variance.
+def _influences_on(
+    counts: Array,
+    times: Array,
+    is_observed: Array,
+    order: Array,
+    horizon: float,
+    areas: Array,
+    influences: Array,
+) -> float:
+    """Return the restricted mean of a resample.
+
+    Write the influence of each run on it, whose squares sum to the variance.
 
     With c the counts, Y the runs at risk before a time and G the area right of it, the influence of run i is
-    sum over events k up to i of c_k G_k / (Y_k (Y_k - c_k)), less G_i / (Y_i - c_i) if i is an event: the derivative of the
-    area by the weight of the run. Of known times it is (T_i - mean) / n.
+    sum over events k up to i of c_k G_k / (Y_k (Y_k - c_k)), less G_i / (Y_i - c_i) if i is an event: the
+    derivative of the area by the weight of the run. Of known times it is (T_i - mean) / n.
     """
     size = times.size
     at_risk = float(size)

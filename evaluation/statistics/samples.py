@@ -79,7 +79,9 @@ def checked_pairs(a: ArrayLike, b: ArrayLike, names: tuple[str, str] = ("a", "b"
     """
     first, second = checked_values(a, names[0]), checked_values(b, names[1])
     if len(first) != len(second):
-        raise ValueError(f"{names[0]} has {len(first)} values and {names[1]} has {len(second)}; want as many, each with its partner")
+        raise ValueError(
+            f"{names[0]} has {len(first)} values and {names[1]} has {len(second)}; want as many, each with its partner"
+        )
     return first, second
 
 

@@ -2,8 +2,9 @@
 
 References
 ----------
-Wilson, Journal of the American Statistical Association 22 (1927). Brown, Cai and DasGupta, Interval estimation for a binomial
-proportion, Statistical Science 16 (2001): close to nominal in the mean over shares, also for few runs and shares near 0 or 1.
+Wilson, Journal of the American Statistical Association 22 (1927). Brown, Cai and DasGupta, Interval
+estimation for a binomial proportion, Statistical Science 16 (2001): close to nominal in the mean over shares,
+also for few runs and shares near 0 or 1.
 """
 
 from scipy import stats
@@ -27,6 +28,8 @@ def share_interval(successes: int, size: int, confidence: float = 0.95) -> Inter
         Where there are no runs, or more successes than runs.
     """
     if size < 1 or not 0 <= successes <= size:
-        raise ValueError(f"{successes} successes of {size} runs; want 1 run at least and 0 to as many successes")
+        raise ValueError(
+            f"{successes} successes of {size} runs; want 1 run at least and 0 to as many successes"
+        )
     ends = stats.binomtest(successes, size).proportion_ci(checked_confidence(confidence), method="wilson")
     return Interval(successes / size, float(ends.low), float(ends.high), confidence, size)

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lidarium.mapping.localization.localizer import Localizer
-from lidarium.mapping.scans import ScanGeometry
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,26 +24,26 @@ class Entry:
 
 
 def _odometry(geometry: ScanGeometry) -> Localizer:
-    from lidarium.mapping.localization.odometry import Odometry
+    from lidarium.mapping.localization.dead_reckoning.odometry import Odometry
 
     return Odometry()
 
 
 def _slam(geometry: ScanGeometry) -> Localizer:
-    from lidarium.mapping.localization.settings import SlamSettings
-    from lidarium.mapping.localization.slam import Slam
+    from lidarium.mapping.localization.matching.settings import SlamSettings
+    from lidarium.mapping.localization.slam.localizer import Slam
 
     return Slam(SlamSettings(), geometry)
 
 
 def _splines(geometry: ScanGeometry) -> Localizer:
-    from lidarium.mapping.localization.spline_filter import SplineFilter
+    from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
 
     return SplineFilter(geometry=geometry)
 
 
 def _splines_ekf(geometry: ScanGeometry) -> Localizer:
-    from lidarium.mapping.localization.spline_ekf import SplineEkf
+    from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
 
     return SplineEkf(geometry=geometry)
 
@@ -52,7 +52,9 @@ LOCALIZERS: dict[str, Entry] = {
     "odometry": Entry("dead reckoning from the start by the wheels", _odometry),
     "slam": Entry("scans matched with local maps, places recognised, the past corrected", _slam),
     "splines": Entry("a particle filter on walls kept as B-splines and their features", _splines),
-    "splines_ekf": Entry("an extended Kalman filter on the features of walls kept as B-splines", _splines_ekf),
+    "splines_ekf": Entry(
+        "an extended Kalman filter on the features of walls kept as B-splines", _splines_ekf
+    ),
 }
 """The localizers by name; the modules of each are imported when it is first made."""
 

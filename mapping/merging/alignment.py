@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.merging.corners import Corners
+from lidarium.mapping.geometry.rigid import Transform, fit
+from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.correspondence import Matches
-from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.merging.description.corners import Corners
+from lidarium.mapping.merging.description.described_map import DescribedMap
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
-from lidarium.mapping.rigid import Transform, fit
 
 INLIER_RULES = ("distance", "ratio")
 REFINEMENTS = ("sweep", "least_squares", "walls")
@@ -24,13 +24,14 @@ class AlignmentSettings:
     Attributes
     ----------
     inlier_rule : str
-        ``distance``: matched corners come together within the tolerance below; ``ratio``: their coordinates, in cells from the corner of
-        the map, differ by less than 8 % each (as it was printed: far from that corner a tolerance of half a metre, near it none).
+        ``distance``: matched corners come together within the tolerance below; ``ratio``: their coordinates,
+        in cells from the corner of the map, differ by less than 8 % each (as it was printed: far from that
+        corner a tolerance of half a metre, near it none).
     tolerance_m : float
         Distance at which corners come together beside the match that proposes the transform [m].
     angle_uncertainty : float
-        Error of the proposed rotation [rad]; the tolerance grows with the distance by its tangent, and rotations of inliers differ by at
-        most twice as much.
+        Error of the proposed rotation [rad]; the tolerance grows with the distance by its tangent, and
+        rotations of inliers differ by at most twice as much.
     ratio : float
         Least quotient of coordinates for ``ratio``.
     least_inliers : int
@@ -40,7 +41,8 @@ class AlignmentSettings:
     candidates : int
         Number of transforms that are refined and looked at more closely.
     refinements : tuple of str
-        Done in this order: ``sweep`` of the rotation over 7 degrees to either side, ``least_squares`` of the inliers, ``walls`` on walls.
+        Done in this order: ``sweep`` of the rotation over 7 degrees to either side, ``least_squares`` of the
+        inliers, ``walls`` on walls.
     refinement_reach_m : float
         Distance to walls within which ``walls`` pulls at first [m].
     wall_samples : int
@@ -155,7 +157,10 @@ def _vote(
     resolution: float,
     is_inlier: Array,
 ) -> None:
-    """Mark the inliers of each proposal; a ratio above 0 chooses the rule of coordinates."""
+    """Mark the inliers of each proposal.
+
+    A ratio above 0 chooses the rule of coordinates.
+    """
     tolerance, tangent, angle = tolerances
     first_taken_by, second_taken_by = np.full(counts[0], -1), np.full(counts[1], -1)
     for k in range(proposals.shape[0]):
@@ -168,7 +173,9 @@ def _vote(
             x = cosine * q[m, 0] - sine * q[m, 1] + proposals[k, 0]
             y = sine * q[m, 0] + cosine * q[m, 1] + proposals[k, 1]
             if ratio > 0.0:
-                agrees = _is_alike(x / resolution, p[m, 0] / resolution, ratio) and _is_alike(y / resolution, p[m, 1] / resolution, ratio)
+                agrees = _is_alike(x / resolution, p[m, 0] / resolution, ratio) and _is_alike(
+                    y / resolution, p[m, 1] / resolution, ratio
+                )
             else:
                 turn = abs((proposals[m, 2] - proposals[k, 2] + math.pi) % (2.0 * math.pi) - math.pi)
                 reach = tolerance + math.hypot(q[m, 0] - q[k, 0], q[m, 1] - q[k, 1]) * tangent
@@ -186,7 +193,11 @@ def _is_alike(a: float, b: float, ratio: float) -> bool:
 
 
 def distinct(
-    proposals: NDArray[np.float64], order: NDArray[np.int64], at: NDArray[np.float64], count: int, apart: tuple[float, float]
+    proposals: NDArray[np.float64],
+    order: NDArray[np.int64],
+    at: NDArray[np.float64],
+    count: int,
+    apart: tuple[float, float],
 ) -> list[int]:
     """Return the first few of the proposals, in an order, that differ from one another by more than a distance [m] or an angle [rad]."""
     chosen: list[int] = []
@@ -208,10 +219,15 @@ def distinct(
     return chosen
 
 
-def refine(a: DescribedMap, b: DescribedMap, matches: Matches, candidate: Candidate, settings: AlignmentSettings) -> Candidate:
+def refine(
+    a: DescribedMap, b: DescribedMap, matches: Matches, candidate: Candidate, settings: AlignmentSettings
+) -> Candidate:
     """Return a candidate with its transform made better by each of the settings' refinements in turn."""
     transform = candidate.a_from_b
-    p, q = a.corners.points[matches.first[candidate.inliers]], b.corners.points[matches.second[candidate.inliers]]
+    p, q = (
+        a.corners.points[matches.first[candidate.inliers]],
+        b.corners.points[matches.second[candidate.inliers]],
+    )
     for step in settings.refinements:
         if step == "walls":
             transform = refine_on_walls(a, b, transform, settings.refinement_reach_m, settings.wall_samples)

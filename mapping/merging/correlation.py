@@ -1,7 +1,8 @@
 """Two maps laid over each other at all translations at once, for some rotations: slow, but it needs no corners.
 
-Maps are reduced to coarse counts of walls and of free space away from walls. Walls on walls count for a translation, walls in free space
-against it; the sums over all translations are correlations, products of spectra.
+Maps are reduced to coarse counts of walls and of free space away from walls. Walls on walls count for a
+translation, walls in free space against it; the sums over all translations are correlations, products of
+spectra.
 """
 
 import math
@@ -12,9 +13,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from lidarium.mapping.merging.described_map import DescribedMap
-from lidarium.mapping.occupancy import FREE
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import FREE
+from lidarium.mapping.merging.description.described_map import DescribedMap
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +35,8 @@ class CorrelationSettings:
     miss_weight : float
         How much a wall in free space counts against one that lies on a wall.
     free_weight : float
-        How much a cell that is free in both maps counts: walls seen from two sides alone are no sign of one place.
+        How much a cell that is free in both maps counts: walls seen from two sides alone are no sign of one
+        place.
     """
 
     cell_m: float = 0.15
@@ -49,9 +51,13 @@ class CorrelationSettings:
             raise ValueError(f"cell_m of correlation is {self.cell_m}; want a positive number")
         if self.rotations < 0 or self.peaks < 1 or self.most_cells < 16:
             found = f"{self.rotations}, {self.peaks} and {self.most_cells}"
-            raise ValueError(f"rotations, peaks and most_cells of correlation are {found}; want at least 0, 1 and 16")
+            raise ValueError(
+                f"rotations, peaks and most_cells of correlation are {found}; want at least 0, 1 and 16"
+            )
         if not (0.0 <= self.miss_weight < math.inf and 0.0 <= self.free_weight < math.inf):
-            raise ValueError(f"miss_weight and free_weight of correlation are {self.miss_weight} and {self.free_weight}; want zero or more")
+            raise ValueError(
+                f"miss_weight and free_weight of correlation are {self.miss_weight} and {self.free_weight}; want zero or more"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +70,11 @@ class _Coarse:
 
 
 def best_translations(
-    a: DescribedMap, b: DescribedMap, rotations: NDArray[np.floating], settings: CorrelationSettings, apart_m: float = 0.5
+    a: DescribedMap,
+    b: DescribedMap,
+    rotations: NDArray[np.floating],
+    settings: CorrelationSettings,
+    apart_m: float = 0.5,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Find for each rotation of map b the translations under which its walls agree best with those of map a.
 
@@ -120,7 +130,12 @@ def _coarse(described: DescribedMap, cell: float) -> _Coarse:
     mask = np.asarray((described.levels == FREE) * np.uint8(255), np.uint8)
     turn = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])
     smooth = max(round(1.0 / scale), 1)
-    free = cv2.warpAffine(cv2.blur(mask, (smooth, smooth), borderType=cv2.BORDER_CONSTANT), turn, shape[::-1], flags=cv2.INTER_NEAREST)
+    free = cv2.warpAffine(
+        cv2.blur(mask, (smooth, smooth), borderType=cv2.BORDER_CONSTANT),
+        turn,
+        shape[::-1],
+        flags=cv2.INTER_NEAREST,
+    )
     # A wall of one cell's length weighs its share of a coarse cell.
     return _Coarse(described.walls / cell, scale, np.asarray(free, np.float32) / np.float32(255.0))
 
@@ -139,7 +154,9 @@ def _clear(free: NDArray[np.float32], walls: NDArray[np.float32]) -> NDArray[np.
     return np.asarray(np.where((free > 0.9) & (beside == 0.0), 1.0, 0.0), np.float32)
 
 
-def _turned(coarse: _Coarse, theta: float, side: int) -> tuple[NDArray[np.float32], NDArray[np.float32], tuple[float, float]]:
+def _turned(
+    coarse: _Coarse, theta: float, side: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32], tuple[float, float]]:
     """Return walls and free space turned into a grid, and where the map's own corner lies in it [cells]."""
     rows, columns = coarse.free.shape
     cosine, sine = math.cos(theta), math.sin(theta)
@@ -148,7 +165,12 @@ def _turned(coarse: _Coarse, theta: float, side: int) -> tuple[NDArray[np.float3
     walls = Transform(x, y, theta).apply(coarse.walls)
     # The centre of pixel (0, 0) is at (0.5, 0.5) of the grid.
     shift_x, shift_y = x + 0.5 * (cosine - sine) - 0.5, y + 0.5 * (sine + cosine) - 0.5
-    free = cv2.warpAffine(coarse.free, np.array([[cosine, -sine, shift_x], [sine, cosine, shift_y]]), (side, side), flags=cv2.INTER_LINEAR)
+    free = cv2.warpAffine(
+        coarse.free,
+        np.array([[cosine, -sine, shift_x], [sine, cosine, shift_y]]),
+        (side, side),
+        flags=cv2.INTER_LINEAR,
+    )
     return _drawn(walls, coarse.weight, (side, side)), np.asarray(free, np.float32), (x, y)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from lidarium.mapping.merging.corners import Corners
-from lidarium.mapping.merging.descriptors import Descriptors
-from lidarium.mapping.rigid import wrapped
+from lidarium.mapping.geometry.rigid import wrapped
+from lidarium.mapping.merging.description.corners import Corners
+from lidarium.mapping.merging.description.descriptors import Descriptors
 
 METHODS = ("descriptors", "distances", "triplets")
 
@@ -24,8 +24,8 @@ class CorrespondenceSettings:
     Attributes
     ----------
     method : str
-        ``descriptors``, ``distances`` (pairs of corners equally far apart in both maps) or ``triplets`` (corners whose two nearest
-        neighbours form the same triangle).
+        ``descriptors``, ``distances`` (pairs of corners equally far apart in both maps) or ``triplets``
+        (corners whose two nearest neighbours form the same triangle).
     threshold : float
         Similarity of two descriptors from which they match, 1 for equal ones.
     margin : float
@@ -35,11 +35,13 @@ class CorrespondenceSettings:
     shift_window : float
         How far the rotation may differ from the difference of the corners' angles [rad].
     is_known_only : bool
-        Whether the similarity is taken over what is known in both descriptors, about zero; otherwise over all samples, about their mean.
+        Whether the similarity is taken over what is known in both descriptors, about zero; otherwise over all
+        samples, about their mean.
     least_known : float
         Share of samples known in both from which descriptors are compared at all, with ``is_known_only``.
     use_shift : bool
-        Whether the best shift refines a match's rotation; otherwise it is the difference of the corners' angles.
+        Whether the best shift refines a match's rotation; otherwise it is the difference of the corners'
+        angles.
     length_tolerance : float
         Two lengths are equal where they differ by at most this share of the longer one.
     """
@@ -57,9 +59,16 @@ class CorrespondenceSettings:
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise ValueError(f"method of correspondence is {self.method!r}; want one of {', '.join(METHODS)}")
-        for name, low, high in (("threshold", -1.0, 1.0), ("margin", 0.0, 2.0), ("shift_window", 0.0, math.pi), ("least_known", 0.0, 1.0)):
+        for name, low, high in (
+            ("threshold", -1.0, 1.0),
+            ("margin", 0.0, 2.0),
+            ("shift_window", 0.0, math.pi),
+            ("least_known", 0.0, 1.0),
+        ):
             if not low <= getattr(self, name) <= high:
-                raise ValueError(f"{name} of correspondence is {getattr(self, name)}; want {low:g} to {high:.4g}")
+                raise ValueError(
+                    f"{name} of correspondence is {getattr(self, name)}; want {low:g} to {high:.4g}"
+                )
         if self.per_corner < 1:
             raise ValueError(f"per_corner is {self.per_corner}; want one or more")
         if not 0.0 < self.length_tolerance < 1.0:
@@ -90,7 +99,11 @@ class Matches:
 
 
 def match_corners(
-    first: Corners, second: Corners, first_descriptors: Descriptors, second_descriptors: Descriptors, settings: CorrespondenceSettings
+    first: Corners,
+    second: Corners,
+    first_descriptors: Descriptors,
+    second_descriptors: Descriptors,
+    settings: CorrespondenceSettings,
 ) -> Matches:
     """Match the corners of map a with those of map b.
 
@@ -117,12 +130,20 @@ def match_corners(
         similarity, shift = compare_descriptors(first_descriptors, second_descriptors, settings)
     else:
         compare = _distance_votes if settings.method == "distances" else _triplet_similarity
-        similarity, shift = compare(first.points, second.points, settings.length_tolerance), np.zeros_like(difference)
+        similarity, shift = (
+            compare(first.points, second.points, settings.length_tolerance),
+            np.zeros_like(difference),
+        )
     # Of a corner seen at a in the first map and at b in the second, the second map is turned by a - b.
     rotation = difference + shift if settings.use_shift else difference
     threshold = settings.threshold if settings.method == "descriptors" else 0.0
     i, j = _chosen(similarity, threshold, settings)
-    return Matches(i, j, similarity[i, j].astype(np.float64), np.array([wrapped(angle) for angle in rotation[i, j].tolist()]))
+    return Matches(
+        i,
+        j,
+        similarity[i, j].astype(np.float64),
+        np.array([wrapped(angle) for angle in rotation[i, j].tolist()]),
+    )
 
 
 def compare_descriptors(
@@ -135,11 +156,13 @@ def compare_descriptors(
     similarity : (n, m) float32
         The largest normalised correlation within the window of shifts, -1 where too little is known in both.
     shift : (n, m) float32
-        Where it is [rad]: the first corner sees at an angle what the second sees at that angle less the shift.
+        Where it is [rad]: the first corner sees at an angle what the second sees at that angle less the
+        shift.
     """
     columns = first.values.shape[2]
     if settings.is_known_only:
-        # Where a sample is half known, so is its square; sums over what is known in both are three correlations.
+        # Where a sample is half known, so is its square; sums over what is known in both are three
+        # correlations.
         product = _correlation(first.values, second.values)
         first_energy = _correlation(first.values**2, second.known)
         second_energy = _correlation(first.known, second.values**2)
@@ -160,7 +183,9 @@ def compare_descriptors(
 
 def _standardised(values: NDArray[np.float32]) -> NDArray[np.float32]:
     centred = values - values.mean(axis=(1, 2), keepdims=True)
-    return np.asarray(centred / np.maximum(np.sqrt((centred**2).sum(axis=(1, 2), keepdims=True)), 1e-9), np.float32)
+    return np.asarray(
+        centred / np.maximum(np.sqrt((centred**2).sum(axis=(1, 2), keepdims=True)), 1e-9), np.float32
+    )
 
 
 def _correlation(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -186,7 +211,9 @@ def _chosen(
     return i.astype(np.int64), order[i, rank].astype(np.int64)
 
 
-def _distance_votes(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+def _distance_votes(
+    first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float
+) -> NDArray[np.float64]:
     """Return for each pair of corners the share of the first one's distances that the second one has too, shape (n, m)."""
     left, right = _distances(first), _distances(second)
     votes = np.zeros((len(first), len(second)))
@@ -194,15 +221,20 @@ def _distance_votes(first: NDArray[np.float64], second: NDArray[np.float64], tol
         lengths = np.sort(np.delete(right[j], j))
         if len(lengths) == 0:
             continue
-        # A length has a like one if the first not shorter than its lower bound is not longer than its upper bound.
+        # A length has a like one if the first not shorter than its lower bound is not longer than its upper
+        # bound.
         place = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
-        votes[:, j] = ((lengths[place] >= left * (1.0 - tolerance)) & (lengths[place] * (1.0 - tolerance) <= left) & (left > 0.0)).sum(
-            axis=1
-        )
+        votes[:, j] = (
+            (lengths[place] >= left * (1.0 - tolerance))
+            & (lengths[place] * (1.0 - tolerance) <= left)
+            & (left > 0.0)
+        ).sum(axis=1)
     return votes / max(len(first) - 1, 1)
 
 
-def _triplet_similarity(first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+def _triplet_similarity(
+    first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float
+) -> NDArray[np.float64]:
     """Return for each pair of corners how alike the triangles with their two nearest neighbours are, 0 where they are not, shape (n, m)."""
     if len(first) < 3 or len(second) < 3:
         return np.zeros((len(first), len(second)))
@@ -217,7 +249,10 @@ def _triangles(points: NDArray[np.float64]) -> NDArray[np.float64]:
     distances = _distances(points)
     order = np.argsort(distances + np.diag(np.full(len(points), np.inf)), axis=1, kind="stable")[:, :2]
     rows = np.arange(len(points))
-    return np.stack([distances[rows, order[:, 0]], distances[rows, order[:, 1]], distances[order[:, 0], order[:, 1]]], axis=1)
+    return np.stack(
+        [distances[rows, order[:, 0]], distances[rows, order[:, 1]], distances[order[:, 0], order[:, 1]]],
+        axis=1,
+    )
 
 
 def _distances(points: NDArray[np.float64]) -> NDArray[np.float64]:

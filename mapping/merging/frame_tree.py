@@ -1,7 +1,7 @@
 """How maps that were joined in pairs lie in common frames: the best forest of transforms that contradicts no other one.
 
-Maps are nodes, accepted transforms edges. Of each group of joined maps one is the root; the world's frame is that of the root of the
-group that was there first, and stays where it is while others join.
+Maps are nodes, accepted transforms edges. Of each group of joined maps one is the root; the world's frame is
+that of the root of the group that was there first, and stays where it is while others join.
 """
 
 import math
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Generic, TypeVar
 
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
 
 Name = TypeVar("Name", bound=Hashable)
 
@@ -45,7 +45,8 @@ class FrameTree(Generic[Name]):
     Attributes
     ----------
     cycle_distance_m, cycle_angle : float
-        By how much the transforms around a cycle may miss identity [m, rad]; else the cycle's weakest edge is dropped.
+        By how much the transforms around a cycle may miss identity [m, rad]; else the cycle's weakest edge is
+        dropped.
     """
 
     cycle_distance_m: float = 0.15
@@ -96,16 +97,21 @@ class FrameTree(Generic[Name]):
             self._edges[pair] = edge
             self._rebuild()
 
-    def set_edges(self, edges: Iterable[Edge[Name]], contradicts: Callable[[Name, Name, Transform], bool] | None = None) -> None:
-        """Put transforms in the place of all that there were; the world stays where it is for as long as its root is joined with any map.
+    def set_edges(
+        self, edges: Iterable[Edge[Name]], contradicts: Callable[[Name, Name, Transform], bool] | None = None
+    ) -> None:
+        """Put transforms in the place of all that there were.
+
+        The world stays where it is for as long as its root is joined with any map.
 
         Parameters
         ----------
         edges : iterable of Edge
             At most one between two maps.
         contradicts : callable or None
-            Asked of maps that are joined through others alone, with the transform of the second into the first that this implies: whether
-            the maps cannot lie over each other so. The weakest transform between them is dropped then.
+            Asked of maps that are joined through others alone, with the transform of the second into the
+            first that this implies: whether the maps cannot lie over each other so. The weakest transform
+            between them is dropped then.
 
         Raises
         ------
@@ -180,14 +186,19 @@ class FrameTree(Generic[Name]):
         return reached
 
     def _rebuild(self, contradicts: Callable[[Name, Name, Transform], bool] | None = None) -> None:
-        """Build the forest of most weight; drop the weakest edge of what cannot be true, until nothing is left of that kind."""
+        """Build the forest of most weight.
+
+        Drop the weakest edge of what cannot be true, until nothing is left of that kind.
+        """
         self._dropped = []
         while True:
             usable = [edge for edge in self._edges.values() if edge not in self._dropped]
             # Equal weights keep the order in which edges came.
             usable.sort(key=lambda edge: -edge.weight)
             left_over = self._grow(usable)
-            worst = max(((self._misses(edge), edge) for edge in left_over), key=lambda one: one[0], default=None)
+            worst = max(
+                ((self._misses(edge), edge) for edge in left_over), key=lambda one: one[0], default=None
+            )
             if worst is not None and worst[0] > 1.0:
                 # The forest has the most weight, so the edge outside of it is the weakest of its cycle.
                 self._dropped.append(worst[1])
@@ -202,7 +213,11 @@ class FrameTree(Generic[Name]):
         """Return the weakest edge on the way between two maps that the forest lays over each other and that contradict each other so."""
         for a, b in combinations(self._names, 2):
             way = self._way(a, b)
-            if len(way) > 1 and frozenset((a, b)) not in self._edges and contradicts(a, b, self._reached_from(a)[b]):
+            if (
+                len(way) > 1
+                and frozenset((a, b)) not in self._edges
+                and contradicts(a, b, self._reached_from(a)[b])
+            ):
                 return min(way, key=lambda edge: edge.weight)
         return None
 
@@ -218,7 +233,10 @@ class FrameTree(Generic[Name]):
         return ways.get(b, [])
 
     def _grow(self, edges: Iterable[Edge[Name]]) -> list[Edge[Name]]:
-        """Join maps by edges in turn; return the edges between maps that were joined already."""
+        """Join maps by edges in turn.
+
+        Return the edges between maps that were joined already.
+        """
         self._tree = {name: {} for name in self._names}
         group = {name: {name} for name in self._names}
         left_over = []
@@ -240,7 +258,10 @@ class FrameTree(Generic[Name]):
         return max(distance / self.cycle_distance_m, angle / self.cycle_angle)
 
     def _settle_roots(self) -> None:
-        """Keep the roots that there were, the oldest one where groups have become one; new groups get their first map."""
+        """Keep the roots that there were, the oldest one where groups have become one.
+
+        New groups get their first map.
+        """
         roots: list[Name] = []
         taken: set[Name] = set()
         for name in [*self._seniors, *(name for name in self._names if self._tree[name])]:

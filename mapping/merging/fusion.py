@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.occupancy import FREE, LOG_ODDS_UNIT, OCCUPIED, UNKNOWN
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import FREE, LOG_ODDS_UNIT, OCCUPIED, UNKNOWN
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 OCCUPIED_LOG_ODDS, FREE_LOG_ODDS = 1.0, -0.6
 """What an occupied and a free cell of a three-level map add: one map that says occupied outweighs one that says free, not two."""
@@ -43,7 +43,9 @@ class FusedMap:
     resolution: float
 
 
-def fuse(maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform], resolution: float) -> FusedMap:
+def fuse(
+    maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform], resolution: float
+) -> FusedMap:
     """Fuse maps of one resolution.
 
     Parameters
@@ -66,11 +68,15 @@ def fuse(maps: Sequence[NDArray[np.uint8]], common_from_map: Sequence[Transform]
         Where there is no map, more than 64, none that knows anything, or the result would be huge.
     """
     if not 0 < len(maps) <= MOST_MAPS or len(maps) != len(common_from_map):
-        raise ValueError(f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MOST_MAPS} of each")
+        raise ValueError(
+            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MOST_MAPS} of each"
+        )
     low, high = _bounds(maps, common_from_map, resolution)
     columns, rows = (high - low).tolist()
     if rows * columns > MAX_CELLS:
-        raise ValueError(f"the fused map would have {rows} x {columns} cells, more than {MAX_CELLS}; use a coarser resolution")
+        raise ValueError(
+            f"the fused map would have {rows} x {columns} cells, more than {MAX_CELLS}; use a coarser resolution"
+        )
     origin = (float(low[0] * resolution), float(low[1] * resolution))
     log_odds, sources = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.uint64)
     for index, (levels, transform) in enumerate(zip(maps, common_from_map, strict=True)):
@@ -98,11 +104,15 @@ def _bounds(
     if not corners:
         raise ValueError("none of the maps knows anything; want at least one known cell")
     points = np.concatenate(corners) / resolution
-    return np.floor(points.min(axis=0) + 1e-6).astype(np.int64), np.ceil(points.max(axis=0) - 1e-6).astype(np.int64)
+    return np.floor(points.min(axis=0) + 1e-6).astype(np.int64), np.ceil(points.max(axis=0) - 1e-6).astype(
+        np.int64
+    )
 
 
 def lay_over(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, float]) -> None:
-    """Write what a fused map knows into a blank map of the same cells, in its units; what lies beyond it is lost.
+    """Write what a fused map knows into a blank map of the same cells, in its units.
+
+    What lies beyond it is lost.
 
     Parameters
     ----------
@@ -111,15 +121,23 @@ def lay_over(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, f
     fused : FusedMap
         The fused one.
     origin : (x, y)
-        Lower left corner of the blank map in the frame of the fused one, whole cells apart from its corner [m].
+        Lower left corner of the blank map in the frame of the fused one, whole cells apart from its corner
+        [m].
     """
     weights = np.zeros(256, np.int8)
-    weights[OCCUPIED], weights[FREE] = round(OCCUPIED_LOG_ODDS / LOG_ODDS_UNIT), round(FREE_LOG_ODDS / LOG_ODDS_UNIT)
-    left, low = (round((place - own) / fused.resolution) for place, own in zip(fused.origin, origin, strict=True))
+    weights[OCCUPIED], weights[FREE] = (
+        round(OCCUPIED_LOG_ODDS / LOG_ODDS_UNIT),
+        round(FREE_LOG_ODDS / LOG_ODDS_UNIT),
+    )
+    left, low = (
+        round((place - own) / fused.resolution) for place, own in zip(fused.origin, origin, strict=True)
+    )
     rows, columns = fused.levels.shape
     inside = log_odds[max(low, 0) : max(low + rows, 0), max(left, 0) : max(left + columns, 0)]
     first_row, first_column = max(-low, 0), max(-left, 0)
-    inside[:] = weights[fused.levels[first_row : first_row + inside.shape[0], first_column : first_column + inside.shape[1]]]
+    inside[:] = weights[
+        fused.levels[first_row : first_row + inside.shape[0], first_column : first_column + inside.shape[1]]
+    ]
 
 
 @kernel

@@ -1,8 +1,9 @@
 """Maps that grow, merged again and again: only what has changed is described, and transforms that were verified are not searched for.
 
-A robot's map keeps its frame while it grows: its origin tells where the array's lower left corner lies in that frame.
-Two maps that know little can look alike without being of one place. Who acts on a merge can ask for a second finding: it is joined only
-when it is found once more, by a search of its own on maps that have grown, where it was before.
+A robot's map keeps its frame while it grows: its origin tells where the array's lower left corner lies in
+that frame. Two maps that know little can look alike without being of one place. Who acts on a merge can ask
+for a second finding: it is joined only when it is found once more, by a search of its own on maps that have
+grown, where it was before.
 """
 
 import itertools
@@ -14,14 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.merging.described_map import DescribedMap
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging.description.described_map import DescribedMap
 from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.merger import Merged, joined_tree, placed
 from lidarium.mapping.merging.pair import PairResult, described, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.validation import ValidationSettings, why_refused
-from lidarium.mapping.occupancy import UNKNOWN
-from lidarium.mapping.rigid import Transform
 
 
 class GrowingMap(NamedTuple):
@@ -87,15 +88,19 @@ class IncrementalMerger:
     search_growth_m2 : float
         A pair that was refused is searched for again when its maps together know so much more [m2].
     confirmation_growth_m2 : float or None
-        A pair that was found joins its maps only when it is found once more, once they know so much more [m2]; at once where None.
+        A pair that was found joins its maps only when it is found once more, once they know so much more
+        [m2]; at once where None.
     confirmation : ValidationSettings or None
-        What the maps must say of a pair beside that when it joins them; what its settings ask of every pair where None.
+        What the maps must say of a pair beside that when it joins them; what its settings ask of every pair
+        where None.
     confirmation_own_m2 : float
-        When two maps are joined, each knows so much that the other one does not [m2], or both know `PLENTY_M2`: of what a map knows
-        beyond the overlap nothing has contradicted, though in rooms that merely look alike something would have.
+        When two maps are joined, each knows so much that the other one does not [m2], or both know
+        `PLENTY_M2`: of what a map knows beyond the overlap nothing has contradicted, though in rooms that
+        merely look alike something would have.
     searches_per_update : int or None
-        Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn was longest ago; pairs that
-        others join are only verified then. All where None. Verifying costs little: whatever has news is verified.
+        Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn
+        was longest ago; pairs that others join are only verified then. All where None. Verifying costs
+        little: whatever has news is verified.
 
     Attributes
     ----------
@@ -121,24 +126,31 @@ class IncrementalMerger:
     _changed_at: dict[str, int] = field(default_factory=dict)
 
     def update(
-        self, maps: Mapping[str, GrowingMap], may_try: frozenset[tuple[str, str]] | None = None, *, may_search: bool = True
+        self,
+        maps: Mapping[str, GrowingMap],
+        may_try: frozenset[tuple[str, str]] | None = None,
+        *,
+        may_search: bool = True,
     ) -> Merged:
         """Take in the maps as they are now.
 
         Parameters
         ----------
         maps : mapping of str to GrowingMap
-            All of them, also those that have not changed; one that is missing is forgotten. Maps are kept, not copied.
+            All of them, also those that have not changed; one that is missing is forgotten. Maps are kept,
+            not copied.
         may_try : frozenset of (str, str) or None
-            Pairs, in the order of the maps, whose robots can talk to each other now: the others keep what they had found. All where None.
+            Pairs, in the order of the maps, whose robots can talk to each other now: the others keep what
+            they had found. All where None.
         may_search : bool
-            Whether there is time for searches; otherwise they wait for the next update, and what was found is verified alone.
+            Whether there is time for searches; otherwise they wait for the next update, and what was found is
+            verified alone.
 
         Returns
         -------
         Merged
-            Pairs, frames and fused maps; frames stay where they are while maps grow. Pairs that are accepted and wait to be confirmed
-            join nothing.
+            Pairs, frames and fused maps; frames stay where they are while maps grow. Pairs that are accepted
+            and wait to be confirmed join nothing.
 
         Raises
         ------
@@ -157,21 +169,35 @@ class IncrementalMerger:
             tried = self._tried(pair, self._pairs.get(pair), most is None or self.searched < most)
             if tried is not None:
                 tried_now[pair] = tried
-        pairs = {pair: tried for pair in every if (tried := tried_now.get(pair) or self._kept(pair)) is not None}
+        pairs = {
+            pair: tried for pair in every if (tried := tried_now.get(pair) or self._kept(pair)) is not None
+        }
         self._pairs = pairs
         results = {pair: tried.result for pair, tried in pairs.items()}
         believed = {pair: tried.result for pair, tried in pairs.items() if tried.is_confirmed}
         origins = {name: one.origin for name, one in maps.items()}
         self._tree = joined_tree(self._features, believed, self.settings, origins, self._tree)
-        return Merged({name: one.levels for name, one in self._features.items()}, self.resolution, results, self._tree, origins)
+        return Merged(
+            {name: one.levels for name, one in self._features.items()},
+            self.resolution,
+            results,
+            self._tree,
+            origins,
+        )
 
     def _describe(self, maps: Mapping[str, GrowingMap]) -> None:
         """Describe the maps that are new or have changed."""
         changed = {name for name, one in maps.items() if not _is_same(self._maps.get(name), one)}
-        fresh = {name: described(maps[name].levels, self.resolution, self.settings) for name in maps if name in changed}
+        fresh = {
+            name: described(maps[name].levels, self.resolution, self.settings)
+            for name in maps
+            if name in changed
+        }
         self._features = {name: fresh.get(name) or self._features[name] for name in maps}
         for name in changed:
-            self._known_m2[name] = float(np.count_nonzero(self._features[name].levels != UNKNOWN)) * self.resolution**2
+            self._known_m2[name] = (
+                float(np.count_nonzero(self._features[name].levels != UNKNOWN)) * self.resolution**2
+            )
             self._changed_at[name] = self._updates
         self._maps = dict(maps)
 
@@ -179,7 +205,9 @@ class IncrementalMerger:
         """Return the pairs whose turn it is to be verified or searched for."""
         due = [pair for pair in pairs if self._has_news(pair)]
         if self.searches_per_update is not None:
-            due.sort(key=lambda pair: (not self._waits(pair), self._pairs[pair].at if pair in self._pairs else 0))
+            due.sort(
+                key=lambda pair: (not self._waits(pair), self._pairs[pair].at if pair in self._pairs else 0)
+            )
         return due
 
     def _waits(self, pair: tuple[str, str]) -> bool:
@@ -217,13 +245,20 @@ class IncrementalMerger:
             return before
         # The middle of the overlap stays where it is on map a.
         centre = a_from_b.inverse().apply(
-            (first.inverse() @ before.corner).apply(before.result.a_from_b.apply(before.result.agreement.centre))
+            (first.inverse() @ before.corner).apply(
+                before.result.a_from_b.apply(before.result.agreement.centre)
+            )
         )
         agreement = replace(before.result.agreement, centre=(float(centre[0]), float(centre[1])))
-        return replace(before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first)
+        return replace(
+            before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first
+        )
 
     def _tried(self, pair: tuple[str, str], before: _Tried | None, may_search: bool) -> _Tried | None:
-        """Verify the transform of a pair; search where there is none, or it is refused by now. None where that has to wait."""
+        """Verify the transform of a pair.
+
+        Search where there is none, or it is refused by now. None where that has to wait.
+        """
         a, b = (self._features[name] for name in pair)
         first, second = (placed(self._maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
@@ -235,15 +270,25 @@ class IncrementalMerger:
                 self.verified += 1
                 refined = first @ result.a_from_b @ second.inverse()
                 # A confirmation that has to wait is due whether maps grow any more or not.
-                return _Tried(result, refined, before.known_m2, before.is_confirmed, before.at if is_due else self._updates, first)
+                return _Tried(
+                    result,
+                    refined,
+                    before.known_m2,
+                    before.is_confirmed,
+                    before.at if is_due else self._updates,
+                    first,
+                )
             if not result.is_accepted and not may_search:
                 return _Tried(result, None, -math.inf, False, before.at, first)
         elif (implied := self._implied(pair)) is not None:
-            # Others join these maps: where they agree so, they join each other as well, more exactly than a chain of transforms.
+            # Others join these maps: where they agree so, they join each other as well, more exactly than a
+            # chain of transforms.
             result = verify_pair(a, b, first.inverse() @ implied @ second, self.settings)
             if result.is_accepted and result.a_from_b is not None and self._convinces(pair, result):
                 self.verified += 1
-                return _Tried(result, first @ result.a_from_b @ second.inverse(), known_m2, True, self._updates, first)
+                return _Tried(
+                    result, first @ result.a_from_b @ second.inverse(), known_m2, True, self._updates, first
+                )
             if self.searches_per_update is not None:
                 return None
             if before is not None and known_m2 < before.known_m2 + self.search_growth_m2:
@@ -253,14 +298,26 @@ class IncrementalMerger:
         self.searched += 1
         result = merge_pair(a, b, self.settings)
         is_found = result.is_accepted and result.a_from_b is not None
-        frames = first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
-        return _Tried(result, frames, known_m2, self._confirms(pair, before, frames, result), self._updates, first)
+        frames = (
+            first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
+        )
+        return _Tried(
+            result, frames, known_m2, self._confirms(pair, before, frames, result), self._updates, first
+        )
 
-    def _confirms(self, pair: tuple[str, str], before: _Tried | None, frames: Transform | None, result: PairResult) -> bool:
+    def _confirms(
+        self, pair: tuple[str, str], before: _Tried | None, frames: Transform | None, result: PairResult
+    ) -> bool:
         """Whether what was searched for and found is believed from now on."""
         if self.confirmation_growth_m2 is None:
             return self._convinces(pair, result)
-        if before is None or before.frames is None or frames is None or before.is_confirmed or not self._convinces(pair, result):
+        if (
+            before is None
+            or before.frames is None
+            or frames is None
+            or before.is_confirmed
+            or not self._convinces(pair, result)
+        ):
             return False
         at = placed(self._maps[pair[1]].origin).apply(result.agreement.centre)
         distance, angle = frames.difference(before.frames, at)

@@ -7,12 +7,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.merging.described_map import DescribedMap, check_resolution, resampled, three_levels_of
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.description.described_map import (
+    DescribedMap,
+    check_resolution,
+    resampled,
+    three_levels_of,
+)
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.pair import PairResult, described, is_contradicted, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.rigid import Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,18 +45,27 @@ class Merged:
     origins: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def groups(self) -> list[list[str]]:
-        """Return the names of the maps that are joined, the root of each group first; a map that joins none is a group of its own."""
+        """Return the names of the maps that are joined, the root of each group first.
+
+        A map that joins none is a group of its own.
+        """
         return self.tree.groups()
 
     def fused(self, group: list[str]) -> FusedMap:
-        """Return the map of a group in the frame of its first; bit i of its sources is the group's map i.
+        """Return the map of a group in the frame of its first.
+
+        Bit i of its sources is the group's map i.
 
         Raises
         ------
         ValueError
             Where the maps are not joined with one another, or as `fuse` raises.
         """
-        return fuse([self.levels[name] for name in group], [self._into(group[0], name) for name in group], self.resolution)
+        return fuse(
+            [self.levels[name] for name in group],
+            [self._into(group[0], name) for name in group],
+            self.resolution,
+        )
 
     def _into(self, root: str, name: str) -> Transform:
         """Return the transform from a map's lower left corner into the frame of another map."""
@@ -64,14 +78,15 @@ class Merged:
 def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSettings | None = None) -> Merged:
     """Merge maps of robots that know nothing of each other's start.
 
-    Pairs of maps that know most are searched for first, by corners before all rotations and translations are tried. Where two maps are
-    joined through others already, they are laid over each other as these imply, and searched for only where they do not agree so.
+    Pairs of maps that know most are searched for first, by corners before all rotations and translations are
+    tried. Where two maps are joined through others already, they are laid over each other as these imply, and
+    searched for only where they do not agree so.
 
     Parameters
     ----------
     maps : mapping of str to ((rows, columns) uint8, float)
-        Occupancy (dark is occupied, row 0 at the lowest y) and side of a cell [m] of each map. Where the sides differ, all maps are
-        brought to the coarsest.
+        Occupancy (dark is occupied, row 0 at the lowest y) and side of a cell [m] of each map. Where the
+        sides differ, all maps are brought to the coarsest.
     settings : MergeSettings or None
         How.
 
@@ -94,7 +109,9 @@ def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSetti
     return Merged(levels, resolution, pairs, joined_tree(features, pairs, settings))
 
 
-def _all_pairs(features: Mapping[str, DescribedMap], settings: MergeSettings) -> dict[tuple[str, str], PairResult]:
+def _all_pairs(
+    features: Mapping[str, DescribedMap], settings: MergeSettings
+) -> dict[tuple[str, str], PairResult]:
     """Return what comes of each two maps, in their order."""
     every = list(itertools.combinations(features, 2))
     # What corners join spares the search of all rotations and translations, where there is one.
@@ -108,14 +125,20 @@ def _all_pairs(features: Mapping[str, DescribedMap], settings: MergeSettings) ->
         for a, b in sorted(every, key=lambda pair: -min(len(features[name].walls) for name in pair)):
             if (a, b) in found and found[a, b].is_accepted:
                 continue
-            result = _implied(features[a], features[b], tree.lookup(a, b), settings) or merge_pair(features[a], features[b], how)
+            result = _implied(features[a], features[b], tree.lookup(a, b), settings) or merge_pair(
+                features[a], features[b], how
+            )
             found[a, b] = result
             if result.is_accepted and result.a_from_b is not None:
-                tree.add_edge(Edge(a, b, result.a_from_b, result.agreement.evidence_m, result.agreement.centre))
+                tree.add_edge(
+                    Edge(a, b, result.a_from_b, result.agreement.evidence_m, result.agreement.centre)
+                )
     return {pair: found[pair] for pair in every}
 
 
-def _implied(a: DescribedMap, b: DescribedMap, a_from_b: Transform | None, settings: MergeSettings) -> PairResult | None:
+def _implied(
+    a: DescribedMap, b: DescribedMap, a_from_b: Transform | None, settings: MergeSettings
+) -> PairResult | None:
     """Return the result of laying maps over each other as others imply, None where these do not say or the maps do not agree so."""
     # The thesis's test needs inliers, which only a search finds.
     if a_from_b is None or settings.validation.test == "discs":
@@ -133,7 +156,8 @@ def joined_tree(
 ) -> FrameTree[str]:
     """Join maps by what was accepted of their pairs.
 
-    Maps that are joined through others alone must not contradict each other either: else the weakest pair between them is dropped.
+    Maps that are joined through others alone must not contradict each other either: else the weakest pair
+    between them is dropped.
 
     Parameters
     ----------
@@ -165,7 +189,9 @@ def joined_tree(
         if result.is_accepted and result.a_from_b is not None:
             centre = frames[b].apply(result.agreement.centre)
             a_from_b = frames[a] @ result.a_from_b @ frames[b].inverse()
-            edges.append(Edge(a, b, a_from_b, result.agreement.evidence_m, (float(centre[0]), float(centre[1]))))
+            edges.append(
+                Edge(a, b, a_from_b, result.agreement.evidence_m, (float(centre[0]), float(centre[1])))
+            )
 
     def contradicts(a: str, b: str, a_from_b: Transform) -> bool:
         implied = frames[a].inverse() @ a_from_b @ frames[b]
@@ -180,7 +206,9 @@ def placed(origin: tuple[float, float]) -> Transform:
     return Transform(float(origin[0]), float(origin[1]), 0.0)
 
 
-def _alike(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSettings) -> tuple[dict[str, NDArray[np.uint8]], float]:
+def _alike(
+    maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSettings
+) -> tuple[dict[str, NDArray[np.uint8]], float]:
     """Return the maps in three levels and in cells of one size, and that size."""
     for name, (_, resolution) in maps.items():
         try:

@@ -7,14 +7,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarium.mapping.geometry.rigid import Transform, halfway
 from lidarium.mapping.merging.alignment import Candidate, distinct, find_inliers, refine
 from lidarium.mapping.merging.correlation import best_translations
 from lidarium.mapping.merging.correspondence import Matches, match_corners
-from lidarium.mapping.merging.described_map import DescribedMap, describe_map
+from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import Agreement, compare, disc_agreement, has_contradiction, is_rival, why_refused
+from lidarium.mapping.merging.validation import (
+    Agreement,
+    compare,
+    disc_agreement,
+    has_contradiction,
+    is_rival,
+    why_refused,
+)
 from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_walls
-from lidarium.mapping.rigid import Transform, halfway
 
 NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))
 THIN_WALL_M = 0.1
@@ -99,14 +106,20 @@ def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None 
     """
     settings = settings or MergeSettings()
     if not math.isclose(a.resolution, b.resolution, rel_tol=1e-6):
-        raise ValueError(f"maps have resolutions of {a.resolution} and {b.resolution} m; want one, see resampled")
+        raise ValueError(
+            f"maps have resolutions of {a.resolution} and {b.resolution} m; want one, see resampled"
+        )
     began = time.process_time()
     matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, settings.correspondence)
     merge = _merge_by_discs if settings.validation.test == "discs" else _merge_by_walls
-    return replace(merge(a, b, matches, settings), matches=len(matches), time_ms=1e3 * (time.process_time() - began))
+    return replace(
+        merge(a, b, matches, settings), matches=len(matches), time_ms=1e3 * (time.process_time() - began)
+    )
 
 
-def verify_pair(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings | None = None) -> PairResult:
+def verify_pair(
+    a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings | None = None
+) -> PairResult:
     """Verify a transform that was found before, when the maps knew less: it is refined and judged, nothing is searched for.
 
     Parameters
@@ -141,24 +154,32 @@ def verify_pair(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings:
 def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings) -> bool:
     """Return whether maps contradict each other where a transform that other maps imply lays them, and also once they have settled.
 
-    What was implied is a little off after some maps; but where walls hold the maps in one direction alone they may settle far away.
+    What was implied is a little off after some maps; but where walls hold the maps in one direction alone
+    they may settle far away.
     """
     validation = settings.validation
 
     def contradicts(transform: Transform) -> bool:
         agreement = compare(a, b, transform, validation)
-        return agreement.overlap_m2 >= validation.least_overlap_m2 and has_contradiction(agreement, validation)
+        return agreement.overlap_m2 >= validation.least_overlap_m2 and has_contradiction(
+            agreement, validation
+        )
 
     return contradicts(a_from_b) and contradicts(
         refine_on_walls(a, b, a_from_b, settings.cycle_distance_m, settings.alignment.wall_samples)
     )
 
 
-def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> PairResult:
+def _merge_by_walls(
+    a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings
+) -> PairResult:
     if len(a.walls) == 0 or len(b.walls) == 0:
         return PairResult(False, "too few corners: a map has no walls that border on free space")
     candidates, shortage = _corner_candidates(a, b, matches, settings)
-    judged = [_judged(a, b, refine(a, b, matches, candidate, settings.alignment), settings) for candidate in candidates]
+    judged = [
+        _judged(a, b, refine(a, b, matches, candidate, settings.alignment), settings)
+        for candidate in candidates
+    ]
     best, found_by = _best(judged), "corners"
     if (best is None or best.refusal is not None) and settings.correlation.rotations > 0:
         angles = np.arange(settings.correlation.rotations) * (2.0 * math.pi / settings.correlation.rotations)
@@ -189,19 +210,26 @@ def _merge_by_walls(a: DescribedMap, b: DescribedMap, matches: Matches, settings
     )
 
 
-def _merge_by_discs(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> PairResult:
+def _merge_by_discs(
+    a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings
+) -> PairResult:
     """Merge by the thesis's rules: the proposal with most inliers, refined, is accepted where the discs around its inliers agree."""
     candidates, shortage = _corner_candidates(a, b, matches, settings)
     if not candidates:
         return PairResult(False, shortage or "too few inliers: no transform was found")
     candidate = refine(a, b, matches, candidates[0], settings.alignment)
-    joined = (a.corners.points[matches.first[candidate.inliers]], b.corners.points[matches.second[candidate.inliers]])
+    joined = (
+        a.corners.points[matches.first[candidate.inliers]],
+        b.corners.points[matches.second[candidate.inliers]],
+    )
     score = disc_agreement(a, b, candidate.a_from_b, joined[1], settings.validation.disc_radius_cells)
     is_accepted = score > settings.validation.disc_agreement
     percent = 100.0 * settings.validation.disc_agreement
     return PairResult(
         is_accepted=is_accepted,
-        reason="accepted" if is_accepted else f"contradiction: {100.0 * score:.1f} % of the cells in discs agree, want {percent:g} %",
+        reason="accepted"
+        if is_accepted
+        else f"contradiction: {100.0 * score:.1f} % of the cells in discs agree, want {percent:g} %",
         a_from_b=candidate.a_from_b,
         inliers=len(candidate.inliers),
         score=score,
@@ -210,12 +238,16 @@ def _merge_by_discs(a: DescribedMap, b: DescribedMap, matches: Matches, settings
     )
 
 
-def _corner_candidates(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> tuple[list[Candidate], str | None]:
+def _corner_candidates(
+    a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings
+) -> tuple[list[Candidate], str | None]:
     """Return the most promising transforms that matches propose, or none and why."""
     alignment = settings.alignment
     if min(len(a.corners), len(b.corners)) < alignment.least_inliers:
         return [], f"too few corners: {len(a.corners)} and {len(b.corners)}, want {alignment.least_inliers}"
-    wanted = max(alignment.least_inliers, math.ceil(alignment.inlier_share * min(len(a.corners), len(b.corners))))
+    wanted = max(
+        alignment.least_inliers, math.ceil(alignment.inlier_share * min(len(a.corners), len(b.corners)))
+    )
     proposals, is_inlier = find_inliers(a.corners, b.corners, matches, a.resolution, alignment)
     counts = is_inlier.sum(axis=1)
     most = int(counts.max(initial=0))
@@ -233,7 +265,11 @@ def _corner_candidates(a: DescribedMap, b: DescribedMap, matches: Matches, setti
 
 
 def _residuals(
-    a: DescribedMap, b: DescribedMap, matches: Matches, proposals: NDArray[np.float64], is_inlier: NDArray[np.bool_]
+    a: DescribedMap,
+    b: DescribedMap,
+    matches: Matches,
+    proposals: NDArray[np.float64],
+    is_inlier: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """Return the mean distance of the inliers of each proposal [m], shape (n,)."""
     p, q = a.corners.points[matches.first], b.corners.points[matches.second]
@@ -241,17 +277,29 @@ def _residuals(
     return np.array([distance[row].mean() for distance, row in zip(distances, is_inlier, strict=True)])
 
 
-def _by_correlation(a: DescribedMap, b: DescribedMap, angles: NDArray[np.floating], count: int, settings: MergeSettings) -> list[_Judged]:
+def _by_correlation(
+    a: DescribedMap, b: DescribedMap, angles: NDArray[np.floating], count: int, settings: MergeSettings
+) -> list[_Judged]:
     """Judge the best of all translations at some rotations."""
-    transforms, values = best_translations(a, b, angles, settings.correlation, settings.validation.rival_distance_m)
+    transforms, values = best_translations(
+        a, b, angles, settings.correlation, settings.validation.rival_distance_m
+    )
     order = np.argsort(-values, kind="stable")
-    chosen = distinct(transforms, order, _middle(b), count, (settings.validation.rival_distance_m, settings.validation.rival_angle))
+    chosen = distinct(
+        transforms,
+        order,
+        _middle(b),
+        count,
+        (settings.validation.rival_distance_m, settings.validation.rival_angle),
+    )
     reach, samples = settings.alignment.refinement_reach_m, settings.alignment.wall_samples
     refined = (refine_on_walls(a, b, Transform(*transforms[k].tolist()), reach, samples) for k in chosen)
     return [_judged(a, b, Candidate(transform, _NONE), settings) for transform in refined]
 
 
-def _beside(a: DescribedMap, b: DescribedMap, judged: list[_Judged], settings: MergeSettings) -> list[_Judged]:
+def _beside(
+    a: DescribedMap, b: DescribedMap, judged: list[_Judged], settings: MergeSettings
+) -> list[_Judged]:
     """Judge transforms beside the best refused ones, by a thin wall's thickness: they may have laid its two sides on each other."""
     found = []
     for one in sorted(judged, key=lambda one: -one.agreement.evidence_m)[:_NEARLY]:
@@ -272,10 +320,16 @@ def _polished(a: DescribedMap, b: DescribedMap, judged: _Judged, settings: Merge
     """Settle a transform on more walls, of b on those of a and of a on those of b, half way between the two."""
     if "walls" not in settings.alignment.refinements:
         return judged
-    start, reach, samples = judged.candidate.a_from_b, 0.5 * settings.alignment.refinement_reach_m, 4 * settings.alignment.wall_samples
+    start, reach, samples = (
+        judged.candidate.a_from_b,
+        0.5 * settings.alignment.refinement_reach_m,
+        4 * settings.alignment.wall_samples,
+    )
     forth = refine_on_walls(a, b, start, reach, samples)
     back = refine_on_walls(b, a, start.inverse(), reach, samples).inverse()
-    return _judged(a, b, Candidate(halfway(forth, back, judged.agreement.centre), judged.candidate.inliers), settings)
+    return _judged(
+        a, b, Candidate(halfway(forth, back, judged.agreement.centre), judged.candidate.inliers), settings
+    )
 
 
 def _best(judged: list[_Judged]) -> _Judged | None:
@@ -283,13 +337,18 @@ def _best(judged: list[_Judged]) -> _Judged | None:
     return max(judged, key=lambda one: (one.refusal is None, one.agreement.evidence_m), default=None)
 
 
-def _ambiguity(a: DescribedMap, b: DescribedMap, best: _Judged, judged: list[_Judged], settings: MergeSettings) -> str | None:
+def _ambiguity(
+    a: DescribedMap, b: DescribedMap, best: _Judged, judged: list[_Judged], settings: MergeSettings
+) -> str | None:
     """Return which other transform explains the maps nearly as well, or None.
 
-    Rooms look alike most of all after quarter turns and shifts, so the best translations at these rotations are tried too.
+    Rooms look alike most of all after quarter turns and shifts, so the best translations at these rotations
+    are tried too.
     """
     validation, transform = settings.validation, best.candidate.a_from_b
-    others = judged + _by_correlation(a, b, transform.theta + _QUARTERS, len(_QUARTERS) * settings.correlation.peaks, settings)
+    others = judged + _by_correlation(
+        a, b, transform.theta + _QUARTERS, len(_QUARTERS) * settings.correlation.peaks, settings
+    )
     for other in others:
         distance, angle = transform.difference(other.candidate.a_from_b, best.agreement.centre)
         if distance <= validation.rival_distance_m and angle <= validation.rival_angle:

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass, field
 
 from lidarium.mapping.merging.alignment import AlignmentSettings
-from lidarium.mapping.merging.corners import CornerSettings
 from lidarium.mapping.merging.correlation import CorrelationSettings
 from lidarium.mapping.merging.correspondence import CorrespondenceSettings
-from lidarium.mapping.merging.descriptors import DescriptorSettings
+from lidarium.mapping.merging.description.corners import CornerSettings
+from lidarium.mapping.merging.description.descriptors import DescriptorSettings
 from lidarium.mapping.merging.validation import ValidationSettings
 
 MODES = ("default", "thesis")
@@ -46,8 +46,9 @@ def merge_settings(mode: str = "default", resolution: float = 0.025) -> MergeSet
     Parameters
     ----------
     mode : str
-        ``default``, or ``thesis`` for the rules of the thesis as they were printed: all corners, one ring band of 25 cells, similarity
-        over all samples, rotations in steps of 22.5 degrees, inliers by the ratio of coordinates, a sweep, the disc test, no fallback.
+        ``default``, or ``thesis`` for the rules of the thesis as they were printed: all corners, one ring
+        band of 25 cells, similarity over all samples, rotations in steps of 22.5 degrees, inliers by the
+        ratio of coordinates, a sweep, the disc test, no fallback.
     resolution : float
         Side of a cell [m]; the thesis counts in cells.
 
@@ -75,9 +76,15 @@ def merge_settings(mode: str = "default", resolution: float = 0.025) -> MergeSet
         unknown=0.5,
         free=0.0,
     )
-    correspondence = CorrespondenceSettings(threshold=0.80, shift_window=math.radians(12.0), is_known_only=False, use_shift=False)
+    correspondence = CorrespondenceSettings(
+        threshold=0.80, shift_window=math.radians(12.0), is_known_only=False, use_shift=False
+    )
     alignment = AlignmentSettings(
-        inlier_rule="ratio", least_inliers=3, angle_uncertainty=math.radians(22.5), candidates=1, refinements=("sweep",)
+        inlier_rule="ratio",
+        least_inliers=3,
+        angle_uncertainty=math.radians(22.5),
+        candidates=1,
+        refinements=("sweep",),
     )
     return MergeSettings(
         corners=CornerSettings(separation_m=0.0, limit=0),

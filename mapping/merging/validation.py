@@ -1,8 +1,9 @@
 """Whether two maps, laid over each other, tell of one place.
 
-The default test counts what both maps know: walls that lie on walls, and walls of one that stand where the other has looked and found
-nothing. A transform is refused where too little agrees, where enough contradicts, or where another transform explains the maps nearly
-as well. The disc test of the thesis looks at cells around the inliers only, unknown ones included.
+The default test counts what both maps know: walls that lie on walls, and walls of one that stand where the
+other has looked and found nothing. A transform is refused where too little agrees, where enough contradicts,
+or where another transform explains the maps nearly as well. The disc test of the thesis looks at cells around
+the inliers only, unknown ones included.
 """
 
 import math
@@ -11,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.checks import check_from_zero
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
-from lidarium.mapping.occupancy import FREE, UNKNOWN
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.checks import check_from_zero
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import FREE, UNKNOWN
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.merging.description.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
 
 OCCUPIED_WEIGHT = 10.0
 """How much more an occupied cell counts than a free one in the score."""
@@ -43,12 +44,14 @@ class ValidationSettings:
     least_wall_m : float
         Least length of walls that agree [m].
     least_evidence_m : float
-        Least length of walls that agree, less that of walls that do not and three times that of walls that contradict [m].
+        Least length of walls that agree, less that of walls that do not and three times that of walls that
+        contradict [m].
     least_across_m : float
-        Least length of walls that hold the maps in the direction in which they are held least [m]: two straight corridors agree
-        wherever they are laid over each other.
+        Least length of walls that hold the maps in the direction in which they are held least [m]: two
+        straight corridors agree wherever they are laid over each other.
     least_across_share : float
-        The same as a share of the walls that agree, which is at most a half: along a corridor hardly any walls hold.
+        The same as a share of the walls that agree, which is at most a half: along a corridor hardly any
+        walls hold.
     least_evidence_per_m2 : float
         Least evidence on each square metre that both know [m/m2]: open floor agrees with open floor anywhere.
     hit_rate : float
@@ -58,14 +61,16 @@ class ValidationSettings:
     most_contradiction_m : float
         Length of contradicting walls that is excused [m].
     plenty_of_overlap_m2, plenty_of_wall_m, contradiction_share : float
-        Where both know so much [m2], of the walls beyond this length [m] this share may contradict too: maps of whole buildings drift.
+        Where both know so much [m2], of the walls beyond this length [m] this share may contradict too: maps
+        of whole buildings drift.
     rival_distance_m, rival_angle : float
         A transform is another one where it differs by more than this [m, rad].
     rival_share : float
-        A rival that nothing contradicts makes the best transform ambiguous where the walls that agree under it are longer than this
-        share of those under the best.
+        A rival that nothing contradicts makes the best transform ambiguous where the walls that agree under
+        it are longer than this share of those under the best.
     rival_lead : float
-        A rival that is refused still speaks against the best transform where so many times more wall speaks for it.
+        A rival that is refused still speaks against the best transform where so many times more wall speaks
+        for it.
     disc_radius_cells : int
         Radius of the discs [cells].
     disc_agreement : float
@@ -97,12 +102,28 @@ class ValidationSettings:
     def __post_init__(self) -> None:
         if self.test not in TESTS:
             raise ValueError(f"test of validation is {self.test!r}; want one of {', '.join(TESTS)}")
-        for name in ("least_across_share", "hit_rate", "score", "contradiction_share", "rival_share", "disc_agreement"):
+        for name in (
+            "least_across_share",
+            "hit_rate",
+            "score",
+            "contradiction_share",
+            "rival_share",
+            "disc_agreement",
+        ):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
         least = ("least_overlap_m2", "least_wall_m", "least_evidence_m", "least_across_m")
-        lengths = ("hit_distance_m", "miss_distance_m", "most_contradiction_m", "plenty_of_wall_m", "rival_distance_m", "rival_lead")
-        check_from_zero(self, "validation", (*least, *lengths, "least_evidence_per_m2", "plenty_of_overlap_m2"))
+        lengths = (
+            "hit_distance_m",
+            "miss_distance_m",
+            "most_contradiction_m",
+            "plenty_of_wall_m",
+            "rival_distance_m",
+            "rival_lead",
+        )
+        check_from_zero(
+            self, "validation", (*least, *lengths, "least_evidence_per_m2", "plenty_of_overlap_m2")
+        )
         if self.disc_radius_cells < 1:
             raise ValueError(f"disc_radius_cells is {self.disc_radius_cells}; want one or more")
 
@@ -122,7 +143,8 @@ class Agreement:
     wall_m : float
         Length of walls within what the other map knows, mean of both maps [m].
     across_m : float
-        Length of walls that hold the maps in the direction in which they are held least: 0 for a straight wall, whatever its length [m].
+        Length of walls that hold the maps in the direction in which they are held least: 0 for a straight
+        wall, whatever its length [m].
     contradicting_m : float
         Length of walls in the free space of the other map, the sum of both maps [m].
     score : float
@@ -169,8 +191,32 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
     hit, miss = max(settings.hit_distance_m, 1.5 * side), max(settings.miss_distance_m, 2.5 * side)
     b_from_a = a_from_b.inverse()
     walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
-    _count_walls(a.levels, a.distance, a.is_open, 1.0 / side, b.walls, b.normals, _pose(a_from_b), hit, miss, walls[0], facing[0])
-    _count_walls(b.levels, b.distance, b.is_open, 1.0 / side, a.walls, a.normals, _pose(b_from_a), hit, miss, walls[1], facing[1])
+    _count_walls(
+        a.levels,
+        a.distance,
+        a.is_open,
+        1.0 / side,
+        b.walls,
+        b.normals,
+        _pose(a_from_b),
+        hit,
+        miss,
+        walls[0],
+        facing[0],
+    )
+    _count_walls(
+        b.levels,
+        b.distance,
+        b.is_open,
+        1.0 / side,
+        a.walls,
+        a.normals,
+        _pose(b_from_a),
+        hit,
+        miss,
+        walls[1],
+        facing[1],
+    )
     area = np.zeros(3)
     _count_overlap(a.levels, b.levels, side, _pose(a_from_b), area)
     both = float(area[0])
@@ -185,7 +231,9 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
 def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | None:
     """Return why a transform is refused, rivals aside, or None where nothing speaks against it."""
     if agreement.overlap_m2 < settings.least_overlap_m2:
-        return f"small overlap: {agreement.overlap_m2:.1f} m2 known in both, want {settings.least_overlap_m2:g}"
+        return (
+            f"small overlap: {agreement.overlap_m2:.1f} m2 known in both, want {settings.least_overlap_m2:g}"
+        )
     if has_contradiction(agreement, settings):
         allowed = _excused(agreement, settings)
         return f"contradiction: {agreement.contradicting_m:.1f} m of walls stand where the other map is free, at most {allowed:.1f} m may"
@@ -222,13 +270,18 @@ def _excused(agreement: Agreement, settings: ValidationSettings) -> float:
     """Return the length of walls that may contradict [m]."""
     if agreement.overlap_m2 < settings.plenty_of_overlap_m2:
         return settings.most_contradiction_m
-    return settings.most_contradiction_m + settings.contradiction_share * max(agreement.wall_m - settings.plenty_of_wall_m, 0.0)
+    return settings.most_contradiction_m + settings.contradiction_share * max(
+        agreement.wall_m - settings.plenty_of_wall_m, 0.0
+    )
 
 
-def disc_agreement(a: DescribedMap, b: DescribedMap, a_from_b: Transform, points: NDArray[np.float64], radius_cells: int) -> float:
+def disc_agreement(
+    a: DescribedMap, b: DescribedMap, a_from_b: Transform, points: NDArray[np.float64], radius_cells: int
+) -> float:
     """Return the share of map b's cells within discs around points [m of map b] that are in the same state in map a.
 
-    Unknown is a state as others are; what lies outside of map a is unknown. A cell in several discs counts once.
+    Unknown is a state as others are; what lies outside of map a is unknown. A cell in several discs counts
+    once.
     """
     if len(points) == 0:
         return 0.0
@@ -256,7 +309,10 @@ def _count_walls(
     counts: Array,
     facing: Array,
 ) -> None:
-    """Count the walls that agree, that miss by little, and that contradict; sum the squares of the normals of those that agree."""
+    """Count the walls that agree, that miss by little, and that contradict.
+
+    Sum the squares of the normals of those that agree.
+    """
     rows, columns = levels.shape
     cosine, sine = math.cos(pose[2]) * scale, math.sin(pose[2]) * scale
     x0, y0 = pose[0] * scale, pose[1] * scale
@@ -302,7 +358,14 @@ def _count_overlap(a: Array, b: Array, side: float, pose: tuple[float, float, fl
 
 @kernel
 def _count_discs(
-    a: Array, b: Array, side: float, pose: tuple[float, float, float], points: Array, radius: int, is_inside: Array, counts: Array
+    a: Array,
+    b: Array,
+    side: float,
+    pose: tuple[float, float, float],
+    points: Array,
+    radius: int,
+    is_inside: Array,
+    counts: Array,
 ) -> None:
     """Count the cells of b in the discs that are the same in a, and all of them."""
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
@@ -310,7 +373,10 @@ def _count_discs(
         middle_column, middle_row = int(math.floor(points[i, 0] / side)), int(math.floor(points[i, 1] / side))
         for row in range(max(middle_row - radius, 0), min(middle_row + radius + 1, b.shape[0])):
             for column in range(max(middle_column - radius, 0), min(middle_column + radius + 1, b.shape[1])):
-                if is_inside[row, column] or (row - middle_row) ** 2 + (column - middle_column) ** 2 > radius * radius:
+                if (
+                    is_inside[row, column]
+                    or (row - middle_row) ** 2 + (column - middle_column) ** 2 > radius * radius
+                ):
                     continue
                 is_inside[row, column] = True
                 x = cosine * (column + 0.5) - sine * (row + 0.5) + pose[0] / side

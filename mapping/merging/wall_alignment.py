@@ -5,14 +5,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.merging.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
-from lidarium.mapping.occupancy import FREE, OCCUPIED
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.merging.description.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
 
 
 def wall_sample(walls: int, count: int) -> NDArray[np.int64]:
-    """Return the indices of so many of a map's walls, spread over all of them; of all where there are no more."""
+    """Return the indices of so many of a map's walls, spread over all of them.
+
+    Of all where there are no more.
+    """
     return np.linspace(0, walls - 1, min(walls, count)).astype(np.int64)
 
 
@@ -27,7 +30,9 @@ def rank_by_walls(
 
 
 @kernel
-def _score_walls(levels: Array, distance: Array, scale: float, walls: Array, proposals: Array, near: float, scores: Array) -> None:
+def _score_walls(
+    levels: Array, distance: Array, scale: float, walls: Array, proposals: Array, near: float, scores: Array
+) -> None:
     rows, columns = levels.shape
     for k in range(proposals.shape[0]):
         cosine, sine = math.cos(proposals[k, 2]) * scale, math.sin(proposals[k, 2]) * scale
@@ -44,23 +49,41 @@ def _score_walls(levels: Array, distance: Array, scale: float, walls: Array, pro
         scores[k] = hits - 2 * misses
 
 
-def refine_on_walls(a: DescribedMap, b: DescribedMap, a_from_b: Transform, reach_m: float, samples: int) -> Transform:
+def refine_on_walls(
+    a: DescribedMap, b: DescribedMap, a_from_b: Transform, reach_m: float, samples: int
+) -> Transform:
     """Return the transform that brings walls of map b onto those of map a that face the same way, by least squares.
 
-    Each wall looks along its normal for the nearest wall of map a, as far as a reach, which shrinks to four cells; walls that find none
-    do not count: there the other map may know nothing.
+    Each wall looks along its normal for the nearest wall of map a, as far as a reach, which shrinks to four
+    cells; walls that find none do not count: there the other map may know nothing.
     """
     sample = wall_sample(len(b.walls), samples)
     if len(sample) == 0:
         return a_from_b
     pose = np.array([a_from_b.x, a_from_b.y, a_from_b.theta])
-    _settle(a.levels, a.distance, a.resolution, b.walls[sample], b.normals[sample], pose, reach_m, min(4.0 * a.resolution, reach_m))
+    _settle(
+        a.levels,
+        a.distance,
+        a.resolution,
+        b.walls[sample],
+        b.normals[sample],
+        pose,
+        reach_m,
+        min(4.0 * a.resolution, reach_m),
+    )
     return Transform(*pose.tolist())
 
 
 @kernel
 def _settle(
-    levels: Array, distance: Array, side: float, walls: Array, normals: Array, pose: Array, reach: float, last_reach: float
+    levels: Array,
+    distance: Array,
+    side: float,
+    walls: Array,
+    normals: Array,
+    pose: Array,
+    reach: float,
+    last_reach: float,
 ) -> None:
     """Move a pose so that walls come to lie on walls along their normals."""
     rounds = 10
@@ -75,7 +98,10 @@ def _settle(
         for i in range(count):
             x = (cosine * walls[i, 0] - sine * walls[i, 1] + pose[0]) / side
             y = (sine * walls[i, 0] + cosine * walls[i, 1] + pose[1]) / side
-            u, v = cosine * normals[i, 0] - sine * normals[i, 1], sine * normals[i, 0] + cosine * normals[i, 1]
+            u, v = (
+                cosine * normals[i, 0] - sine * normals[i, 1],
+                sine * normals[i, 0] + cosine * normals[i, 1],
+            )
             gap = _gap_to_wall(levels, distance, side, x, y, u, v, steps)
             if gap <= steps:
                 places[found, 0], places[found, 1] = x, y
@@ -117,7 +143,9 @@ def _settle(
 
 
 @kernel(inline=True)
-def _gap_to_wall(levels: Array, distance: Array, side: float, x: float, y: float, u: float, v: float, steps: int) -> float:
+def _gap_to_wall(
+    levels: Array, distance: Array, side: float, x: float, y: float, u: float, v: float, steps: int
+) -> float:
     """Return how far along the normal the nearest wall that faces the same way lies [cells], more than ``steps`` where there is none."""
     rows, columns = levels.shape
     column, row = int(math.floor(x)), int(math.floor(y))

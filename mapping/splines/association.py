@@ -1,8 +1,9 @@
 """Which curves are of one wall, and along which part of both.
 
-Rough step: curves some of whose control points are near each other are candidates. Fine step: from an end of the seen curve the nearest
-point of the known curve is looked up. Where that is an end of the known curve, the known curve ends first, and the overlap begins at the
-seen curve's point nearest to it; else it begins at the seen curve's own end. The same at the other end: four cases.
+Rough step: curves some of whose control points are near each other are candidates. Fine step: from an end of
+the seen curve the nearest point of the known curve is looked up. Where that is an end of the known curve, the
+known curve ends first, and the overlap begins at the seen curve's point nearest to it; else it begins at the
+seen curve's own end. The same at the other end: four cases.
 """
 
 import math
@@ -11,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.splines.bspline import Spline
-from lidarium.mapping.splines.settings import AssociationSettings
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.splines.curves.bspline import Spline
+from lidarium.mapping.splines.curves.settings import AssociationSettings
 
 SAMPLE_SPACING = 0.05
 """Curves are compared by points so far apart [m]."""
@@ -124,7 +125,10 @@ def mark_along(points: Array, way: Array, distance: float, is_along: Array) -> N
     for k in range(points.shape[0]):
         place, gap = closest_place(way, points[k, 0], points[k, 1])
         if gap <= distance:
-            x, y = points[min(k + 1, last), 0] - points[max(k - 1, 0), 0], points[min(k + 1, last), 1] - points[max(k - 1, 0), 1]
+            x, y = (
+                points[min(k + 1, last), 0] - points[max(k - 1, 0), 0],
+                points[min(k + 1, last), 1] - points[max(k - 1, 0), 1],
+            )
             direction = direction_of(way, place)
             if x * math.cos(direction) + y * math.sin(direction) >= 0.0:
                 is_along[k] = True
@@ -152,8 +156,9 @@ def find_overlap(seen: Array, known: Array) -> tuple[float, float, float, float,
     Returns
     -------
     tuple
-        Places where it begins and ends on the seen way and on the known one, counted in points; its length along the seen way [m]; mean
-        distance [m] and mean angle [rad]; 1 where the known way's end begins it, plus 2 where one ends it. A length of 0 for none.
+        Places where it begins and ends on the seen way and on the known one, counted in points; its length
+        along the seen way [m]; mean distance [m] and mean angle [rad]; 1 where the known way's end begins it,
+        plus 2 where one ends it. A length of 0 for none.
     """
     ends = np.empty(4)
     cases = 0

@@ -5,16 +5,16 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.splines.curves.settings import BREAKPOINT_TESTS, SegmentationSettings
 from lidarium.mapping.splines.scan_points import ScanPoints
-from lidarium.mapping.splines.settings import BREAKPOINT_TESTS, SegmentationSettings
 
 
 def clusters(points: ScanPoints, settings: SegmentationSettings | None = None) -> NDArray[np.int64]:
     """Cut the points of a scan where the surface ends.
 
-    A beam without a return, or an invalid one, always breaks. Dietmayer's test is printed with a difference of the ranges where their
-    smaller one is meant, and with its sense turned round; it is used as meant.
+    A beam without a return, or an invalid one, always breaks. Dietmayer's test is printed with a difference
+    of the ranges where their smaller one is meant, and with its sense turned round; it is used as meant.
 
     Parameters
     ----------
@@ -52,8 +52,13 @@ def clusters(points: ScanPoints, settings: SegmentationSettings | None = None) -
 
 
 @kernel
-def _find_breaks(points: Array, beams: Array, ranges: Array, sigmas: Array, numbers: Array, test: int, is_break: Array) -> None:
-    """Mark each point that does not belong to the one before it; ``test`` is an index into ``BREAKPOINT_TESTS``."""
+def _find_breaks(
+    points: Array, beams: Array, ranges: Array, sigmas: Array, numbers: Array, test: int, is_break: Array
+) -> None:
+    """Mark each point that does not belong to the one before it.
+
+    ``test`` is an index into ``BREAKPOINT_TESTS``.
+    """
     increment, incidence, noise_sigmas, floor, share, step_ratio, most_turn = numbers
     count = points.shape[0]
     grazing = math.sin(increment) / math.sin(max(incidence - increment, 1e-3))

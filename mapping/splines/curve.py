@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.splines.basis import ORDER
-from lidarium.mapping.splines.bspline import Spline
-from lidarium.mapping.splines.fitting import fit_bspline
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.splines.curves.basis import ORDER
+from lidarium.mapping.splines.curves.bspline import Spline
+from lidarium.mapping.splines.curves.fitting import fit_bspline
+from lidarium.mapping.splines.curves.settings import FitSettings, MapSettings
 from lidarium.mapping.splines.joining import Way, lengths_along
-from lidarium.mapping.splines.settings import FitSettings, MapSettings
 
 STRAIGHT = 0.02
 """A curve that stays this close to its chord is a line [m]."""
@@ -34,7 +34,8 @@ class Curve:
     spline : Spline
         Its shape.
     weights : (n,) float64
-        How much is known at each control point, as a number of observations with a standard deviation of 1 cm.
+        How much is known at each control point, as a number of observations with a standard deviation of 1
+        cm.
     count : int
         How many scans have seen it.
     last_seen : int
@@ -56,7 +57,9 @@ class Curve:
     line: NDArray[np.float64] | None
 
 
-def make_curve(spline: Spline, weights: NDArray[np.float64], count: int, last_seen: int, spacing: float) -> Curve:
+def make_curve(
+    spline: Spline, weights: NDArray[np.float64], count: int, last_seen: int, spacing: float
+) -> Curve:
     """Return a curve whose way has points ``spacing`` apart [m].
 
     Raises
@@ -65,13 +68,23 @@ def make_curve(spline: Spline, weights: NDArray[np.float64], count: int, last_se
         Where there are not as many weights as control points.
     """
     if np.shape(weights) != (len(spline.control_points),):
-        raise ValueError(f"weights have shape {np.shape(weights)}; the curve has {len(spline.control_points)} control points")
+        raise ValueError(
+            f"weights have shape {np.shape(weights)}; the curve has {len(spline.control_points)} control points"
+        )
     parameters = spline.sample_parameters(spacing)
     points = spline.evaluate(parameters)
     way = Way(points, np.interp(parameters, control_parameters(spline.knots), weights))
     line = np.empty(4)
     is_line = _find_line(points, line)
-    return Curve(spline, np.asarray(weights, np.float64), count, last_seen, way, box_of(points), line if is_line else None)
+    return Curve(
+        spline,
+        np.asarray(weights, np.float64),
+        count,
+        last_seen,
+        way,
+        box_of(points),
+        line if is_line else None,
+    )
 
 
 def fit_curve(way: Way, count: int, last_seen: int, fit: FitSettings, settings: MapSettings) -> Curve:
@@ -101,7 +114,10 @@ def curves_in(curves: list[Curve], box: Box) -> list[int]:
     return [
         index
         for index, curve in enumerate(curves)
-        if curve.box[0] <= high_x and curve.box[2] >= low_x and curve.box[1] <= high_y and curve.box[3] >= low_y
+        if curve.box[0] <= high_x
+        and curve.box[2] >= low_x
+        and curve.box[1] <= high_y
+        and curve.box[3] >= low_y
     ]
 
 
@@ -123,7 +139,10 @@ def box_of(points: Array) -> Box:
 
 @kernel
 def _find_line(points: Array, line: Array) -> bool:
-    """Write the line through a way; return whether the way is long and straight enough to be one."""
+    """Write the line through a way.
+
+    Return whether the way is long and straight enough to be one.
+    """
     last = points.shape[0] - 1
     x, y = points[last, 0] - points[0, 0], points[last, 1] - points[0, 1]
     length = math.sqrt(x * x + y * y)

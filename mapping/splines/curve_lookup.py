@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.splines.curve import Curve, curves_in
 
 CELL = 0.05
@@ -54,7 +54,10 @@ class CurveLookup:
         self._centre = np.array(place, np.float64)
         self.frame[:2] = self._centre - side / 2.0
         low_x, low_y = self.frame[:2].tolist()
-        ways = [curves[index].way.points for index in curves_in(curves, (low_x, low_y, low_x + side, low_y + side))]
+        ways = [
+            curves[index].way.points
+            for index in curves_in(curves, (low_x, low_y, low_x + side, low_y + side))
+        ]
         ends = np.cumsum(np.array([len(way) for way in ways], np.int64))
         self.pieces = _pieces_of(np.concatenate([np.empty((0, 2)), *ways]), ends)
         self.nearest.fill(-1)
@@ -64,7 +67,9 @@ class CurveLookup:
     def look_up(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return the nearest pieces of points (m, 2), -1 for none, and the distances from them [m], inf for none, each (m,)."""
         pieces, gaps = np.empty(len(points), np.int64), np.empty(len(points))
-        _look_up(np.ascontiguousarray(points, np.float64), self.pieces, self.nearest, self.frame, pieces, gaps)
+        _look_up(
+            np.ascontiguousarray(points, np.float64), self.pieces, self.nearest, self.frame, pieces, gaps
+        )
         return pieces, gaps
 
 
@@ -140,7 +145,10 @@ def _stamp(pieces: Array, frame: Array, nearest: Array, gaps: Array) -> None:
         half_x, half_y = abs(pieces[k, 2]) * pieces[k, 4] + reach, abs(pieces[k, 3]) * pieces[k, 4] + reach
         x, y = pieces[k, 0] - frame[0], pieces[k, 1] - frame[1]
         first_row, last_row = max(int((y - half_y) / CELL), 0), min(int((y + half_y) / CELL), rows - 1)
-        first_column, last_column = max(int((x - half_x) / CELL), 0), min(int((x + half_x) / CELL), columns - 1)
+        first_column, last_column = (
+            max(int((x - half_x) / CELL), 0),
+            min(int((x + half_x) / CELL), columns - 1),
+        )
         for row in range(first_row, last_row + 1):
             for column in range(first_column, last_column + 1):
                 middle_x, middle_y = frame[0] + (column + 0.5) * CELL, frame[1] + (row + 0.5) * CELL

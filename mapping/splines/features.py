@@ -1,7 +1,8 @@
 """What is seen in a scan: curves of walls, and as features corners, free ends of walls (peaks) and straight lines.
 
-A corner is where two smooth pieces of one cluster meet. A peak is where a surface ends because it ends: the scan goes on farther away.
-Where it goes on nearer, something stands in front; where it does not go on, the laser's reach has ended; neither is a feature.
+A corner is where two smooth pieces of one cluster meet. A peak is where a surface ends because it ends: the
+scan goes on farther away. Where it goes on nearer, something stands in front; where it does not go on, the
+laser's reach has ended; neither is a feature.
 """
 
 import math
@@ -10,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.splines.breakpoints import clusters
-from lidarium.mapping.splines.bspline import Spline
-from lidarium.mapping.splines.fitting import fit_bspline
+from lidarium.mapping.splines.curves.bspline import Spline
+from lidarium.mapping.splines.curves.fitting import fit_bspline
+from lidarium.mapping.splines.curves.settings import SplineSettings
 from lidarium.mapping.splines.scan_points import ScanPoints
 from lidarium.mapping.splines.segmentation import Cut, split_merge
-from lidarium.mapping.splines.settings import SplineSettings
 
 PEAK_JUMP = 0.3
 """What follows a peak lies at least so much farther away [m]."""
@@ -55,7 +56,14 @@ class Features:
         lines = self.lines.copy()
         lines[:, :2] = pose.apply(self.lines[:, :2])
         lines[:, 2] += pose.theta
-        return Features(pose.apply(self.corners), pose.apply(self.peaks), lines, self.corner_sigmas, self.peak_sigmas, self.line_sigmas)
+        return Features(
+            pose.apply(self.corners),
+            pose.apply(self.peaks),
+            lines,
+            self.corner_sigmas,
+            self.peak_sigmas,
+            self.line_sigmas,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,8 +110,13 @@ def observe(points: ScanPoints, settings: SplineSettings | None = None) -> Obser
     return Observation(points, tuple(pieces), features)
 
 
-def curves_of(observation: Observation, settings: SplineSettings | None = None) -> list[tuple[Spline, NDArray[np.float64]]]:
-    """Fit a curve to each smooth piece; returns curves in the robot's frame and the standard deviations of their points (m,) [m]."""
+def curves_of(
+    observation: Observation, settings: SplineSettings | None = None
+) -> list[tuple[Spline, NDArray[np.float64]]]:
+    """Fit a curve to each smooth piece.
+
+    Returns curves in the robot's frame and the standard deviations of their points (m,) [m].
+    """
     settings = settings or SplineSettings()
     fitted = []
     for first, last in observation.pieces:
@@ -127,7 +140,9 @@ def match_points(
         return np.empty(0, np.int64), np.empty(0, np.int64)
     distances = np.linalg.norm(seen[:, None] - known[None], axis=2)
     nearest = distances.argmin(axis=1)
-    is_match = (distances[np.arange(len(seen)), nearest] < most_distance) & (distances.argmin(axis=0)[nearest] == np.arange(len(seen)))
+    is_match = (distances[np.arange(len(seen)), nearest] < most_distance) & (
+        distances.argmin(axis=0)[nearest] == np.arange(len(seen))
+    )
     indices = np.flatnonzero(is_match)
     return indices.astype(np.int64), nearest[indices].astype(np.int64)
 

@@ -1,6 +1,7 @@
 """Joins two curves of one wall: their weighted mean where both run, and each of them where it runs alone.
 
-Curves are joined as ways, points along them with weights. A weight is a number of observations with a standard deviation of 1 cm.
+Curves are joined as ways, points along them with weights. A weight is a number of observations with a
+standard deviation of 1 cm.
 """
 
 import math
@@ -9,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
+from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.splines.association import closest_place, find_overlap, point_of
-from lidarium.mapping.splines.settings import AssociationSettings, MapSettings
+from lidarium.mapping.splines.curves.settings import AssociationSettings, MapSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +49,9 @@ class Places:
 
 def common_places(seen: Way, known: Way, settings: AssociationSettings) -> Places | None:
     """Return where two ways run together, None where they are not of one wall."""
-    seen_from, seen_to, known_from, known_to, length, distance, turn, _ = find_overlap(seen.points, known.points)
+    seen_from, seen_to, known_from, known_to, length, distance, turn, _ = find_overlap(
+        seen.points, known.points
+    )
     if length < settings.least_overlap or distance > settings.mean_distance or turn > settings.mean_turn:
         return None
     return Places(seen_from, seen_to, known_from, known_to, length)
@@ -116,7 +119,10 @@ def _join(
     points: Array,
     weights: Array,
 ) -> tuple[int, bool]:
-    """Write the joined way; return its number of points and whether the seen way goes beyond an end of the known one."""
+    """Write the joined way.
+
+    Return its number of points and whether the seen way goes beyond an end of the known one.
+    """
     seen_from, seen_to, known_from, known_to = places
     last_seen, last_known = seen.shape[0] - 1.0, known.shape[0] - 1.0
     head = known_from <= 0.0 and _length_between(seen, 0.0, seen_from) >= least_extension
@@ -124,7 +130,9 @@ def _join(
     count = 0
     if head:
         x, y = point_of(seen, seen_from)
-        offset_x, offset_y = _shift(known[0, 0], known[0, 1], known_weights[0], x, y, _weight_at(seen_weights, seen_from))
+        offset_x, offset_y = _shift(
+            known[0, 0], known[0, 1], known_weights[0], x, y, _weight_at(seen_weights, seen_from)
+        )
         for k in range(int(math.ceil(seen_from))):
             fade = max(1.0 - _length_between(seen, float(k), seen_from) / blend, 0.0)
             points[count, 0], points[count, 1] = seen[k, 0] + fade * offset_x, seen[k, 1] + fade * offset_y
@@ -150,7 +158,9 @@ def _join(
     if tail:
         x, y = point_of(seen, seen_to)
         end = known.shape[0] - 1
-        offset_x, offset_y = _shift(known[end, 0], known[end, 1], known_weights[end], x, y, _weight_at(seen_weights, seen_to))
+        offset_x, offset_y = _shift(
+            known[end, 0], known[end, 1], known_weights[end], x, y, _weight_at(seen_weights, seen_to)
+        )
         for k in range(int(math.floor(seen_to)) + 1, seen.shape[0]):
             fade = max(1.0 - _length_between(seen, seen_to, float(k)) / blend, 0.0)
             points[count, 0], points[count, 1] = seen[k, 0] + fade * offset_x, seen[k, 1] + fade * offset_y
@@ -166,7 +176,9 @@ def _ramp(length: float, blend: float) -> float:
 
 
 @kernel
-def _shift(x: float, y: float, weight: float, from_x: float, from_y: float, from_weight: float) -> tuple[float, float]:
+def _shift(
+    x: float, y: float, weight: float, from_x: float, from_y: float, from_weight: float
+) -> tuple[float, float]:
     """Return how the weighted mean of two points differs from the second."""
     share = weight / (weight + from_weight)
     return share * (x - from_x), share * (y - from_y)

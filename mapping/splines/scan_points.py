@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.rigid import Transform
-from lidarium.mapping.scans import ScanGeometry
-from lidarium.mapping.splines.settings import PointSettings
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.splines.curves.settings import PointSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,14 +51,15 @@ def scan_points(
     Parameters
     ----------
     ranges : (beams,) float32
-        The scan [m]; inf for no return, nan for an invalid beam. What is nearer than the laser's least range is invalid, what is farther
-        than its greatest is no return.
+        The scan [m]; inf for no return, nan for an invalid beam. What is nearer than the laser's least range
+        is invalid, what is farther than its greatest is no return.
     geometry : ScanGeometry
         The laser.
     settings : PointSettings or None
         Time between beams, place and noise of the laser.
     motion : Transform or None
-        How the robot has moved in the time before the last beam, ``before_from_now``; None for a robot at rest.
+        How the robot has moved in the time before the last beam, ``before_from_now``; None for a robot at
+        rest.
     motion_s : float
         That time [s]. Speeds are taken as constant in it.
 
@@ -71,7 +72,9 @@ def scan_points(
     measured = np.asarray(ranges, np.float64)
     if measured.shape != (geometry.beams,):
         raise ValueError(f"the scan has shape {measured.shape}; the laser has {geometry.beams} beams")
-    scan = np.where(measured < geometry.range_min, np.nan, np.where(measured > geometry.range_max, np.inf, measured))
+    scan = np.where(
+        measured < geometry.range_min, np.nan, np.where(measured > geometry.range_max, np.inf, measured)
+    )
     beams = np.flatnonzero(np.isfinite(scan))
     hits = scan[beams]
     cosines, sines = geometry.unit_vectors[:, beams]

@@ -1,8 +1,9 @@
 """Cuts clusters of points at their corners: split, merge, and a look at the directions on both sides.
 
-Points are split where one lies too far from the line through the ends, again and again; neighbouring parts that fit one line are merged.
-What remains are straight leaves. Where the wall turns sharply between two of them, the cluster is cut, so that each curve is smooth; where
-it bends gently, as a round wall does, it is not.
+Points are split where one lies too far from the line through the ends, again and again; neighbouring parts
+that fit one line are merged. What remains are straight leaves. Where the wall turns sharply between two of
+them, the cluster is cut, so that each curve is smooth; where it bends gently, as a round wall does, it is
+not.
 """
 
 import math
@@ -11,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array, kernel
-from lidarium.mapping.splines.settings import CORNER_RULES, SegmentationSettings
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.splines.curves.settings import CORNER_RULES, SegmentationSettings
 
 _REACH_SIGMAS = 10.0
 _NEAR_CORNER = 0.15
@@ -31,7 +32,8 @@ class Cut:
     leaves : (l, 2) int64
         First and last point of each straight leaf.
     lines : (l, 5) float64
-        Of each leaf: middle x, y, direction [rad], half its length and the root mean square of the distances from it [m].
+        Of each leaf: middle x, y, direction [rad], half its length and the root mean square of the distances
+        from it [m].
     corners : (p - 1, 2) float64
         Where the lines on both sides of a corner meet [m].
     corner_points : (p - 1,) int64
@@ -46,7 +48,9 @@ class Cut:
 
 
 def split_merge(
-    points: NDArray[np.float64], sigmas: NDArray[np.float64] | None = None, settings: SegmentationSettings | None = None
+    points: NDArray[np.float64],
+    sigmas: NDArray[np.float64] | None = None,
+    settings: SegmentationSettings | None = None,
 ) -> Cut:
     """Cut a cluster at its corners.
 
@@ -78,9 +82,25 @@ def split_merge(
     lines, corners = np.empty((len(places), 5)), np.empty((len(places), 2))
     is_corner = np.zeros(len(places) + 1, np.bool_)
     numbers = np.array(
-        [settings.split_distance, settings.split_sigmas, settings.collinear_angle, settings.corner_angle, settings.corner_reach]
+        [
+            settings.split_distance,
+            settings.split_sigmas,
+            settings.collinear_angle,
+            settings.corner_angle,
+            settings.corner_reach,
+        ]
     )
-    count = _cut(places, noise, numbers, settings.least_points, CORNER_RULES.index(settings.corner_rule), ends, lines, corners, is_corner)
+    count = _cut(
+        places,
+        noise,
+        numbers,
+        settings.least_points,
+        CORNER_RULES.index(settings.corner_rule),
+        ends,
+        lines,
+        corners,
+        is_corner,
+    )
     inner = np.flatnonzero(is_corner[: count + 1])
     cut_at = ends[inner]
     is_corner[0] = is_corner[count] = True
@@ -116,7 +136,11 @@ def fit_line(points: Array, first: int, last: int) -> tuple[float, float, float,
         xy += dx * dy
         yy += dy * dy
     theta = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-    if np.cos(theta) * (points[last, 0] - points[first, 0]) + np.sin(theta) * (points[last, 1] - points[first, 1]) < 0.0:
+    if (
+        np.cos(theta) * (points[last, 0] - points[first, 0])
+        + np.sin(theta) * (points[last, 1] - points[first, 1])
+        < 0.0
+    ):
         theta += np.pi if theta <= 0.0 else -np.pi
     cosine, sine = np.cos(theta), np.sin(theta)
     low, high, across = np.inf, -np.inf, 0.0
@@ -147,7 +171,10 @@ def _farthest(points: Array, sigmas: Array, first: int, last: int, limit: float,
 
 @kernel
 def _split(points: Array, sigmas: Array, limit: float, noise_sigmas: float, ends: Array) -> int:
-    """Write the ends of the leaves, first and last point included; return the number of leaves."""
+    """Write the ends of the leaves, first and last point included.
+
+    Return the number of leaves.
+    """
     stack = np.empty(points.shape[0] + 1, np.int64)
     ends[0], stack[0] = 0, points.shape[0] - 1
     height, count, first = 1, 0, 0
@@ -166,7 +193,9 @@ def _split(points: Array, sigmas: Array, limit: float, noise_sigmas: float, ends
 
 
 @kernel
-def _merge(points: Array, sigmas: Array, limit: float, noise_sigmas: float, collinear: float, ends: Array, count: int) -> int:
+def _merge(
+    points: Array, sigmas: Array, limit: float, noise_sigmas: float, collinear: float, ends: Array, count: int
+) -> int:
     """Join neighbouring leaves of about one direction whose points fit one line, until none do; return the number of leaves."""
     is_changed = True
     while is_changed and count > 1:
@@ -206,11 +235,13 @@ def _reach(points: Array, at: int, step: int, length: float) -> int:
 
 
 @kernel
-def _is_round(points: Array, first: int, low: int, high: int, last: int, reach: float, least: int, turn: float) -> bool:
+def _is_round(
+    points: Array, first: int, low: int, high: int, last: int, reach: float, least: int, turn: float
+) -> bool:
     """Return whether a wall goes on turning beyond the parts low .. high from which a turn [rad] was told, as a round one does.
 
-    Directions a reach farther on differ no more than those at a corner do, and three times as much on an arc. Only slight turns are
-    in doubt; leaves first .. last bound where it is looked.
+    Directions a reach farther on differ no more than those at a corner do, and three times as much on an arc.
+    Only slight turns are in doubt; leaves first .. last bound where it is looked.
     """
     if abs(math.atan2(math.sin(turn), math.cos(turn))) > _SURE_TURN:
         return False
@@ -224,9 +255,20 @@ def _is_round(points: Array, first: int, low: int, high: int, last: int, reach: 
 
 @kernel
 def _cut(
-    points: Array, sigmas: Array, numbers: Array, least: int, rule: int, ends: Array, lines: Array, corners: Array, is_corner: Array
+    points: Array,
+    sigmas: Array,
+    numbers: Array,
+    least: int,
+    rule: int,
+    ends: Array,
+    lines: Array,
+    corners: Array,
+    is_corner: Array,
 ) -> int:
-    """Write leaves, their lines, and which of their ends are corners, and where; return the number of leaves."""
+    """Write leaves, their lines, and which of their ends are corners, and where.
+
+    Return the number of leaves.
+    """
     limit, noise_sigmas, collinear, corner_angle, corner_reach = numbers
     count = _split(points, sigmas, limit, noise_sigmas, ends)
     count = _merge(points, sigmas, limit, noise_sigmas, collinear, ends, count)
@@ -236,7 +278,8 @@ def _cut(
     for k in range(1, count):
         at = ends[k]
         reach = max(corner_reach, _REACH_SIGMAS * sigmas[at])
-        # Directions are told from the wall nearby: the leaves of a round wall turn as much as those of a corner do.
+        # Directions are told from the wall nearby: the leaves of a round wall turn as much as those of a
+        # corner do.
         low, high = max(_reach(points, at, -1, reach), last_cut), _reach(points, at, 1, reach)
         if at - low + 1 < least or high - at + 1 < least:
             continue
@@ -246,7 +289,9 @@ def _cut(
             is_sharp = abs(np.tan(after[2]) - np.tan(before[2])) > np.tan(corner_angle)
         else:
             is_sharp = abs(np.arctan2(np.sin(turn), np.cos(turn))) > corner_angle
-        if not is_sharp or (rule == 0 and _is_round(points, ends[k - 1], low, high, ends[k + 1], reach, least, turn)):
+        if not is_sharp or (
+            rule == 0 and _is_round(points, ends[k - 1], low, high, ends[k + 1], reach, least, turn)
+        ):
             continue
         is_corner[k] = True
         last_cut = at

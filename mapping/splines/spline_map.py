@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.splines.association import are_near, mark_along
-from lidarium.mapping.splines.basis import ORDER
-from lidarium.mapping.splines.bspline import Spline
 from lidarium.mapping.splines.curve import Curve, box_of, curves_in, fit_curve
+from lidarium.mapping.splines.curves.basis import ORDER
+from lidarium.mapping.splines.curves.bspline import Spline
+from lidarium.mapping.splines.curves.settings import MapSettings, SplineSettings
 from lidarium.mapping.splines.features import Observation, curves_of, match_points
 from lidarium.mapping.splines.joining import Places, Way, common_places, join
 from lidarium.mapping.splines.segmentation import split_merge
-from lidarium.mapping.splines.settings import MapSettings, SplineSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,12 +42,22 @@ class Landmarks:
         return len(self.points)
 
     def updated(
-        self, seen: NDArray[np.float64], sigmas: NDArray[np.float64], update: int, most_distance: float, settings: MapSettings
+        self,
+        seen: NDArray[np.float64],
+        sigmas: NDArray[np.float64],
+        update: int,
+        most_distance: float,
+        settings: MapSettings,
     ) -> "Landmarks":
         """Return the landmarks with seen points (m, 2) of standard deviations (m,) taken in, and without those that were but noise [m]."""
         weights = (0.01 / sigmas) ** 2
         which, known = match_points(seen, self.points, most_distance)
-        points, all_weights, counts, last_seen = self.points.copy(), self.weights.copy(), self.counts.copy(), self.last_seen.copy()
+        points, all_weights, counts, last_seen = (
+            self.points.copy(),
+            self.weights.copy(),
+            self.counts.copy(),
+            self.last_seen.copy(),
+        )
         share = (weights[which] / (weights[which] + all_weights[known]))[:, None]
         points[known] += share * (seen[which] - points[known])
         all_weights[known] = np.minimum(all_weights[known] + weights[which], settings.most_weight)
@@ -141,7 +151,9 @@ class SplineMap:
         self.curves = [
             curve
             for curve in self.curves
-            if curve.count >= settings.trusted_count or curve.last_seen > since or curve.way.length >= settings.trusted_length
+            if curve.count >= settings.trusted_count
+            or curve.last_seen > since
+            or curve.way.length >= settings.trusted_length
         ]
 
     def _take_in(self, spline: Spline, sigmas: NDArray[np.float64]) -> None:
@@ -185,7 +197,9 @@ class SplineMap:
     def _near(self, way: Way, distance: float) -> list[int]:
         """Return the curves whose boxes come within a distance of that of a way [m]."""
         low_x, low_y, high_x, high_y = box_of(way.points)
-        return curves_in(self.curves, (low_x - distance, low_y - distance, high_x + distance, high_y + distance))
+        return curves_in(
+            self.curves, (low_x - distance, low_y - distance, high_x + distance, high_y + distance)
+        )
 
     def _best_match(self, way: Way, control_points: NDArray[np.float64]) -> tuple[int, Places] | None:
         """Return which curve runs along a way the longest, and where."""
@@ -209,4 +223,7 @@ class SplineMap:
         cut = split_merge(way.points, 0.01 / np.sqrt(way.weights), self.settings.segmentation)
         if len(cut.pieces) == 1:
             return [way]
-        return [Way(way.points[first : last + 1], way.weights[first : last + 1]) for first, last in cut.pieces.tolist()]
+        return [
+            Way(way.points[first : last + 1], way.weights[first : last + 1])
+            for first, last in cut.pieces.tolist()
+        ]

@@ -1,7 +1,7 @@
 """lidarium: teams of lidar robots explore unknown floors.
 
-``parallel_env`` makes the PettingZoo environment, ``env`` its turn-based form, ``vector_env`` and ``sb3_vec_env`` many episodes at
-once, and after ``import lidarium`` Gymnasium knows
+``parallel_env`` makes the PettingZoo environment, ``env`` its turn-based form, ``vector_env`` and
+``sb3_vec_env`` many episodes at once, and after ``import lidarium`` Gymnasium knows
 ``lidarium/Exploration-v0``, ``lidarium/WaypointExploration-v0`` and ``lidarium/FrontierExploration-v0``.
 """
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lidarium.envs.batch.stable_baselines import ExplorationVecEnv
     from lidarium.envs.batch.vector_env import ExplorationVectorEnv
     from lidarium.envs.floors.floor import Floor
-    from lidarium.envs.settings import ExplorationSettings
+    from lidarium.envs.settings.exploration import ExplorationSettings
 
 __version__ = "0.1.0"
 
@@ -29,12 +29,16 @@ for _name, _level in _LEVELS.items():
     if f"lidarium/{_name}-v0" not in gymnasium.registry:
         gymnasium.register(
             id=f"lidarium/{_name}-v0",
-            entry_point="lidarium.envs.solo:SoloExploration",
+            entry_point="lidarium.envs.levels.gymnasium_env:SoloExploration",
             vector_entry_point="lidarium.envs.batch.vector_env:make_vector_env",
             kwargs={"level": _level},
         )
-        pettingzoo.register("parallel", f"lidarium/{_name}-v0", entry_point="lidarium:parallel_env", kwargs={"level": _level})
-        pettingzoo.register("aec", f"lidarium/{_name}-v0", entry_point="lidarium:env", kwargs={"level": _level})
+        pettingzoo.register(
+            "parallel", f"lidarium/{_name}-v0", entry_point="lidarium:parallel_env", kwargs={"level": _level}
+        )
+        pettingzoo.register(
+            "aec", f"lidarium/{_name}-v0", entry_point="lidarium:env", kwargs={"level": _level}
+        )
 
 
 def parallel_env(
@@ -53,8 +57,8 @@ def parallel_env(
     floor : str, Path or Floor
         A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor.
     level : str
-        What an action is: ``velocity`` (shares of the greatest speed and turn rate), ``waypoint`` (a point of the observed
-        map) or ``frontier`` (one of the frontiers in reach).
+        What an action is: ``velocity`` (shares of the greatest speed and turn rate), ``waypoint`` (a point of
+        the observed map) or ``frontier`` (one of the frontiers in reach).
     settings : ExplorationSettings or None
         Where the options start from.
     render_mode : str or None
@@ -62,8 +66,9 @@ def parallel_env(
     image_resolution : float or None
         Side of a pixel [m] where the floor is a plain image.
     **options
-        Any attribute of ``ExplorationSettings``, such as ``robots=3`` or ``horizon_s=None``; ``robot`` and ``lidar`` by name;
-        ``noise`` (none, datasheet, thesis), ``resolution`` of the maps [m], ``max_cycles`` [steps].
+        Any attribute of ``ExplorationSettings``, such as ``robots=3`` or ``horizon_s=None``; ``robot`` and
+        ``lidar`` by name; ``noise`` (none, datasheet, thesis), ``resolution`` of the maps [m], ``max_cycles``
+        [steps].
 
     Returns
     -------
@@ -76,21 +81,30 @@ def parallel_env(
         Where an option or the floor cannot be used.
     """
     from lidarium.envs.exploration import ExplorationEnv
-    from lidarium.envs.settings import make_settings
-    from lidarium.envs.solo import at_level
+    from lidarium.envs.levels.gymnasium_env import at_level
+    from lidarium.envs.settings.exploration import make_settings
 
-    return at_level(ExplorationEnv(floor, make_settings(settings, **options), render_mode, image_resolution), level)
+    return at_level(
+        ExplorationEnv(floor, make_settings(settings, **options), render_mode, image_resolution), level
+    )
 
 
 def env(floor: "str | Path | Floor" = "apartment", **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401
-    """Make a team's environment in PettingZoo's turn-based form; options as for ``parallel_env``."""
+    """Make a team's environment in PettingZoo's turn-based form.
+
+    Options as for ``parallel_env``.
+    """
     from pettingzoo.utils.conversions import parallel_to_aec
 
     converted: AECEnv[str, Any, Any] = parallel_to_aec(parallel_env(floor, **options))
     return converted
 
 
-def vector_env(episodes: int, floor: "str | Path | Floor" = "apartment", **options: Any) -> "ExplorationVectorEnv":  # noqa: ANN401
+def vector_env(
+    episodes: int,
+    floor: "str | Path | Floor" = "apartment",
+    **options: Any,  # noqa: ANN401
+) -> "ExplorationVectorEnv":
     """Make many episodes as one Gymnasium vector environment, stepped by one kernel call; a row for every robot.
 
     Parameters
@@ -100,8 +114,8 @@ def vector_env(episodes: int, floor: "str | Path | Floor" = "apartment", **optio
     floor : str, Path or Floor
         As for ``parallel_env``; of a set such as ``set:train``, each beginning draws one.
     **options
-        ``level``, ``image_resolution`` and the options of ``parallel_env``; ``copy=False`` for observations in two sets of
-        arrays that take turns.
+        ``level``, ``image_resolution`` and the options of ``parallel_env``; ``copy=False`` for observations
+        in two sets of arrays that take turns.
 
     Raises
     ------
@@ -113,7 +127,11 @@ def vector_env(episodes: int, floor: "str | Path | Floor" = "apartment", **optio
     return ExplorationVectorEnv(episodes, floor, **options)
 
 
-def sb3_vec_env(episodes: int, floor: "str | Path | Floor" = "apartment", **options: Any) -> "ExplorationVecEnv":  # noqa: ANN401
+def sb3_vec_env(
+    episodes: int,
+    floor: "str | Path | Floor" = "apartment",
+    **options: Any,  # noqa: ANN401
+) -> "ExplorationVecEnv":
     """Make the same rows as ``vector_env`` for stable-baselines3, which resets in the step that ends an episode; needs ``lidarium[rl]``.
 
     Raises
@@ -129,7 +147,9 @@ def sb3_vec_env(episodes: int, floor: "str | Path | Floor" = "apartment", **opti
 
 
 def policy(name: str, **settings: Any) -> "Policy":  # noqa: ANN401
-    """Make a policy by name, such as ``nearest_frontier``; ``lidarium show policies`` lists them.
+    """Make a policy by name, such as ``nearest_frontier``.
+
+    ``lidarium show policies`` lists them.
 
     Raises
     ------

@@ -8,7 +8,7 @@ import pytest
 import lidarium
 from lidarium.agents.frontier import ExploreLite, NearestFrontier, UtilityFrontier
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.evaluation.runner import run_episode
+from lidarium.evaluation.episodes.runner import run_episode
 
 
 def wall(x, y, width, height):
@@ -16,9 +16,11 @@ def wall(x, y, width, height):
 
 
 TWO_ROOMS = Floor(
-    "two_rooms", (0.0, 0.0, 7.0, 4.5), (wall(3.4, 0.0, 0.2, 1.6), wall(3.4, 2.6, 0.2, 1.9), wall(5.0, 2.0, 0.6, 0.6)),
+    "two_rooms",
+    (0.0, 0.0, 7.0, 4.5),
+    (wall(3.4, 0.0, 0.2, 1.6), wall(3.4, 2.6, 0.2, 1.9), wall(5.0, 2.0, 0.6, 0.6)),
     starts=np.array([[1.0, 1.0, 0.5], [1.0, 3.0, -0.5]]),
-)  # fmt: skip
+)
 NAMES = ("nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite")
 
 
@@ -35,7 +37,9 @@ def with_a_crack(crack):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("robots", [1, 2])
 def test_an_unreachable_room_is_named_and_does_not_count(name, robots):
-    env = lidarium.parallel_env(with_a_crack(0.2), robots=robots, horizon_s=None, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env(
+        with_a_crack(0.2), robots=robots, horizon_s=None, stop_coverage=None, map_cells=32
+    )
     episode = run_episode(lidarium.policy(name), env, 1)
     assert env.scorer.coverage == 1.0
     assert set(env.scorer.ended_because.values()) <= {"no_frontier", "frontier_unreachable"}
@@ -45,7 +49,8 @@ def test_an_unreachable_room_is_named_and_does_not_count(name, robots):
     beyond = [entry for entry in episode.given_up if entry.agent == "robot_0" and entry.x + offset[0] > 3.0]
     assert beyond
     assert all(
-        entry.reason in ("unseen", "hidden", "narrow", "blocked", "no_progress") and entry.size_m > 0.0 for entry in episode.given_up
+        entry.reason in ("unseen", "hidden", "narrow", "blocked", "no_progress") and entry.size_m > 0.0
+        for entry in episode.given_up
     )
 
 
@@ -70,7 +75,10 @@ def test_a_noisy_laser_still_ends_with_nearly_all_seen(name, noise):
 def test_unknown_starts_mean_that_each_robot_explores_alone(name):
     env = lidarium.parallel_env(TWO_ROOMS, robots=2, known_starts=False, horizon_s=300.0, map_cells=32)
     run_episode(lidarium.policy(name), env, 1)
-    assert env.scorer.coverage >= 0.99 or set(env.scorer.ended_because.values()) <= {"no_frontier", "frontier_unreachable"}
+    assert env.scorer.coverage >= 0.99 or set(env.scorer.ended_because.values()) <= {
+        "no_frontier",
+        "frontier_unreachable",
+    }
 
 
 def test_with_the_own_map_each_robot_sees_it_all_itself():
@@ -86,7 +94,9 @@ def test_with_the_own_map_each_robot_sees_it_all_itself():
 def test_the_team_shares_its_frontiers_out():
     """Two robots side by side between two corridors take one each."""
     solids = (wall(2.0, 1.0, 6.0, 2.0),)
-    floor = Floor("two_ways", (0.0, 0.0, 10.0, 4.0), solids, starts=np.array([[0.6, 1.6, 0.0], [0.6, 2.4, 0.0]]))
+    floor = Floor(
+        "two_ways", (0.0, 0.0, 10.0, 4.0), solids, starts=np.array([[0.6, 1.6, 0.0], [0.6, 2.4, 0.0]])
+    )
     env = lidarium.parallel_env(floor, robots=2, horizon_s=14.0, stop_coverage=None, map_cells=32)
     run_episode(UtilityFrontier(cost_weight=0.05), env, 1)
     y = env.world.poses[:, 1]
@@ -100,7 +110,9 @@ def test_frontiers_far_away_are_left_out_only_where_they_change_no_choice(robots
 
     def choices(first_slack):
         monkeypatch.setattr("lidarium.agents.frontier.FIRST_SLACK", first_slack)
-        env = lidarium.parallel_env("building:4", robots=robots, horizon_s=120.0, stop_coverage=None, map_cells=32, resolution=0.05)
+        env = lidarium.parallel_env(
+            "building:4", robots=robots, horizon_s=120.0, stop_coverage=None, map_cells=32, resolution=0.05
+        )
         run_episode(UtilityFrontier(cost_weight=cost_weight), env, 3)
         return env.world.poses
 

@@ -9,8 +9,8 @@ import pytest
 
 import lidarium
 from lidarium.agents import GivenUp, PerRobot, Stop, make_policy, policy_names, register_policy
-from lidarium.envs.onboard.state import Target
-from lidarium.evaluation.runner import run_episode
+from lidarium.envs.radio.messages import Target
+from lidarium.evaluation.episodes.runner import run_episode
 
 FRONTIER_POLICIES = ("nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite")
 REASONS = {"covered", "no_frontier", "frontier_unreachable"}
@@ -52,16 +52,22 @@ def test_the_same_seed_gives_the_same_run(name):
     assert first.env.scorer.curve == second.env.scorer.curve
     assert first.env.scorer.ended_because == second.env.scorer.ended_because
     assert first.given_up == second.given_up
-    assert all(np.array_equal(a, b) for a, b in zip(first.env.world.log_odds, second.env.world.log_odds, strict=True))
+    assert all(
+        np.array_equal(a, b) for a, b in zip(first.env.world.log_odds, second.env.world.log_odds, strict=True)
+    )
 
 
 def test_another_seed_gives_another_random_walk():
-    assert not np.array_equal(finished("random_walk", 3).env.world.poses, finished("random_walk", 3, 2).env.world.poses)
+    assert not np.array_equal(
+        finished("random_walk", 3).env.world.poses, finished("random_walk", 3, 2).env.world.poses
+    )
 
 
 def test_a_policy_object_is_used_again_as_if_new():
     policy = lidarium.policy("utility_frontier")
-    runs = [run_episode(policy, lidarium.parallel_env("apartment", robots=2, map_cells=32), 5) for _ in range(2)]
+    runs = [
+        run_episode(policy, lidarium.parallel_env("apartment", robots=2, map_cells=32), 5) for _ in range(2)
+    ]
     assert np.array_equal(runs[0].env.world.poses, runs[1].env.world.poses)
     assert runs[0].given_up == runs[1].given_up
 
@@ -78,7 +84,8 @@ def test_all_registered_policies_are_tested_here_and_have_a_line_about_them():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "meant"), [("nearest_frontir", "nearest_frontier"), ("utility", "utility_frontier"), ("randomwalk", "random_walk")]
+    ("wrong", "meant"),
+    [("nearest_frontir", "nearest_frontier"), ("utility", "utility_frontier"), ("randomwalk", "random_walk")],
 )
 def test_an_unknown_policy_is_refused_with_the_nearest_name(wrong, meant):
     with pytest.raises(ValueError, match=f"did you mean '{meant}'"):
@@ -135,7 +142,9 @@ def test_a_decentralised_policy_has_one_instance_a_robot_that_sees_its_own_robot
 
 @pytest.mark.parametrize("name", ["nearest_frontier", "random_walk"])
 def test_decentralised_explorers_finish_as_well(name):
-    env = lidarium.parallel_env("apartment", robots=2, horizon_s=None if name != "random_walk" else 10.0, map_cells=32)
+    env = lidarium.parallel_env(
+        "apartment", robots=2, horizon_s=None if name != "random_walk" else 10.0, map_cells=32
+    )
     run_episode(PerRobot(lambda: lidarium.policy(name)), env, 1)
     assert env.scorer.ended_because.keys() == set(env.possible_agents)
     if name != "random_walk":
@@ -155,7 +164,10 @@ class StopsOne(Recorder):
 
 
 def test_a_robot_that_stops_is_terminated_at_that_step_and_shown_no_more():
-    policy, env = StopsOne(), lidarium.parallel_env("scene_room", robots=2, horizon_s=10.0, stop_coverage=None, map_cells=32)
+    policy, env = (
+        StopsOne(),
+        lidarium.parallel_env("scene_room", robots=2, horizon_s=10.0, stop_coverage=None, map_cells=32),
+    )
     run_episode(policy, env, 3)
     assert policy.calls[0] == ["robot_0", "robot_1"]
     assert all(call == ["robot_1"] for call in policy.calls[1:])

@@ -7,13 +7,15 @@ import pytest
 
 import lidarium
 from lidarium.agents.random_walk import RandomWalk
-from lidarium.evaluation.runner import run_episode
+from lidarium.evaluation.episodes.runner import run_episode
 
 
 @pytest.mark.parametrize("floor", ["scene_loop", "building:5"])
 @pytest.mark.parametrize("lidar", ["urg", "lidar_360_6m"])
 def test_it_drives_on_and_on_without_getting_stuck(floor, lidar):
-    env = lidarium.parallel_env(floor, robots=2, lidar=lidar, horizon_s=90.0, stop_coverage=None, map_cells=32)
+    env = lidarium.parallel_env(
+        floor, robots=2, lidar=lidar, horizon_s=90.0, stop_coverage=None, map_cells=32
+    )
     run_episode(RandomWalk(), env, 3)
     assert (env.world.travelled > 4.0).all()
     assert env.scorer.coverage > 0.1
@@ -33,7 +35,11 @@ def test_it_turns_away_where_something_is_near_ahead():
 
     env.reset(seed=0)
     walk.reset(Team(), 0)
-    observation = {"scan": np.full(727, 0.4, np.float32), "pose": np.zeros(3, np.float32), "bumper": np.zeros(3, np.int8)}
+    observation = {
+        "scan": np.full(727, 0.4, np.float32),
+        "pose": np.zeros(3, np.float32),
+        "bumper": np.zeros(3, np.int8),
+    }
     for _ in range(20):
         walk.reset(Team(), len(headings))
         action = walk.act({"robot_0": observation})["robot_0"]
@@ -59,7 +65,11 @@ def test_it_drives_straight_on_in_the_open():
 
     walk = RandomWalk(speed=0.6)
     walk.reset(Team(), 1)
-    observation = {"scan": np.full(727, 4.0, np.float32), "pose": np.zeros(3, np.float32), "bumper": np.zeros(3, np.int8)}
+    observation = {
+        "scan": np.full(727, 4.0, np.float32),
+        "pose": np.zeros(3, np.float32),
+        "bumper": np.zeros(3, np.int8),
+    }
     assert walk.act({"robot_0": observation})["robot_0"].tolist() == pytest.approx([0.6, 0.0])
 
 

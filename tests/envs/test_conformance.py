@@ -43,14 +43,18 @@ def no_display(monkeypatch):
 @pytest.mark.parametrize("level", LEVELS.values())
 @pytest.mark.parametrize("robots", [1, 3])
 def test_the_parallel_api_is_pettingzoos(level, robots, capsys):
-    env = lidarium.parallel_env(level=level, robots=robots, horizon_s=15.0 if level == "velocity" else 60.0, map_cells=64)
+    env = lidarium.parallel_env(
+        level=level, robots=robots, horizon_s=15.0 if level == "velocity" else 60.0, map_cells=64
+    )
     parallel_api_test(env, num_cycles=200)
     assert "Passed" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("observe", CHOICES)
 def test_the_parallel_api_is_pettingzoos_whatever_is_observed(observe, capsys):
-    parallel_api_test(lidarium.parallel_env(robots=2, horizon_s=5.0, observe=observe, egocentric_cells=32), num_cycles=60)
+    parallel_api_test(
+        lidarium.parallel_env(robots=2, horizon_s=5.0, observe=observe, egocentric_cells=32), num_cycles=60
+    )
     assert "Passed" in capsys.readouterr().out
 
 
@@ -108,7 +112,10 @@ def test_gymnasiums_checker_finds_nothing(name, render_mode):
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.parametrize("observe", CHOICES)
 def test_gymnasiums_checker_finds_nothing_whatever_is_observed(name, observe):
-    check_env(gymnasium.make(name, observe=observe, egocentric_cells=40, egocentric_scales=(1, 2, 4)).unwrapped, skip_render_check=True)
+    check_env(
+        gymnasium.make(name, observe=observe, egocentric_cells=40, egocentric_scales=(1, 2, 4)).unwrapped,
+        skip_render_check=True,
+    )
 
 
 @pytest.mark.parametrize("name", IDS)
@@ -151,7 +158,10 @@ def test_every_observation_lies_in_its_space_and_is_of_its_type(level):
                 assert observation[name].dtype == box.dtype
                 assert box.is_bounded() or name == "action_mask"
         if level == "frontier":
-            actions = {agent: int(generator.choice(np.flatnonzero(observations[agent]["action_mask"]))) for agent in env.agents}
+            actions = {
+                agent: int(generator.choice(np.flatnonzero(observations[agent]["action_mask"])))
+                for agent in env.agents
+            }
         else:
             actions = {agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents}
         observations = env.step(actions)[0]
@@ -195,7 +205,9 @@ def test_no_mode_renders_nothing_and_rendering_needs_a_reset():
 @pytest.mark.parametrize("name", IDS)
 def test_the_solo_form_is_the_parallel_one_with_one_robot(name):
     level = LEVELS[name.split("/")[1].removesuffix("-v0")]
-    solo = gymnasium.make(name, floor="building:5", noise="datasheet", map_cells=64, disable_env_checker=True).unwrapped
+    solo = gymnasium.make(
+        name, floor="building:5", noise="datasheet", map_cells=64, disable_env_checker=True
+    ).unwrapped
     team = lidarium.parallel_env("building:5", level=level, robots=1, noise="datasheet", map_cells=64)
     ours, _ = solo.reset(seed=3)
     theirs, _ = team.reset(seed=3)
@@ -205,7 +217,11 @@ def test_the_solo_form_is_the_parallel_one_with_one_robot(name):
         action = 0 if level == "frontier" else np.array([0.3, 0.1], np.float32)
         ours, reward, terminated, truncated, info = solo.step(action)
         theirs, rewards, terminations, truncations, infos = team.step({"robot_0": action})
-        assert (reward, terminated, truncated) == (rewards["robot_0"], terminations["robot_0"], truncations["robot_0"])
+        assert (reward, terminated, truncated) == (
+            rewards["robot_0"],
+            terminations["robot_0"],
+            truncations["robot_0"],
+        )
         assert info.keys() == infos["robot_0"].keys()
 
 
@@ -226,7 +242,9 @@ def test_random_actions_never_break_the_bounds_of_velocity_and_heading():
     env.reset(seed=0)
     generator = np.random.default_rng(1)
     for _ in range(300):
-        observations = env.step({agent: generator.choice([-1.0, 1.0], 2).astype(np.float32) for agent in env.agents})[0]
+        observations = env.step(
+            {agent: generator.choice([-1.0, 1.0], 2).astype(np.float32) for agent in env.agents}
+        )[0]
         for observation in observations.values():
             assert abs(observation["velocity"][0]) <= np.float32(0.77)
             assert abs(observation["pose"][2]) <= math.pi + 1e-6

@@ -27,12 +27,17 @@ def assert_equal(one, other):
 
 
 def differs(one, other):
-    return any(not np.array_equal(a, b) for (_, a), (_, b) in zip(flattened(one), flattened(other), strict=True))
+    return any(
+        not np.array_equal(a, b) for (_, a), (_, b) in zip(flattened(one), flattened(other), strict=True)
+    )
 
 
 def sampled(env, generator, observations, level):
     if level == "frontier":
-        return {agent: int(generator.choice(np.flatnonzero(observations[agent]["action_mask"]))) for agent in env.agents}
+        return {
+            agent: int(generator.choice(np.flatnonzero(observations[agent]["action_mask"])))
+            for agent in env.agents
+        }
     return {agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents}
 
 
@@ -56,7 +61,16 @@ def run(env, seed, steps, level="velocity", options=None):
 def test_five_hundred_steps_and_two_resets_give_the_same_arrays_for_the_same_seed(noise, known_starts):
     first, second = (
         run(
-            lidarium.parallel_env("building:5", robots=3, noise=noise, known_starts=known_starts, stop_coverage=None, map_cells=64), 11, 250
+            lidarium.parallel_env(
+                "building:5",
+                robots=3,
+                noise=noise,
+                known_starts=known_starts,
+                stop_coverage=None,
+                map_cells=64,
+            ),
+            11,
+            250,
         )
         for _ in range(2)
     )
@@ -68,21 +82,32 @@ def test_five_hundred_steps_and_two_resets_give_the_same_arrays_for_the_same_see
 @pytest.mark.parametrize("level", ["waypoint", "frontier"])
 def test_decisions_give_the_same_arrays_for_the_same_seed(level):
     first, second = (
-        run(lidarium.parallel_env("building:5", level=level, robots=3, noise="datasheet", map_cells=64), 11, 25, level) for _ in range(2)
+        run(
+            lidarium.parallel_env("building:5", level=level, robots=3, noise="datasheet", map_cells=64),
+            11,
+            25,
+            level,
+        )
+        for _ in range(2)
     )
     for one, other in zip(first, second, strict=True):
         assert_equal(one, other)
 
 
 def test_one_environment_used_twice_gives_the_same_as_a_new_one():
-    used, new = (lidarium.parallel_env("set:test", robots=2, noise="datasheet", map_cells=64) for _ in range(2))
+    used, new = (
+        lidarium.parallel_env("set:test", robots=2, noise="datasheet", map_cells=64) for _ in range(2)
+    )
     run(used, 5, 30)
     for one, other in zip(run(used, 6, 60), run(new, 6, 60), strict=True):
         assert_equal(one, other)
 
 
 def test_another_seed_gives_other_starts_noise_and_floors():
-    records = [run(lidarium.parallel_env("building:5", robots=2, noise="datasheet", map_cells=64), seed, 5) for seed in (1, 2)]
+    records = [
+        run(lidarium.parallel_env("building:5", robots=2, noise="datasheet", map_cells=64), seed, 5)
+        for seed in (1, 2)
+    ]
     assert differs(records[0][0], records[1][0])
     env = lidarium.parallel_env("scene_room", robots=1, noise="datasheet", map_cells=64)
     starts = env_starts(env)
@@ -112,7 +137,12 @@ def test_resets_without_a_seed_go_on_with_the_generator_and_differ():
 
 def test_threads_do_not_change_an_episode():
     one, two = (
-        run(lidarium.parallel_env("scene_loop", robots=9, noise="datasheet", threads=threads, map_cells=64), 3, 40) for threads in (1, 2)
+        run(
+            lidarium.parallel_env("scene_loop", robots=9, noise="datasheet", threads=threads, map_cells=64),
+            3,
+            40,
+        )
+        for threads in (1, 2)
     )
     for first, second in zip(one, two, strict=True):
         assert_equal(first, second)
@@ -163,7 +193,9 @@ def test_writing_into_what_was_returned_changes_nothing_later():
             leaf[...] = 0
         for info in outcomes[0][-1].values():
             info["truth"]["pose"][:] = 99.0
-        outcomes = [env.step({agent: np.array([0.4, 0.2], np.float32) for agent in env.agents}) for env in envs]
+        outcomes = [
+            env.step({agent: np.array([0.4, 0.2], np.float32) for agent in env.agents}) for env in envs
+        ]
         assert_equal(outcomes[0][0], outcomes[1][0])
         assert_equal(outcomes[0][-1], outcomes[1][-1])
 

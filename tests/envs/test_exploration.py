@@ -8,8 +8,8 @@ import pytest
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster, Solid
-from lidarium.envs.settings import ExplorationSettings, make_settings
-from lidarium.envs.simulation.arrays import ENDED
+from lidarium.envs.settings.exploration import ExplorationSettings, make_settings
+from lidarium.envs.simulation.kinematic.arrays import ENDED
 
 STAY = np.zeros(2, np.float32)
 AHEAD = np.array([1.0, 0.0], np.float32)
@@ -17,7 +17,9 @@ WALL_ACROSS = Solid(np.array([[2.0, 0.0], [2.2, 0.0], [2.2, 4.0], [2.0, 4.0]]))
 
 
 def box(width=5.0, height=4.0, solids=(), starts=((1.0, 1.0, 0.0), (1.0, 3.0, 0.0)), goal=None):
-    return Floor("box", (0.0, 0.0, width, height), tuple(solids), starts=np.array(starts, np.float64), goal=goal)
+    return Floor(
+        "box", (0.0, 0.0, width, height), tuple(solids), starts=np.array(starts, np.float64), goal=goal
+    )
 
 
 def make(floor=None, **options):
@@ -173,7 +175,9 @@ def test_a_robot_at_the_goal_has_reached_it_and_the_others_go_on():
     assert env.agents == ["robot_1"]
 
 
-@pytest.mark.parametrize(("goal", "told"), [((9.0, 1.0), "outside of the floor"), ((2.1, 1.0), "inside a wall")])
+@pytest.mark.parametrize(
+    ("goal", "told"), [((9.0, 1.0), "outside of the floor"), ((2.1, 1.0), "inside a wall")]
+)
 def test_a_goal_that_no_robot_can_be_at_is_refused_before_the_run(goal, told):
     env = make(box(solids=[WALL_ACROSS], goal=(1.5, 3.0)))
     with pytest.raises(ValueError, match=told):
@@ -199,7 +203,9 @@ def test_a_goal_given_at_reset_replaces_that_of_the_floor():
     assert env.goal == (4.0, 3.0)
 
 
-@pytest.mark.parametrize("reason", ["no_frontier", "frontier_unreachable", "stopped", "unreachable", "battery is tired"])
+@pytest.mark.parametrize(
+    "reason", ["no_frontier", "frontier_unreachable", "stopped", "unreachable", "battery is tired"]
+)
 def test_a_robot_that_is_stopped_ends_at_the_next_step_with_that_reason(reason):
     env = make()
     env.reset(seed=0)
@@ -319,18 +325,23 @@ def test_headings_of_starts_are_told_within_half_a_turn(known_starts, turns):
     for floor, options in [(box(), {"starts": starts}), (box(starts=starts), {})]:
         env = make(floor, known_starts=known_starts)
         observations, _ = env.reset(seed=0, options=options)
-        assert all(env.observation_space(agent).contains(observation) for agent, observation in observations.items())
+        assert all(
+            env.observation_space(agent).contains(observation) for agent, observation in observations.items()
+        )
         assert env.world.poses[:, 2] == pytest.approx([1.0, math.pi])
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"starts": [[1.0, 1.0, 0.0]]}, r"want \(2, 3\)"), ({"starts": [[0.05, 1.0, 0.0], [2.0, 2.0, 0.0]]}, "does not fit"),
-        ({"starts": [[-3.0, 1.0, 0.0], [2.0, 2.0, 0.0]]}, "inside a wall"), ({"starts": [[1.0, 1.0, 0.0], [1.2, 1.0, 0.0]]}, "apart"),
-        ({"goal": (math.nan, 1.0)}, "goal"), ({"floor": "apartmnt"}, "did you mean 'apartment'"),
+        ({"starts": [[1.0, 1.0, 0.0]]}, r"want \(2, 3\)"),
+        ({"starts": [[0.05, 1.0, 0.0], [2.0, 2.0, 0.0]]}, "does not fit"),
+        ({"starts": [[-3.0, 1.0, 0.0], [2.0, 2.0, 0.0]]}, "inside a wall"),
+        ({"starts": [[1.0, 1.0, 0.0], [1.2, 1.0, 0.0]]}, "apart"),
+        ({"goal": (math.nan, 1.0)}, "goal"),
+        ({"floor": "apartmnt"}, "did you mean 'apartment'"),
     ],
-)  # fmt: skip
+)
 def test_known_reset_options_with_bad_values_are_refused(options, words):
     env = make()
     with pytest.raises(ValueError, match=words):
@@ -350,11 +361,13 @@ def test_a_floor_given_at_reset_is_taken_for_that_episode_only():
 @pytest.mark.parametrize(
     ("floor", "options", "words"),
     [
-        (box(0.3, 0.3, starts=np.zeros((0, 3))), {"robots": 1}, "fit"), (box(starts=[(0.0, -2.0, 0.0)]), {"robots": 1}, "inside a wall"),
-        (box(1.5, 1.5, starts=np.zeros((0, 3))), {"robots": 12}, "12 robots"), ("no_such_floor", {}, "no floor called"),
+        (box(0.3, 0.3, starts=np.zeros((0, 3))), {"robots": 1}, "fit"),
+        (box(starts=[(0.0, -2.0, 0.0)]), {"robots": 1}, "inside a wall"),
+        (box(1.5, 1.5, starts=np.zeros((0, 3))), {"robots": 12}, "12 robots"),
+        ("no_such_floor", {}, "no floor called"),
         (box(solids=[WALL_ACROSS], starts=[(1.0, 1.0, 0.0), (4.0, 1.0, 0.0)]), {}, "disconnected"),
     ],
-)  # fmt: skip
+)
 def test_a_team_that_cannot_be_placed_is_refused_with_the_cause(floor, options, words):
     with pytest.raises(ValueError, match=words):
         make(floor, **options).reset(seed=0)

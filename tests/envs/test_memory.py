@@ -7,11 +7,11 @@ import pytest
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings import make_settings
-from lidarium.evaluation.history import History
-from lidarium.evaluation.result import result_of
-from lidarium.evaluation.runner import run_episode
-from lidarium.evaluation.watching import WatchedExploration
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.history import History
+from lidarium.evaluation.episodes.result import result_of
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration
 
 
 @pytest.fixture
@@ -28,7 +28,9 @@ def parts_of(env):
 
 def run(policy, **settings):
     history = History()
-    env = WatchedExploration("apartment", make_settings(robots=2, resolution=0.05, horizon_s=6.0, **settings), watchers=[history])
+    env = WatchedExploration(
+        "apartment", make_settings(robots=2, resolution=0.05, horizon_s=6.0, **settings), watchers=[history]
+    )
     result_of(run_episode(lidarium.policy(policy), env, 0), policy, history)
     return parts_of(env)
 
@@ -64,7 +66,9 @@ def test_a_batch_leaves_nothing_behind(no_collection, level):
 
 def test_an_environment_that_was_only_reset_leaves_nothing_behind(no_collection):
     def made():
-        env = ExplorationEnv("apartment", make_settings(robots=2, radio="range", localization="slam", resolution=0.05))
+        env = ExplorationEnv(
+            "apartment", make_settings(robots=2, radio="range", localization="slam", resolution=0.05)
+        )
         env.reset(seed=0)
         return parts_of(env)
 

@@ -14,26 +14,34 @@ from lidarium.agents.random_walk import RandomWalk
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, observation_space
-from lidarium.envs.settings import OBSERVABLES, make_settings
-from lidarium.evaluation.runner import run_episode
-from lidarium.mapping.map_crops import crop_turned
+from lidarium.envs.settings.exploration import OBSERVABLES, make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.mapping.grids.map_crops import crop_turned
 
 SMALL = {"map_cells": 32, "egocentric_cells": 16, "egocentric_scales": (1, 2, 3)}
-GOAL_FLOOR = Floor("box", (0.0, 0.0, 5.0, 4.0), (), starts=np.array([[1.0, 1.0, 0.0], [1.0, 3.0, 0.5]]), goal=(4.0, 3.0))
+GOAL_FLOOR = Floor(
+    "box", (0.0, 0.0, 5.0, 4.0), (), starts=np.array([[1.0, 1.0, 0.0], [1.0, 3.0, 0.5]]), goal=(4.0, 3.0)
+)
 
 
 def driven(steps=15, floor="building:5", **options):
     """An environment in mid-episode, and its last observations."""
-    env = lidarium.parallel_env(floor, **{"robots": 3, "stop_coverage": None, "noise": "datasheet", **SMALL, **options})
+    env = lidarium.parallel_env(
+        floor, **{"robots": 3, "stop_coverage": None, "noise": "datasheet", **SMALL, **options}
+    )
     observations, _ = env.reset(seed=2)
     generator = np.random.default_rng(0)
     for _ in range(steps):
-        observations = env.step({agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents})[0]
+        observations = env.step(
+            {agent: generator.uniform(-1.0, 1.0, 2).astype(np.float32) for agent in env.agents}
+        )[0]
     return env, observations
 
 
 def writer_of(env, offsets=None, goals=None, **options):
-    return ObservationWriter(env.world, make_settings(env.settings, **options), env._offsets if offsets is None else offsets, goals)
+    return ObservationWriter(
+        env.world, make_settings(env.settings, **options), env._offsets if offsets is None else offsets, goals
+    )
 
 
 OFFSETS = np.zeros((9, 2))
@@ -57,7 +65,9 @@ def test_what_is_observed_does_not_depend_on_what_else_is(names):
 
 
 @pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
-@pytest.mark.parametrize("observe", [["egocentric_map"], ["map", "scan"], ["bumper", "egocentric_map", "pose"]])
+@pytest.mark.parametrize(
+    "observe", [["egocentric_map"], ["map", "scan"], ["bumper", "egocentric_map", "pose"]]
+)
 @pytest.mark.parametrize("floor", ["scene_room", GOAL_FLOOR])
 def test_any_choice_is_observed_at_every_level_and_lies_in_its_space(level, observe, floor):
     env = lidarium.parallel_env(floor, level=level, robots=2, observe=observe, stop_coverage=None, **SMALL)
@@ -68,21 +78,27 @@ def test_any_choice_is_observed_at_every_level_and_lies_in_its_space(level, obse
         for agent, observation in observations.items():
             assert set(observation) == set(observe) | added | goal
             assert env.observation_space(agent).contains(observation)
-        observations = env.step({agent: 0 if level == "frontier" else np.zeros(2, np.float32) for agent in env.agents})[0]
+        observations = env.step(
+            {agent: 0 if level == "frontier" else np.zeros(2, np.float32) for agent in env.agents}
+        )[0]
 
 
 def test_the_order_of_the_names_does_not_matter():
     one, other = (make_settings(observe=names) for names in (["map", "scan"], ("scan", "map")))
     assert one == other
     assert hash(one) == hash(other)
-    assert list(observation_space(one, has_goal=True).spaces) == list(observation_space(other, has_goal=True).spaces)
+    assert list(observation_space(one, has_goal=True).spaces) == list(
+        observation_space(other, has_goal=True).spaces
+    )
 
 
 def pooled(log_odds, scale):
     rows, columns = (-(-size // scale) * scale for size in log_odds.shape)
     padded = np.zeros((rows, columns), np.int8)
     padded[: log_odds.shape[0], : log_odds.shape[1]] = log_odds
-    return np.ascontiguousarray(padded.reshape(rows // scale, scale, columns // scale, scale).max(axis=(1, 3)))
+    return np.ascontiguousarray(
+        padded.reshape(rows // scale, scale, columns // scale, scale).max(axis=(1, 3))
+    )
 
 
 def test_the_egocentric_map_is_turned_about_the_corner_nearest_to_where_the_robot_believes_to_be():
@@ -102,7 +118,9 @@ def test_the_egocentric_map_does_not_tell_the_heading_on_the_floor():
     crops = []
     for quarter in range(4):
         room = Floor("room", (0.0, 0.0, 4.0, 4.0), (), starts=np.array([[2.0, 2.0, quarter * math.pi / 2.0]]))
-        env = lidarium.parallel_env(room, robots=1, lidar="lidar_360_6m", stop_coverage=None, observe=["egocentric_map"])
+        env = lidarium.parallel_env(
+            room, robots=1, lidar="lidar_360_6m", stop_coverage=None, observe=["egocentric_map"]
+        )
         crops.append(env.reset(seed=0)[0]["robot_0"]["egocentric_map"])
     for crop in crops[1:]:
         # A wall that lies on the border of cells falls to one side or the other.
@@ -132,7 +150,9 @@ def test_rows_that_are_not_active_keep_what_they_hold(observe):
         writer.write(out, np.array(active))
         for name, array in out.items():
             for row, is_active in enumerate(active):
-                assert np.array_equal(array[row], whole[name][row] if is_active else np.full_like(array[row], 77))
+                assert np.array_equal(
+                    array[row], whole[name][row] if is_active else np.full_like(array[row], 77)
+                )
 
 
 def test_threads_do_not_change_an_observation():
@@ -150,12 +170,16 @@ def test_threads_do_not_change_an_observation():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda out: out.pop("pose"), "no array for pose"), (lambda out: out.update(scan=out["scan"][:2]), r"scan is float32 \(2, 727\)"),
-        (lambda out: out.update(pose=out["pose"].astype(np.float64)), r"pose is float64 \(3, 3\); want float32 \(3, 3\)"),
+        (lambda out: out.pop("pose"), "no array for pose"),
+        (lambda out: out.update(scan=out["scan"][:2]), r"scan is float32 \(2, 727\)"),
+        (
+            lambda out: out.update(pose=out["pose"].astype(np.float64)),
+            r"pose is float64 \(3, 3\); want float32 \(3, 3\)",
+        ),
         (lambda out: out.update(pose=np.asfortranarray(out["pose"])), "contiguous"),
         (lambda out: out["pose"].flags.__setattr__("writeable", False), "writeable"),
     ],
-)  # fmt: skip
+)
 def test_arrays_that_do_not_fit_are_refused(change, words):
     env, _ = driven(1)
     out = writer_of(env).buffers()
@@ -167,7 +191,9 @@ def test_arrays_that_do_not_fit_are_refused(change, words):
 def test_a_goal_is_in_the_frame_of_the_pose_and_zero_where_it_is_not_known():
     env, observations = driven(floor=GOAL_FLOOR, robots=2, observe=["pose"])
     for row, agent in enumerate(env.agents):
-        assert np.array_equal(observations[agent]["goal"], (np.array([4.0, 3.0]) - env._offsets[row]).astype(np.float32))
+        assert np.array_equal(
+            observations[agent]["goal"], (np.array([4.0, 3.0]) - env._offsets[row]).astype(np.float32)
+        )
     _, observations = driven(floor=GOAL_FLOOR, robots=2, observe=["pose"], known_starts=False)
     assert all(not observation["goal"].any() for observation in observations.values())
     goals = np.array([[np.nan, np.nan], [4.0, 3.0]])
@@ -189,7 +215,9 @@ def test_a_writer_reads_frames_and_goals_as_they_are_at_each_call():
     assert np.allclose(after["goal"] - before["goal"], 1.0)
 
 
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda pair: pickle.loads(pickle.dumps(pair))], ids=["deepcopy", "pickle"])
+@pytest.mark.parametrize(
+    "copied", [copy.deepcopy, lambda pair: pickle.loads(pickle.dumps(pair))], ids=["deepcopy", "pickle"]
+)
 def test_a_copied_writer_tells_of_the_copied_world(copied):
     env, _ = driven(3)
     writer = writer_of(env)
@@ -206,9 +234,10 @@ def test_a_copied_writer_tells_of_the_copied_world(copied):
     ("offsets", "words"),
     [
         (np.zeros((3, 3))[:, :2], r"offsets are float64 \(3, 2\); want float64 \(3, 2\), contiguous"),
-        (np.zeros((3, 2), np.float32), "offsets are float32"), (np.zeros((2, 2)), r"offsets are float64 \(2, 2\)"),
+        (np.zeros((3, 2), np.float32), "offsets are float32"),
+        (np.zeros((2, 2)), r"offsets are float64 \(2, 2\)"),
     ],
-)  # fmt: skip
+)
 def test_frames_that_cannot_be_read_are_refused(offsets, words):
     env, _ = driven(1)
     with pytest.raises(ValueError, match=words):
@@ -216,7 +245,9 @@ def test_frames_that_cannot_be_read_are_refused(offsets, words):
 
 
 def test_the_gymnasium_form_takes_the_choice():
-    env = gymnasium.make("lidarium/Exploration-v0", observe=["egocentric_map"], egocentric_cells=32, egocentric_scales=[2])
+    env = gymnasium.make(
+        "lidarium/Exploration-v0", observe=["egocentric_map"], egocentric_cells=32, egocentric_scales=[2]
+    )
     observation, _ = env.reset(seed=0)
     assert {name: array.shape for name, array in observation.items()} == {"egocentric_map": (1, 32, 32)}
     env.close()
@@ -231,7 +262,9 @@ def test_explorers_need_no_observation_and_the_random_walk_says_which_it_needs()
         ends.append(env.world.poses)
     assert all(np.array_equal(end, ends[0]) for end in ends)
     with pytest.raises(ValueError, match=r"random walk needs scan, bumper, which .* observe"):
-        run_episode(RandomWalk(), ExplorationEnv("scene_room", make_settings(robots=1, observe=["pose"], **SMALL)), 1)
+        run_episode(
+            RandomWalk(), ExplorationEnv("scene_room", make_settings(robots=1, observe=["pose"], **SMALL)), 1
+        )
 
 
 def test_a_frame_is_drawn_whatever_is_observed():

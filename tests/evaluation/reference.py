@@ -1,10 +1,9 @@
 """A second scorer, slow and plain, that shares nothing with the package but the arrays of the world.
 
-It notes what a watcher sees of every step (true poses, scans as told) and works out anew from the rasters of the floor: rays by
-all crossings with the lattice, the seen area cell by cell (which fan holds a cell's centre, and does it lie before the fan's far
-edge), F by flood fill, log-odds cell by cell. Only what is exactly on an edge could be told differently, and nothing that is
-drawn at random is.
-"""
+It notes what a watcher sees of every step (true poses, scans as told) and works out anew from the rasters of
+the floor: rays by all crossings with the lattice, the seen area cell by cell (which fan holds a cell's
+centre, and does it lie before the fan's far edge), F by flood fill, log-odds cell by cell. Only what is
+exactly on an edge could be told differently, and nothing that is drawn at random is."""
 
 import itertools
 import math
@@ -95,12 +94,19 @@ class Reference:
         self.look()
 
     def start_cells(self, side):
-        return [tuple(int(value) for value in ((start[:2] - self.origin) / side)[::-1]) for start in self.env.world.starts]
+        return [
+            tuple(int(value) for value in ((start[:2] - self.origin) / side)[::-1])
+            for start in self.env.world.starts
+        ]
 
     def cells_of_f(self):
         """F: what the disc sweeps from the starts and the laser can look into."""
         reach = self.radius / self.cell
-        near = [(i, j) for i, j in around(reach) if math.hypot(max(abs(i) - 0.5, 0), max(abs(j) - 0.5, 0)) ** 2 < reach**2 - 1e-9]
+        near = [
+            (i, j)
+            for i, j in around(reach)
+            if math.hypot(max(abs(i) - 0.5, 0), max(abs(j) - 0.5, 0)) ** 2 < reach**2 - 1e-9
+        ]
         space = ~grown(self.body, near)
         centres = np.zeros_like(space)
         for cell in self.start_cells(self.cell):
@@ -128,7 +134,12 @@ class Reference:
             middles = np.append((at[1:] + at[:-1]) / 2, (at[-1] + longest) / 2)
             # The outermost cells of a raster are solid: what lies beyond is never asked for.
             rows, columns = (
-                np.clip(np.floor(place[axis] + middles * slope[axis]).astype(int), 0, self.laser.shape[1 - axis] - 1) for axis in (1, 0)
+                np.clip(
+                    np.floor(place[axis] + middles * slope[axis]).astype(int),
+                    0,
+                    self.laser.shape[1 - axis] - 1,
+                )
+                for axis in (1, 0)
             )
             met = np.flatnonzero(self.laser[rows, columns])
             length = at[met[0]] * self.cell if met.size else np.inf
@@ -184,7 +195,10 @@ class Reference:
 
     def settled(self, believed, pose, ranges):
         """Ranges of beams that end at most three deviations and a cell behind an occupied cell, and beside no free one, end in it."""
-        lidar, known = self.env.settings.lidar, {tuple(cell): believed[tuple(cell)] for cell in np.argwhere(believed).tolist()}
+        lidar, known = (
+            self.env.settings.lidar,
+            {tuple(cell): believed[tuple(cell)] for cell in np.argwhere(believed).tolist()},
+        )
         start, settled = (pose[:2] - self.origin) / self.resolution, ranges.astype(float)
         for beam, angle in enumerate(self.angles):
             if ranges[beam] > self.reach:
@@ -249,7 +263,14 @@ class Reference:
         return ways
 
     def time_to(self, share):
-        return next((round(k * self.env.settings.time_step, 6) for k, value in enumerate(self.coverage) if value >= share), None)
+        return next(
+            (
+                round(k * self.env.settings.time_step, 6)
+                for k, value in enumerate(self.coverage)
+                if value >= share
+            ),
+            None,
+        )
 
     @property
     def auc(self):
@@ -264,7 +285,9 @@ class Reference:
         sensed = self.seen.any(axis=0)
         surface = {tuple(cell) for cell in np.argwhere(self.occupied & grown(sensed, EIGHT)).tolist()}
         hits = sum(
-            any((i + k, j + m) in other for k, m in EIGHT) for one, other in ((believed, surface), (surface, believed)) for i, j in one
+            any((i + k, j + m) in other for k, m in EIGHT)
+            for one, other in ((believed, surface), (surface, believed))
+            for i, j in one
         )
         size = len(believed) + len(surface)
         return hits / size if size else 1.0

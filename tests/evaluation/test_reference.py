@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.floors.catalogue import load_floor
+from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.settings import make_settings
-from lidarium.envs.simulation.lidar import Lidar
-from lidarium.evaluation.history import History
-from lidarium.evaluation.result import result_of
-from lidarium.evaluation.runner import run_episode
-from lidarium.evaluation.watching import WatchedExploration
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.evaluation.episodes.history import History
+from lidarium.evaluation.episodes.result import result_of
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration
 from tests.evaluation.reference import Notes, Reference
 
 EPISODES = 50
@@ -23,7 +23,11 @@ EXACT = {"rel": 0.0, "abs": 1e-9}
 def floor_of(solid, side):
     solid[[0, -1]], solid[:, [0, -1]] = 1, 1
     rows, columns = solid.shape
-    return Floor("drawn", (0.0, 0.0, columns * side, rows * side), cells=Raster(solid.astype(np.uint8), (0.0, 0.0), side))
+    return Floor(
+        "drawn",
+        (0.0, 0.0, columns * side, rows * side),
+        cells=Raster(solid.astype(np.uint8), (0.0, 0.0), side),
+    )
 
 
 def drawn_floor(generator):
@@ -43,7 +47,10 @@ def drawn_floor(generator):
 def cut_floor(generator, apartment):
     """A piece of 3 to 4 m of the apartment, walls and furniture as they come."""
     rows, columns = (int(generator.integers(60, 80)) for _ in range(2))
-    row, column = (int(generator.integers(0, size - part)) for size, part in zip(apartment.solid.shape, (rows, columns), strict=True))
+    row, column = (
+        int(generator.integers(0, size - part))
+        for size, part in zip(apartment.solid.shape, (rows, columns), strict=True)
+    )
     return floor_of(apartment.solid[row : row + rows, column : column + columns].copy(), apartment.resolution)
 
 
@@ -101,7 +108,9 @@ def test_a_random_episode_has_the_figures_of_the_slow_reference(seed):
     env = episode.env
     result, reference = result_of(episode, history=history), Reference(env, notes)
     assert result["coverage_final"] == pytest.approx(reference.coverage[-1], **EXACT)
-    assert [result[f"t{share}_s"] for share in (85, 90, 95, 99)] == [reference.time_to(share / 100) for share in (85, 90, 95, 99)]
+    assert [result[f"t{share}_s"] for share in (85, 90, 95, 99)] == [
+        reference.time_to(share / 100) for share in (85, 90, 95, 99)
+    ]
     assert result["auc"] == pytest.approx(reference.auc, **EXACT)
     assert result["overlap"] == pytest.approx(reference.overlap, **EXACT)
     assert result["overlap_mv"] == pytest.approx(reference.instant_overlap, **EXACT)

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 import pytest
 
 from lidarium.benchmarks.speed import all as benchmarks
-from lidarium.benchmarks.speed import timing
-from lidarium.benchmarks.speed.lines import Line, faster
+from lidarium.benchmarks.speed.harness import timing
+from lidarium.benchmarks.speed.harness.lines import Line, faster
 from lidarium.scripts.main import main
 
 
@@ -13,8 +13,16 @@ from lidarium.scripts.main import main
 def two_questions(monkeypatch):
     """Two questions of no cost in place of all."""
     questions = {
-        "rays": SimpleNamespace(CORES=1, NOTES=("*Rays*: many.",), measure=lambda effort: [faster("rays", [1e-3], "slow", [1e-2], 5.0)]),
-        "steps": SimpleNamespace(CORES=1, NOTES=("*Steps*: few.",), measure=lambda effort: [faster("steps", [1e-3], "absent", None, 5.0)]),
+        "rays": SimpleNamespace(
+            CORES=1,
+            NOTES=("*Rays*: many.",),
+            measure=lambda effort: [faster("rays", [1e-3], "slow", [1e-2], 5.0)],
+        ),
+        "steps": SimpleNamespace(
+            CORES=1,
+            NOTES=("*Steps*: few.",),
+            measure=lambda effort: [faster("steps", [1e-3], "absent", None, 5.0)],
+        ),
     }
     monkeypatch.setattr(benchmarks, "QUESTIONS", questions)
     return questions
@@ -39,7 +47,10 @@ def test_json_is_what_is_written_and_the_page_says_the_same(two_questions, no_pe
     assert main(["bench", "--json", "--effort", "quick", "--out", str(tmp_path / "out")]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads((tmp_path / "out" / "speed.json").read_text())
-    assert [(line["name"], line["is_reached"]) for line in result["lines"]] == [("rays", True), ("steps", None)]
+    assert [(line["name"], line["is_reached"]) for line in result["lines"]] == [
+        ("rays", True),
+        ("steps", None),
+    ]
     assert result["command"] == "lidarium bench --effort quick"
     page = (tmp_path / "out" / "speed.md").read_text()
     assert "| rays | 1,000 agent steps/s | slow: 100 | 10 x (10 to 10) | >= 5 x | yes |" in page

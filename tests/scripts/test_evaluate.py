@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from lidarium.evaluation.episodes_file import read_episodes
+from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.scripts.main import main
 
 SHORT = ["--robots", "1", "--seeds", "2", "--horizon-s", "5", "--map-resolution", "0.05", "--workers", "1"]
@@ -24,7 +24,11 @@ def test_an_evaluation_writes_a_folder_and_tells_its_medians(tmp_path, capsys):
     told = capsys.readouterr().out
     assert "4 of 4 episodes finished" in told
     assert "random_walk" in told
-    assert len(read_episodes(tmp_path / "episodes.jsonl")) == len(list((tmp_path / "records").glob("*.npz"))) == 4
+    assert (
+        len(read_episodes(tmp_path / "episodes.jsonl"))
+        == len(list((tmp_path / "records").glob("*.npz")))
+        == 4
+    )
     assert evaluate("--policies", "random_walk", *SHORT, "--out", tmp_path, "--json") == 0
     result = json.loads(capsys.readouterr().out)
     assert (result["episodes"], result["finished"], result["failed"]) == (2, 2, [])
@@ -33,7 +37,9 @@ def test_an_evaluation_writes_a_folder_and_tells_its_medians(tmp_path, capsys):
 
 def test_a_file_says_what_to_run(tmp_path, capsys):
     path = tmp_path / "suite.toml"
-    path.write_text('policies = ["random_walk"]\nfloors = ["apartment"]\n[settings]\nhorizon_s = 3.0\nresolution = 0.05\n')
+    path.write_text(
+        'policies = ["random_walk"]\nfloors = ["apartment"]\n[settings]\nhorizon_s = 3.0\nresolution = 0.05\n'
+    )
     assert evaluate(path, "--out", tmp_path / "out", "--workers", "1", "--no-records") == 0
     (line,) = read_episodes(tmp_path / "out" / "episodes.jsonl")
     assert line["time_s"] == 3.0
@@ -93,7 +99,9 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     ended = time.monotonic() + 60.0
-    while time.monotonic() < ended and not ((tmp_path / "episodes.jsonl").exists() and (tmp_path / "episodes.jsonl").stat().st_size):
+    while time.monotonic() < ended and not (
+        (tmp_path / "episodes.jsonl").exists() and (tmp_path / "episodes.jsonl").stat().st_size
+    ):
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     assert process.wait(30) == 130
@@ -105,7 +113,7 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
 
 
 def test_the_leaderboard_is_made_by_one_command(tmp_path, capsys, monkeypatch):
-    from lidarium.evaluation.experiments import leaderboard
+    from lidarium.benchmarks.studies.leaderboard import study as leaderboard
 
     monkeypatch.setattr(leaderboard, "SETTINGS", {"resolution": 0.05, "horizon_s": 4.0})
     monkeypatch.setattr(leaderboard, "TEAMS", (1,))

@@ -4,10 +4,10 @@ import json
 import cv2
 import pytest
 
-from lidarium.envs.floors import catalogue
-from lidarium.envs.floors.catalogue import load_floor
-from lidarium.envs.floors.store import FOLDER_VARIABLE
-from lidarium.mapping.map_files import read_ros_map
+from lidarium.envs.floors.catalogue import names as catalogue
+from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE
+from lidarium.mapping.files.map_files import read_ros_map
 from lidarium.scripts import floors
 from lidarium.scripts.main import main
 
@@ -15,7 +15,10 @@ from lidarium.scripts.main import main
 def test_the_list_names_floors_kinds_and_sets(capsys):
     assert main(["floors", "list"]) == 0
     told = capsys.readouterr().out
-    assert all(word in told for word in ("apartment", "clinic", "scene_loop_corridor", "office:SEED", "set:validation", "200"))
+    assert all(
+        word in told
+        for word in ("apartment", "clinic", "scene_loop_corridor", "office:SEED", "set:validation", "200")
+    )
 
 
 def test_the_list_is_json_too(capsys, tmp_path):
@@ -34,20 +37,63 @@ def test_a_floor_is_told_in_figures_and_drawn(capsys, tmp_path):
 
 
 def test_a_generated_floor_is_a_ros_map_that_can_be_explored(tmp_path, capsys):
-    arguments = ["floors", "generate", "--kind", "apartment", "--area", "45", "--loops", "0.2", "--clutter", "0.1", "--seed", "7"]
+    arguments = [
+        "floors",
+        "generate",
+        "--kind",
+        "apartment",
+        "--area",
+        "45",
+        "--loops",
+        "0.2",
+        "--clutter",
+        "0.1",
+        "--seed",
+        "7",
+    ]
     assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures["name"] == "apartment:7"
-    assert sorted(path.name for path in tmp_path.iterdir()) == [f"apartment-7.{kind}" for kind in ("json", "pgm", "png", "yaml")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        f"apartment-7.{kind}" for kind in ("json", "pgm", "png", "yaml")
+    ]
     assert cv2.imread(str(tmp_path / "apartment-7.png")) is not None
     assert (
-        main(["run", "--floor", str(tmp_path / "apartment-7.yaml"), "--robots", "1", "--horizon-s", "5", "--out", str(tmp_path / "run")])
+        main(
+            [
+                "run",
+                "--floor",
+                str(tmp_path / "apartment-7.yaml"),
+                "--robots",
+                "1",
+                "--horizon-s",
+                "5",
+                "--out",
+                str(tmp_path / "run"),
+            ]
+        )
         == 0
     )
 
 
 def test_the_ros_map_of_a_floor_has_its_free_cells(tmp_path):
-    assert main(["floors", "generate", "--kind", "corridors", "--seed", "2", "--out", str(tmp_path), "--map-resolution", "0.05"]) == 0
+    assert (
+        main(
+            [
+                "floors",
+                "generate",
+                "--kind",
+                "corridors",
+                "--seed",
+                "2",
+                "--out",
+                str(tmp_path),
+                "--map-resolution",
+                "0.05",
+            ]
+        )
+        == 0
+    )
     found = read_ros_map(tmp_path / "corridors-2.yaml")
     raster = load_floor("corridors:2").raster(0.05, 0.3, 0.3)
     assert ((found.levels == 255) == (raster.solid == 0)).all()
@@ -93,7 +139,12 @@ def test_a_set_is_prepared_once(store, tmp_path, capsys):
     for made in (3, 0):
         assert main(["floors", "prepare", "set:few", "--json", "--out", str(tmp_path / "out")]) == 0
         result = json.loads(capsys.readouterr().out)
-        assert (result["floors"], result["prepared"], result["made"], result["is_interrupted"]) == (3, 3, made, False)
+        assert (result["floors"], result["prepared"], result["made"], result["is_interrupted"]) == (
+            3,
+            3,
+            made,
+            False,
+        )
         assert result["folder"] == str(store)
         assert result == json.loads((tmp_path / "out" / "prepared.json").read_text())
     assert len([path for path in store.rglob("*") if path.is_file()]) == 6
@@ -123,7 +174,9 @@ def test_several_workers_prepare_the_same(store, capsys):
 
 
 def test_a_killed_worker_ends_the_preparation_with_what_to_do(store, tmp_path, monkeypatch, capsys):
-    (tmp_path / "killing.py").write_text("import os, signal\n\ndef prepared(spec, **heights):\n    os.kill(os.getpid(), signal.SIGKILL)\n")
+    (tmp_path / "killing.py").write_text(
+        "import os, signal\n\ndef prepared(spec, **heights):\n    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(floors, "_prepared", importlib.import_module("killing").prepared)
     assert main(["floors", "prepare", "set:few", "--workers", "2"]) == 2

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
-from lidarium.mapping import kernels
-from lidarium.mapping.map_files import read_ros_map, write_ros_map
+from lidarium.mapping.files.map_files import read_ros_map, write_ros_map
+from lidarium.mapping.kernels import compilation
 from lidarium.scripts import main as command_line
 from lidarium.scripts.main import main
 
@@ -59,7 +59,10 @@ def rewritten(path, **changes):
 def test_help_names_the_commands(capsys):
     assert main(["--help"]) == 0
     told = capsys.readouterr().out
-    assert all(name in told for name in ("run", "evaluate", "merge", "replay", "report", "reproduce", "floors", "bench", "show"))
+    assert all(
+        name in told
+        for name in ("run", "evaluate", "merge", "replay", "report", "reproduce", "floors", "bench", "show")
+    )
 
 
 def test_help_comes_without_loading_the_kernels():
@@ -94,10 +97,25 @@ def test_every_command_has_seed_out_and_json(command, capsys):
 
 
 def test_a_run_writes_its_figures_map_and_picture(floor, tmp_path, capsys):
-    arguments = ["run", "--floor", str(floor), "--robots", "2", "--policy", "nearest_frontier", "--out", str(tmp_path / "out")]
+    arguments = [
+        "run",
+        "--floor",
+        str(floor),
+        "--robots",
+        "2",
+        "--policy",
+        "nearest_frontier",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert main(arguments) == 0
     told = capsys.readouterr()
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["map.pgm", "map.yaml", "result.json", "run.png"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "map.pgm",
+        "map.yaml",
+        "result.json",
+        "run.png",
+    ]
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     assert result["coverage_final"] >= 0.99
     assert result["floor"] == "rooms"
@@ -107,7 +125,18 @@ def test_a_run_writes_its_figures_map_and_picture(floor, tmp_path, capsys):
 
 
 def test_a_team_is_supervised_where_nothing_is_said_and_its_decisions_are_written(floor, tmp_path, capsys):
-    arguments = ["run", "--floor", str(floor), "--robots", "2", "--json", "--map-resolution", "0.05", "--out", str(tmp_path / "out")]
+    arguments = [
+        "run",
+        "--floor",
+        str(floor),
+        "--robots",
+        "2",
+        "--json",
+        "--map-resolution",
+        "0.05",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert main(arguments) == 0
     result = json.loads(capsys.readouterr().out)
     assert (result["policy"], result["localization"], result["realism"]) == ("supervised", "slam", "lab")
@@ -117,7 +146,23 @@ def test_a_team_is_supervised_where_nothing_is_said_and_its_decisions_are_writte
 
 
 def test_a_world_that_is_given_is_not_changed(floor, tmp_path, capsys):
-    assert main(["run", "--floor", str(floor), "--robots", "2", "--json", "--noise", "none", "--out", str(tmp_path / "out")]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "--floor",
+                str(floor),
+                "--robots",
+                "2",
+                "--json",
+                "--noise",
+                "none",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 0
+    )
     result = json.loads(capsys.readouterr().out)
     assert (result["policy"], result["localization"], result["realism"]) == ("supervised", "truth", "ideal")
 
@@ -133,7 +178,9 @@ def test_the_map_of_a_run_lies_where_the_floor_lies(floor, tmp_path):
     assert main(["run", "--floor", str(floor), "--robots", "1", "--out", str(tmp_path / "out")]) == 0
     found = read_ros_map(tmp_path / "out" / "map.yaml")
     assert found.resolution == 0.025
-    column, row = (int((value - corner) / 0.025) for value, corner in zip((1.05, 1.05), found.origin[:2], strict=True))
+    column, row = (
+        int((value - corner) / 0.025) for value, corner in zip((1.05, 1.05), found.origin[:2], strict=True)
+    )
     assert found.levels[row, column] == 255
     column = int((2.15 - found.origin[0]) / 0.025)
     row = int((0.45 - found.origin[1]) / 0.025)
@@ -141,7 +188,18 @@ def test_the_map_of_a_run_lies_where_the_floor_lies(floor, tmp_path):
 
 
 def test_json_is_the_result_file_and_nothing_else(tmp_path, capsys):
-    arguments = ["run", "--json", "--seed", "3", "--map-resolution", "0.05", "--out", str(tmp_path / "out"), "--horizon-s", "20"]
+    arguments = [
+        "run",
+        "--json",
+        "--seed",
+        "3",
+        "--map-resolution",
+        "0.05",
+        "--out",
+        str(tmp_path / "out"),
+        "--horizon-s",
+        "20",
+    ]
     assert main(arguments) == 0
     told = capsys.readouterr().out
     assert told == (tmp_path / "out" / "result.json").read_text()
@@ -155,24 +213,63 @@ def test_a_run_without_out_writes_below_runs(floor, tmp_path, monkeypatch):
 
 
 def test_a_run_can_be_filmed(floor, tmp_path):
-    assert main(["run", "--floor", str(floor), "--robots", "1", "--horizon-s", "4", "--video", "--out", str(tmp_path / "out")]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "--floor",
+                str(floor),
+                "--robots",
+                "1",
+                "--horizon-s",
+                "4",
+                "--video",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 0
+    )
     assert (tmp_path / "out" / "run.mp4").stat().st_size > 1000
     assert not [path for path in (tmp_path / "out").iterdir() if path.name.startswith(".")]
 
 
 def test_a_run_starts_where_it_is_told(floor, tmp_path, capsys):
     starts = "1.0,1.0,0;3.2,1.0,1.57"
-    assert main(["run", "--floor", str(floor), "--robots", "2", "--starts", starts, "--out", str(tmp_path / "out")]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "--floor",
+                str(floor),
+                "--robots",
+                "2",
+                "--starts",
+                starts,
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 0
+    )
 
 
 def test_a_missing_floor_is_refused(tmp_path, capsys):
     refused(["run", "--floor", str(tmp_path / "none.yaml")], capsys, tmp_path, "none.yaml")
-    refused(["floors", "import", str(tmp_path / "none.png"), "--resolution", "0.1"], capsys, tmp_path, "none.png")
+    refused(
+        ["floors", "import", str(tmp_path / "none.png"), "--resolution", "0.1"], capsys, tmp_path, "none.png"
+    )
 
 
 def test_what_is_not_an_image_is_refused(tmp_path, capsys):
     (tmp_path / "text.png").write_text("no pixels here")
-    refused(["run", "--floor", str(tmp_path / "text.png"), "--resolution", "0.1"], capsys, tmp_path, "text.png", "image")
+    refused(
+        ["run", "--floor", str(tmp_path / "text.png"), "--resolution", "0.1"],
+        capsys,
+        tmp_path,
+        "text.png",
+        "image",
+    )
 
 
 def test_an_image_without_a_scale_is_refused(tmp_path, capsys):
@@ -183,10 +280,22 @@ def test_an_image_without_a_scale_is_refused(tmp_path, capsys):
 @pytest.mark.parametrize("resolution", ["0", "-0.1", "nan"])
 def test_a_resolution_that_is_not_positive_is_refused(resolution, tmp_path, capsys, floor):
     cv2.imwrite(str(tmp_path / "plain.png"), two_rooms())
-    refused(["run", "--floor", str(tmp_path / "plain.png"), "--resolution", resolution], capsys, tmp_path, "resolution is", "positive")
+    refused(
+        ["run", "--floor", str(tmp_path / "plain.png"), "--resolution", resolution],
+        capsys,
+        tmp_path,
+        "resolution is",
+        "positive",
+    )
     refused(["run", "--map-resolution", resolution], capsys, tmp_path, "resolution")
     if resolution != "nan":
-        refused(["run", "--floor", rewritten(floor, resolution=float(resolution))], capsys, tmp_path, "resolution", "positive")
+        refused(
+            ["run", "--floor", rewritten(floor, resolution=float(resolution))],
+            capsys,
+            tmp_path,
+            "resolution",
+            "positive",
+        )
 
 
 def test_a_yaml_with_a_missing_key_is_refused(floor, tmp_path, capsys):
@@ -196,11 +305,22 @@ def test_a_yaml_with_a_missing_key_is_refused(floor, tmp_path, capsys):
 @pytest.mark.parametrize("grey", [0, 255])
 def test_an_image_of_one_colour_is_refused(grey, tmp_path, capsys):
     cv2.imwrite(str(tmp_path / "plain.png"), np.full((40, 40), grey, np.uint8))
-    refused(["run", "--floor", str(tmp_path / "plain.png"), "--resolution", "0.1"], capsys, tmp_path, "plain.png", "want")
+    refused(
+        ["run", "--floor", str(tmp_path / "plain.png"), "--resolution", "0.1"],
+        capsys,
+        tmp_path,
+        "plain.png",
+        "want",
+    )
 
 
 def test_a_start_inside_a_wall_is_refused(floor, tmp_path, capsys):
-    refused(["run", "--floor", str(floor), "--robots", "1", "--starts", "2.15,0.4,0"], capsys, tmp_path, "inside a wall")
+    refused(
+        ["run", "--floor", str(floor), "--robots", "1", "--starts", "2.15,0.4,0"],
+        capsys,
+        tmp_path,
+        "inside a wall",
+    )
 
 
 @pytest.mark.parametrize(("start", "told"), [("1.5,0,0", "inside a wall"), ("50,0,0", "start")])
@@ -213,7 +333,12 @@ def test_disconnected_starts_are_refused(tmp_path, capsys):
     levels = two_rooms(door=False)
     levels[10, 21] = 255  # too narrow for the robot
     path = write_ros_map(tmp_path / "in", "cells", levels, (0.0, 0.0, 0.0), 0.1)
-    refused(["run", "--floor", str(path), "--robots", "2", "--starts", "1,1,0;3.2,1,0"], capsys, tmp_path, "disconnected")
+    refused(
+        ["run", "--floor", str(path), "--robots", "2", "--starts", "1,1,0;3.2,1,0"],
+        capsys,
+        tmp_path,
+        "disconnected",
+    )
 
 
 @pytest.mark.parametrize("starts", ["1,1", "one,two,three", "1,1,0;2", "1,1,nan", ""])
@@ -256,18 +381,24 @@ def test_unknown_names_are_refused(option, tmp_path, capsys):
     refused(["run", option, "nonsense"], capsys, tmp_path, "nonsense")
 
 
-@pytest.mark.parametrize("arguments", [["run", "--flor", "x"], ["run", "--robots", "many"], ["walk"], [], ["show", "nothing"]])
+@pytest.mark.parametrize(
+    "arguments", [["run", "--flor", "x"], ["run", "--robots", "many"], ["walk"], [], ["show", "nothing"]]
+)
 def test_unknown_options_are_refused(arguments, capsys, tmp_path):
     assert main(arguments) == 2
     assert capsys.readouterr().out == ""
 
 
-@pytest.mark.parametrize("option", ["--seed -1", "--horizon-s 0", "--stop-coverage 0", "--stop-coverage 1.5", "--video-speed 0"])
+@pytest.mark.parametrize(
+    "option", ["--seed -1", "--horizon-s 0", "--stop-coverage 0", "--stop-coverage 1.5", "--video-speed 0"]
+)
 def test_numbers_out_of_range_are_refused(option, tmp_path, capsys):
     refused(["run", "--video", *option.split()], capsys, tmp_path, option.split()[1])
 
 
-@pytest.mark.parametrize("command", ["run", "floors list", "floors show apartment", "floors generate", "show robots", "bench"])
+@pytest.mark.parametrize(
+    "command", ["run", "floors list", "floors show apartment", "floors generate", "show robots", "bench"]
+)
 def test_an_out_that_cannot_be_written_is_refused_before_the_work(command, tmp_path, capsys):
     (tmp_path / "file").write_text("mine")
     for place in (tmp_path / "file", tmp_path / "file" / "below"):
@@ -288,9 +419,27 @@ def test_a_defect_of_ours_asks_for_a_report(capsys, monkeypatch):
 
 
 def start_endless_run(folder: Path, *options: str) -> "subprocess.Popen[str]":
-    arguments = ["run", "--floor", "office:3", "--policy", "random_walk", "--stop-coverage", "1", "--robots", "1", *options]
+    arguments = [
+        "run",
+        "--floor",
+        "office:3",
+        "--policy",
+        "random_walk",
+        "--stop-coverage",
+        "1",
+        "--robots",
+        "1",
+        *options,
+    ]
     return subprocess.Popen(
-        [sys.executable, "-c", "import sys; from lidarium.scripts.main import main; sys.exit(main())", *arguments, "--out", str(folder)],
+        [
+            sys.executable,
+            "-c",
+            "import sys; from lidarium.scripts.main import main; sys.exit(main())",
+            *arguments,
+            "--out",
+            str(folder),
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -338,7 +487,12 @@ def test_a_reader_who_leaves_is_no_error(tmp_path):
 
 
 def test_show_tells_what_can_be_chosen(capsys):
-    for what, word in (("policies", "nearest_frontier"), ("robots", "kobuki"), ("lidars", "urg"), ("settings", "stop_coverage")):
+    for what, word in (
+        ("policies", "nearest_frontier"),
+        ("robots", "kobuki"),
+        ("lidars", "urg"),
+        ("settings", "stop_coverage"),
+    ):
         assert main(["show", what]) == 0
         assert word in capsys.readouterr().out
         assert main(["show", what, "--json"]) == 0
@@ -347,7 +501,7 @@ def test_show_tells_what_can_be_chosen(capsys):
 
 @pytest.mark.parametrize("is_first_start", [False, True])
 def test_the_first_start_tells_that_it_compiles(tmp_path, capsys, monkeypatch, is_first_start):
-    monkeypatch.setattr(kernels, "is_cache_empty", lambda: is_first_start)
+    monkeypatch.setattr(compilation, "is_cache_empty", lambda: is_first_start)
     assert main(["run", "--floor", str(tmp_path / "none.yaml")]) == 2
     assert ("compiling the kernels" in capsys.readouterr().err) == is_first_start
 
@@ -367,5 +521,21 @@ def test_progress_is_a_line_every_few_seconds_where_there_is_no_terminal(capsys)
 
 
 def test_a_run_on_a_floor_with_a_goal_ends_there(tmp_path, capsys):
-    assert main(["run", "--floor", "srt_l_room", "--robots", "1", "--policy", "srt", "--out", str(tmp_path), "--json"]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "--floor",
+                "srt_l_room",
+                "--robots",
+                "1",
+                "--policy",
+                "srt",
+                "--out",
+                str(tmp_path),
+                "--json",
+            ]
+        )
+        == 0
+    )
     assert json.loads(capsys.readouterr().out)["ended_because"] == {"robot_0": "reached"}

@@ -7,8 +7,8 @@ import pytest
 import yaml
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, room
 
-from lidarium.mapping.map_files import read_ros_map, write_ros_map
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.files.map_files import read_ros_map, write_ros_map
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.scripts.main import main
 
 ORIGINS = {"west": (-3.0, 2.0, 0.5), "east": (10.0, -4.0, 0.0)}
@@ -29,7 +29,11 @@ def maps(tmp_path):
 
 @pytest.fixture
 def elsewhere(tmp_path):
-    return str(write_ros_map(tmp_path / "in", "elsewhere", room(blank(), 20, 20, 90, 130), (0.0, 0.0, 0.0), RESOLUTION))
+    return str(
+        write_ros_map(
+            tmp_path / "in", "elsewhere", room(blank(), 20, 20, 90, 130), (0.0, 0.0, 0.0), RESOLUTION
+        )
+    )
 
 
 def test_two_maps_are_joined_in_the_ros_frame_of_the_first(maps, tmp_path, capsys):
@@ -37,7 +41,12 @@ def test_two_maps_are_joined_in_the_ros_frame_of_the_first(maps, tmp_path, capsy
     assert main(["merge", *paths, "--out", str(tmp_path / "out"), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads((tmp_path / "out" / "transforms.json").read_text())
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["map.pgm", "map.yaml", "merge.png", "transforms.json"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "map.pgm",
+        "map.yaml",
+        "merge.png",
+        "transforms.json",
+    ]
     assert result["world"] == "west"
     assert result["maps"]["west"] == {"x": 0.0, "y": 0.0, "theta": 0.0, "group": 0}
     place = Transform(*ORIGINS["east"]).apply((8.0, 8.0))
@@ -46,7 +55,19 @@ def test_two_maps_are_joined_in_the_ros_frame_of_the_first(maps, tmp_path, capsy
         distance, angle = Transform(found["x"], found["y"], found["theta"]).difference(truth, place)
         assert distance < 0.05
         assert angle < math.radians(0.5)
-    assert set(pair) == {"a", "b", "accepted", "reason", "x", "y", "theta", "inliers", "score", "overlap_m2", "time_ms"}
+    assert set(pair) == {
+        "a",
+        "b",
+        "accepted",
+        "reason",
+        "x",
+        "y",
+        "theta",
+        "inliers",
+        "score",
+        "overlap_m2",
+        "time_ms",
+    }
     assert pair["accepted"] is True
 
 
@@ -104,7 +125,20 @@ def test_colours_are_read_as_greys_and_equal_names_are_numbered(tmp_path, capsys
 def test_maps_of_one_colour_are_refused(grey, tmp_path, capsys):
     for name in "ab":
         cv2.imwrite(str(tmp_path / f"{name}.png"), np.full((30, 30), grey, np.uint8))
-    assert main(["merge", str(tmp_path / "a.png"), str(tmp_path / "b.png"), "--resolution", "0.05", "--out", str(tmp_path / "out")]) == 3
+    assert (
+        main(
+            [
+                "merge",
+                str(tmp_path / "a.png"),
+                str(tmp_path / "b.png"),
+                "--resolution",
+                "0.05",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 3
+    )
     assert "too few" in capsys.readouterr().out
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lidarium.mapping.map_files import write_ros_map
+from lidarium.mapping.files.map_files import write_ros_map
 from lidarium.scripts.main import main
 
 
@@ -58,12 +58,27 @@ def test_the_figures_are_those_of_the_run(record, tmp_path, capsys):
     again, result = json.loads(told), json.loads((record.parent / "result.json").read_text())
     assert again["same"]
     names = set(again) & set(result)
-    assert {"coverage_final", "time_s", "t85_s", "path_m", "overlap", "collisions", "ended_because", "iou_occupied"} <= names
+    assert {
+        "coverage_final",
+        "time_s",
+        "t85_s",
+        "path_m",
+        "overlap",
+        "collisions",
+        "ended_because",
+        "iou_occupied",
+    } <= names
     assert {name: again[name] for name in names} == {name: result[name] for name in names}
 
 
 def test_a_run_writes_its_record_beside_its_result(record):
-    assert {path.name for path in record.parent.iterdir()} == {"episode.npz", "map.pgm", "map.yaml", "result.json", "run.png"}
+    assert {path.name for path in record.parent.iterdir()} == {
+        "episode.npz",
+        "map.pgm",
+        "map.yaml",
+        "result.json",
+        "run.png",
+    }
 
 
 def test_a_run_that_comes_out_differently_answers_no(record, capsys):
@@ -93,7 +108,24 @@ def test_a_record_of_another_version_is_drawn_but_not_run(record, tmp_path, caps
 
 def test_a_run_can_be_recorded_and_filmed(record, tmp_path):
     out = tmp_path / "out"
-    assert main(["run", "--floor", "in/hall.yaml", "--robots", "1", "--horizon-s", "2", "--video", "--record", "--out", str(out)]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "--floor",
+                "in/hall.yaml",
+                "--robots",
+                "1",
+                "--horizon-s",
+                "2",
+                "--video",
+                "--record",
+                "--out",
+                str(out),
+            ]
+        )
+        == 0
+    )
     assert {"episode.npz", "run.mp4"} <= {path.name for path in out.iterdir()}
     assert main(["replay", str(out / "episode.npz")]) == 0
 

@@ -4,9 +4,9 @@ import pytest
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings import make_settings
-from lidarium.evaluation.result import result_of
-from lidarium.evaluation.runner import run_episode
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.result import result_of
+from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.scripts.main import main
 
 
@@ -14,7 +14,11 @@ from lidarium.scripts.main import main
 def folder(tmp_path):
     env = ExplorationEnv("apartment", make_settings(robots=1, resolution=0.05, horizon_s=20.0))
     result = result_of(run_episode(lidarium.policy("random_walk"), env, 0), "random_walk")
-    lines = [json.dumps({**result, "policy": policy, "seed": seed}) for policy in ("random_walk", "explore_lite") for seed in (0, 1)]
+    lines = [
+        json.dumps({**result, "policy": policy, "seed": seed})
+        for policy in ("random_walk", "explore_lite")
+        for seed in (0, 1)
+    ]
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "episodes.jsonl").write_text("\n".join(lines) + "\n")
     return tmp_path / "in"
@@ -24,13 +28,30 @@ def test_the_report_lies_beside_the_episodes_and_its_figures_are_told(folder, ca
     assert main(["report", str(folder)]) == 0
     told = capsys.readouterr().out
     assert "1 robot, drawn floors" in told
-    assert "careful: 1 robot, drawn floors: fewer than 50 runs of `explore_lite` (2), `random_walk` (2)" in told
+    assert (
+        "careful: 1 robot, drawn floors: fewer than 50 runs of `explore_lite` (2), `random_walk` (2)" in told
+    )
     assert f"written to {folder / 'report'}" in told
     assert (folder / "report" / "report.md").is_file()
 
 
 def test_json_is_what_is_written(folder, tmp_path, capsys):
-    assert main(["report", str(folder), "--out", str(tmp_path / "out"), "--json", "--baseline", "random_walk", "--seed", "5"]) == 0
+    assert (
+        main(
+            [
+                "report",
+                str(folder),
+                "--out",
+                str(tmp_path / "out"),
+                "--json",
+                "--baseline",
+                "random_walk",
+                "--seed",
+                "5",
+            ]
+        )
+        == 0
+    )
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads((tmp_path / "out" / "report.json").read_text())
     assert (result["baseline"], result["seed"]) == ("random_walk", 5)

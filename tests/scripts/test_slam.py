@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from driven_rooms import GEOMETRY, driven, odd_room
 
-from lidarium.mapping.laser_logs import LaserLog, write_npz_log
-from lidarium.mapping.map_files import read_ros_map
-from lidarium.mapping.rigid import composed, relative
-from lidarium.mapping.trajectories import read_tum, write_tum
+from lidarium.mapping.files.laser_logs import LaserLog, write_npz_log
+from lidarium.mapping.files.map_files import read_ros_map
+from lidarium.mapping.files.trajectories import read_tum, write_tum
+from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.scripts.main import main
 
 FILES = ["map.pgm", "map.yaml", "slam.json", "trajectory.tum"]
@@ -30,7 +30,10 @@ def log(run, tmp_path_factory):
     write_npz_log(folder / "run.npz", LaserLog(stamps, ranges, GEOMETRY, odometry))
     write_tum(folder / "true.tum", stamps, run.truth)
     motions = relative(run.truth[:-20], run.truth[20:])
-    rows = [f"{a} {b} {m[0]} {m[1]} 0 0 0 {m[2]}\n" for a, b, m in zip(stamps[:-20], stamps[20:], motions, strict=True)]
+    rows = [
+        f"{a} {b} {m[0]} {m[1]} 0 0 0 {m[2]}\n"
+        for a, b, m in zip(stamps[:-20], stamps[20:], motions, strict=True)
+    ]
     (folder / "true.relations").write_text("".join(rows))
     return folder / "run.npz"
 
@@ -71,7 +74,12 @@ def test_the_robots_poses_are_told_wherever_its_laser_is(run, log, tmp_path, cap
 def carmen(run, count=60):
     lines = []
     for sensing in run.sensings[:count]:
-        numbers = [*np.nan_to_num(sensing.ranges, posinf=80.0).round(3)[30:211], *[0.0] * 3, *sensing.odometry, sensing.time_s]
+        numbers = [
+            *np.nan_to_num(sensing.ranges, posinf=80.0).round(3)[30:211],
+            *[0.0] * 3,
+            *sensing.odometry,
+            sensing.time_s,
+        ]
         lines.append(f"FLASER 181 {' '.join(map(str, numbers))} host {sensing.time_s}\n")
     return lines
 
@@ -110,7 +118,11 @@ def test_the_same_log_gives_the_same_trajectory_to_the_bit(log, tmp_path, capsys
 
 @pytest.mark.parametrize(
     ("content", "word"),
-    [(b"", "no scans"), (b"ODOM 0 0 0 0 0 0 1 h 1\n", "no scans"), (b"FLASER 3 80 80 80 0 0 0 0 0 0 1 h 1\n", "no scan with a return")],
+    [
+        (b"", "no scans"),
+        (b"ODOM 0 0 0 0 0 0 1 h 1\n", "no scans"),
+        (b"FLASER 3 80 80 80 0 0 0 0 0 0 1 h 1\n", "no scan with a return"),
+    ],
 )
 def test_logs_without_anything_to_map_are_refused(content, word, tmp_path, capsys):
     (tmp_path / "run.log").write_bytes(content)

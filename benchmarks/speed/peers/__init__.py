@@ -1,1 +1,4 @@
-"""What the package is compared with. Other simulators are optional: where one is not installed, its lines say so."""
+"""What the package is compared with.
+
+Other simulators are optional: where one is not installed, its lines say so.
+"""

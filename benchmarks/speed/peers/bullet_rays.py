@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 HEIGHT = 0.3
 
 
-def bullet_scan(boxes: NDArray[np.float64], poses: NDArray[np.float64], beams: int, reach: float) -> Callable[[], object] | None:
-    """Return a function that casts the scan of the next pose in one thread; None where PyBullet is not installed.
+def bullet_scan(
+    boxes: NDArray[np.float64], poses: NDArray[np.float64], beams: int, reach: float
+) -> Callable[[], object] | None:
+    """Return a function that casts the scan of the next pose in one thread.
+
+    None where PyBullet is not installed.
 
     Parameters
     ----------
@@ -39,7 +43,9 @@ def bullet_scan(boxes: NDArray[np.float64], poses: NDArray[np.float64], beams: i
     rays = []
     for x, y, theta in poses:
         begins = np.tile([x, y, HEIGHT], (beams, 1))
-        ends = begins + reach * np.stack([np.cos(angles + theta), np.sin(angles + theta), np.zeros(beams)], axis=1)
+        ends = begins + reach * np.stack(
+            [np.cos(angles + theta), np.sin(angles + theta), np.zeros(beams)], axis=1
+        )
         # Lists are what rayTestBatch reads fastest.
         rays.append((begins.tolist(), ends.tolist()))
     count = 0

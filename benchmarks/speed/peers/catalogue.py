@@ -34,7 +34,11 @@ def _is_installed(module: str) -> bool:
 PEERS = (
     Peer("IR-SIM", partial(_is_installed, "irsim"), 'pip install "lidarium[bench]"'),
     Peer("PyBullet", partial(_is_installed, "pybullet"), 'pip install "lidarium[bench]" (Python 3.11)'),
-    Peer("VMAS", vmas_peer.is_there, f"pip install vmas in an environment of its own, and name its interpreter in {vmas_peer.INTERPRETER}"),
+    Peer(
+        "VMAS",
+        vmas_peer.is_there,
+        f"pip install vmas in an environment of its own, and name its interpreter in {vmas_peer.INTERPRETER}",
+    ),
     Peer(
         "f1tenth's scan simulator",
         f1tenth_scans.is_there,

@@ -1,6 +1,7 @@
 """f1tenth's scan simulator as a peer: an outside module, loaded from where the user has put it.
 
-It is not on PyPI. LIDARIUM_F1TENTH names its file, ``gym/f110_gym/envs/laser_models.py`` of the repository f1tenth/f1tenth_gym.
+It is not on PyPI. LIDARIUM_F1TENTH names its file, ``gym/f110_gym/envs/laser_models.py`` of the repository
+f1tenth/f1tenth_gym.
 """
 
 import importlib.util
@@ -14,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.benchmarks.speed.floors import BenchFloor
+from lidarium.benchmarks.speed.scenes.floors import BenchFloor
 
 SOURCE = "LIDARIUM_F1TENTH"
 

@@ -16,10 +16,12 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from lidarium.benchmarks.speed.floors import BenchFloor
+from lidarium.benchmarks.speed.scenes.floors import BenchFloor
 
 
-def fastest_irsim_step(floor: BenchFloor, poses: NDArray[np.float64], shape: str, beams: int, reach: float) -> Callable[[], object] | None:
+def fastest_irsim_step(
+    floor: BenchFloor, poses: NDArray[np.float64], shape: str, beams: int, reach: float
+) -> Callable[[], object] | None:
     """Return a function that steps IR-SIM with one robot, at the pose where it is fastest; None where it is not installed.
 
     Its time depends on what is in the robot's reach, several times over on a grid map.
@@ -39,7 +41,8 @@ def fastest_irsim_step(floor: BenchFloor, poses: NDArray[np.float64], shape: str
     """
     if importlib.util.find_spec("irsim") is None:
         return None
-    # IR-SIM asks matplotlib for a window while it is imported, and tells on standard output that there is none.
+    # IR-SIM asks matplotlib for a window while it is imported, and tells on standard output that there is
+    # none.
     with contextlib.redirect_stdout(io.StringIO()):
         irsim = importlib.import_module("irsim")
 
@@ -56,7 +59,11 @@ def _step(
     reach: float,
 ) -> Callable[[], object]:
     with tempfile.TemporaryDirectory() as folder:
-        env = irsim.make(str(_write_world(Path(folder), floor, pose, shape, beams, reach)), headless=True, log_level="ERROR")
+        env = irsim.make(
+            str(_write_world(Path(folder), floor, pose, shape, beams, reach)),
+            headless=True,
+            log_level="ERROR",
+        )
     action = np.array([[0.2], [0.3]])
     count = 0
 
@@ -76,7 +83,9 @@ def _seconds(step: Callable[[], object]) -> float:
     return time.perf_counter() - began
 
 
-def _write_world(folder: Path, floor: BenchFloor, pose: NDArray[np.float64], shape: str, beams: int, reach: float) -> Path:
+def _write_world(
+    folder: Path, floor: BenchFloor, pose: NDArray[np.float64], shape: str, beams: int, reach: float
+) -> Path:
     rows, columns = floor.solid.shape
     world = {
         "height": rows * floor.resolution,
@@ -109,7 +118,11 @@ def _write_world(folder: Path, floor: BenchFloor, pose: NDArray[np.float64], sha
     else:
         content["obstacle"] = [
             {
-                "shape": {"name": "rectangle", "length": float(x_high - x_low), "width": float(y_high - y_low)},
+                "shape": {
+                    "name": "rectangle",
+                    "length": float(x_high - x_low),
+                    "width": float(y_high - y_low),
+                },
                 "state": [float(x_low + x_high) / 2, float(y_low + y_high) / 2, 0.0],
             }
             for x_low, y_low, x_high, y_high in floor.boxes

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import Array
+from lidarium.mapping.kernels.compilation import Array
 
 
 class PolygonUpdate:
@@ -25,12 +25,22 @@ class PolygonUpdate:
         self.log_odds = np.zeros(shape, np.int8)
         self._hit, self._miss, self._least, self._greatest = (int(value) for value in increments)
 
-    def update(self, x: float, y: float, directions: NDArray[np.float64], lengths: NDArray[np.float64], is_hit: NDArray[np.bool_]) -> None:
+    def update(
+        self,
+        x: float,
+        y: float,
+        directions: NDArray[np.float64],
+        lengths: NDArray[np.float64],
+        is_hit: NDArray[np.bool_],
+    ) -> None:
         """Put in a scan from x, y with beams of these directions (2, beams) and lengths [cells]."""
         rows, columns = self.log_odds.shape
         ends = np.floor(np.stack([x, y]) + (directions * lengths).T).astype(np.int32)
         np.clip(ends, 0, (columns - 1, rows - 1), out=ends)
-        low, high = np.minimum(ends.min(axis=0), (int(x), int(y))), np.maximum(ends.max(axis=0), (int(x), int(y))) + 1
+        low, high = (
+            np.minimum(ends.min(axis=0), (int(x), int(y))),
+            np.maximum(ends.max(axis=0), (int(x), int(y))) + 1,
+        )
         outline = np.concatenate([[(int(x), int(y))], ends]).astype(np.int32) - low.astype(np.int32)
         seen = np.zeros((high[1] - low[1], high[0] - low[0]), np.uint8)
         cv2.fillPoly(seen, [outline], self._miss)
@@ -45,7 +55,9 @@ class PolygonUpdate:
 
 
 @numba.njit
-def update_by_rays(log_odds: Array, x: float, y: float, directions: Array, lengths: Array, is_hit: Array, increments: Array) -> None:
+def update_by_rays(
+    log_odds: Array, x: float, y: float, directions: Array, lengths: Array, is_hit: Array, increments: Array
+) -> None:
     """Put in a scan by walking along every beam: each cell on the way is lowered, the last one is raised."""
     hit, miss, least, greatest = increments[0], increments[1], increments[2], increments[3]
     rows, columns = log_odds.shape
@@ -56,7 +68,9 @@ def update_by_rays(log_odds: Array, x: float, y: float, directions: Array, lengt
         step_column, step_row = (1 if cosine >= 0.0 else -1), (1 if sine >= 0.0 else -1)
         per_column = abs(1.0 / cosine) if cosine != 0.0 else math.inf
         per_row = abs(1.0 / sine) if sine != 0.0 else math.inf
-        to_column = ((column + 1 - x) if cosine >= 0.0 else (x - column)) * per_column if cosine != 0.0 else math.inf
+        to_column = (
+            ((column + 1 - x) if cosine >= 0.0 else (x - column)) * per_column if cosine != 0.0 else math.inf
+        )
         to_row = ((row + 1 - y) if sine >= 0.0 else (y - row)) * per_row if sine != 0.0 else math.inf
         for _ in range(abs(last_column - column) + abs(last_row - row)):
             if 0 <= row < rows and 0 <= column < columns:

@@ -1,13 +1,13 @@
 """Sphere tracing on a distance transform, in the manner of f1tenth's scan simulator.
 
-This is code of our own after its published method, a second yardstick beside the original: directions from a table of 2000 angles, and
-along each beam steps of the distance that the transform of the cell tells, until that is zero or the range is out. Like the
-original it passes through corners now and then.
+This is code of our own after its published method, a second yardstick beside the original: directions from a
+table of 2000 angles, and along each beam steps of the distance that the transform of the cell tells, until
+that is zero or the range is out. Like the original it passes through corners now and then.
 
 References
 ----------
-M. O'Kelly, H. Zheng, D. Karthik and R. Mangharam, F1TENTH: An Open-source Evaluation Environment for Continuous Control and
-Reinforcement Learning, NeurIPS 2019 Competition and Demonstration Track.
+M. O'Kelly, H. Zheng, D. Karthik and R. Mangharam, F1TENTH: An Open-source Evaluation Environment for
+Continuous Control and Reinforcement Learning, NeurIPS 2019 Competition and Demonstration Track.
 """
 
 import math
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from lidarium.benchmarks.speed.floors import BenchFloor
-from lidarium.mapping.kernels import Array
+from lidarium.benchmarks.speed.scenes.floors import BenchFloor
+from lidarium.mapping.kernels.compilation import Array
 
 ANGLES = 2000
 CLOSE = 1e-4
@@ -27,7 +27,14 @@ CLOSE = 1e-4
 
 @numba.njit
 def _distance_at(
-    x: float, y: float, origin_x: float, origin_y: float, cosine: float, sine: float, resolution: float, distances: Array
+    x: float,
+    y: float,
+    origin_x: float,
+    origin_y: float,
+    cosine: float,
+    sine: float,
+    resolution: float,
+    distances: Array,
 ) -> float:
     """Look the distance of a point up in the transform, whose grid may be shifted and turned."""
     rows, columns = distances.shape
@@ -41,7 +48,14 @@ def _distance_at(
 
 @numba.njit
 def _scan(
-    pose: Array, beams: int, field_of_view: float, directions: Array, reach: float, frame: Array, resolution: float, distances: Array
+    pose: Array,
+    beams: int,
+    field_of_view: float,
+    directions: Array,
+    reach: float,
+    frame: Array,
+    resolution: float,
+    distances: Array,
 ) -> Array:
     """Return the ranges of one scan [m]."""
     ranges = np.empty(beams)
@@ -81,7 +95,12 @@ class SphereTracer:
     """
 
     def __init__(self, floor: BenchFloor, beams: int, field_of_view: float, reach: float) -> None:
-        self._beams, self._field_of_view, self._reach, self._resolution = beams, field_of_view, reach, floor.resolution
+        self._beams, self._field_of_view, self._reach, self._resolution = (
+            beams,
+            field_of_view,
+            reach,
+            floor.resolution,
+        )
         self._distances = ndimage.distance_transform_edt(floor.solid == 0) * floor.resolution
         turns = np.linspace(0.0, 2.0 * math.pi, ANGLES)
         self._directions = np.stack([np.cos(turns), np.sin(turns)])
@@ -90,6 +109,13 @@ class SphereTracer:
     def scan(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the ranges at a pose x, y, theta [m, rad], shape (beams,) [m]."""
         ranges: NDArray[np.float64] = _scan(
-            pose, self._beams, self._field_of_view, self._directions, self._reach, self._frame, self._resolution, self._distances
+            pose,
+            self._beams,
+            self._field_of_view,
+            self._directions,
+            self._reach,
+            self._frame,
+            self._resolution,
+            self._distances,
         )
         return ranges

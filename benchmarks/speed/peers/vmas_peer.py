@@ -20,7 +20,8 @@ BATCHES = (1, 32, 128)
 
 _WRONG = f"{INTERPRETER} is {{}}, which gives no answer; want a Python interpreter with vmas and torch"
 
-# glibc otherwise hands VMAS's large temporaries back to the system after every operation, which slows it down.
+# glibc otherwise hands VMAS's large temporaries back to the system after every operation, which slows it
+# down.
 MEMORY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": "20000000000"}
 
 
@@ -49,7 +50,9 @@ def package_version() -> str:
     assert python is not None
     program = "from importlib.metadata import version; print(version('vmas'))"
     try:
-        return subprocess.run([python, "-c", program], capture_output=True, text=True, check=True).stdout.strip()
+        return subprocess.run(
+            [python, "-c", program], capture_output=True, text=True, check=True
+        ).stdout.strip()
     except (OSError, subprocess.CalledProcessError) as error:
         raise ValueError(_WRONG.format(python)) from error
 
@@ -99,7 +102,11 @@ class VmasProcess:
             return
         program = Path(__file__).parent / "outside" / "vmas_program.py"
         self._process = subprocess.Popen(
-            [python, str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, **MEMORY}
+            [python, str(program)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, **MEMORY},
         )
         request = {
             "boxes": boxes.tolist(),
@@ -132,7 +139,9 @@ class VmasProcess:
     def __enter__(self) -> "VmasProcess":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self._process is not None:
             assert self._process.stdin is not None
             self._process.stdin.close()

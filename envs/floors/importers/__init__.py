@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import amrl, arrays, houseexpo, images, kth, lifull, ros_map
-from lidarium.mapping.map_files import check_file
+from lidarium.mapping.files.map_files import check_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,23 +54,24 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     Parameters
     ----------
     path : Path
-        The file: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy array.
+        The file: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy
+        array.
     resolution : float or None
         Side of a pixel [m] where the file does not say it: needed for plain images and numpy arrays.
 
     Returns
     -------
     Floor
-        The floor. Where it comes from pixels or rooms, its largest connected free area is free (of a dungeon: that of the
-        start) and all else is solid. It has starts only if the file has.
+        The floor. Where it comes from pixels or rooms, its largest connected free area is free (of a dungeon:
+        that of the start) and all else is solid. It has starts only if the file has.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        If it is a folder, of no known format, or not what its name says, or if a resolution is missing, not positive, or
-        given for a file that has its own scale.
+        If it is a folder, of no known format, or not what its name says, or if a resolution is missing, not
+        positive, or given for a file that has its own scale.
     """
     path = Path(path)
     check_file(path)

@@ -17,7 +17,10 @@ def matches(path: Path) -> bool:
 
 
 def load(path: Path, resolution: float | None) -> Floor:
-    """Read a vector map; outside of the outer walls is solid. Door leaves drawn as lines are walls."""
+    """Read a vector map; outside of the outer walls is solid.
+
+    Door leaves drawn as lines are walls.
+    """
     refuse_resolution(path, resolution)
     lines = []
     for number, line in enumerate(read_text(path).splitlines(), start=1):
@@ -25,7 +28,9 @@ def load(path: Path, resolution: float | None) -> Floor:
         if not line.strip():
             continue
         if len(words) != 4 or not all(_is_number(word) for word in words):
-            raise ValueError(f"{path}, line {number}: {line[:60]!r} is no wall; want x1, y1, x2, y2 in metres")
+            raise ValueError(
+                f"{path}, line {number}: {line[:60]!r} is no wall; want x1, y1, x2, y2 in metres"
+            )
         lines.append([float(word) for word in words])
     if not lines:
         raise ValueError(f"{path} has no lines; want x1, y1, x2, y2 per wall in metres")

@@ -15,12 +15,17 @@ _FREE_ABOVE = 127
 def load(path: Path, resolution: float | None) -> Floor:
     """Read an array.
 
-    ``.npy`` is an image, row 0 at the top: grey levels (above 127 is free) or booleans (true is solid); it needs a
-    resolution. ``.npz`` holds ``solid`` (row 0 at the lowest y), ``origin`` (x, y) and ``resolution`` [m].
+    ``.npy`` is an image, row 0 at the top: grey levels (above 127 is free) or booleans (true is solid); it
+    needs a resolution. ``.npz`` holds ``solid`` (row 0 at the lowest y), ``origin`` (x, y) and ``resolution``
+    [m].
     """
     try:
         loaded = np.load(path, allow_pickle=False)
-        content = {name: loaded[name] for name in loaded.files} if isinstance(loaded, np.lib.npyio.NpzFile) else np.asarray(loaded)
+        content = (
+            {name: loaded[name] for name in loaded.files}
+            if isinstance(loaded, np.lib.npyio.NpzFile)
+            else np.asarray(loaded)
+        )
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path} is not a numpy array that can be read: {error}") from error
     if isinstance(content, dict):
@@ -41,7 +46,9 @@ def _load_named(path: Path, named: dict[str, NDArray[np.generic]], resolution: f
     origin = np.asarray(named["origin"], dtype=np.float64).ravel()
     side = np.asarray(named["resolution"], dtype=np.float64).ravel()
     if origin.size != 2 or not np.isfinite(origin).all() or side.size != 1 or not 0.0 < side[0] < np.inf:
-        raise ValueError(f"{path} has origin {origin} and resolution {side}; want (x, y) and a positive number in metres")
+        raise ValueError(
+            f"{path} has origin {origin} and resolution {side}; want (x, y) and a positive number in metres"
+        )
     return floor_of_cells(path, named["solid"] == 0, (float(origin[0]), float(origin[1])), float(side[0]))
 
 

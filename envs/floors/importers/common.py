@@ -15,7 +15,8 @@ from lidarium.envs.floors.floor import Floor, Raster, Solid
 # Where a drawing has walls without thickness [m].
 WALL_THICKNESS = 0.1
 
-# Gaps in the outer wall of a drawing that are tried until it is closed [m], and the share of the largest area wanted.
+# Gaps in the outer wall of a drawing that are tried until it is closed [m], and the share of the largest area
+# wanted.
 _GAPS = (0.0, 0.2, 0.5, 1.0, 2.0)
 _CLOSED_SHARE = 0.85
 _OUTLINE_RESOLUTION = 0.02
@@ -83,16 +84,26 @@ def floor_of_cells(
         If no cell, or all, are free, or the seed cell is not.
     """
     if not free.any() or free.all():
-        raise ValueError(f"{path} is {'all free' if free.any() else 'all solid'}; want a floor with free space and walls")
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
-    label = int(labels[seed_cell]) if seed_cell is not None else 1 + int(np.argmax(statistics[1:count, cv2.CC_STAT_AREA]))
+        raise ValueError(
+            f"{path} is {'all free' if free.any() else 'all solid'}; want a floor with free space and walls"
+        )
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats(
+        free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
+    )
+    label = (
+        int(labels[seed_cell])
+        if seed_cell is not None
+        else 1 + int(np.argmax(statistics[1:count, cv2.CC_STAT_AREA]))
+    )
     if label == 0:
         raise ValueError(f"{path} has its start in a wall; want it in free space")
     left, bottom, width, height = (int(value) for value in statistics[label, :4])
     solid = (labels[bottom : bottom + height, left : left + width] != label).astype(np.uint8)
     corner = (origin[0] + left * resolution, origin[1] + bottom * resolution)
     bounds = (*corner, corner[0] + width * resolution, corner[1] + height * resolution)
-    cells = Raster(np.pad(solid, 1, constant_values=1), (corner[0] - resolution, corner[1] - resolution), resolution)
+    cells = Raster(
+        np.pad(solid, 1, constant_values=1), (corner[0] - resolution, corner[1] - resolution), resolution
+    )
     return Floor(floor_name(path), bounds, cells=cells, starts=np.zeros((0, 3)) if starts is None else starts)
 
 
@@ -114,7 +125,11 @@ def floor_of_lines(path: Path, walls: NDArray[np.float64], openings: NDArray[np.
     half = WALL_THICKNESS / 2.0
     bounds = (low[0] - half, low[1] - half, high[0] + half, high[1] + half)
     surroundings = Solid(_box(low - 1.0, high + 1.0), holes=_enclosed(path, everything, low, high))
-    return Floor(floor_name(path), (float(bounds[0]), float(bounds[1]), float(bounds[2]), float(bounds[3])), (surroundings, *solids))
+    return Floor(
+        floor_name(path),
+        (float(bounds[0]), float(bounds[1]), float(bounds[2]), float(bounds[3])),
+        (surroundings, *solids),
+    )
 
 
 def _box(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -126,21 +141,31 @@ def _enclosed(
 ) -> tuple[NDArray[np.float64], ...]:
     """Return the outlines of what the lines enclose, along the middle of the outer walls.
 
-    Drawings have gaps in the outer wall. They are closed by widening the lines, step by step, until nearly as much is
-    enclosed as with the widest. What a smaller widening encloses keeps its finer outline.
+    Drawings have gaps in the outer wall. They are closed by widening the lines, step by step, until nearly as
+    much is enclosed as with the widest. What a smaller widening encloses keeps its finer outline.
     """
     widest = max(_GAPS) + WALL_THICKNESS
     size = high - low + 2.0 * widest
     resolution = max(_OUTLINE_RESOLUTION, float(np.sqrt(size.prod() / _MAX_OUTLINE_CELLS)))
     origin = (float(low[0] - widest), float(low[1] - widest))
     drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
-    fill_shapes(drawn, origin, resolution, [ring_edges(strip(line, WALL_THICKNESS, WALL_THICKNESS / 2.0)) for line in lines], 1)
+    fill_shapes(
+        drawn,
+        origin,
+        resolution,
+        [ring_edges(strip(line, WALL_THICKNESS, WALL_THICKNESS / 2.0)) for line in lines],
+        1,
+    )
     distance = np.asarray(cv2.distanceTransform(1 - drawn, cv2.DIST_L2, 5) * resolution, np.float32)
-    insides = list(itertools.accumulate((_inside(distance, gap / 2.0, resolution) for gap in _GAPS), np.maximum))
+    insides = list(
+        itertools.accumulate((_inside(distance, gap / 2.0, resolution) for gap in _GAPS), np.maximum)
+    )
     areas = [int(inside.sum()) for inside in insides]
     if areas[-1] == 0:
         raise ValueError(f"{path} has no walls that enclose a space; want a floor plan")
-    inside = next(inside for inside, area in zip(insides, areas, strict=True) if area >= _CLOSED_SHARE * areas[-1])
+    inside = next(
+        inside for inside, area in zip(insides, areas, strict=True) if area >= _CLOSED_SHARE * areas[-1]
+    )
     contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     rings = [contour[:, 0, :].astype(np.float64) for contour in contours if len(contour) >= 3]
     return tuple((ring + 0.5) * resolution + origin for ring in rings)

@@ -2,7 +2,8 @@
 
 References
 ----------
-T. Li et al., HouseExpo: A Large-scale 2D Indoor Layout Dataset for Learning-based Algorithms on Mobile Robots, IROS 2020.
+T. Li et al., HouseExpo: A Large-scale 2D Indoor Layout Dataset for Learning-based Algorithms on Mobile
+Robots, IROS 2020.
 """
 
 import json
@@ -24,7 +25,9 @@ def load(path: Path, resolution: float | None) -> Floor:
     except json.JSONDecodeError as error:
         raise ValueError(f"{path} is not JSON: {error}") from error
     if not isinstance(house, dict) or "verts" not in house:
-        raise ValueError(f"{path} has no key verts; want a HouseExpo file, with the corners of its free space in metres")
+        raise ValueError(
+            f"{path} has no key verts; want a HouseExpo file, with the corners of its free space in metres"
+        )
     try:
         corners = np.asarray(house["verts"], dtype=np.float64)
     except (TypeError, ValueError):

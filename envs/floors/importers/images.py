@@ -1,7 +1,8 @@
 """Images as floors: dungeons of the exploration literature, and plain pictures.
 
-Dungeons follow the reading rule of their projects (DRL_robot_exploration, ARiADNE and their kin): 0.1 m a pixel, grey
-above 150 is free, the start is the middle of a yellow block, which is grey 208 where the file has no colours.
+Dungeons follow the reading rule of their projects (DRL_robot_exploration, ARiADNE and their kin): 0.1 m a
+pixel, grey above 150 is free, the start is the middle of a yellow block, which is grey 208 where the file has
+no colours.
 """
 
 from pathlib import Path
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells
-from lidarium.mapping.map_files import read_image
+from lidarium.mapping.files.map_files import read_image
 
 SUFFIXES = (".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff")
 
@@ -45,7 +46,10 @@ def load_dungeon(path: Path, resolution: float | None) -> Floor:
 
 
 def load_image(path: Path, resolution: float | None) -> Floor:
-    """Read a picture: grey above 127 is free; in the greys of map_server (0, 205, 254 alone) 205 is unknown, so solid."""
+    """Read a picture: grey above 127 is free.
+
+    In the greys of map_server (0, 205, 254 alone) 205 is unknown, so solid.
+    """
     if resolution is None:
         raise ValueError(f"{path} is an image without a scale; pass --resolution with its metres per pixel")
     grey = _grey(read_image(path))

@@ -1,12 +1,12 @@
 """KTH campus floors: rooms as contours of walls, windows and portals (XML).
 
-Room contours run along the inner faces of the walls, so the gap between two rooms is the wall. A portal is an open door:
-the gap between its segments on both sides is carved out.
+Room contours run along the inner faces of the walls, so the gap between two rooms is the wall. A portal is an
+open door: the gap between its segments on both sides is carved out.
 
 References
 ----------
-A. Aydemir, P. Jensfelt and J. Folkesson, What can we learn from 38,000 rooms? Reasoning about unexplored space in indoor
-environments, IROS 2012.
+A. Aydemir, P. Jensfelt and J. Folkesson, What can we learn from 38,000 rooms? Reasoning about unexplored
+space in indoor environments, IROS 2012.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -27,7 +27,8 @@ RESOLUTION = 0.025
 # Rooms that touch are parted by a wall of this thickness, half of it in each room [m].
 _THIN_WALL = 0.05
 
-# Facing portals belong together up to this distance, and a portal that faces none opens a wall up to this thickness [m].
+# Facing portals belong together up to this distance, and a portal that faces none opens a wall up to this
+# thickness [m].
 _THICKEST_WALL = 1.5
 _DEEPEST_BREACH = 0.6
 _PARALLEL = 0.9
@@ -50,7 +51,9 @@ def load(path: Path, resolution: float | None) -> Floor:
     low = points.min(axis=0) - _MARGIN
     columns, rows = (int(size) + 1 for size in (points.max(axis=0) + _MARGIN - low) / RESOLUTION)
     if rows * columns > MAX_RASTER_CELLS:
-        raise ValueError(f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_RASTER_CELLS}; check its scale")
+        raise ValueError(
+            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_RASTER_CELLS}; check its scale"
+        )
     origin = (float(low[0]), float(low[1]))
     free = np.zeros((rows, columns), dtype=np.uint8)
     _draw_free_space(free, origin, spaces)
@@ -106,7 +109,9 @@ def _space(path: Path, element: ElementTree.Element, scale: float) -> _Space:
     lines = list(element.iter("linesegment"))
     to_metres = np.array([scale, -scale, scale, -scale])  # y of the drawing points down
     try:
-        segments = np.array([[float(line.attrib[key]) for key in ("x1", "y1", "x2", "y2")] for line in lines]).reshape(-1, 4)
+        segments = np.array(
+            [[float(line.attrib[key]) for key in ("x1", "y1", "x2", "y2")] for line in lines]
+        ).reshape(-1, 4)
     except (KeyError, ValueError):
         segments = np.full((1, 4), np.nan)
     if not np.isfinite(segments).all():
@@ -114,7 +119,9 @@ def _space(path: Path, element: ElementTree.Element, scale: float) -> _Space:
     return _Space(segments * to_metres, tuple(line.get("type", "Wall") for line in lines))
 
 
-def _doorways(spaces: list[_Space], is_free: Callable[[NDArray[np.float64]], bool]) -> list[NDArray[np.float64]]:
+def _doorways(
+    spaces: list[_Space], is_free: Callable[[NDArray[np.float64]], bool]
+) -> list[NDArray[np.float64]]:
     """Return the polygons between facing portals, and through the wall in front of portals that face none.
 
     Portals are paired by place: the names of their targets are often those of rooms elsewhere, or of none.
@@ -150,7 +157,9 @@ def _face(segment: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     return parallel and not beside
 
 
-def _breaches(segment: NDArray[np.float64], is_free: Callable[[NDArray[np.float64]], bool]) -> list[NDArray[np.float64]]:
+def _breaches(
+    segment: NDArray[np.float64], is_free: Callable[[NDArray[np.float64]], bool]
+) -> list[NDArray[np.float64]]:
     """Return the rectangles from a portal to the first free place on either side."""
     middle, along = (segment[:2] + segment[2:]) / 2.0, segment[2:] - segment[:2]
     across = np.array([-along[1], along[0]]) / np.hypot(*along)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells, refuse_resolution
-from lidarium.mapping.map_files import FREE, MapImage, read_ros_map
+from lidarium.mapping.files.map_files import FREE, MapImage, read_ros_map
 
 
 def load(path: Path, resolution: float | None) -> Floor:
@@ -24,13 +24,17 @@ def load(path: Path, resolution: float | None) -> Floor:
 def _turned(image: MapImage, free: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], tuple[float, float], float]:
     """Return the free cells along the axes, with origin and resolution.
 
-    The cells have half the size: walls of one pixel stay 4-connected when turned only if sampled more densely than a
-    cell's diagonal.
+    The cells have half the size: walls of one pixel stay 4-connected when turned only if sampled more densely
+    than a cell's diagonal.
     """
     x, y, yaw = image.origin
     cosine, sine = math.cos(yaw), math.sin(yaw)
     rows, columns = free.shape
-    corners = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]]) * image.resolution @ np.array([[cosine, sine], [-sine, cosine]])
+    corners = (
+        np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]])
+        * image.resolution
+        @ np.array([[cosine, sine], [-sine, cosine]])
+    )
     low, high = corners.min(axis=0), corners.max(axis=0)
     resolution = image.resolution / 2.0
     width, height = (math.ceil(side / resolution) for side in high - low)

@@ -9,11 +9,11 @@ import lidarium
 from lidarium.agents.random_walk import RandomWalk
 from lidarium.agents.supervisor.policy import Supervised, supervised
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.envs.simulation.faults import Fault, FaultSettings
+from lidarium.envs.settings.faults import Fault, FaultSettings
+from lidarium.evaluation.episodes.result import result_of
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.supervision import decision_lines
 from lidarium.evaluation.metrics.merges import transform_error
-from lidarium.evaluation.result import result_of
-from lidarium.evaluation.runner import run_episode
-from lidarium.evaluation.supervision import decision_lines
 
 
 class FirstFrontier:
@@ -25,12 +25,16 @@ class FirstFrontier:
         self.team = team
 
     def act(self, observations):
-        return {agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()}
+        return {
+            agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()
+        }
 
 
 @lru_cache
 def finished(name, robots=2, horizon_s=400.0, **settings):
-    env = lidarium.parallel_env("apartment", robots=robots, known_starts=False, horizon_s=horizon_s, stop_coverage=None, **settings)
+    env = lidarium.parallel_env(
+        "apartment", robots=robots, known_starts=False, horizon_s=horizon_s, stop_coverage=None, **settings
+    )
     return run_episode(lidarium.policy(name), env, seed=0)
 
 
@@ -56,7 +60,10 @@ def test_two_robots_are_joined_rightly_redirected_and_stopped_when_the_floor_is_
 def test_a_team_is_faster_than_robots_alone_and_about_as_fast_as_one_that_is_told_its_starts():
     alone, together = finished("independent"), finished("supervised")
     told = finished("oracle_starts", reveals_starts=True)
-    times = {name: one.env.scorer.times[0.99] for name, one in (("alone", alone), ("together", together), ("told", told))}
+    times = {
+        name: one.env.scorer.times[0.99]
+        for name, one in (("alone", alone), ("together", together), ("told", told))
+    }
     assert times["together"] < 0.7 * times["alone"]
     assert times["together"] <= 1.3 * times["told"]
     assert float(together.env.world.travelled.sum()) < 0.7 * float(alone.env.world.travelled.sum())
@@ -70,12 +77,22 @@ def test_the_same_seed_gives_the_same_decisions():
 
 def test_a_robot_that_dies_is_left_out_and_the_other_goes_on():
     faults = FaultSettings(schedule=(Fault(kind="dead_robot", robot=1, at_s=55.0),))
-    env = lidarium.parallel_env("apartment", robots=2, known_starts=False, horizon_s=90.0, stop_coverage=None, faults=faults)
+    env = lidarium.parallel_env(
+        "apartment", robots=2, known_starts=False, horizon_s=90.0, stop_coverage=None, faults=faults
+    )
     policy = supervised()
     run_episode(policy, env, seed=0)
-    assert {decision.rule for decision in policy.decisions if decision.agent == "robot_1" and decision.time_s > 60.0} == {1}
+    assert {
+        decision.rule
+        for decision in policy.decisions
+        if decision.agent == "robot_1" and decision.time_s > 60.0
+    } == {1}
     assert {"excluded", "dropped"} <= {event.event for event in policy.events}
-    assert {decision.group for decision in policy.decisions if decision.agent == "robot_0" and decision.time_s > 60.0} == {("robot_0",)}
+    assert {
+        decision.group
+        for decision in policy.decisions
+        if decision.agent == "robot_0" and decision.time_s > 60.0
+    } == {("robot_0",)}
     assert env.unwrapped.scorer.coverage > 0.9
 
 

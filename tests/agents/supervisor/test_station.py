@@ -10,7 +10,7 @@ from reported_halls import RADIUS, hall, report
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
-from lidarium.envs.onboard.state import OperatingState
+from lidarium.envs.radio.messages import OperatingState
 from lidarium.mapping.merging.incremental import GrowingMap
 
 FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
@@ -44,7 +44,9 @@ def test_a_join_is_used_only_after_it_was_found_twice(station):
 
 
 def test_a_join_that_maps_contradict_is_dropped_at_once_and_noted(station):
-    station.receive("b", report(GrowingMap(room(blank(320, 320), 20, 20, 90, 130)), 8.0, 8.0, time_s=8.0, frame=None), 8.0)
+    station.receive(
+        "b", report(GrowingMap(room(blank(320, 320), 20, 20, 90, 130)), 8.0, 8.0, time_s=8.0, frame=None), 8.0
+    )
     station.merge(8.0)
     assert station.groups() == [["a"], ["b"]]
     assert [event.event for event in station.events][-1] == "dropped"
@@ -55,7 +57,9 @@ def test_a_map_frame_that_jumps_is_followed(station):
     """After a closure a robot's map may lie elsewhere in its frame: the old transform is refused, and the new one has to be confirmed."""
     for time_s, columns in ((8.0, 170), (10.0, 180), (12.0, 190)):
         jumped = GrowingMap(part(slice(60, 220), SECOND, 1).levels, (2.0, -1.0))
-        station.receive("a", report(part(slice(0, columns), FIRST), 8.0, 8.0, time_s=time_s, frame=None), time_s)
+        station.receive(
+            "a", report(part(slice(0, columns), FIRST), 8.0, 8.0, time_s=time_s, frame=None), time_s
+        )
         station.receive("b", report(jumped, 10.0, 7.0, time_s=time_s, frame=None), time_s)
         station.merge(time_s)
     assert station.groups() == [["a", "b"]]
@@ -96,7 +100,16 @@ def test_mates_of_a_robot_that_fails_learn_once_where_it_drove(station):
     trail = [(8.0, 8.0)] * 3 + [(9.0, 8.0)]
     for time_s in (8.0, 10.0):
         station.receive(
-            "b", report(part(slice(60, 220), SECOND, 1), 9.0, 8.0, time_s=time_s, frame=None, state=OperatingState.FAILED), time_s
+            "b",
+            report(
+                part(slice(60, 220), SECOND, 1),
+                9.0,
+                8.0,
+                time_s=time_s,
+                frame=None,
+                state=OperatingState.FAILED,
+            ),
+            time_s,
         )
         station.merge(time_s)
     [(agent, told)] = station.left_behind

@@ -7,8 +7,8 @@ from reported_halls import RADIUS, RESOLUTION, hall, report
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Supervisor
-from lidarium.envs.onboard.state import OperatingState, OrderKind
-from lidarium.envs.onboard.team_driver import footprint_of
+from lidarium.envs.driving.team_driver import footprint_of
+from lidarium.envs.radio.messages import OperatingState, OrderKind
 from lidarium.mapping.merging.incremental import GrowingMap
 
 WEST, EAST, NORTH = (0.0, 2.0), (7.95, 2.0), (4.0, 3.95)
@@ -31,7 +31,9 @@ def rules(supervisor):
 
 def test_of_two_robots_with_one_goal_the_farther_one_is_sent_to_the_other_opening():
     levels = hall(openings=(WEST, EAST))
-    supervisor, commands = looked({"a": report(levels, 6.5, 2.0, (7.7, 2.0)), "b": report(levels, 5.0, 2.0, (7.7, 2.1))})
+    supervisor, commands = looked(
+        {"a": report(levels, 6.5, 2.0, (7.7, 2.0)), "b": report(levels, 5.0, 2.0, (7.7, 2.1))}
+    )
     assert rules(supervisor) == {"a": (3, None), "b": (3, "go_to")}
     target = commands["b"].target
     assert np.hypot(target.x, target.y - 2.0) < 0.7
@@ -55,7 +57,9 @@ def test_where_there_is_no_other_goal_the_farther_one_stands_by_and_goes_on_when
 
 def test_robots_with_goals_of_their_own_go_on():
     levels = hall(openings=(WEST, EAST))
-    supervisor, commands = looked({"a": report(levels, 6.5, 2.0, (7.7, 2.0)), "b": report(levels, 2.0, 2.0, (0.3, 2.0))})
+    supervisor, commands = looked(
+        {"a": report(levels, 6.5, 2.0, (7.7, 2.0)), "b": report(levels, 2.0, 2.0, (0.3, 2.0))}
+    )
     assert commands == {}
     assert rules(supervisor) == {"a": (0, None), "b": (0, None)}
 
@@ -110,14 +114,18 @@ def test_failed_robots_are_left_out_with_their_maps_and_paused_ones_keep_theirs_
 
 def test_when_all_have_failed_nothing_is_left_to_order():
     levels = hall(openings=(EAST,))
-    supervisor, commands = looked({name: report(levels, 2.0, 2.0, state=OperatingState.FAILED) for name in "ab"})
+    supervisor, commands = looked(
+        {name: report(levels, 2.0, 2.0, state=OperatingState.FAILED) for name in "ab"}
+    )
     assert commands == {}
     assert rules(supervisor) == {"a": (1, None), "b": (1, None)}
     assert supervisor.station.fused(["a", "b"], "a") is None
 
 
 def test_a_robot_that_never_reports_is_noted_once_and_gets_no_orders():
-    supervisor, commands = looked({"a": report(hall(openings=(EAST,)), 6.0, 2.0, (7.7, 2.0))}, agents=["a", "b"])
+    supervisor, commands = looked(
+        {"a": report(hall(openings=(EAST,)), 6.0, 2.0, (7.7, 2.0))}, agents=["a", "b"]
+    )
     supervisor.look(20.0, {})
     assert commands == {}
     assert [(event.event, event.agents) for event in supervisor.station.events] == [("silent", ("b",))]
@@ -137,7 +145,9 @@ def test_maps_that_know_nothing_are_no_maps():
     blank = GrowingMap(np.full((20, 20), 127, np.uint8))
     empty = GrowingMap(np.zeros((0, 0), np.uint8))
     for nothing in (blank, empty):
-        supervisor, commands = looked({"a": report(nothing, 0.5, 0.5), "b": report(hall(openings=(EAST,)), 6.0, 2.0)})
+        supervisor, commands = looked(
+            {"a": report(nothing, 0.5, 0.5), "b": report(hall(openings=(EAST,)), 6.0, 2.0)}
+        )
         assert supervisor.station.groups() == [["b"]]
         assert "a" not in commands
 
@@ -146,7 +156,9 @@ def test_maps_that_know_nothing_are_no_maps():
 def test_all_robots_get_goals_of_their_own_at_once_where_that_is_asked_for(assignment):
     levels = hall(openings=(WEST, EAST, NORTH))
     places = {"a": (6.0, 1.0), "b": (4.0, 2.0), "c": (2.0, 1.0)}
-    supervisor, commands = looked({name: report(levels, *place) for name, place in places.items()}, assignment=assignment)
+    supervisor, commands = looked(
+        {name: report(levels, *place) for name, place in places.items()}, assignment=assignment
+    )
     targets = [(command.target.x, command.target.y) for command in commands.values()]
     assert {decision.rule for decision in supervisor.decisions} == {6}
     assert len(targets) == 3
@@ -176,7 +188,11 @@ def test_a_robot_turns_back_before_its_battery_is_too_low_to_bring_it_home(left,
     station = MergeStation(["a"], RESOLUTION, RADIUS, settings)
     supervisor = Supervisor(station, footprint_of(RADIUS))
     for time_s, way, energy in ((10.0, 0.5, 1000.0), (20.0, 50.0, left)):
-        station.receive("a", report(levels, 6.5, 2.0, (7.7, 2.0), travelled_m=way, energy_left_j=energy, time_s=time_s), time_s)
+        station.receive(
+            "a",
+            report(levels, 6.5, 2.0, (7.7, 2.0), travelled_m=way, energy_left_j=energy, time_s=time_s),
+            time_s,
+        )
         station.merge(time_s)
         supervisor.look(time_s, {})
     assert supervisor.decisions[-1].rule == rule

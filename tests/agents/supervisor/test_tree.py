@@ -8,8 +8,19 @@ import numpy as np
 import pytest
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.tree import HOME, OTHER, RICH, Case, RobotInputs, decide, decision_tree, leaves, tree_data, tree_text
-from lidarium.envs.onboard.state import OperatingState, OrderKind
+from lidarium.agents.supervisor.tree import (
+    HOME,
+    OTHER,
+    RICH,
+    Case,
+    RobotInputs,
+    decide,
+    decision_tree,
+    leaves,
+    tree_data,
+    tree_text,
+)
+from lidarium.envs.radio.messages import OperatingState, OrderKind
 
 TREE = decision_tree(SupervisorSettings())
 WHOLE = decision_tree(SupervisorSettings(avoids_rendezvous=True, returns_home=True, battery_margin=1.5))
@@ -61,9 +72,9 @@ def test_of_two_equally_near_robots_the_first_by_name_keeps_the_goal():
 def test_the_reported_run_diverted_the_nearer_robot_and_the_tree_does_not():
     """The thesis tells of Jade with 0.66 m and Luna with 0.45 m to go.
 
-    Its supervisor diverted Luna, who was nearer; ten seconds later it stopped Jade "because she was farther". By rule 3, which the
-    thesis states, Luna keeps the goal from the start; both readings are kept here so that nobody takes the run for the rule.
-    """
+    Its supervisor diverted Luna, who was nearer; ten seconds later it stopped Jade "because she was farther".
+    By rule 3, which the thesis states, Luna keeps the goal from the start; both readings are kept here so
+    that nobody takes the run for the rule."""
     jade, luna = robot("jade", 0.66), robot("luna", 0.45)
     assert outcome(Case(luna, rival=jade)) == (3, None, "")
     assert outcome(Case(jade, rival=luna)) == (3, OrderKind.GO_TO, OTHER)
@@ -86,13 +97,21 @@ def test_answers_can_be_written_whatever_answered():
 
 
 def test_an_enclosed_robot_is_redirected_where_it_can_be_and_stopped_where_not():
-    assert outcome(Case(robot(), is_behind=True, is_enclosed=True, has_richer_goal=True)) == (4, OrderKind.GO_TO, RICH)
+    assert outcome(Case(robot(), is_behind=True, is_enclosed=True, has_richer_goal=True)) == (
+        4,
+        OrderKind.GO_TO,
+        RICH,
+    )
     assert outcome(Case(robot(), is_behind=True, is_enclosed=True)) == (4, OrderKind.STOP, "")
 
 
 def test_where_no_frontier_is_left_all_stop_whoever_has_which_goal():
     for rival in (None, robot("robot_1", 0.1)):
-        assert outcome(Case(robot(), rival=rival, has_frontier=False, is_behind=True)) == (5, OrderKind.STOP, "")
+        assert outcome(Case(robot(), rival=rival, has_frontier=False, is_behind=True)) == (
+            5,
+            OrderKind.STOP,
+            "",
+        )
 
 
 def test_what_goes_beyond_the_thesis_is_only_in_trees_whose_settings_ask_for_it():
@@ -103,14 +122,23 @@ def test_what_goes_beyond_the_thesis_is_only_in_trees_whose_settings_ask_for_it(
     assert outcome(meeting, WHOLE) == (7, OrderKind.GO_TO, OTHER)
     assert outcome(replace(meeting, has_other_goal=False), WHOLE) == (0, None, "")
     assert outcome(Case(robot(), has_frontier=False), WHOLE) == (8, OrderKind.GO_TO, HOME)
-    assert outcome(Case(robot(), is_battery_low=True, has_frontier=False), WHOLE) == (9, OrderKind.GO_TO, HOME)
+    assert outcome(Case(robot(), is_battery_low=True, has_frontier=False), WHOLE) == (
+        9,
+        OrderKind.GO_TO,
+        HOME,
+    )
 
 
 def test_every_answer_is_told_with_the_decision():
     leaf, answers = decide(TREE, Case(robot("robot_1", 2.0), rival=robot()))
     assert answers == [
-        ("failed", False), ("operating", True), ("frontier", True), ("same_goal", True), ("nearer", False), ("other_goal", True)
-    ]  # fmt: skip
+        ("failed", False),
+        ("operating", True),
+        ("frontier", True),
+        ("same_goal", True),
+        ("nearer", False),
+        ("other_goal", True),
+    ]
     assert leaf.rule == 3
 
 

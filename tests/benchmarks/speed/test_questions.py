@@ -7,13 +7,14 @@ import sys
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.speed import batches, cached_start, waypoint_decision
-from lidarium.benchmarks.speed.batches import DrivenBatch
-from lidarium.benchmarks.speed.floors import straight_floor
+from lidarium.benchmarks.speed.cases import cached_start, waypoint_decision
+from lidarium.benchmarks.speed.cases.waypoint_decision import Deciders
+from lidarium.benchmarks.speed.harness import batches
+from lidarium.benchmarks.speed.harness.batches import DrivenBatch
+from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.benchmarks.speed.peers.catalogue import PEERS, missing_peers
 from lidarium.benchmarks.speed.profile_step import OBSERVATION, REST, WHOLE, profile, profile_page
-from lidarium.benchmarks.speed.timing import Effort
-from lidarium.benchmarks.speed.waypoint_decision import Deciders
+from lidarium.benchmarks.speed.scenes.floors import straight_floor
 
 LEAST = Effort(rounds=1, block_s=0.0)
 
@@ -25,7 +26,9 @@ def few_episodes(monkeypatch):
 
 
 def test_the_kernel_alone_takes_the_steps_of_the_whole(few_episodes):
-    whole, kernel = (DrivenBatch(straight_floor(), 1, lidar="lidar_360_6m", resolution=0.05) for _ in range(2))
+    whole, kernel = (
+        DrivenBatch(straight_floor(), 1, lidar="lidar_360_6m", resolution=0.05) for _ in range(2)
+    )
     for batch in (whole, kernel):
         batch.start(3)
     began = whole.poses.copy()
@@ -76,7 +79,14 @@ def test_nothing_but_the_temporary_folder_takes_files_in_the_read_only_environme
         "import lidarium, os; from lidarium.mapping import files, kernels; from pathlib import Path; "
         "print(lidarium.__file__, kernels._FOLDER, files.is_writable(files.user_cache_folder()), sep=os.linesep)"
     )
-    told = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True, cwd=tmp_path)
+    told = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+    )
     package, folder, has_home = told.stdout.splitlines()
     assert package.startswith(str(tmp_path / "package"))
     assert folder.startswith(str(tmp_path / "temporary") + os.sep)

@@ -6,7 +6,11 @@ import pytest
 import lidarium
 from lidarium.envs.batch.vector_env import ExplorationVectorEnv
 
-SMALL = {"lidar": "lidar_360_6m", "map_cells": 64, "observe": ["scan", "pose", "velocity", "bumper", "map", "egocentric_map"]}
+SMALL = {
+    "lidar": "lidar_360_6m",
+    "map_cells": 64,
+    "observe": ["scan", "pose", "velocity", "bumper", "map", "egocentric_map"],
+}
 
 
 def draw_actions(generator, level, rows, observations):
@@ -24,7 +28,8 @@ class Alone:
 
     def reset(self, seed):
         return [
-            env.reset(seed=seed + k, options={"floor": floor}) for k, (env, floor) in enumerate(zip(self.envs, self.floors, strict=True))
+            env.reset(seed=seed + k, options={"floor": floor})
+            for k, (env, floor) in enumerate(zip(self.envs, self.floors, strict=True))
         ]
 
     def step(self, actions):
@@ -32,7 +37,9 @@ class Alone:
         results, row = [], 0
         for env in self.envs:
             own = dict(zip(env.possible_agents, actions[row : row + len(env.possible_agents)], strict=True))
-            results.append(env.step({agent: own[agent] for agent in env.agents}) if env.agents else env.reset())
+            results.append(
+                env.step({agent: own[agent] for agent in env.agents}) if env.agents else env.reset()
+            )
             row += len(own)
         return results
 
@@ -82,7 +89,9 @@ def compare_rows(level, threads, steps, floors, robots=2, seed=11, **options):
                     check_observation(observations, row, {name: array[row] for name, array in last.items()})
                 assert rewards[row] == gains.get(agent, 0.0)
                 assert terminated[row] == ended.get(agent, False)
-                assert truncated[row] == (cut[agent] if agent in own and cut else agent not in own and is_over)
+                assert truncated[row] == (
+                    cut[agent] if agent in own and cut else agent not in own and is_over
+                )
                 ends += int(terminated[row] or (truncated[row] and agent in own))
     return ends
 

@@ -3,8 +3,8 @@
 import pytest
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.simulation.faults import FaultSettings
-from lidarium.envs.simulation.radio import RadioSettings
+from lidarium.envs.settings.faults import FaultSettings
+from lidarium.envs.settings.radio import RadioSettings
 
 FLOORS = ("apartment", "building:3", "clinic", "building:17", "scene_room")
 CLOSET = Floor("closet", (0.0, 0.0, 2.0, 1.6))

@@ -10,7 +10,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.settings.lidar import Lidar
 
 STATUS = Path("/proc/self/statm")
 CLOSET = Floor("closet", (0.0, 0.0, 2.0, 1.6))
@@ -25,9 +25,9 @@ FEW = {
 def memory():
     """Blocks that Python holds, and pages that the process holds, which is also what kernels allocate.
 
-    Without the names of attributes that the interpreter's method cache keeps: extension modules that look an attribute up by a C
-    string make its name anew each time, and the cache fills its 4,096 entries with them by chance, some hundreds in a thousand resets.
-    """
+    Without the names of attributes that the interpreter's method cache keeps: extension modules that look an
+    attribute up by a C string make its name anew each time, and the cache fills its 4,096 entries with them
+    by chance, some hundreds in a thousand resets."""
     gc.collect()
     sys._clear_type_cache()
     return np.array([sys.getallocatedblocks(), int(STATUS.read_text().split()[1])])

@@ -3,7 +3,17 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-FLOORS = ("apartment", "clinic", "scene_room", "scene_corridor", "building:3", "building:5", "building:8", "apartment:2", "office:6")
+FLOORS = (
+    "apartment",
+    "clinic",
+    "scene_room",
+    "scene_corridor",
+    "building:3",
+    "building:5",
+    "building:8",
+    "apartment:2",
+    "office:6",
+)
 
 
 @settings(max_examples=12, derandomize=True, database=None)
@@ -16,7 +26,11 @@ FLOORS = ("apartment", "clinic", "scene_room", "scene_corridor", "building:3", "
     threads=st.integers(1, 2),
     horizon_s=st.sampled_from([0.4, 600.0]),
     stop_on_contact=st.booleans(),
-    observe=st.lists(st.sampled_from(["scan", "pose", "velocity", "bumper", "map", "egocentric_map"]), min_size=1, unique=True),
+    observe=st.lists(
+        st.sampled_from(["scan", "pose", "velocity", "bumper", "map", "egocentric_map"]),
+        min_size=1,
+        unique=True,
+    ),
 )
 def test_rows_are_the_robots_of_parallel_environments(compare, floors, robots, seed, threads, **options):
     compare("velocity", threads, 8, floors, robots, seed, **options)

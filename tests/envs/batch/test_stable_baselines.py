@@ -8,18 +8,24 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.settings import OBSERVABLES
-from lidarium.envs.simulation.lidar import Lidar
+from lidarium.envs.settings.exploration import OBSERVABLES
+from lidarium.envs.settings.lidar import Lidar
 
-stable_baselines3 = pytest.importorskip("stable_baselines3", reason='stable-baselines3 is not installed: pip install "lidarium[rl]"')
-sb3_contrib = pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: pip install "lidarium[rl]"')
+stable_baselines3 = pytest.importorskip(
+    "stable_baselines3", reason='stable-baselines3 is not installed: pip install "lidarium[rl]"'
+)
+sb3_contrib = pytest.importorskip(
+    "sb3_contrib", reason='sb3-contrib is not installed: pip install "lidarium[rl]"'
+)
 
 import torch  # noqa: E402
 from sb3_contrib.common.maskable.utils import get_action_masks, is_masking_supported  # noqa: E402
 from stable_baselines3.common.env_checker import check_env  # noqa: E402
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize  # noqa: E402
 
-ROOM = Floor("room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),))
+ROOM = Floor(
+    "room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),)
+)
 FEW = {
     "lidar": Lidar(beams=36, field_of_view=2.0 * math.pi, range_max=6.0),
     "observe": ["scan", "pose"],
@@ -57,7 +63,9 @@ def test_rows_are_those_of_the_vector_environment_but_for_the_time_of_the_reset(
         for name, array in wanted.items():
             assert np.array_equal(observations[name], array), name
         if level == "frontier":
-            actions = np.array([generator.choice(np.flatnonzero(mask)) for mask in observations["action_mask"]])
+            actions = np.array(
+                [generator.choice(np.flatnonzero(mask)) for mask in observations["action_mask"]]
+            )
         else:
             actions = generator.uniform(-1.0, 1.0, (6, 2)).astype(np.float32)
         observations, rewards, dones, infos = both[0].step(actions)
@@ -69,7 +77,9 @@ def test_rows_are_those_of_the_vector_environment_but_for_the_time_of_the_reset(
             assert info["TimeLimit.truncated"] == truncated[row]
             assert np.array_equal(info["truth"]["pose"], told["truth"]["pose"][row])
             assert ("terminal_observation" in info) == dones[row]
-            assert info.get("ended_because") == (told["ended_because"][row] if "ended_because" in told else None)
+            assert info.get("ended_because") == (
+                told["ended_because"][row] if "ended_because" in told else None
+            )
             if dones[row]:
                 assert_row(wanted, row, info["terminal_observation"])
         ends += int(dones.sum())
@@ -110,14 +120,20 @@ def test_the_horizon_truncates_and_an_ending_does_not():
     cut = lidarium.sb3_vec_env(1, ROOM, **{**FEW, "horizon_s": 0.2, "stop_coverage": None})
     cut.reset()
     _, _, dones, infos = cut.step(np.zeros((1, 2)))
-    assert (dones[0], infos[0]["TimeLimit.truncated"], "terminal_observation" in infos[0]) == (False, False, False)
+    assert (dones[0], infos[0]["TimeLimit.truncated"], "terminal_observation" in infos[0]) == (
+        False,
+        False,
+        False,
+    )
     _, _, dones, infos = cut.step(np.zeros((1, 2)))
     assert dones[0]
     assert (infos[0]["ended_because"], infos[0]["TimeLimit.truncated"]) == ("horizon", True)
 
 
 def test_a_robot_that_ends_early_is_done_and_then_masked_until_its_episode_begins_anew():
-    envs = lidarium.sb3_vec_env(1, ROOM, **{**FEW, "robots": 2, "stop_on_contact": True, "horizon_s": 3.0, "stop_coverage": None})
+    envs = lidarium.sb3_vec_env(
+        1, ROOM, **{**FEW, "robots": 2, "stop_on_contact": True, "horizon_s": 3.0, "stop_coverage": None}
+    )
     envs.set_options({"starts": [(4.2, 3.0, 0.0), (1.0, 1.0, math.pi / 2)]})
     envs.reset()
     steps = []
@@ -126,13 +142,22 @@ def test_a_robot_that_ends_early_is_done_and_then_masked_until_its_episode_begin
         steps.append(({name: array.copy() for name, array in observations.items()}, rewards, dones, infos))
     end = next(k for k, step in enumerate(steps) if step[2][0])
     observations, rewards, dones, infos = steps[end]
-    assert (infos[0]["ended_because"], infos[0]["TimeLimit.truncated"], infos[0]["active"]) == ("collision", False, True)
+    assert (infos[0]["ended_because"], infos[0]["TimeLimit.truncated"], infos[0]["active"]) == (
+        "collision",
+        False,
+        True,
+    )
     assert rewards[0] != 0.0
     assert_row(observations, 0, infos[0]["terminal_observation"])
     last = infos[0]["terminal_observation"]
     for observations, rewards, dones, infos in steps[end + 1 : 29]:
         assert_row(observations, 0, last)
-        assert (rewards[0], infos[0]["active"], infos[1]["active"], list(dones)) == (0.0, False, True, [False, False])
+        assert (rewards[0], infos[0]["active"], infos[1]["active"], list(dones)) == (
+            0.0,
+            False,
+            True,
+            [False, False],
+        )
         assert "terminal_observation" not in infos[0]
     observations, rewards, dones, infos = steps[29]
     assert list(dones) == [True, True]
@@ -166,7 +191,9 @@ def test_options_are_for_all_episodes_for_each_or_for_each_row():
     assert [floor.name for floor in envs.batch.floors] == ["apartment", "room"]
     envs.reset()
     assert [floor.name for floor in envs.batch.floors] == ["room", "room"]
-    with pytest.raises(ValueError, match="options has 2 entries; want one dict, or one for each of the 4 rows"):
+    with pytest.raises(
+        ValueError, match="options has 2 entries; want one dict, or one for each of the 4 rows"
+    ):
         envs.set_options([{}, {}])
     with pytest.raises(ValueError, match=r"option starts has shape \(1, 3\); want \(2, 3\)"):
         envs.set_options({"starts": [(1.0, 1.0, 0.0)]})
@@ -219,7 +246,8 @@ def test_the_level_of_frontiers_has_masks_of_actions():
         assert not is_masking_supported(lidarium.sb3_vec_env(1, ROOM, level=level, **FEW))
 
 
-# The checker would rather have the table of frontiers (16, 4) flat; the networks of its policies flatten it themselves.
+# The checker would rather have the table of frontiers (16, 4) flat; the networks of its policies flatten it
+# themselves.
 @pytest.mark.filterwarnings("ignore:Your observation frontiers has an unconventional shape:UserWarning")
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.parametrize("observe", [["scan", "pose"], OBSERVABLES])
@@ -244,12 +272,22 @@ def assert_trains(algorithm, env, steps=2_000, **options):
 @pytest.mark.parametrize(("algorithm", "options"), [("PPO", PPO_FEW), ("SAC", SAC_FEW)])
 @pytest.mark.parametrize("is_batch", [True, False])
 def test_stable_baselines_algorithms_train(algorithm, options, is_batch):
-    env = VecMonitor(lidarium.sb3_vec_env(4, ROOM, **FEW)) if is_batch else gymnasium.make("lidarium/Exploration-v0", floor=ROOM, **FEW)
+    env = (
+        VecMonitor(lidarium.sb3_vec_env(4, ROOM, **FEW))
+        if is_batch
+        else gymnasium.make("lidarium/Exploration-v0", floor=ROOM, **FEW)
+    )
     assert_trains(getattr(stable_baselines3, algorithm), env, **options)
 
 
 def test_teams_train_on_an_egocentric_map_and_normalised_rewards():
-    options = {**FEW, "robots": 2, "observe": ["velocity", "egocentric_map"], "egocentric_cells": 36, "stop_on_contact": True}
+    options = {
+        **FEW,
+        "robots": 2,
+        "observe": ["velocity", "egocentric_map"],
+        "egocentric_cells": 36,
+        "stop_on_contact": True,
+    }
     env = VecNormalize(VecMonitor(lidarium.sb3_vec_env(2, ROOM, **options)), norm_obs=False)
     assert_trains(stable_baselines3.PPO, env, 256, n_steps=64, batch_size=128, n_epochs=1)
 

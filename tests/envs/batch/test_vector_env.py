@@ -13,15 +13,17 @@ from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 import lidarium
 from lidarium.envs.batch.vector_env import ExplorationVectorEnv
-from lidarium.envs.floors import catalogue
-from lidarium.envs.floors.catalogue import load_floor
+from lidarium.envs.floors.catalogue import names as catalogue
+from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.settings import make_settings
-from lidarium.envs.simulation.lidar import Lidar
-from lidarium.mapping.kernels import available_threads
-from lidarium.mapping.scans import MOST_BEAMS
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.mapping.grids.scan_geometry import MOST_BEAMS
+from lidarium.mapping.kernels.compilation import available_threads
 
-ROOM = Floor("room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),))
+ROOM = Floor(
+    "room", (0.0, 0.0, 5.0, 4.0), (Solid(np.array([(2.4, 0.0), (2.6, 0.0), (2.6, 2.8), (2.4, 2.8)])),)
+)
 COARSE = Lidar(beams=36, field_of_view=2.0 * math.pi, range_max=6.0)
 FEW = {"lidar": COARSE, "observe": ["scan", "pose"], "robots": 1, "threads": 1}
 IDS = {"velocity": "Exploration", "waypoint": "WaypointExploration", "frontier": "FrontierExploration"}
@@ -44,13 +46,27 @@ def without_masks(infos):
 
 @pytest.mark.parametrize("level", IDS)
 def test_one_robot_an_episode_is_as_in_gymnasiums_own_vector_environment(level):
-    options = {"floor": ROOM, "horizon_s": 1.5, "decision_period_s": 0.3, "lidar": COARSE, "map_cells": 32, "threads": 1}
+    options = {
+        "floor": ROOM,
+        "horizon_s": 1.5,
+        "decision_period_s": 0.3,
+        "lidar": COARSE,
+        "map_cells": 32,
+        "threads": 1,
+    }
     batch = gymnasium.make_vec(f"lidarium/{IDS[level]}-v0", 3, **options)
     oracle = gymnasium.make_vec(f"lidarium/{IDS[level]}-v0", 3, vectorization_mode="sync", **options)
     assert isinstance(batch, ExplorationVectorEnv)
     assert batch.spec.id == oracle.spec.id
     assert batch.metadata["autoreset_mode"] is oracle.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-    for name in ("observation_space", "single_observation_space", "action_space", "single_action_space", "num_envs", "render_mode"):
+    for name in (
+        "observation_space",
+        "single_observation_space",
+        "action_space",
+        "single_action_space",
+        "num_envs",
+        "render_mode",
+    ):
         assert getattr(batch, name) == getattr(oracle, name)
     batch.action_space.seed(3)
     told, wanted = batch.reset(seed=7), oracle.reset(seed=7)
@@ -206,7 +222,11 @@ def test_goals_are_for_all_or_for_each_episode():
     assert "goal" in batch.single_observation_space.spaces
     start = np.array([[1.5, 1.5, 0.0]])
     one, another = (2.0, 3.0), (3.0, 2.0)
-    for goal, wanted in ((one, [one, one]), ([one, another], [one, another]), ([None, another], [floor.goal, another])):
+    for goal, wanted in (
+        (one, [one, one]),
+        ([one, another], [one, another]),
+        ([None, another], [floor.goal, another]),
+    ):
         observations, _ = batch.reset(options={"goal": goal, "starts": start})
         away = observations["goal"] - observations["pose"][:, :2]
         assert np.allclose(away, np.array(wanted) - start[0, :2], atol=1e-5)
@@ -232,7 +252,10 @@ def test_floors_of_different_sizes_and_of_cells_of_different_sizes_are_in_one_ba
 def test_of_a_set_each_beginning_draws_a_floor(monkeypatch):
     monkeypatch.setattr(catalogue, "SETS", {"train": (5, 3)})
     options = {"horizon_s": 0.1, **FEW}
-    batch, alone = lidarium.vector_env(4, "set:train", **options), lidarium.parallel_env("set:train", **options)
+    batch, alone = (
+        lidarium.vector_env(4, "set:train", **options),
+        lidarium.parallel_env("set:train", **options),
+    )
     batch.reset(seed=2)
     alone.reset(seed=5)
     seen = []
@@ -242,7 +265,9 @@ def test_of_a_set_each_beginning_draws_a_floor(monkeypatch):
         alone.reset()
         for _ in range(2):
             batch.step(np.zeros((4, 2)))
-    assert {name for names in seen for name in names} == {load_floor(f"building:{seed}").name for seed in (5, 6, 7)}
+    assert {name for names in seen for name in names} == {
+        load_floor(f"building:{seed}").name for seed in (5, 6, 7)
+    }
 
 
 def test_a_list_has_a_seed_for_each_episode():
@@ -264,7 +289,11 @@ def test_observations_are_new_arrays_or_two_sets_that_take_turns():
     kept = {name: array.copy() for name, array in first.items()}
     returned = [first] + [fresh.step(np.ones((2, 2)))[0] for _ in range(4)]
     assert_same(first, kept)
-    assert not any(np.shares_memory(one["scan"], other["scan"]) for k, one in enumerate(returned) for other in returned[:k])
+    assert not any(
+        np.shares_memory(one["scan"], other["scan"])
+        for k, one in enumerate(returned)
+        for other in returned[:k]
+    )
     turning = lidarium.vector_env(2, ROOM, copy=False, **FEW)
     reused = [turning.reset(seed=0)[0]]
     last = {name: array.copy() for name, array in reused[0].items()}
@@ -290,7 +319,9 @@ def test_copies_in_mid_episode_go_on_alike(duplicate):
 
 
 def test_gymnasiums_wrappers_of_vector_environments_work_on_it():
-    batch = DictInfoToList(RecordEpisodeStatistics(lidarium.vector_env(2, ROOM, level="waypoint", horizon_s=2.0, **FEW)))
+    batch = DictInfoToList(
+        RecordEpisodeStatistics(lidarium.vector_env(2, ROOM, level="waypoint", horizon_s=2.0, **FEW))
+    )
     _, infos = batch.reset(seed=0)
     total = np.zeros(2)
     for _ in range(30):
@@ -333,7 +364,10 @@ def test_a_closed_environment_and_one_without_reset_say_what_to_do():
         ({"episodes": True}, "number of episodes is True"),
         ({"episodes": 2, "level": "joint"}, "level is 'joint'; want velocity, waypoint or frontier"),
         ({"episodes": 2, "render_mode": "human"}, "a batch is not drawn"),
-        ({"episodes": 2, "floor": ["apartment", "clinic"]}, r"floor is \['apartment', 'clinic'\]; want a name"),
+        (
+            {"episodes": 2, "floor": ["apartment", "clinic"]},
+            r"floor is \['apartment', 'clinic'\]; want a name",
+        ),
         ({"episodes": 2, "floor": "apartmnt"}, "did you mean 'apartment'"),
         ({"episodes": 2, "resolution": 0.03}, "want a whole multiple of raster_resolution 0.025 m"),
         ({"episodes": 2, "robots": 0}, "robots is 0"),
@@ -362,7 +396,11 @@ def test_make_vec_refuses_teams_and_none():
         (None, {"episodes": [True, False]}, "want a mask of 3 booleans"),
         (None, {"episodes": [0, 1, 1]}, "want a mask of 3 booleans"),
         (None, {"episodes": [False] * 3}, "at least one of them True"),
-        (None, {"floor": ["apartment", "clinic"]}, "option floor has 2 entries; want one for all, or one for each of the 3 episodes"),
+        (
+            None,
+            {"floor": ["apartment", "clinic"]},
+            "option floor has 2 entries; want one for all, or one for each of the 3 episodes",
+        ),
         (None, {"floor": 17}, "floor is 17; want a name"),
         (None, {"floor": "clinc"}, "did you mean 'clinic'"),
         (None, {"starts": np.zeros((2, 1, 3))}, "option starts has 2 entries"),
@@ -388,12 +426,20 @@ def test_resets_that_cannot_be_are_refused_and_change_nothing(seed, options, wor
     [
         ("velocity", np.zeros((2, 2)), r"actions have shape \(2, 2\); want \(3, 2\)"),
         ("velocity", np.zeros(6), r"actions have shape \(6,\); want \(3, 2\)"),
-        ("velocity", [[0.0, 0.0], [0.0, math.nan], [0.0, 0.0]], r"the action of row 1 is \[ *0. *nan\], nan or infinite; want two finite"),
+        (
+            "velocity",
+            [[0.0, 0.0], [0.0, math.nan], [0.0, 0.0]],
+            r"the action of row 1 is \[ *0. *nan\], nan or infinite; want two finite",
+        ),
         ("waypoint", [[0.0, 0.0], [0.0, 0.0], [math.inf, 0.0]], "the action of row 2 is .*nan or infinite"),
         ("waypoint", [[0.0, 0.0], [0.0], [0.0, 0.0]], r"actions are .*; want an array \(3, 2\)"),
         ("velocity", [["a", "b"]] * 3, "actions are of type <U1; want two finite numbers"),
         ("velocity", None, "actions is None; want an action for each row"),
-        ("frontier", np.zeros((3, 2)), r"actions have shape \(3, 2\); want \(3,\): a whole number from 0 to 16"),
+        (
+            "frontier",
+            np.zeros((3, 2)),
+            r"actions have shape \(3, 2\); want \(3,\): a whole number from 0 to 16",
+        ),
         ("frontier", [0, 17, 0], "the action of row 1 is 17; want a whole number from 0 to 16, 16 to stay"),
         ("frontier", [0, 0, -1], "the action of row 2 is -1"),
         ("frontier", [0.0, 0.5, 0.0], "the action of row 1 is 0.5"),
@@ -420,7 +466,14 @@ def test_actions_of_rows_that_do_not_act_are_ignored():
 @pytest.mark.parametrize("threads", [1, 2])
 def test_scans_of_as_many_beams_as_there_may_be_find_room_on_the_stacks_of_all_threads(threads):
     lidar = Lidar(beams=MOST_BEAMS, field_of_view=2.0 * math.pi, range_max=12.0, noise_floor=0.01)
-    batch = lidarium.vector_env(8, "apartment", lidar=lidar, observe=["scan", "egocentric_map"], egocentric_cells=1024, threads=threads)
+    batch = lidarium.vector_env(
+        8,
+        "apartment",
+        lidar=lidar,
+        observe=["scan", "egocentric_map"],
+        egocentric_cells=1024,
+        threads=threads,
+    )
     batch.reset(seed=0)
     for _ in range(2):
         observations, _, _, _, infos = batch.step(batch.action_space.sample())

@@ -38,7 +38,9 @@ def test_rasters_are_padded_to_eight_with_a_solid_ring_and_an_origin_on_the_latt
     assert all(abs(value / 0.1 - round(value / 0.1)) < 1e-9 for value in raster.origin)
     for edge in (raster.solid[0], raster.solid[-1], raster.solid[:, 0], raster.solid[:, -1]):
         assert edge.all()
-    inside = (centres(raster) > np.subtract([-3.33, 7.77], 1e-9)).all(axis=-1) & (centres(raster) < np.add([2.1, 9.99], 1e-9)).all(axis=-1)
+    inside = (centres(raster) > np.subtract([-3.33, 7.77], 1e-9)).all(axis=-1) & (
+        centres(raster) < np.add([2.1, 9.99], 1e-9)
+    ).all(axis=-1)
     np.testing.assert_array_equal(raster.solid == 0, inside)
 
 
@@ -53,13 +55,24 @@ def test_a_cell_is_solid_if_its_centre_is_in_a_thick_solid(points, resolution):
     # A star around the middle is simple; a hole keeps it from being drawn as a thin wall.
     polygon = points[np.argsort(np.arctan2(*(points - middle).T))]
     hole = rectangle(4.0, 4.0, 1.0, 1.0)
-    raster = Floor("star", (0.0, 0.0, 3.0, 3.0), (Solid(polygon, holes=(hole,)),)).raster(resolution, 0.0, 1.0)
+    raster = Floor("star", (0.0, 0.0, 3.0, 3.0), (Solid(polygon, holes=(hole,)),)).raster(
+        resolution, 0.0, 1.0
+    )
     at = centres(raster)
-    want = Outline(np.vstack([polygon, polygon[:1]]), closed=True).contains_points(at.reshape(-1, 2)).reshape(raster.solid.shape)
+    want = (
+        Outline(np.vstack([polygon, polygon[:1]]), closed=True)
+        .contains_points(at.reshape(-1, 2))
+        .reshape(raster.solid.shape)
+    )
     edges = np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)
     along = edges[:, 1] - edges[:, 0]
-    share = np.clip(((at[..., None, :] - edges[:, 0]) * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-12), 0.0, 1.0)
-    clear = np.hypot(*np.moveaxis(at[..., None, :] - edges[:, 0] - share[..., None] * along, -1, 0)).min(axis=-1) > 1e-6
+    share = np.clip(
+        ((at[..., None, :] - edges[:, 0]) * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-12), 0.0, 1.0
+    )
+    clear = (
+        np.hypot(*np.moveaxis(at[..., None, :] - edges[:, 0] - share[..., None] * along, -1, 0)).min(axis=-1)
+        > 1e-6
+    )
     within = ((at > 0.0) & (at < 3.0)).all(axis=-1)
     np.testing.assert_array_equal(raster.solid[within & clear] == 1, want[within & clear])
 
@@ -90,12 +103,19 @@ def test_no_ray_slips_through_a_thin_wall_however_it_is_turned(turn, thickness, 
 def test_a_thin_bent_wall_is_closed():
     outside = np.array([[0.0, 0.7], [1.303, 0.7], [1.303, 2.0]])
     inside = np.array([[1.3, 2.0], [1.3, 0.703], [0.0, 0.703]])
-    free = Floor("bent", (0.0, 0.0, 2.0, 2.0), (Solid(np.vstack([outside, inside])),)).raster(0.05, 0.0, 1.0).solid == 0
+    free = (
+        Floor("bent", (0.0, 0.0, 2.0, 2.0), (Solid(np.vstack([outside, inside])),))
+        .raster(0.05, 0.0, 1.0)
+        .solid
+        == 0
+    )
     assert ndimage.label(free, structure=np.ones((3, 3)))[1] == 2
 
 
 def test_a_solid_smaller_than_a_cell_leaves_a_mark():
-    raster = Floor("leg", (0.0, 0.0, 1.0, 1.0), (Solid(rectangle(0.501, 0.501, 0.004, 0.004)),)).raster(0.05, 0.0, 1.0)
+    raster = Floor("leg", (0.0, 0.0, 1.0, 1.0), (Solid(rectangle(0.501, 0.501, 0.004, 0.004)),)).raster(
+        0.05, 0.0, 1.0
+    )
     assert (raster.solid == 0).sum() == 20 * 20 - 1
 
 
@@ -125,7 +145,9 @@ def test_outside_of_an_image_is_solid():
 
 def test_a_raster_too_large_for_memory_is_refused_with_the_resolution_that_fits():
     floor = Floor("campus", (0.0, 0.0, 1000.0, 1000.0))
-    with pytest.raises(ValueError, match=r"campus.* cells at 0.025 m, more than 200000000; a resolution of 0.\d+ m fits"):
+    with pytest.raises(
+        ValueError, match=r"campus.* cells at 0.025 m, more than 200000000; a resolution of 0.\d+ m fits"
+    ):
         floor.raster(0.025, 0.0, 1.0)
 
 
@@ -140,7 +162,10 @@ def test_a_height_range_upside_down_is_refused():
         Floor("hall", (0.0, 0.0, 1.0, 1.0)).raster(0.1, 1.0, 0.0)
 
 
-@pytest.mark.parametrize("bounds", [(0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 1.0, 0.0), (0.0, 0.0, math.inf, 1.0), (math.nan, 0.0, 1.0, 1.0)])
+@pytest.mark.parametrize(
+    "bounds",
+    [(0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 1.0, 0.0), (0.0, 0.0, math.inf, 1.0), (math.nan, 0.0, 1.0, 1.0)],
+)
 def test_bounds_without_size_are_refused(bounds):
     with pytest.raises(ValueError, match="bounds"):
         Floor("flat", bounds)
@@ -171,6 +196,11 @@ def test_the_hash_is_of_what_stands_there_and_stays_the_same():
         return Floor(name, (0.0, 0.0, 3.0, 3.0), (Solid(rectangle(1.0 + shift, 1.0, 0.1, 1.0)),), **more)
 
     assert floor().sha256 == floor("b").sha256 == floor(shift=1e-9).sha256
-    others = [floor(shift=0.001), floor(goal=(1.0, 1.0)), floor(starts=np.zeros((1, 3))), Floor("a", (0.0, 0.0, 3.0, 3.0))]
+    others = [
+        floor(shift=0.001),
+        floor(goal=(1.0, 1.0)),
+        floor(starts=np.zeros((1, 3))),
+        Floor("a", (0.0, 0.0, 3.0, 3.0)),
+    ]
     assert len({one.sha256 for one in [floor(), *others]}) == 5
     assert floor().sha256 == "b236adf4bae3db9b101d33274b7ec1aab6ed3d2e38e3ca01e271accf74793f78"

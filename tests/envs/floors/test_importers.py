@@ -11,7 +11,12 @@ from scipy import ndimage
 from lidarium.envs.floors.importers import load_file
 
 # Small floors of the real sets whose pictures are connected (meta.json: conn).
-KTH = ["A0043001__0510034691_Layout1", "A0043002__50057024", "A0050018__0510034880_A-40", "A0043018__0510040941_A-40.1-805"]
+KTH = [
+    "A0043001__0510034691_Layout1",
+    "A0043002__50057024",
+    "A0050018__0510034880_A-40",
+    "A0043018__0510040941_A-40.1-805",
+]
 SLAM_MAPS = ["radish_intel", "willow_garage_2010", "linorobot_house", "intel_lab_bwi"]
 
 
@@ -26,7 +31,14 @@ def connectivity(free):
 
 def write_map(folder, levels, **changes):
     cv2.imwrite(str(folder / "map.png"), np.asarray(levels, np.uint8))
-    header = {"image": "map.png", "resolution": 0.1, "origin": [0.0, 0.0, 0.0], "negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196}
+    header = {
+        "image": "map.png",
+        "resolution": 0.1,
+        "origin": [0.0, 0.0, 0.0],
+        "negate": 0,
+        "occupied_thresh": 0.65,
+        "free_thresh": 0.196,
+    }
     (folder / "map.yaml").write_text(yaml.safe_dump({**header, **changes}))
     return folder / "map.yaml"
 
@@ -54,7 +66,9 @@ def test_a_ros_map_is_turned_by_the_yaw_of_its_origin(tmp_path):
     straight = load_file(write_map(tmp_path, room()))
     quarter = load_file(write_map(tmp_path, room(), origin=[0.0, 0.0, math.pi / 2]))
     np.testing.assert_allclose(
-        quarter.bounds, (-straight.bounds[3], straight.bounds[0], -straight.bounds[1], straight.bounds[2]), atol=1e-6
+        quarter.bounds,
+        (-straight.bounds[3], straight.bounds[0], -straight.bounds[1], straight.bounds[2]),
+        atol=1e-6,
     )
     x, y = 2.55, 1.35
     solid = quarter.raster(0.1, 0.0, 1.0)
@@ -122,14 +136,18 @@ def test_houseexpo_is_free_within_its_polygon(tmp_path):
     assert free_of(floor).sum() * 0.05**2 == pytest.approx(12.0)
 
 
-@pytest.mark.parametrize("content", ["{}", "[1]", '{"verts": [[0, 0], [1, 1]]}', '{"verts": "none"}', '{"verts": [[0, 0], [1, "a"]]}', "{"])
+@pytest.mark.parametrize(
+    "content",
+    ["{}", "[1]", '{"verts": [[0, 0], [1, 1]]}', '{"verts": "none"}', '{"verts": [[0, 0], [1, "a"]]}', "{"],
+)
 def test_houseexpo_without_a_polygon_is_refused(tmp_path, content):
     (tmp_path / "house.json").write_text(content)
     with pytest.raises(ValueError, match=r"verts|JSON"):
         load_file(tmp_path / "house.json")
 
 
-# Two rooms of 4 m x 4 m, 0.2 m apart, y down; a door of 1 m in the wall between them, the names of its targets unknown.
+# Two rooms of 4 m x 4 m, 0.2 m apart, y down; a door of 1 m in the wall between them, the names of its
+# targets unknown.
 KTH_XML = """<?xml version="1.0" encoding="UTF-8"?>
 <floor><Scale PixelDistance="100" RealDistance="1"/>
 <space name="a"><contour>
@@ -144,7 +162,9 @@ KTH_XML = """<?xml version="1.0" encoding="UTF-8"?>
 </contour></space></floor>"""
 
 
-@pytest.mark.parametrize(("kind", "other", "area"), [("Portal", "Portal", 32.0), ("Portal", "Wall", 32.0), ("Wall", "Wall", 16.0)])
+@pytest.mark.parametrize(
+    ("kind", "other", "area"), [("Portal", "Portal", 32.0), ("Portal", "Wall", 32.0), ("Wall", "Wall", 16.0)]
+)
 def test_a_portal_opens_the_wall_between_two_rooms(tmp_path, kind, other, area):
     (tmp_path / "floor.xml").write_text(KTH_XML.format(kind=kind, other=other))
     floor = load_file(tmp_path / "floor.xml")
@@ -167,7 +187,10 @@ def test_y_of_a_kth_drawing_points_down(tmp_path):
         ("<floor><space name='a'/></floor>", "no Scale"),
         ("<floor><Scale PixelDistance='0' RealDistance='1'/><space/></floor>", "has Scale"),
         ("<floor>", "not XML"),
-        ("<floor><Scale PixelDistance='1' RealDistance='1'/><space name='a'><linesegment x1='1'/></space></floor>", "space 'a'"),
+        (
+            "<floor><Scale PixelDistance='1' RealDistance='1'/><space name='a'><linesegment x1='1'/></space></floor>",
+            "space 'a'",
+        ),
         (KTH_XML.format(kind="Wall", other="Wall").replace("820", "nan"), "space 'b'"),
     ],
 )
@@ -178,9 +201,16 @@ def test_a_kth_file_without_spaces_or_scale_is_refused(tmp_path, content, messag
 
 
 APARTMENT = [
-    "0 0 600 0 wall", "600 0 600 300 wall", "600 300 0 300 wall", "0 300 0 0 wall", "300 0 300 300 wall",
-    "300 100 300 180 door", "100 0 180 0 door", "400 300 480 300 door", "50 50 90 70 bedroom",
-]  # fmt: skip
+    "0 0 600 0 wall",
+    "600 0 600 300 wall",
+    "600 300 0 300 wall",
+    "0 300 0 0 wall",
+    "300 0 300 300 wall",
+    "300 100 300 180 door",
+    "100 0 180 0 door",
+    "400 300 480 300 door",
+    "50 50 90 70 bedroom",
+]
 
 
 def test_doors_of_an_apartment_are_open_inside_and_its_outline_is_closed(tmp_path):
@@ -188,7 +218,8 @@ def test_doors_of_an_apartment_are_open_inside_and_its_outline_is_closed(tmp_pat
     floor = load_file(tmp_path / "flat.txt")
     free = free_of(floor, 0.025)
     assert connectivity(free) == 1.0
-    # 6 m x 3 m with half a wall of 0.1 m inside, a wall between the rooms, and recesses at the doors to the outside.
+    # 6 m x 3 m with half a wall of 0.1 m inside, a wall between the rooms, and recesses at the doors to the
+    # outside.
     assert free.sum() * 0.025**2 == pytest.approx(5.8 * 2.9 + 0.1 * 0.8, rel=0.02)
     assert floor.bounds == pytest.approx((-0.05, -0.05, 6.05, 3.05))
 
@@ -238,7 +269,8 @@ def test_missing_files_folders_and_unknown_formats_are_refused(tmp_path):
 
 @pytest.mark.parametrize("name", ["a.xml.gz", "a.txt.gz", "a.vectormap.txt.gz", "a.json.gz"])
 @pytest.mark.parametrize(
-    "content", [gzip.compress(b"0,0,1,1\n" * 99, mtime=0)[:-9], b"not packed", gzip.compress(b"\xff\xfe\x00", mtime=0)]
+    "content",
+    [gzip.compress(b"0,0,1,1\n" * 99, mtime=0)[:-9], b"not packed", gzip.compress(b"\xff\xfe\x00", mtime=0)],
 )
 def test_damaged_packed_files_are_refused(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)

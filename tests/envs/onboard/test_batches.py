@@ -6,17 +6,23 @@ import math
 import numpy as np
 import pytest
 
+from lidarium.envs.driving.drives import (
+    STATE_ARRIVED,
+    STATE_GIVING_WAY,
+    any_newly_done,
+    is_done,
+    mark_waiting,
+)
+from lidarium.envs.driving.team_driver import TeamDriver
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.onboard.drives import STATE_ARRIVED, STATE_GIVING_WAY, any_newly_done, is_done, mark_waiting
-from lidarium.envs.onboard.frontier_offers import REASONS, FrontierOffers
+from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
 from lidarium.envs.onboard.navigation import FLAGS
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.onboard.state import Orders, Target
-from lidarium.envs.onboard.team_driver import TeamDriver
-from lidarium.envs.settings import make_settings
-from lidarium.envs.simulation.arrays import ENDED
-from lidarium.envs.simulation.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic import KinematicWorld
+from lidarium.envs.radio.messages import Orders, Target
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
 
 ROBOTS = 2
 
@@ -26,18 +32,30 @@ def wall(x, y, width, height):
 
 
 CORRIDOR = Floor(
-    "corridor", (0.0, 0.0, 8.0, 3.0),
+    "corridor",
+    (0.0, 0.0, 8.0, 3.0),
     (wall(1.6, 0.0, 4.8, 1.2), wall(1.6, 1.8, 2.0, 2.0), wall(4.2, 1.8, 2.2, 2.0), wall(3.4, 2.4, 1.0, 1.0)),
     starts=np.array([[0.9, 1.5, 0.0], [7.1, 1.5, math.pi]]),
-)  # fmt: skip
+)
 ROOMS = Floor(
-    "rooms", (0.0, 0.0, 7.0, 4.0), (wall(3.4, 0.0, 0.2, 1.5), wall(3.4, 2.5, 0.2, 1.5)),
+    "rooms",
+    (0.0, 0.0, 7.0, 4.0),
+    (wall(3.4, 0.0, 0.2, 1.5), wall(3.4, 2.5, 0.2, 1.5)),
     starts=np.array([[1.0, 1.0, 0.5], [1.0, 3.0, -0.5]]),
-)  # fmt: skip
-HALL = Floor("hall", (0.0, 0.0, 6.0, 5.0), (wall(3.8, 3.0, 0.4, 0.4),), starts=np.array([[1.0, 2.5, 0.0], [3.0, 0.5, math.pi / 2]]))
+)
+HALL = Floor(
+    "hall",
+    (0.0, 0.0, 6.0, 5.0),
+    (wall(3.8, 3.0, 0.4, 0.4),),
+    starts=np.array([[1.0, 2.5, 0.0], [3.0, 0.5, math.pi / 2]]),
+)
 FLOORS = (CORRIDOR, ROOMS, HALL, CORRIDOR, ROOMS)
 SEEDS = (3, 4, 5, 6, 7)
-TARGETS = {"corridor": [(7.1, 1.5), (0.9, 1.5)], "rooms": [(6.0, 2.0), (5.0, 3.4)], "hall": [(5.0, 2.5), (3.0, 4.5)]}
+TARGETS = {
+    "corridor": [(7.1, 1.5), (0.9, 1.5)],
+    "rooms": [(6.0, 2.0), (5.0, 3.4)],
+    "hall": [(5.0, 2.5), (3.0, 4.5)],
+}
 
 
 class Teams:
@@ -45,19 +63,31 @@ class Teams:
 
     def __init__(self, floors, seeds, threads=1, known_starts=True):
         self.settings = make_settings(
-            robots=ROBOTS, lidar="lidar_360_6m", noise="datasheet", known_starts=known_starts, threads=threads, stop_coverage=None
+            robots=ROBOTS,
+            lidar="lidar_360_6m",
+            noise="datasheet",
+            known_starts=known_starts,
+            threads=threads,
+            stop_coverage=None,
         )
         settings, self.episodes = self.settings, len(floors)
         self.rows = self.episodes * ROBOTS
         self.world = KinematicWorld(
-            [settings.robot] * ROBOTS, settings.lidar, settings.occupancy, settings.time_step, self.episodes, settings.threads
+            [settings.robot] * ROBOTS,
+            settings.lidar,
+            settings.occupancy,
+            settings.time_step,
+            self.episodes,
+            settings.threads,
         )
         self.offsets = np.zeros((self.rows, 2))
         self.perception = Perception(self.world, settings, self.offsets)
         self.driver = TeamDriver(self.perception, settings)
         self.offers = FrontierOffers(self.perception, settings, self.driver)
         for episode, (floor, seed) in enumerate(zip(floors, seeds, strict=True)):
-            tables = FloorTables.of_floor(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
+            tables = FloorTables.of_floor(
+                floor, settings.raster_resolution, settings.lidar.height, settings.robot.height
+            )
             self.world.place(episode, tables, floor.starts, seed, known_starts)
             if known_starts:
                 self.offsets[episode * ROBOTS : (episode + 1) * ROBOTS] = floor.starts[:, :2]
@@ -81,15 +111,22 @@ class Teams:
         states, commands = driver.states(), np.array(commands)
         return [
             (
-                states[row], drives.counts[row], drives.places[row], drives.paths[row, : drives.counts[row]].tobytes(),
-                drives.room[row, : drives.counts[row]].tobytes(), commands[:, row].tobytes(), self.world.poses[row].tobytes(),
+                states[row],
+                drives.counts[row],
+                drives.places[row],
+                drives.paths[row, : drives.counts[row]].tobytes(),
+                drives.room[row, : drives.counts[row]].tobytes(),
+                commands[:, row].tobytes(),
+                self.world.poses[row].tobytes(),
             )
             for row in range(self.rows)
-        ]  # fmt: skip
+        ]
 
     def driven_to_targets(self, decisions):
         targets = [np.array(place) for floor in self.floors for place in TARGETS[floor.name]]
-        orders = Orders.of([Target(*(place - offset)) for place, offset in zip(targets, self.offsets, strict=True)])
+        orders = Orders.of(
+            [Target(*(place - offset)) for place, offset in zip(targets, self.offsets, strict=True)]
+        )
         return [self.drive(orders) for _ in range(decisions)]
 
     def explored(self, decisions):
@@ -100,12 +137,18 @@ class Teams:
             log.append(
                 [
                     (
-                        reasons[row], offers.tables[row].tobytes(), offers.masks[row].tobytes(), offers.counts[row],
-                        *(part[row, : offers.counts[row]].tobytes() for part in (offers.targets, offers.headings, offers.cells)),
+                        reasons[row],
+                        offers.tables[row].tobytes(),
+                        offers.masks[row].tobytes(),
+                        offers.counts[row],
+                        *(
+                            part[row, : offers.counts[row]].tobytes()
+                            for part in (offers.targets, offers.headings, offers.cells)
+                        ),
                     )
                     for row in range(self.rows)
                 ]
-            )  # fmt: skip
+            )
             numbers = np.concatenate([generator.integers(0, 8, ROBOTS) for generator in generators])
             log.append(self.drive(self.offers.choose(self.every, numbers)))
             reasons = self.offers.renew(self.every, self.every)

@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings import make_settings
-from lidarium.mapping.swept import MARGIN_M, passed, swept
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed, swept
 
 RESOLUTION = 0.05
 
 
 @pytest.fixture
 def env():
-    environment = ExplorationEnv("apartment", make_settings(robots=2, known_starts=False, localization="slam"))
+    environment = ExplorationEnv(
+        "apartment", make_settings(robots=2, known_starts=False, localization="slam")
+    )
     environment.reset(seed=0)
     return environment
 
@@ -92,7 +94,9 @@ def test_a_trail_beyond_the_map_or_of_one_place_changes_nothing(env):
     assert (belief.map.log_odds == before).all()
 
 
-@pytest.mark.parametrize("trail", [np.zeros((0, 2)), np.zeros(2), np.zeros((3, 3)), np.array([[0.0, np.nan]])])
+@pytest.mark.parametrize(
+    "trail", [np.zeros((0, 2)), np.zeros(2), np.zeros((3, 3)), np.array([[0.0, np.nan]])]
+)
 def test_what_is_no_trail_is_refused(env, trail):
     with pytest.raises(ValueError, match="want places"):
         env.perception.forget_walls(0, trail)
@@ -111,7 +115,9 @@ def test_a_wall_beside_the_trail_stays(env):
 
 @pytest.mark.parametrize("margin", [0.0, MARGIN_M])
 def test_a_body_sweeps_a_band_as_wide_as_it_is_and_its_margin(margin):
-    rows, columns = np.nonzero(swept((80, 120), (0.0, 0.0), np.array([[1.0, 2.0], [4.0, 2.0]]), 0.2, RESOLUTION, margin))
+    rows, columns = np.nonzero(
+        swept((80, 120), (0.0, 0.0), np.array([[1.0, 2.0], [4.0, 2.0]]), 0.2, RESOLUTION, margin)
+    )
     reach = 0.2 + margin
     assert (rows.min() + 0.5) * RESOLUTION == pytest.approx(2.0 - reach, abs=RESOLUTION)
     assert (rows.max() + 0.5) * RESOLUTION == pytest.approx(2.0 + reach, abs=RESOLUTION)

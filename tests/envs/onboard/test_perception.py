@@ -5,11 +5,13 @@ import pytest
 
 import lidarium
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.occupancy import three_levels
+from lidarium.mapping.grids.occupancy import three_levels
 
 
 def driven(steps=30, **options):
-    env = lidarium.parallel_env("building:5", **{"robots": 3, "stop_coverage": None, "map_cells": 64, **options})
+    env = lidarium.parallel_env(
+        "building:5", **{"robots": 3, "stop_coverage": None, "map_cells": 64, **options}
+    )
     env.reset(seed=2)
     generator = np.random.default_rng(0)
     for _ in range(steps):
@@ -47,7 +49,10 @@ def test_maps_first_asked_for_late_are_the_same_as_those_asked_for_from_the_star
         early.step(actions)
         assert early.perception.belief("robot_1").shared_map is not None
         late.step(actions)
-    for get in (lambda env: env.perception.belief("robot_1").shared_map, lambda env: env.perception.belief("robot_1").map):
+    for get in (
+        lambda env: env.perception.belief("robot_1").shared_map,
+        lambda env: env.perception.belief("robot_1").map,
+    ):
         one, other = get(early), get(late)
         assert np.array_equal(one.log_odds, other.log_odds)
         same_navigation(one, other)

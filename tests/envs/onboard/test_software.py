@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.settings import REALISM, make_settings
-from lidarium.evaluation.runner import run_episode
-from lidarium.mapping.localization.localizer import KeyScans
+from lidarium.envs.settings.exploration import REALISM, make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
 from lidarium.mapping.localization.registry import LOCALIZERS, Entry
-from lidarium.mapping.rigid import Transform
 
 
 class Reckoner:
@@ -42,7 +42,9 @@ class Corrector(Reckoner):
         pose = super().localize(sensing)
         if len(self.keys) % 10 == 0:
             # The last scan is mapped by the robot itself.
-            self.correction = KeyScans(np.stack([key[0] for key in self.keys[:-1]]), np.stack([key[1] for key in self.keys[:-1]]))
+            self.correction = KeyScans(
+                np.stack([key[0] for key in self.keys[:-1]]), np.stack([key[1] for key in self.keys[:-1]])
+            )
         return pose
 
 
@@ -58,7 +60,10 @@ def explored(steps=150, seed=2, **options):
     generator = np.random.default_rng(seed)
     for step in range(steps):
         if step % 15 == 0:
-            actions = {agent: generator.uniform([0.1, -0.5], [0.5, 0.5]).astype(np.float32) for agent in env.possible_agents}
+            actions = {
+                agent: generator.uniform([0.1, -0.5], [0.5, 0.5]).astype(np.float32)
+                for agent in env.possible_agents
+            }
         observations, *_ = env.step(actions)
     return env, observations
 
@@ -66,7 +71,9 @@ def explored(steps=150, seed=2, **options):
 @pytest.mark.parametrize("known_starts", [True, False])
 def test_a_localizer_outside_of_the_kernels_is_as_good_as_one_within(localizers, known_starts):
     inside, seen = explored(localization="odometry", odometry="good", known_starts=known_starts, radio="none")
-    outside, also_seen = explored(localization="reckoner", odometry="good", known_starts=known_starts, radio="none")
+    outside, also_seen = explored(
+        localization="reckoner", odometry="good", known_starts=known_starts, radio="none"
+    )
     assert np.allclose(inside.world.believed, outside.world.believed, atol=1e-9)
     for one, other in zip(inside.world.log_odds, outside.world.log_odds, strict=True):
         assert (one != other).mean() < 1e-4
@@ -85,7 +92,9 @@ def test_a_map_rendered_anew_at_the_same_poses_is_the_same_map(localizers):
 
 
 def test_pooled_and_navigation_maps_follow_a_rendering(localizers):
-    env, _ = explored(localization="corrector", odometry="typical", observe=("egocentric_map",), noise="datasheet")
+    env, _ = explored(
+        localization="corrector", odometry="typical", observe=("egocentric_map",), noise="datasheet"
+    )
     twin = copy.deepcopy(env)
     own = env.perception.own_map(0)
     fresh = type(own)(env.world.log_odds[0], own.resolution)
@@ -105,20 +114,30 @@ def test_the_spread_of_a_belief_is_what_the_localizer_tells(localizers):
 
 def test_localizers_draw_from_the_seed_of_the_episode(localizers):
     seeds = [
-        [localizer.seed for localizer in explored(1, seed=seed, localization="reckoner")[0].perception.localizers] for seed in (1, 1, 2)
+        [
+            localizer.seed
+            for localizer in explored(1, seed=seed, localization="reckoner")[0].perception.localizers
+        ]
+        for seed in (1, 1, 2)
     ]
     assert seeds[0] == seeds[1]
     assert len({*seeds[0], *seeds[2]}) == 4
 
 
 def test_episodes_with_localizers_are_recorded_and_run_again_to_the_bit(localizers, tmp_path):
+    from lidarium.evaluation.episodes.watching import WatchedExploration
     from lidarium.evaluation.record import Recorder
     from lidarium.evaluation.record.replay import rerun
-    from lidarium.evaluation.watching import WatchedExploration
 
     recorder = Recorder("nearest_frontier", 3, "apartment")
     settings = make_settings(
-        robots=2, localization="corrector", odometry="good", noise="datasheet", radio="range", horizon_s=20.0, lidar="lidar_360_6m"
+        robots=2,
+        localization="corrector",
+        odometry="good",
+        noise="datasheet",
+        radio="range",
+        horizon_s=20.0,
+        lidar="lidar_360_6m",
     )
     env = WatchedExploration("apartment", settings, watchers=[recorder])
     run_episode(lidarium.policy("nearest_frontier"), env, seed=3)

@@ -4,18 +4,24 @@ import numpy as np
 import pytest
 
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.onboard.state import DriveState, Target
-from lidarium.envs.settings import make_settings
-from lidarium.envs.wrappers.waypoints import WaypointExploration
-from lidarium.mapping.frontiers import FRONTIER, IGNORED
+from lidarium.envs.levels.waypoints import WaypointExploration
+from lidarium.envs.radio.messages import DriveState, Target
+from lidarium.envs.settings.exploration import make_settings
 from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.mapping.planning.frontiers import FRONTIER, IGNORED
 
 RESOLUTION = 0.05
 
 
 def known(rows, columns, origin, level=255):
     levels = np.full((rows, columns), level, np.uint8)
-    return FusedMap(levels, np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.uint64), origin, RESOLUTION)
+    return FusedMap(
+        levels,
+        np.zeros((rows, columns), np.float32),
+        np.zeros((rows, columns), np.uint64),
+        origin,
+        RESOLUTION,
+    )
 
 
 @pytest.fixture
@@ -75,7 +81,9 @@ def test_a_robot_drives_over_what_it_only_knows_from_others():
     belief = env.perception.belief("robot_0")
     origin, pose = belief.map_origin, belief.pose
     # A lane of free cells from where the robot stands towards the unknown at its back.
-    env.perception.tell(0, known(24, 80, (float(np.round(pose[0] - 3.0, 2)), float(np.round(pose[1] - 0.6, 2)))))
+    env.perception.tell(
+        0, known(24, 80, (float(np.round(pose[0] - 3.0, 2)), float(np.round(pose[1] - 0.6, 2))))
+    )
     behind = Target(float(pose[0] - 1.0), float(pose[1]))
     assert len(free) > 0
     assert log_odds[cell(belief, behind.x, behind.y)] == 0, (origin, pose)

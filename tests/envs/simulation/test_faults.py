@@ -7,8 +7,9 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.simulation.faults import FAULT_NUMBERS, KINDS, MOST_DRAWN, Fault, FaultSettings, plan_faults
-from lidarium.evaluation.runner import run_episode
+from lidarium.envs.settings.faults import KINDS, MOST_DRAWN, Fault, FaultSettings
+from lidarium.envs.simulation.faults import FAULT_NUMBERS, plan_faults
+from lidarium.evaluation.episodes.runner import run_episode
 
 HALL = Floor("hall", (0.0, 0.0, 30.0, 20.0))
 PLACES = np.array([[10.0, 10.0], [12.0, 10.0]])
@@ -16,9 +17,15 @@ PLACES = np.array([[10.0, 10.0], [12.0, 10.0]])
 
 def run(*faults, steps=30, action=(0.4, 0.0), robots=2, **options):
     """Drive straight ahead with faults; return the environment and what every step returned."""
-    env = lidarium.parallel_env(HALL, robots=robots, faults=FaultSettings(schedule=faults), stop_coverage=None, **options)
+    env = lidarium.parallel_env(
+        HALL, robots=robots, faults=FaultSettings(schedule=faults), stop_coverage=None, **options
+    )
     env.reset(seed=1, options={"starts": [[4.0, 4.0 + 4.0 * k, 0.0] for k in range(robots)]})
-    outcomes = [env.step({agent: np.array(action, np.float32) for agent in env.agents}) for _ in range(steps) if env.agents]
+    outcomes = [
+        env.step({agent: np.array(action, np.float32) for agent in env.agents})
+        for _ in range(steps)
+        if env.agents
+    ]
     return env, outcomes
 
 
@@ -55,7 +62,9 @@ def test_a_blind_sector_takes_its_beams_and_no_others():
 
 
 def test_a_blind_sector_behind_a_robot_that_sees_all_around_wraps():
-    env, outcomes = run(Fault(kind="blind_sector", bearing=math.pi, width=math.radians(40.0)), lidar="lidar_360_6m")
+    env, outcomes = run(
+        Fault(kind="blind_sector", bearing=math.pi, width=math.radians(40.0)), lidar="lidar_360_6m"
+    )
     angles = env.settings.lidar.angles
     behind = math.pi - np.abs(angles) <= math.radians(20.0) + 1e-9
     assert np.array_equal((scans(outcomes) == 0.0).all(axis=0), behind)
@@ -66,14 +75,17 @@ def test_a_stuck_wheel_lets_the_robot_turn_about_it(wheel, sign):
     env, _ = run(Fault(kind="stuck_wheel", wheel=wheel, at_s=0.0, lasts_s=2.0), steps=20)
     world, base = env.world, env.settings.robot.wheel_base
     assert sign * world.poses[0, 2] > 0.3
-    # The wheel that sticks stays where it is, but for the first steps in which the drive still picks up speed.
+    # The wheel that sticks stays where it is, but for the first steps in which the drive still picks up
+    # speed.
     radius = world.velocities[0, 0] / world.velocities[0, 1]
     assert abs(radius) == pytest.approx(base / 2.0, rel=0.05)
     assert world.poses[1, 2] == 0.0
 
 
 def test_a_kidnapped_robot_is_elsewhere_and_what_it_knows_is_not_told():
-    env, outcomes = run(Fault(kind="kidnapping", at_s=1.0, place=(20.0, 12.0, 1.5)), steps=20, localization="odometry")
+    env, outcomes = run(
+        Fault(kind="kidnapping", at_s=1.0, place=(20.0, 12.0, 1.5)), steps=20, localization="odometry"
+    )
     poses = np.array([outcome[4]["robot_0"]["truth"]["pose"] for outcome in outcomes])
     assert np.hypot(*(poses[9, :2] - [4.0, 4.0])) < 1.0
     assert np.hypot(*(poses[10, :2] - [20.0, 12.0])) < 0.1
@@ -84,7 +96,9 @@ def test_a_kidnapped_robot_is_elsewhere_and_what_it_knows_is_not_told():
 
 def test_a_kidnapped_robot_is_never_put_into_another():
     env, outcomes = run(Fault(kind="kidnapping", robot=0, at_s=0.5, place=(4.5, 8.0, 0.0)), steps=60)
-    poses = np.array([[outcome[4][agent]["truth"]["pose"] for agent in ("robot_0", "robot_1")] for outcome in outcomes])
+    poses = np.array(
+        [[outcome[4][agent]["truth"]["pose"] for agent in ("robot_0", "robot_1")] for outcome in outcomes]
+    )
     gaps = np.hypot(*(poses[:, 0, :2] - poses[:, 1, :2]).T)
     assert gaps.min() >= 2.0 * env.settings.robot.radius - 1e-6
     # As soon as the other has left, it is put there.
@@ -92,7 +106,9 @@ def test_a_kidnapped_robot_is_never_put_into_another():
 
 
 def test_places_of_kidnapping_are_drawn_where_robots_fit_and_can_get_to():
-    env = lidarium.parallel_env("apartment", robots=2, faults=FaultSettings(schedule=(Fault(kind="kidnapping", at_s=0.2),)))
+    env = lidarium.parallel_env(
+        "apartment", robots=2, faults=FaultSettings(schedule=(Fault(kind="kidnapping", at_s=0.2),))
+    )
     for seed in range(5):
         env.reset(seed=seed)
         for _ in range(4):
@@ -123,14 +139,19 @@ def test_teams_finish_without_a_robot_that_died():
 @pytest.mark.parametrize("kind", KINDS[1:])
 def test_every_kind_comes_at_its_rate_and_is_survived(kind):
     settings = FaultSettings(**{kind: 300.0}, lasts_s=2.0)
-    env = lidarium.parallel_env("apartment", robots=2, faults=settings, localization="odometry", radio="range", horizon_s=60.0)
+    env = lidarium.parallel_env(
+        "apartment", robots=2, faults=settings, localization="odometry", radio="range", horizon_s=60.0
+    )
     run_episode(lidarium.policy("nearest_frontier"), env, seed=2)
     assert set(env.unwrapped.scorer.ended_because) == {"robot_0", "robot_1"}
 
 
 def test_rates_draw_as_many_faults_as_they_say():
     settings = FaultSettings(laser_dropout=6.0, stuck_wheel=3.0)
-    tables = [plan_faults(settings, 4, seed, 0.1, 3600.0, PLACES).reshape(4, -1, FAULT_NUMBERS) for seed in range(40)]
+    tables = [
+        plan_faults(settings, 4, seed, 0.1, 3600.0, PLACES).reshape(4, -1, FAULT_NUMBERS)
+        for seed in range(40)
+    ]
     kinds = np.stack(tables)[..., 0]
     assert (kinds == KINDS.index("laser_dropout")).sum() / 160 == pytest.approx(6.0, rel=0.1)
     assert (kinds == KINDS.index("stuck_wheel")).sum() / 160 == pytest.approx(3.0, rel=0.15)

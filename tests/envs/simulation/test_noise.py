@@ -7,15 +7,15 @@ import pytest
 from scipy import stats
 
 from lidarium.envs.floors.floor import Raster
-from lidarium.envs.simulation.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic import KinematicWorld
-from lidarium.envs.simulation.lidar import Lidar
-from lidarium.envs.simulation.motion import distance_bound
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.robots import ROBOTS
+from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic.motion import distance_bound
+from lidarium.envs.simulation.kinematic.ray_tables import RayTables
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
 from lidarium.envs.simulation.noise import GAUSSIAN_TABLE, fill_gaussian, stream_key
-from lidarium.envs.simulation.ray_tables import RayTables
-from lidarium.envs.simulation.robots import ROBOTS
-from lidarium.mapping.kernels import kernel
-from lidarium.mapping.occupancy import OccupancySettings
+from lidarium.mapping.grids.occupancy import OccupancySettings
+from lidarium.mapping.kernels.compilation import kernel
 
 
 @kernel
@@ -25,7 +25,9 @@ def fill_streams(seeds, robots, steps, table, values):
 
 
 def draws(seeds, robots, steps, beams=727):
-    seeds, robots, steps = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(robots), np.asarray(steps))
+    seeds, robots, steps = np.broadcast_arrays(
+        np.asarray(seeds, np.uint64), np.asarray(robots), np.asarray(steps)
+    )
     values = np.empty((seeds.size, beams), np.float32)
     fill_streams(seeds.ravel().copy(), robots.ravel().copy(), steps.ravel().copy(), GAUSSIAN_TABLE, values)
     return values.astype(np.float64)
@@ -76,7 +78,9 @@ def test_robots_and_seeds_have_streams_of_their_own():
 
 
 def test_no_two_of_many_streams_are_the_same():
-    values = draws(np.arange(40)[:, None, None], np.arange(8)[None, :, None], np.arange(-1, 99)[None, None, :], beams=4)
+    values = draws(
+        np.arange(40)[:, None, None], np.arange(8)[None, :, None], np.arange(-1, 99)[None, None, :], beams=4
+    )
     assert len(np.unique(values, axis=0)) == len(values)
 
 
@@ -100,7 +104,9 @@ def test_the_same_seed_gives_the_same_ranges_in_any_row():
     alone, among = world(), world(episodes=4)
     alone.place(0, tables, STARTS, 99)
     for episode in range(4):
-        among.place(episode, tables, STARTS if episode == 2 else STARTS[::-1].copy(), 99 if episode == 2 else episode)
+        among.place(
+            episode, tables, STARTS if episode == 2 else STARTS[::-1].copy(), 99 if episode == 2 else episode
+        )
     for step in range(20):
         alone.step(commands, moves_bodies=step > 0)
         among.step(np.tile(commands, (4, 1)), moves_bodies=step > 0)

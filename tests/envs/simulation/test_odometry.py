@@ -7,9 +7,9 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.simulation.odometry import ODOMETRY, OdometrySettings
-from lidarium.envs.simulation.robots import ROBOTS
-from lidarium.mapping.rigid import wrapped
+from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
+from lidarium.envs.settings.robots import ROBOTS
+from lidarium.mapping.geometry.rigid import wrapped
 
 HALL = Floor("hall", (0.0, 0.0, 60.0, 40.0))
 FORWARD, TURNING = (0.4, 0.0), (0.0, 0.3)
@@ -37,7 +37,9 @@ def test_ideal_wheels_tell_the_truth_to_within_rounding():
 
 def test_wheels_that_nobody_reckons_with_change_nothing():
     plain = drive((0.5, 0.2), localization="truth", noise="datasheet")
-    biased = drive((0.5, 0.2), localization="truth", noise="datasheet", odometry=bias(distance_bias=0.05, turn_bias=0.05))
+    biased = drive(
+        (0.5, 0.2), localization="truth", noise="datasheet", odometry=bias(distance_bias=0.05, turn_bias=0.05)
+    )
     assert np.array_equal(plain.poses, biased.poses)
     assert np.array_equal(plain.ranges, biased.ranges)
     assert all(np.array_equal(a, b) for a, b in zip(plain.log_odds, biased.log_odds, strict=True))
@@ -78,7 +80,10 @@ def test_encoders_count_whole_ticks_and_lose_none():
     assert np.allclose(ticks, np.round(ticks), atol=1e-6)
     # What is left of a tick counts in the next step: never more than a tick and a half is missing.
     assert abs(math.hypot(*world.odometry[0, :2]) - math.hypot(*(world.poses[0, :2] - [4.0, 4.0]))) < 0.02
-    assert abs(wrapped(world.odometry[0, 2] - world.poses[0, 2])) < 2.0 / robot.ticks_per_metre / robot.wheel_base
+    assert (
+        abs(wrapped(world.odometry[0, 2] - world.poses[0, 2]))
+        < 2.0 / robot.ticks_per_metre / robot.wheel_base
+    )
 
 
 def test_noise_spreads_with_the_root_of_the_way_whatever_the_time_step():
@@ -100,7 +105,9 @@ def test_drives_do_not_quite_what_they_are_told_and_the_wheels_know_it():
 
 
 def test_the_same_seed_is_the_same_run_to_the_bit():
-    one, other, another = (drive((0.5, 0.2), seed=seed, odometry="poor", noise="datasheet") for seed in (3, 3, 4))
+    one, other, another = (
+        drive((0.5, 0.2), seed=seed, odometry="poor", noise="datasheet") for seed in (3, 3, 4)
+    )
     assert np.array_equal(one.believed, other.believed)
     assert np.array_equal(one.log_odds[0], other.log_odds[0])
     assert not np.array_equal(one.believed, another.believed)

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.floors.floor import Raster
-from lidarium.envs.simulation.radio import RADIO_KINDS, RadioSettings, links, path_loss, solid_length
+from lidarium.envs.settings.radio import RADIO_KINDS, RadioSettings
+from lidarium.envs.simulation.radio import links, path_loss, solid_length
 
 RESOLUTION = 0.1
 
@@ -20,7 +21,10 @@ def raster(generator, rows=40, columns=50, share=0.15):
 def sampled_length(solid, x, y, to_x, to_y, samples=40_000):
     """Length within solid cells by many points on the line."""
     shares = (np.arange(samples) + 0.5) / samples
-    columns, rows = np.floor(x + shares * (to_x - x)).astype(int), np.floor(y + shares * (to_y - y)).astype(int)
+    columns, rows = (
+        np.floor(x + shares * (to_x - x)).astype(int),
+        np.floor(y + shares * (to_y - y)).astype(int),
+    )
     inside = (rows >= 0) & (rows < solid.shape[0]) & (columns >= 0) & (columns < solid.shape[1])
     return solid[rows[inside], columns[inside]].sum() / samples * math.hypot(to_x - x, to_y - y)
 
@@ -53,7 +57,11 @@ def slow_links(radio, places, floor):
             if i == j or radio.kind == "none":
                 continue
             distance = math.dist(one, other)
-            cells = [(value - corner) / RESOLUTION for place in (one, other) for value, corner in zip(place, floor.origin, strict=True)]
+            cells = [
+                (value - corner) / RESOLUTION
+                for place in (one, other)
+                for value, corner in zip(place, floor.origin, strict=True)
+            ]
             walls = sampled_length(floor.solid, *cells) * RESOLUTION
             if radio.kind == "all":
                 reached[i, j] = True

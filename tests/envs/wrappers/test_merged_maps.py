@@ -6,20 +6,27 @@ from pettingzoo.test import parallel_api_test
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings import make_settings
-from lidarium.envs.solo import at_level
+from lidarium.envs.levels.gymnasium_env import at_level
+from lidarium.envs.settings.exploration import make_settings
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings
+from lidarium.evaluation.episodes.result import result_of
+from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.metrics.merges import merge_figures
-from lidarium.evaluation.result import result_of
-from lidarium.evaluation.runner import run_episode
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
 
 STARTS = [(2.4, 4.0, 0.0), (3.3, 4.5, 1.2)]
 APART = np.eye(2, dtype=bool)
 
 
 def team(known_starts=False, **options):
-    chosen = {"robots": 2, "resolution": 0.05, "horizon_s": 6.0, "map_cells": 64, "observe": ["pose", "map"], **options}
+    chosen = {
+        "robots": 2,
+        "resolution": 0.05,
+        "horizon_s": 6.0,
+        "map_cells": 64,
+        "observe": ["pose", "map"],
+        **options,
+    }
     return ExplorationEnv("apartment", make_settings(known_starts=known_starts, **chosen))
 
 
@@ -91,7 +98,10 @@ def test_news_are_passed_on():
 def test_maps_are_exchanged_at_the_period_alone():
     env = MergedMaps(team(), MergingSettings(period_s=0.5, known_starts=True))
     env.reset(seed=3, options={"starts": STARTS})
-    ages = [env.step({agent: np.zeros(2, np.float32) for agent in env.agents})[0]["robot_0"]["teammates"][0, 3] for _ in range(7)]
+    ages = [
+        env.step({agent: np.zeros(2, np.float32) for agent in env.agents})[0]["robot_0"]["teammates"][0, 3]
+        for _ in range(7)
+    ]
     np.testing.assert_allclose(ages, [0.1, 0.2, 0.3, 0.4, 0.0, 0.1, 0.2], atol=1e-5)
 
 
@@ -109,7 +119,9 @@ def test_every_level_of_decision_can_be_wrapped_and_repeats_itself(level):
         env = MergedMaps(at_level(team(), level))
         observations, _ = env.reset(seed=5)
         for _ in range(2):
-            actions = {agent: 0 if level == "frontier" else np.array([0.5, 0.1], np.float32) for agent in env.agents}
+            actions = {
+                agent: 0 if level == "frontier" else np.array([0.5, 0.1], np.float32) for agent in env.agents
+            }
             observations = env.step(actions)[0]
         told.append(observations)
     for agent, observation in told[0].items():
@@ -136,9 +148,17 @@ def test_figures_tell_right_merges_from_wrong_ones():
     ]
     figures = merge_figures(events, 0.05)
     assert figures == {
-        "accepted": 3, "correct": 2, "false": 1, "off": 0, "worst_m": 0.2, "worst_rad": 0.0, "wrong": 0, "worst_here_m": 0.2,
-        "worst_here_rad": 0.0, "first_correct_s": 2.0,
-    }  # fmt: skip
+        "accepted": 3,
+        "correct": 2,
+        "false": 1,
+        "off": 0,
+        "worst_m": 0.2,
+        "worst_rad": 0.0,
+        "wrong": 0,
+        "worst_here_m": 0.2,
+        "worst_here_rad": 0.0,
+        "first_correct_s": 2.0,
+    }
     assert merge_figures([], 0.05)["worst_m"] is None
     far = MergeEvent(1.0, "a", "c", (1.31, 2.0, 0.5), pose, (0.0, 0.0))
     turned = MergeEvent(1.0, "a", "c", (1.0, 2.0, 0.56), pose, (0.0, 0.0))

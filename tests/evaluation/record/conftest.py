@@ -5,17 +5,19 @@ from collections.abc import Callable
 import pytest
 
 import lidarium
-from lidarium.envs.settings import make_settings
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder
-from lidarium.evaluation.runner import run_episode
-from lidarium.evaluation.watching import WatchedExploration
 
 
 def run_recorded(policy="nearest_frontier", floor="apartment", seed=3, options=None, watchers=(), **settings):
     """Return the record of an episode and its environment."""
     name = policy if isinstance(policy, str) else type(policy).__name__
     recorder = Recorder(name, seed, floor if isinstance(floor, str) else None)
-    env = WatchedExploration(floor, make_settings(**{"robots": 2, **settings}), watchers=[recorder, *watchers])
+    env = WatchedExploration(
+        floor, make_settings(**{"robots": 2, **settings}), watchers=[recorder, *watchers]
+    )
     run_episode(lidarium.policy(policy) if isinstance(policy, str) else policy, env, seed, options)
     return recorder.finish(), env
 

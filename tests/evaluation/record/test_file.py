@@ -41,7 +41,9 @@ def assert_equal(one, other):
     for name in ("times", "poses", "coverage"):
         np.testing.assert_array_equal(getattr(one.display, name), getattr(other.display, name))
     for name in ("rows", "words", "times", "counts", "places", "known", "occupied"):
-        np.testing.assert_array_equal(getattr(one.display.changes, name), getattr(other.display.changes, name))
+        np.testing.assert_array_equal(
+            getattr(one.display.changes, name), getattr(other.display.changes, name)
+        )
     assert (one.display.origin, one.display.resolution) == (other.display.origin, other.display.resolution)
     assert one.display.events == other.display.events
 
@@ -62,7 +64,9 @@ def test_numpy_opens_it_without_pickles(apartment_record, path):
 
 def test_ten_minutes_with_three_robots_take_less_than_a_megabyte(recorded, tmp_path):
     """The first 100 seconds, the most eventful ones, with noise and fine maps: in less than a sixth of a megabyte."""
-    record, _ = recorded(floor="building:23", robots=3, resolution=0.025, noise="thesis", horizon_s=100.0, stop_coverage=None)
+    record, _ = recorded(
+        floor="building:23", robots=3, resolution=0.025, noise="thesis", horizon_s=100.0, stop_coverage=None
+    )
     write_record(tmp_path / "episode.npz", record)
     assert record.header["steps"] == 1000
     assert (tmp_path / "episode.npz").stat().st_size < 1_000_000 / 6
@@ -101,7 +105,10 @@ def test_what_is_no_record_is_refused(tmp_path):
 
 
 def test_a_newer_format_is_refused_naming_both(path):
-    with pytest.raises(ValueError, match=rf"format 2, written by lidarium 9\.1.*this is lidarium {lidarium.__version__}.*up to 1"):
+    with pytest.raises(
+        ValueError,
+        match=rf"format 2, written by lidarium 9\.1.*this is lidarium {lidarium.__version__}.*up to 1",
+    ):
         read_record(with_header(path, format=2, version="9.1", starts=...))
 
 
@@ -133,7 +140,12 @@ def test_a_header_that_is_not_good_is_refused(path, changes, words):
 
 
 def test_members_that_are_not_good_are_refused(path):
-    for member, content in (("poses.npy", None), ("poses.npy", b"no array"), ("events.json", b"{}"), ("header.json", b"[")):
+    for member, content in (
+        ("poses.npy", None),
+        ("poses.npy", b"no array"),
+        ("events.json", b"{}"),
+        ("header.json", b"["),
+    ):
         original = path.read_bytes()
         with pytest.raises(ValueError, match=r"episode\.npz is not a whole episode record"):
             read_record(rewritten(path, **{member: content}))
@@ -141,7 +153,10 @@ def test_members_that_are_not_good_are_refused(path):
 
 
 def test_an_event_that_json_cannot_hold_is_refused_and_nothing_is_written(apartment_record, tmp_path):
-    display = replace(apartment_record.display, events=[{"time_s": 0.0, "kind": "message", "agent": None, "what": np.zeros(2)}])
+    display = replace(
+        apartment_record.display,
+        events=[{"time_s": 0.0, "kind": "message", "agent": None, "what": np.zeros(2)}],
+    )
     with pytest.raises(ValueError, match="JSON"):
         write_record(tmp_path / "below" / "episode.npz", replace(apartment_record, display=display))
     assert not list(tmp_path.iterdir())

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.settings import make_settings
-from lidarium.evaluation.beliefs import team_log_odds
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder
-from lidarium.evaluation.runner import run_episode
-from lidarium.evaluation.watching import WatchedExploration
-from lidarium.mapping.occupancy import three_levels
+from lidarium.evaluation.truth.beliefs import team_log_odds
+from lidarium.mapping.grids.occupancy import three_levels
 
 
 class MapLog:
@@ -59,7 +59,10 @@ class Rams:
 
     def act(self, observations):
         self.steps += 1
-        return {agent: np.array([1.0 if self.steps % 50 < 40 else -0.5, 0.0], np.float32) for agent in observations}
+        return {
+            agent: np.array([1.0 if self.steps % 50 < 40 else -0.5, 0.0], np.float32)
+            for agent in observations
+        }
 
 
 @pytest.mark.parametrize(
@@ -127,7 +130,9 @@ def test_decisions_tell_where_a_robot_was_sent_and_when(recorded):
 def test_decisions_with_unknown_starts_are_in_the_floors_frame(recorded):
     record, env = recorded(known_starts=False, horizon_s=10.0)
     x_min, y_min, x_max, y_max = env.floor.bounds
-    told = [event for event in record.display.events if event["kind"] == "decision" and event["x"] is not None]
+    told = [
+        event for event in record.display.events if event["kind"] == "decision" and event["x"] is not None
+    ]
     assert {event["agent"] for event in told} == {"robot_0", "robot_1"}
     assert all(x_min <= event["x"] <= x_max and y_min <= event["y"] <= y_max for event in told)
 
@@ -136,7 +141,9 @@ def test_what_is_given_up_is_told_once_with_its_place(recorded):
     record, env = recorded(robots=3, resolution=0.025)
     told = [event for event in record.display.events if event["kind"] == "given_up"]
     assert told
-    assert len({(event["agent"], event["x"], event["y"], event["size_m"], event["reason"]) for event in told}) == len(told)
+    assert len(
+        {(event["agent"], event["x"], event["y"], event["size_m"], event["reason"]) for event in told}
+    ) == len(told)
     assert all(0.0 <= event["time_s"] <= env.scorer.time for event in told)
 
 
@@ -193,7 +200,11 @@ def test_an_episode_broken_off_within_a_step_is_recorded_without_its_last_state(
     env = WatchedExploration("apartment", make_settings(robots=1), watchers=[recorder])
     assert run_episode(lidarium.policy("random_walk"), env, 0, raise_interrupt=False).is_interrupted
     record = recorder.finish(is_interrupted=True)
-    assert (record.header["interrupted"], record.header["steps"], record.header["final_sha256"]) == (True, 4, None)
+    assert (record.header["interrupted"], record.header["steps"], record.header["final_sha256"]) == (
+        True,
+        4,
+        None,
+    )
 
 
 def test_a_recorder_that_saw_nothing_has_no_record():

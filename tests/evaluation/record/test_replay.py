@@ -7,13 +7,13 @@ import pytest
 
 from lidarium.agents import Stop
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.floors.catalogue import load_floor
-from lidarium.envs.settings import make_settings
+from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder, read_record, rerun, write_record
 from lidarium.evaluation.record.replay import drive_again, find_floor, is_same
 from lidarium.evaluation.record.state import state_sha256
-from lidarium.evaluation.watching import WatchedExploration
-from lidarium.mapping.map_files import write_ros_map
+from lidarium.mapping.files.map_files import write_ros_map
 
 
 class FirstFrontier:
@@ -25,7 +25,9 @@ class FirstFrontier:
         self.team = team
 
     def act(self, observations):
-        return {agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()}
+        return {
+            agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()
+        }
 
 
 class Leaves:
@@ -40,12 +42,25 @@ class Leaves:
     def act(self, observations):
         self.steps += 1
         spin = np.array([0.3, 0.7], np.float32)
-        return {agent: Stop(self.reasons[int(agent[-1])]) if self.steps > 5 * (int(agent[-1]) + 1) else spin for agent in observations}
+        return {
+            agent: Stop(self.reasons[int(agent[-1])]) if self.steps > 5 * (int(agent[-1]) + 1) else spin
+            for agent in observations
+        }
 
 
 def assert_same(again, env):
     """Assert that two environments are in the same state, array by array."""
-    for name in ("poses", "velocities", "believed", "ranges", "seen", "team_seen", "travelled", "collisions", "steps"):
+    for name in (
+        "poses",
+        "velocities",
+        "believed",
+        "ranges",
+        "seen",
+        "team_seen",
+        "travelled",
+        "collisions",
+        "steps",
+    ):
         np.testing.assert_array_equal(getattr(again.world, name), getattr(env.world, name), err_msg=name)
     for name in ("log_odds", "masks", "team_masks"):
         for here, there in zip(getattr(again.world, name), getattr(env.world, name), strict=True):
@@ -64,14 +79,39 @@ def assert_same(again, env):
         {"policy": Leaves(), "robots": 3},
         {"policy": "nearest_frontier", "horizon_s": 20.0, "noise": "datasheet"},
         {"policy": "nearest_frontier_own_map", "horizon_s": 20.0, "known_starts": False, "noise": "thesis"},
-        {"policy": "random_walk", "horizon_s": 120.0, "robots": 3, "stop_on_contact": True, "floor": "scene_room"},
+        {
+            "policy": "random_walk",
+            "horizon_s": 120.0,
+            "robots": 3,
+            "stop_on_contact": True,
+            "floor": "scene_room",
+        },
         {"policy": "nearest_frontier", "horizon_s": 10.0, "floor": "set:test"},
-        {"policy": "nearest_frontier", "horizon_s": 10.0, "floor": "building:17", "robot": "service", "lidar": "lidar_360_6m"},
-        {"policy": "nearest_frontier", "horizon_s": 10.0, "options": {"starts": [(2.5, 4.0, 1.0), (6.0, 4.5, 7.0)]}},
+        {
+            "policy": "nearest_frontier",
+            "horizon_s": 10.0,
+            "floor": "building:17",
+            "robot": "service",
+            "lidar": "lidar_360_6m",
+        },
+        {
+            "policy": "nearest_frontier",
+            "horizon_s": 10.0,
+            "options": {"starts": [(2.5, 4.0, 1.0), (6.0, 4.5, 7.0)]},
+        },
         {"policy": "nearest_frontier", "horizon_s": 10.0, "options": {"floor": "clinic"}},
-        {"policy": "nearest_frontier", "horizon_s": 10.0, "time_step": 0.05, "resolution": 0.025, "map_cells": 64},
+        {
+            "policy": "nearest_frontier",
+            "horizon_s": 10.0,
+            "time_step": 0.05,
+            "resolution": 0.025,
+            "map_cells": 64,
+        },
     ],
-    ids=lambda setup: "-".join(f"{value if isinstance(value, str | float | int) else type(value).__name__}" for value in setup.values()),
+    ids=lambda setup: "-".join(
+        f"{value if isinstance(value, str | float | int) else type(value).__name__}"
+        for value in setup.values()
+    ),
 )
 def test_a_record_runs_again_to_the_bit(recorded, setup, tmp_path):
     record, env = recorded(**setup)
@@ -81,7 +121,11 @@ def test_a_record_runs_again_to_the_bit(recorded, setup, tmp_path):
 
 def test_robots_that_end_early_end_again_at_the_same_step(recorded):
     record, env = recorded(Leaves(), robots=3)
-    assert record.header["endings"] == [[6, "robot_0", "covered"], [11, "robot_1", "horizon"], [16, "robot_2", "tired"]]
+    assert record.header["endings"] == [
+        [6, "robot_0", "covered"],
+        [11, "robot_1", "horizon"],
+        [16, "robot_2", "tired"],
+    ]
     assert_same(rerun(record), env)
 
 

@@ -10,10 +10,10 @@ import pytest
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings import make_settings
-from lidarium.evaluation.beliefs import team_log_odds
-from lidarium.evaluation.result import result_of
-from lidarium.evaluation.runner import run_episode
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.result import result_of
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.truth.beliefs import team_log_odds
 
 POLICIES = ("nearest_frontier", "random_walk", "utility_frontier")
 SEEDS = (0, 1)
@@ -63,7 +63,12 @@ def read_display(path):
     try:
         with np.load(path) as file:
             display = Display(
-                file["times"], file["poses"], file["coverage"], tuple(file["origin"]), float(file["resolution"]), file["levels"]
+                file["times"],
+                file["poses"],
+                file["coverage"],
+                tuple(file["origin"]),
+                float(file["resolution"]),
+                file["levels"],
             )
             return SimpleNamespace(header=json.loads(str(file["header"])), display=display)
     except (ValueError, EOFError) as error:
@@ -75,7 +80,9 @@ def write_directory(folder, policies=POLICIES, seeds=SEEDS, floor="apartment", *
     lines = []
     for policy in policies:
         for seed in seeds:
-            episode = run_episode(lidarium.policy(policy), ExplorationEnv(floor, make_settings(**chosen)), seed)
+            episode = run_episode(
+                lidarium.policy(policy), ExplorationEnv(floor, make_settings(**chosen)), seed
+            )
             name = f"records/{floor.replace(':', '-')}-{chosen['robots']}-{policy}-{seed}.npz"
             lines.append(json.dumps({**result_of(episode, policy), "record": name}) + "\n")
             save_display(folder / name, episode, policy)
@@ -93,7 +100,7 @@ def episodes_folder(tmp_path_factory) -> Path:
 @pytest.fixture
 def readable_records(monkeypatch):
     """Records are read in the form above."""
-    monkeypatch.setattr("lidarium.evaluation.report.records.read_record", read_display)
+    monkeypatch.setattr("lidarium.evaluation.analysis.records.read_record", read_display)
 
 
 @pytest.fixture(scope="session")

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from lidarium.evaluation.analysis.records import coverage_at
 from lidarium.evaluation.report import write_report
-from lidarium.evaluation.report.records import coverage_at
 from lidarium.evaluation.report.report import jsonable
 from lidarium.evaluation.statistics import Interval
 
@@ -23,20 +23,37 @@ def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_pa
     assert (result["episodes"], result["records"]) == (6, 6)
     (group,) = result["groups"]
     assert group["pictures"] == pictures_in(page)
-    assert [name.split("_")[0] for name in group["pictures"]] == ["coverage", "boxes", "profiles", "paths", "visits"]
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted([*group["pictures"], "report.json", "report.md"])
+    assert [name.split("_")[0] for name in group["pictures"]] == [
+        "coverage",
+        "boxes",
+        "profiles",
+        "paths",
+        "visits",
+    ]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
+        [*group["pictures"], "report.json", "report.md"]
+    )
     for name in group["pictures"]:
         picture = cv2.imread(str(tmp_path / "out" / name))
         assert min(picture.shape[:2]) > 300
         assert (picture != 255).any()
-    for heading in ("Time to 90 %", "Time to 99 %", "Coverage, paths, overlap", "Compared with `nearest_frontier`", "By floor"):
+    for heading in (
+        "Time to 90 %",
+        "Time to 99 %",
+        "Coverage, paths, overlap",
+        "Compared with `nearest_frontier`",
+        "By floor",
+    ):
         assert f"### {heading}" in page
     visits = group["visits"]["apartment"]["random_walk"]
     # Two robots for the whole of each run.
     assert np.sum(visits["seconds"]) == pytest.approx(2 * 40.0, rel=0.01)
     curve = group["coverage_over_time"]["random_walk"]
     assert curve["runs"] == 2
-    assert all(later >= sooner for sooner, later in zip(curve["median_percent"], curve["median_percent"][1:], strict=False))
+    assert all(
+        later >= sooner
+        for sooner, later in zip(curve["median_percent"], curve["median_percent"][1:], strict=False)
+    )
     assert {each["policy"] for each in group["comparisons"]} == {"random_walk", "utility_frontier"}
     assert any("fewer than 50 runs" in warning for warning in result["warnings"])
     assert any("fewer than 50 pairs" in warning for warning in result["warnings"])
@@ -46,13 +63,18 @@ def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_pa
 def test_without_records_their_plots_are_left_out_and_that_is_told(rows, directory_of, tmp_path):
     result = write_report(directory_of(rows), tmp_path / "out", baseline="random_walk")
     assert [name.split("_")[0] for name in result["groups"][0]["pictures"]] == ["boxes", "profiles"]
-    assert "There are no records in records/, so coverage over time, paths and visits are not drawn." in result["warnings"]
+    assert (
+        "There are no records in records/, so coverage over time, paths and visits are not drawn."
+        in result["warnings"]
+    )
     assert "Compared with `random_walk`" in (tmp_path / "out" / "report.md").read_text()
 
 
 @pytest.mark.usefixtures("readable_records")
 def test_a_damaged_record_is_left_out_and_named(rows, directory_of, tmp_path, episodes_folder):
-    folder = directory_of([rows[0], {**rows[1], "record": "records/cut.npz"}, {**rows[2], "record": "records/other.npz"}])
+    folder = directory_of(
+        [rows[0], {**rows[1], "record": "records/cut.npz"}, {**rows[2], "record": "records/other.npz"}]
+    )
     (folder / "records").mkdir()
     for name in (rows[0]["record"], "records/other.npz"):
         (folder / name).write_bytes((episodes_folder / rows[0]["record"]).read_bytes())
@@ -60,7 +82,9 @@ def test_a_damaged_record_is_left_out_and_named(rows, directory_of, tmp_path, ep
     result = write_report(folder, tmp_path / "out")
     assert result["records"] == 1
     assert any(warning.startswith("The record cut.npz was left out") for warning in result["warnings"])
-    assert any("left out: it is of an episode with another policy" in warning for warning in result["warnings"])
+    assert any(
+        "left out: it is of an episode with another policy" in warning for warning in result["warnings"]
+    )
     assert any("2 of 3 episodes have no record" in warning for warning in result["warnings"])
 
 
@@ -84,7 +108,10 @@ def test_a_policy_that_is_gone_is_reported_all_the_same(rows, directory_of, tmp_
 
 
 def test_a_baseline_without_episodes_is_refused_and_nothing_written(rows, directory_of, tmp_path):
-    with pytest.raises(ValueError, match="--baseline is 'best', of which there are no episodes; want one of nearest_frontier, random_walk"):
+    with pytest.raises(
+        ValueError,
+        match="--baseline is 'best', of which there are no episodes; want one of nearest_frontier, random_walk",
+    ):
         write_report(directory_of(rows), tmp_path / "out", baseline="best")
     assert not (tmp_path / "out").exists()
 

@@ -1,4 +1,4 @@
-"""A quick look at whether intervals hold known truths; benchmarks/interval_coverage.py is the thorough one."""
+"""A quick look at whether intervals hold known truths; benchmarks/studies/interval_coverage.py is the thorough one."""
 
 import numpy as np
 import pytest
@@ -33,10 +33,16 @@ def difference_of_times(generator, trial):
 FIGURES = {
     "median": (lambda g, k: median_interval(g.exponential(size=SIZE)), np.log(2.0)),
     "mean": (lambda g, k: mean_interval(g.exponential(size=SIZE), **DRAWS, seed=k), 1.0),
-    "interquartile mean": (lambda g, k: interquartile_mean_interval(g.normal(size=SIZE), **DRAWS, seed=k), 0.0),
+    "interquartile mean": (
+        lambda g, k: interquartile_mean_interval(g.normal(size=SIZE), **DRAWS, seed=k),
+        0.0,
+    ),
     "difference": (lambda g, k: paired_difference(*g.exponential(size=(2, SIZE)), **DRAWS, seed=k), 0.0),
     "ratio": (lambda g, k: paired_ratio(*g.exponential([[2.0], [1.0]], (2, SIZE)), **DRAWS, seed=k), 2.0),
-    "restricted mean": (lambda g, k: restricted_mean(*exponential_times(g), HORIZON, **DRAWS, seed=k), 1 - np.exp(-HORIZON)),
+    "restricted mean": (
+        lambda g, k: restricted_mean(*exponential_times(g), HORIZON, **DRAWS, seed=k),
+        1 - np.exp(-HORIZON),
+    ),
     "restricted difference": (difference_of_times, -0.5 - np.exp(-HORIZON) + 1.5 * np.exp(-HORIZON / 1.5)),
     "share": (lambda g, k: share_interval(int(g.binomial(SIZE, 0.8)), SIZE), 0.8),
 }

@@ -40,7 +40,10 @@ def test_shares_of_runs_with_at_least_a_score():
 
 def test_wilsons_interval_by_its_formula():
     z = stats.norm.ppf(0.975)
-    centre, reach = (0.3 + z**2 / 40) / (1 + z**2 / 20), z / (1 + z**2 / 20) * np.sqrt(0.3 * 0.7 / 20 + z**2 / 1600)
+    centre, reach = (
+        (0.3 + z**2 / 40) / (1 + z**2 / 20),
+        z / (1 + z**2 / 20) * np.sqrt(0.3 * 0.7 / 20 + z**2 / 1600),
+    )
     found = share_interval(6, 20)
     assert (found.estimate, found.low, found.high) == pytest.approx((0.3, centre - reach, centre + reach))
 

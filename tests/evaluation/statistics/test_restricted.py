@@ -24,7 +24,9 @@ censored_rows = st.lists(st.tuples(st.integers(1, 12), st.booleans()), min_size=
 
 def area_below(times, is_observed, horizon):
     """The area below scipy's Kaplan-Meier curve."""
-    sample = stats.CensoredData(uncensored=np.asarray(times)[is_observed], right=np.asarray(times)[~np.asarray(is_observed)])
+    sample = stats.CensoredData(
+        uncensored=np.asarray(times)[is_observed], right=np.asarray(times)[~np.asarray(is_observed)]
+    )
     curve = stats.ecdf(sample).sf
     ends = np.append(curve.quantiles[curve.quantiles < horizon], horizon)
     starts = np.concatenate([[0.0], ends[:-1]])
@@ -37,13 +39,19 @@ def test_known_times_have_their_plain_mean():
 
 
 def test_times_cut_at_the_horizon_count_with_the_horizon():
-    assert restricted_mean([10.0, 20.0, 100.0, 100.0], [True, True, False, False], 100.0).estimate == pytest.approx(57.5)
-    assert restricted_mean([10.0, 20.0, 300.0, 150.0], [True, True, True, False], 100.0).estimate == pytest.approx(57.5)
+    assert restricted_mean(
+        [10.0, 20.0, 100.0, 100.0], [True, True, False, False], 100.0
+    ).estimate == pytest.approx(57.5)
+    assert restricted_mean(
+        [10.0, 20.0, 300.0, 150.0], [True, True, True, False], 100.0
+    ).estimate == pytest.approx(57.5)
 
 
 def test_a_time_cut_early_counts_as_those_that_were_left_at_the_cut():
     # One of three is cut at 15: what happens to it afterwards is what happened to the one that went on.
-    assert restricted_mean([10.0, 15.0, 30.0], [True, False, True], 40.0).estimate == pytest.approx(10.0 + 20.0 * 2.0 / 3.0)
+    assert restricted_mean([10.0, 15.0, 30.0], [True, False, True], 40.0).estimate == pytest.approx(
+        10.0 + 20.0 * 2.0 / 3.0
+    )
 
 
 def test_without_censoring_the_interval_is_that_of_the_mean():
@@ -99,7 +107,9 @@ def test_the_error_without_ties_is_greenwoods():
     at_risk = np.array([(moment <= TIMES).sum() for moment in moments])
     ends = np.append(moments[1:], 150.0)
     right = np.cumsum((shares * (ends - moments))[::-1])[::-1]
-    assert np.sqrt((influences**2).sum()) == pytest.approx(np.sqrt(np.sum(right**2 / (at_risk * (at_risk - 1)))))
+    assert np.sqrt((influences**2).sum()) == pytest.approx(
+        np.sqrt(np.sum(right**2 / (at_risk * (at_risk - 1))))
+    )
     assert mean == pytest.approx(moments[0] + right[0])
 
 

@@ -6,12 +6,12 @@ from drawn_maps import RESOLUTION, SPREAD, about_middle, apartment, blank, kept,
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lidarium.mapping.geometry.rigid import Transform, fit, halfway, wrapped
 from lidarium.mapping.merging.alignment import AlignmentSettings, find_inliers, propose, sweep_rotation
-from lidarium.mapping.merging.corners import Corners, detect_corners
 from lidarium.mapping.merging.correspondence import METHODS, CorrespondenceSettings, Matches, match_corners
-from lidarium.mapping.merging.described_map import describe_map
+from lidarium.mapping.merging.description.corners import Corners, detect_corners
+from lidarium.mapping.merging.description.described_map import describe_map
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
-from lidarium.mapping.rigid import Transform, fit, halfway, wrapped
 
 POSES = st.builds(Transform, st.floats(-5, 5), st.floats(-5, 5), st.floats(-3.1, 3.1))
 
@@ -23,7 +23,12 @@ def close(first, second, distance=1e-9, angle=1e-9):
 
 def corners_at(points, angles):
     points = np.asarray(points, float)
-    return Corners(np.floor(points / RESOLUTION).astype(np.int64), points, np.asarray(angles, float), np.full(len(points), 5))
+    return Corners(
+        np.floor(points / RESOLUTION).astype(np.int64),
+        points,
+        np.asarray(angles, float),
+        np.full(len(points), 5),
+    )
 
 
 def scattered(count, seed=0):
@@ -32,7 +37,9 @@ def scattered(count, seed=0):
 
 
 def seen_from(b_points, b_angles, a_from_b):
-    return corners_at(a_from_b.apply(b_points), np.asarray(b_angles) + a_from_b.theta), corners_at(b_points, b_angles)
+    return corners_at(a_from_b.apply(b_points), np.asarray(b_angles) + a_from_b.theta), corners_at(
+        b_points, b_angles
+    )
 
 
 def paired(first, second):
@@ -49,7 +56,9 @@ def test_transforms_are_a_group(a, b, c):
 
 
 def test_a_point_turns_counter_clockwise():
-    np.testing.assert_allclose(Transform(1.0, -2.0, math.radians(30.0)).apply((1.0, 0.0)), (1.0 + math.sqrt(0.75), -1.5))
+    np.testing.assert_allclose(
+        Transform(1.0, -2.0, math.radians(30.0)).apply((1.0, 0.0)), (1.0 + math.sqrt(0.75), -1.5)
+    )
 
 
 @given(POSES)
@@ -79,7 +88,9 @@ def test_every_exact_match_proposes_the_true_transform(pose):
 
 def test_the_transform_maps_b_into_a():
     first, second = seen_from(*scattered(6), Transform(1.0, -2.0, math.radians(30.0)))
-    np.testing.assert_allclose(propose(first, second, paired(first, second))[0], (1.0, -2.0, math.radians(30.0)))
+    np.testing.assert_allclose(
+        propose(first, second, paired(first, second))[0], (1.0, -2.0, math.radians(30.0))
+    )
 
 
 def test_the_true_transform_wins_among_sixty_percent_wrong_matches():
@@ -99,7 +110,9 @@ def test_the_true_transform_wins_among_sixty_percent_wrong_matches():
 def test_a_corner_takes_part_in_one_inlier_only():
     first, second = seen_from([(1, 1), (1.02, 1.0), (4, 4)], [0, 0, 0], Transform())
     pairs = [(0, 0), (0, 1), (1, 0), (1, 1), (2, 2)]
-    matches = Matches(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs]), np.ones(5), np.zeros(5))
+    matches = Matches(
+        np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs]), np.ones(5), np.zeros(5)
+    )
     _, is_inlier = find_inliers(first, second, matches, RESOLUTION, AlignmentSettings())
     assert is_inlier.sum(axis=1).max() == 3
 
@@ -140,8 +153,12 @@ def test_walls_pull_a_transform_into_place(error):
 def test_each_method_matches_corners_of_a_turned_map(method):
     pose = about_middle(math.pi / 2.0, apartment(), (SPREAD, SPREAD))
     a, b = describe_map(moved(apartment(), pose), RESOLUTION), describe_map(apartment(), RESOLUTION)
-    matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, CorrespondenceSettings(method=method))
-    gaps = np.linalg.norm(pose.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1)
+    matches = match_corners(
+        a.corners, b.corners, a.descriptors, b.descriptors, CorrespondenceSettings(method=method)
+    )
+    gaps = np.linalg.norm(
+        pose.apply(b.corners.points[matches.second]) - a.corners.points[matches.first], axis=1
+    )
     is_right = gaps < 0.1
     assert is_right.sum() >= 0.7 * min(len(a.corners), len(b.corners))
     if method == "descriptors":
@@ -150,9 +167,18 @@ def test_each_method_matches_corners_of_a_turned_map(method):
 
 
 def test_nothing_matches_where_there_are_no_corners():
-    none, some = describe_map(np.full((30, 30), 255, np.uint8), RESOLUTION), describe_map(apartment(), RESOLUTION)
+    none, some = (
+        describe_map(np.full((30, 30), 255, np.uint8), RESOLUTION),
+        describe_map(apartment(), RESOLUTION),
+    )
     for method in METHODS:
-        found = match_corners(none.corners, some.corners, none.descriptors, some.descriptors, CorrespondenceSettings(method=method))
+        found = match_corners(
+            none.corners,
+            some.corners,
+            none.descriptors,
+            some.descriptors,
+            CorrespondenceSettings(method=method),
+        )
         assert len(found) == 0
     assert len(detect_corners(none.levels, RESOLUTION)) == 0
 

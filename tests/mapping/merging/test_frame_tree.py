@@ -4,8 +4,8 @@ import math
 import numpy as np
 import pytest
 
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
-from lidarium.mapping.rigid import Transform
 
 A_FROM_B, B_FROM_C = Transform(1.0, 2.0, 0.3), Transform(-2.0, 0.5, 1.2)
 
@@ -28,7 +28,9 @@ def test_a_chain_of_three_maps_is_looked_up_in_all_directions():
     assert near(tree.lookup("a", "c"), A_FROM_B @ B_FROM_C)
     assert near(tree.lookup("c", "a"), (A_FROM_B @ B_FROM_C).inverse())
     assert near(tree.lookup("b", "b"), Transform())
-    assert near(tree.pose_in("a", "c", Transform(1.0, 0.0, 0.1)), A_FROM_B @ B_FROM_C @ Transform(1.0, 0.0, 0.1))
+    assert near(
+        tree.pose_in("a", "c", Transform(1.0, 0.0, 0.1)), A_FROM_B @ B_FROM_C @ Transform(1.0, 0.0, 0.1)
+    )
     assert tree.groups() == [["a", "b", "c"]]
 
 
@@ -45,7 +47,11 @@ def test_a_cycle_that_does_not_close_loses_its_weakest_edge():
 
 
 def test_a_cycle_that_closes_keeps_all_edges():
-    tree = chain(Edge("a", "b", A_FROM_B, 5.0), Edge("b", "c", B_FROM_C, 4.0), Edge("c", "a", (A_FROM_B @ B_FROM_C).inverse(), 3.0))
+    tree = chain(
+        Edge("a", "b", A_FROM_B, 5.0),
+        Edge("b", "c", B_FROM_C, 4.0),
+        Edge("c", "a", (A_FROM_B @ B_FROM_C).inverse(), 3.0),
+    )
     assert tree.dropped == []
     assert len(tree.edges) == 3
 
@@ -56,9 +62,15 @@ def test_misses_around_a_cycle_are_taken_where_the_maps_overlap():
     turn = Transform(0.0, 0.0, math.radians(1.0))
     shift = np.array(place) - turn.apply(place)
     about_place = Transform(float(shift[0]), float(shift[1]), turn.theta)
-    tree = chain(Edge("a", "b", Transform(), 2.0), Edge("b", "c", Transform(), 2.0), Edge("a", "c", about_place, 1.0, place))
+    tree = chain(
+        Edge("a", "b", Transform(), 2.0),
+        Edge("b", "c", Transform(), 2.0),
+        Edge("a", "c", about_place, 1.0, place),
+    )
     assert tree.dropped == []
-    tree = chain(Edge("a", "b", Transform(), 2.0), Edge("b", "c", Transform(), 2.0), Edge("a", "c", about_place, 1.0))
+    tree = chain(
+        Edge("a", "b", Transform(), 2.0), Edge("b", "c", Transform(), 2.0), Edge("a", "c", about_place, 1.0)
+    )
     assert len(tree.dropped) == 1
 
 
@@ -91,7 +103,9 @@ def test_the_world_stays_where_it_is_while_groups_join_and_edges_improve():
     assert tree.groups() == [["c", "d"], ["a", "b"]]
 
 
-@pytest.mark.parametrize("edge", [Edge("a", "a", Transform(), 1.0), Edge("a", "b", Transform(math.nan, 0.0, 0.0), 1.0)])
+@pytest.mark.parametrize(
+    "edge", [Edge("a", "a", Transform(), 1.0), Edge("a", "b", Transform(math.nan, 0.0, 0.0), 1.0)]
+)
 def test_bad_edges_are_refused(edge):
     with pytest.raises(ValueError, match=r"itself|finite"):
         FrameTree().add_edge(edge)

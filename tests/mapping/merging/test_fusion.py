@@ -4,22 +4,30 @@ from drawn_maps import RESOLUTION, apartment, blank, kept, room
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.fusion import fuse
-from lidarium.mapping.rigid import Transform
 
 
 def test_maps_that_agree_fuse_to_the_same_map_and_tell_who_saw_what():
-    left, right = kept(apartment(), slice(0, 180), slice(0, 130)), kept(apartment(), slice(0, 180), slice(90, 220))
+    left, right = (
+        kept(apartment(), slice(0, 180), slice(0, 130)),
+        kept(apartment(), slice(0, 180), slice(90, 220)),
+    )
     fused = fuse([left, right], [Transform(), Transform()], RESOLUTION)
     row, column = (round(value / RESOLUTION) for value in fused.origin[::-1])
     inside = apartment()[row : row + fused.levels.shape[0], column : column + fused.levels.shape[1]]
     np.testing.assert_array_equal(fused.levels, inside)
-    seen = ((left != UNKNOWN).astype(int) + 2 * (right != UNKNOWN))[row : row + inside.shape[0], column : column + inside.shape[1]]
+    seen = ((left != UNKNOWN).astype(int) + 2 * (right != UNKNOWN))[
+        row : row + inside.shape[0], column : column + inside.shape[1]
+    ]
     np.testing.assert_array_equal(fused.sources, seen)
 
 
-@pytest.mark.parametrize(("votes", "level"), [((0, 255), OCCUPIED), ((0, 255, 255), FREE), ((127, 255), FREE), ((127, 127, 0), OCCUPIED)])
+@pytest.mark.parametrize(
+    ("votes", "level"),
+    [((0, 255), OCCUPIED), ((0, 255, 255), FREE), ((127, 255), FREE), ((127, 127, 0), OCCUPIED)],
+)
 def test_free_needs_a_majority_over_occupied(votes, level):
     fused = fuse([np.full((2, 2), vote, np.uint8) for vote in votes], [Transform()] * len(votes), 0.1)
     assert (fused.levels == level).all()

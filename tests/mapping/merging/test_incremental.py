@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
 
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging import pair
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
 from lidarium.mapping.merging.pair import described, is_contradicted, verify_pair
 from lidarium.mapping.merging.settings import merge_settings
 from lidarium.mapping.merging.validation import ValidationSettings
-from lidarium.mapping.rigid import Transform
 
 FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
 
@@ -43,7 +43,9 @@ def test_maps_that_have_not_changed_are_neither_described_nor_compared_again():
 
 def test_a_verified_transform_is_not_searched_for_when_maps_grow_and_frames_stay():
     merger = IncrementalMerger(RESOLUTION)
-    before = merger.update({"b": GrowingMap(part(slice(60, 220), SECOND, 1)), "a": GrowingMap(part(slice(0, 150), FIRST))})
+    before = merger.update(
+        {"b": GrowingMap(part(slice(60, 220), SECOND, 1)), "a": GrowingMap(part(slice(0, 150), FIRST))}
+    )
     larger = grown(part(slice(0, 190), FIRST), 30, 41)
     after = merger.update({"b": GrowingMap(part(slice(60, 220), SECOND, 1)), "a": larger})
     assert (merger.searched, merger.verified) == (0, 1)
@@ -52,7 +54,9 @@ def test_a_verified_transform_is_not_searched_for_when_maps_grow_and_frames_stay
     for merged in (before, after):
         assert is_true(merged.tree.lookup("a", "b"))
     fused = after.fused(["b", "a"])
-    assert np.count_nonzero(fused.levels == 255) == pytest.approx(np.count_nonzero(apartment() == 255), rel=0.05)
+    assert np.count_nonzero(fused.levels == 255) == pytest.approx(
+        np.count_nonzero(apartment() == 255), rel=0.05
+    )
 
 
 def test_a_transform_that_grown_maps_contradict_is_given_up():
@@ -106,7 +110,9 @@ def test_a_pair_that_wants_confirmation_joins_when_grown_maps_are_found_to_lie_t
 
 
 def test_a_pair_waits_for_as_long_as_the_maps_do_not_convince():
-    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0, confirmation=ValidationSettings(least_evidence_m=40.0))
+    merger = IncrementalMerger(
+        RESOLUTION, confirmation_growth_m2=2.0, confirmation=ValidationSettings(least_evidence_m=40.0)
+    )
     maps = {"a": GrowingMap(part(slice(0, 120), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
     merger.update(maps)
     waiting = merger.update({**maps, "a": GrowingMap(part(slice(0, 150), FIRST))})
@@ -137,8 +143,11 @@ def test_a_map_that_knows_nothing_of_its_own_joins_none_yet():
 
 def test_a_pair_that_is_found_elsewhere_the_second_time_is_not_confirmed():
     merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=2.0)
-    merger.update({"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))})
-    # The second robot's frame has jumped by half a metre: what was found before is gone, and the new place waits in its turn.
+    merger.update(
+        {"a": GrowingMap(part(slice(0, 150), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
+    )
+    # The second robot's frame has jumped by half a metre: what was found before is gone, and the new place
+    # waits in its turn.
     jumped = GrowingMap(part(slice(60, 220), SECOND, 1), (0.5, 0.0))
     moved_frame = merger.update({"a": GrowingMap(part(slice(0, 170), FIRST)), "b": jumped})
     assert moved_frame.pairs["a", "b"].is_accepted
@@ -148,7 +157,10 @@ def test_a_pair_that_is_found_elsewhere_the_second_time_is_not_confirmed():
 
 def test_verification_refines_a_transform_or_says_why_not():
     settings = merge_settings()
-    a, b = (described(levels, RESOLUTION, settings) for levels in (part(slice(0, 150), FIRST), part(slice(60, 220), SECOND, 1)))
+    a, b = (
+        described(levels, RESOLUTION, settings)
+        for levels in (part(slice(0, 150), FIRST), part(slice(60, 220), SECOND, 1))
+    )
     true = FIRST @ SECOND.inverse()
     near = Transform(true.x + 0.05, true.y - 0.05, true.theta)
     result = verify_pair(a, b, near, settings)
@@ -171,7 +183,10 @@ def test_maps_joined_through_a_third_must_not_contradict_each_other():
     for shift, weakest in ((0.0, None), (1.5, "b")):
         tree = FrameTree()
         # Through a map in between, whose overlap with both is not in question here.
-        edges = [Edge("west", "between", Transform(), 9.0), Edge("between", "east", Transform(true.x + shift, true.y, true.theta), 3.0)]
+        edges = [
+            Edge("west", "between", Transform(), 9.0),
+            Edge("between", "east", Transform(true.x + shift, true.y, true.theta), 3.0),
+        ]
         tree.set_edges(edges, contradicts)
         assert [edge.weight for edge in tree.dropped] == ([] if weakest is None else [3.0])
         assert (tree.lookup("west", "east") is None) == (weakest is not None)

@@ -7,21 +7,25 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, 
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings import make_settings
-from lidarium.evaluation.runner import run_episode
-from lidarium.mapping.map_files import FREE, UNKNOWN
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.mapping.files.map_files import FREE, UNKNOWN
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import three_levels
 from lidarium.mapping.merging import merger
 from lidarium.mapping.merging.merger import merge_maps
 from lidarium.mapping.merging.pair import merge_pair
 from lidarium.mapping.merging.settings import merge_settings
-from lidarium.mapping.occupancy import three_levels
-from lidarium.mapping.rigid import Transform
 
 
 def parts():
     """Three turned parts of one apartment, and where they belong."""
     slices = {"west": slice(0, 120), "middle": slice(40, 170), "east": slice(75, 220)}
-    poses = {"west": about_middle(0.4, apartment()), "middle": about_middle(2.9, apartment()), "east": about_middle(-1.3, apartment())}
+    poses = {
+        "west": about_middle(0.4, apartment()),
+        "middle": about_middle(2.9, apartment()),
+        "east": about_middle(-1.3, apartment()),
+    }
     maps = {}
     for seed, (name, columns) in enumerate(slices.items()):
         maps[name] = (noisy(moved(kept(apartment(), slice(0, 180), columns), poses[name]), seed), RESOLUTION)
@@ -42,7 +46,9 @@ def test_many_maps_become_one_in_any_order(order):
         assert distance < 0.1
         assert angle < math.radians(1.0)
     fused = merged.fused(groups[0])
-    assert np.count_nonzero(fused.levels == FREE) == pytest.approx(np.count_nonzero(apartment() == FREE), rel=0.05)
+    assert np.count_nonzero(fused.levels == FREE) == pytest.approx(
+        np.count_nonzero(apartment() == FREE), rel=0.05
+    )
     with pytest.raises(ValueError, match="not joined"):
         merged.fused([groups[0][0], "elsewhere"])
 
@@ -70,7 +76,10 @@ def test_the_thesis_mode_searches_for_every_pair_once(monkeypatch):
         return merge_pair(*pair_and_settings)
 
     monkeypatch.setattr(merger, "merge_pair", noted)
-    found = merge_maps({**maps, "elsewhere": (room(blank(), 20, 20, 90, 130), RESOLUTION)}, merge_settings("thesis", RESOLUTION))
+    found = merge_maps(
+        {**maps, "elsewhere": (room(blank(), 20, 20, 90, 130), RESOLUTION)},
+        merge_settings("thesis", RESOLUTION),
+    )
     assert "verification" not in {result.found_by for result in found.pairs.values()}
     assert len(searched) == len(found.pairs) == 6
 
@@ -99,7 +108,9 @@ def test_bad_maps_are_named(maps, message):
 
 def driven(floor, start, seconds, seed):
     """The map of a robot that starts somewhere, and its pose in the floor."""
-    chosen = make_settings(robots=1, known_starts=False, noise="datasheet", resolution=RESOLUTION, horizon_s=seconds)
+    chosen = make_settings(
+        robots=1, known_starts=False, noise="datasheet", resolution=RESOLUTION, horizon_s=seconds
+    )
     env = ExplorationEnv(floor, chosen)
     run_episode(lidarium.policy("nearest_frontier"), env, seed, {"starts": [start]})
     belief = env.perception.belief("robot_0")
@@ -114,7 +125,9 @@ def test_maps_of_robots_that_start_apart_are_joined_where_they_met():
     first, floor_from_first = driven("apartment", (2.5, 4.0, 0.0), 40.0, 1)
     second, floor_from_second = driven("apartment", (8.5117, 5.0262, -0.966), 40.0, 2)
     other, _ = driven("building:17", (17.025, 22.475, 1.58), 20.0, 3)
-    merged = merge_maps({"first": (first, RESOLUTION), "other": (other, RESOLUTION), "second": (second, RESOLUTION)})
+    merged = merge_maps(
+        {"first": (first, RESOLUTION), "other": (other, RESOLUTION), "second": (second, RESOLUTION)}
+    )
     assert merged.groups() == [["first", "second"], ["other"]]
     found = merged.tree.lookup("first", "second")
     assert found is not None

@@ -7,12 +7,18 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.map_files import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.described_map import describe_map, resampled
+from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.description.described_map import describe_map, resampled
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings
-from lidarium.mapping.merging.validation import Agreement, ValidationSettings, compare, disc_agreement, why_refused
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.merging.validation import (
+    Agreement,
+    ValidationSettings,
+    compare,
+    disc_agreement,
+    why_refused,
+)
 
 
 def merged(a, b, resolution=RESOLUTION, mode="default"):
@@ -27,7 +33,9 @@ def is_right(result, truth, at, distance=0.1, degrees=1.0):
 
 
 @settings(max_examples=8)
-@given(st.floats(-math.pi, math.pi), st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), st.integers(0, 99))
+@given(
+    st.floats(-math.pi, math.pi), st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), st.integers(0, 99)
+)
 def test_a_turned_shifted_and_noisy_map_is_joined_where_it_belongs(theta, shift, seed):
     truth = about_middle(theta, apartment(), shift=shift)
     result = merged(noisy(moved(apartment(), truth), seed), noisy(apartment(), seed + 1))
@@ -44,7 +52,9 @@ def test_margins_of_unknown_cells_change_nothing_but_the_translation(rows, colum
     assert plain.is_accepted
     assert result.is_accepted
     assert plain.a_from_b is not None
-    assert is_right(result, plain.a_from_b @ Transform(-columns * RESOLUTION, -rows * RESOLUTION), (5.0, 4.0), 0.03, 0.3)
+    assert is_right(
+        result, plain.a_from_b @ Transform(-columns * RESOLUTION, -rows * RESOLUTION), (5.0, 4.0), 0.03, 0.3
+    )
 
 
 def test_the_order_of_the_maps_turns_the_transform_round():
@@ -69,7 +79,10 @@ def test_the_other_methods_of_matching_never_join_wrongly(method):
     chosen = merge_settings()
     chosen = replace(chosen, correspondence=replace(chosen.correspondence, method=method))
     truth = about_middle(0.5, apartment())
-    a, b = described(moved(apartment(), truth), RESOLUTION, chosen), described(apartment(), RESOLUTION, chosen)
+    a, b = (
+        described(moved(apartment(), truth), RESOLUTION, chosen),
+        described(apartment(), RESOLUTION, chosen),
+    )
     result = merge_pair(a, b, chosen)
     assert result.is_accepted
     assert is_right(result, truth, (5.0, 4.0))
@@ -79,7 +92,11 @@ def test_without_corners_walls_alone_join_maps():
     chosen = merge_settings()
     chosen = replace(chosen, correspondence=replace(chosen.correspondence, threshold=1.0))
     truth = about_middle(-0.8, apartment())
-    result = merge_pair(described(moved(apartment(), truth), RESOLUTION, chosen), described(apartment(), RESOLUTION, chosen), chosen)
+    result = merge_pair(
+        described(moved(apartment(), truth), RESOLUTION, chosen),
+        described(apartment(), RESOLUTION, chosen),
+        chosen,
+    )
     assert result.found_by == "correlation"
     assert result.is_accepted, result.reason
     assert is_right(result, truth, (5.0, 4.0))
@@ -145,7 +162,13 @@ def test_a_door_that_was_moved_is_refused():
 
 @pytest.mark.parametrize("mode", ["default", "thesis"])
 @pytest.mark.parametrize(
-    "levels", [blank(), np.full((1, 1), FREE, np.uint8), np.full((1, 1), OCCUPIED, np.uint8), np.full((40, 40), FREE, np.uint8)]
+    "levels",
+    [
+        blank(),
+        np.full((1, 1), FREE, np.uint8),
+        np.full((1, 1), OCCUPIED, np.uint8),
+        np.full((40, 40), FREE, np.uint8),
+    ],
 )
 def test_a_map_without_features_is_refused_with_a_reason(levels, mode):
     for a, b in ((levels, apartment()), (apartment(), levels), (levels, levels)):
@@ -176,7 +199,9 @@ def test_walls_at_the_rim_of_what_a_map_knows_do_not_contradict():
 
 def test_what_speaks_against_a_transform_weighs_more_than_what_speaks_for_it():
     settings = ValidationSettings()
-    weak = Agreement(overlap_m2=6.0, agreeing_m=5.2, wall_m=6.0, across_m=1.3, contradicting_m=0.1, score=0.98)
+    weak = Agreement(
+        overlap_m2=6.0, agreeing_m=5.2, wall_m=6.0, across_m=1.3, contradicting_m=0.1, score=0.98
+    )
     assert weak.evidence_m == pytest.approx(5.2 - 0.8 - 0.3)
     assert why_refused(weak, settings) is None
     assert "small overlap" in str(why_refused(replace(weak, wall_m=6.8), settings))
@@ -193,7 +218,9 @@ def test_corridors_and_halls_can_be_asked_for_more():
 
 
 def test_what_drift_explains_is_excused_where_both_maps_know_a_building():
-    furnished = Agreement(overlap_m2=150.0, agreeing_m=260.0, wall_m=265.0, across_m=120.0, contradicting_m=1.4, score=0.998)
+    furnished = Agreement(
+        overlap_m2=150.0, agreeing_m=260.0, wall_m=265.0, across_m=120.0, contradicting_m=1.4, score=0.998
+    )
     assert "contradiction" in str(why_refused(furnished, ValidationSettings()))
     assert why_refused(replace(furnished, overlap_m2=300.0), ValidationSettings()) is None
 
@@ -219,7 +246,10 @@ def test_rooms_that_look_alike_are_refused_where_the_building_has_changed():
 
 
 def test_the_overlap_and_its_middle_are_measured():
-    a, b = describe_map(np.full((60, 60), FREE, np.uint8), 0.1), describe_map(np.full((60, 60), FREE, np.uint8), 0.1)
+    a, b = (
+        describe_map(np.full((60, 60), FREE, np.uint8), 0.1),
+        describe_map(np.full((60, 60), FREE, np.uint8), 0.1),
+    )
     found = compare(a, b, Transform(3.0, 0.0, 0.0), ValidationSettings())
     assert found.overlap_m2 == pytest.approx(18.0, rel=0.05)
     assert found.centre == pytest.approx((1.5, 3.0), abs=0.1)

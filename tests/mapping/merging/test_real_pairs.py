@@ -4,10 +4,10 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.mapping.map_files import read_grey_map
+from lidarium.mapping.files.map_files import read_grey_map
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import merge_settings
-from lidarium.mapping.rigid import Transform
 
 
 def real_truth(pixel, resolution, rows_a, rows_b):
@@ -26,7 +26,9 @@ def test_a_transform_of_pixels_that_run_down_is_turned_round():
     np.testing.assert_allclose(truth.apply(place_b), place_a)
 
 
-@pytest.mark.parametrize("name", ["intel_hard", "freiburg-079_easy", "freiburg-079_hard", "csail_hard", "belgioioso_hard"])
+@pytest.mark.parametrize(
+    "name", ["intel_hard", "freiburg-079_easy", "freiburg-079_hard", "csail_hard", "belgioioso_hard"]
+)
 def test_real_maps_are_joined_right_or_refused(shared_data, name):
     folder = shared_data / "map_pairs" / "log_split"
     if not folder.is_dir():

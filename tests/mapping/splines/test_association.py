@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.splines.association import are_near, overlap_of
-from lidarium.mapping.splines.bspline import Spline
-from lidarium.mapping.splines.fitting import fit_bspline
+from lidarium.mapping.splines.curves.bspline import Spline
+from lidarium.mapping.splines.curves.fitting import fit_bspline
+from lidarium.mapping.splines.curves.settings import AssociationSettings, MapSettings
 from lidarium.mapping.splines.joining import Way, common_places, join
-from lidarium.mapping.splines.settings import AssociationSettings, MapSettings
 
 
 def along(first, last, y=0.0):
@@ -48,14 +48,21 @@ def test_the_overlap_does_not_depend_on_where_both_curves_are(x, y, theta):
     seen, known = along(-1.0, 2.0, 0.04), along(0.0, 4.0)
     here = overlap_of(seen, known)
     there = overlap_of(*(Spline(curve.knots, move.apply(curve.control_points)) for curve in (seen, known)))
-    np.testing.assert_allclose((*here.seen, *here.known, here.distance), (*there.seen, *there.known, there.distance), atol=1e-6)
+    np.testing.assert_allclose(
+        (*here.seen, *here.known, here.distance), (*there.seen, *there.known, there.distance), atol=1e-6
+    )
 
 
 @pytest.mark.parametrize(
     "seen",
-    [along(1.0, 3.0, 0.15), along(3.9, 6.0), along(4.5, 6.0), fit_bspline([(3, 0), (2, 0), (1.5, 0), (1, 0)]).spline,
-     fit_bspline([(1, 0), (1.1, 0.1), (1.2, 0.2), (1.3, 0.3)]).spline],
-)  # fmt: skip
+    [
+        along(1.0, 3.0, 0.15),
+        along(3.9, 6.0),
+        along(4.5, 6.0),
+        fit_bspline([(3, 0), (2, 0), (1.5, 0), (1, 0)]).spline,
+        fit_bspline([(1, 0), (1.1, 0.1), (1.2, 0.2), (1.3, 0.3)]).spline,
+    ],
+)
 def test_curves_apart_short_of_overlap_opposite_or_across_are_not_of_one_wall(seen):
     assert overlap_of(seen, along(0.0, 4.0)) is None
 
@@ -69,7 +76,8 @@ def test_joined_curves_are_their_weighted_mean_where_both_run():
     seen, known = way(1.0, 3.0, 0.04, weight=1.0), way(0.0, 4.0, 0.0, weight=3.0)
     joined, extends = join(seen, known, common_places(seen, known, AssociationSettings()), MapSettings())
     assert not extends
-    # Towards the ends of the seen curve its share fades, so that there is no step where the known one goes on alone.
+    # Towards the ends of the seen curve its share fades, so that there is no step where the known one goes on
+    # alone.
     middle = (joined.points[:, 0] > 1.5) & (joined.points[:, 0] < 2.5)
     np.testing.assert_allclose(joined.points[middle, 1], 0.01, atol=1e-9)
     np.testing.assert_allclose(joined.weights[middle], 4.0)
@@ -77,7 +85,9 @@ def test_joined_curves_are_their_weighted_mean_where_both_run():
     np.testing.assert_allclose(joined.weights[[0, -1]], 3.0)
 
 
-@pytest.mark.parametrize(("seen", "ends"), [((2.0, 6.0), (0.0, 6.0)), ((-2.0, 1.0), (-2.0, 4.0)), ((-1.0, 5.0), (-1.0, 5.0))])
+@pytest.mark.parametrize(
+    ("seen", "ends"), [((2.0, 6.0), (0.0, 6.0)), ((-2.0, 1.0), (-2.0, 4.0)), ((-1.0, 5.0), (-1.0, 5.0))]
+)
 def test_a_seen_curve_extends_the_known_one_without_a_step(seen, ends):
     new, known = way(*seen, 0.04), way(0.0, 4.0)
     joined, extends = join(new, known, common_places(new, known, AssociationSettings()), MapSettings())
@@ -96,5 +106,7 @@ def test_what_noise_adds_to_an_end_is_no_extension():
 
 def test_weights_have_a_limit():
     new, known = way(1.0, 3.0, weight=10.0), way(0.0, 4.0, weight=35.0)
-    joined, _ = join(new, known, common_places(new, known, AssociationSettings()), MapSettings(most_weight=40.0))
+    joined, _ = join(
+        new, known, common_places(new, known, AssociationSettings()), MapSettings(most_weight=40.0)
+    )
     assert joined.weights.max() == 40.0

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from polygon_scans import ring, scan
 
-from lidarium.mapping.rigid import Transform
-from lidarium.mapping.scans import ScanGeometry
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.splines.breakpoints import clusters
+from lidarium.mapping.splines.curves.settings import PointSettings, SegmentationSettings, SplineSettings
 from lidarium.mapping.splines.features import curves_of, observe
 from lidarium.mapping.splines.scan_points import scan_points
 from lidarium.mapping.splines.segmentation import split_merge
-from lidarium.mapping.splines.settings import PointSettings, SegmentationSettings, SplineSettings
 
 LASER = ScanGeometry()
 DIETMAYER, PEDRAZA = SegmentationSettings(test="dietmayer"), SegmentationSettings(test="pedraza")
@@ -133,7 +133,9 @@ def test_each_beam_is_placed_where_it_was_seen_at_its_own_time():
     for k, pose in enumerate(poses):
         ranges[k] = scan(wall, (pose.x, pose.y, pose.theta), LASER)[k]
     still = scan_points(ranges, LASER)
-    moving = scan_points(ranges, LASER, PointSettings(beam_interval_s=interval), poses[0].inverse() @ poses[-1], duration)
+    moving = scan_points(
+        ranges, LASER, PointSettings(beam_interval_s=interval), poses[0].inverse() @ poses[-1], duration
+    )
     placed, unplaced = (poses[-1].apply(points.points) for points in (moving, still))
     assert np.abs(placed[:, 0] - 3.0).max() < 0.002
     assert np.abs(unplaced[:, 0] - 3.0).max() > 0.05

@@ -7,17 +7,19 @@ import numpy as np
 import pytest
 from polygon_scans import distances_to, ring, scan
 
-from lidarium.mapping.rigid import Transform, yaw_of_quaternion
-from lidarium.mapping.scans import ScanGeometry
+from lidarium.mapping.files.spline_files import compact_bytes, read_spline_map, write_spline_map
+from lidarium.mapping.geometry.rigid import Transform, yaw_of_quaternion
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.splines.curve_lookup import CurveLookup
+from lidarium.mapping.splines.curves.settings import SplineSettings, spline_settings
 from lidarium.mapping.splines.features import observe
 from lidarium.mapping.splines.scan_points import scan_points
-from lidarium.mapping.splines.settings import SplineSettings, spline_settings
-from lidarium.mapping.splines.spline_files import compact_bytes, read_spline_map, write_spline_map
 from lidarium.mapping.splines.spline_map import SplineMap
 
 LASER = ScanGeometry()
-ROOM = np.vstack([ring((-2, -1.5), (3, -1.5), (3, 2), (-2, 2)), ring((0.5, 0.5), (1.1, 0.5), (1.1, 1.0), (0.5, 1.0))])
+ROOM = np.vstack(
+    [ring((-2, -1.5), (3, -1.5), (3, 2), (-2, 2)), ring((0.5, 0.5), (1.1, 0.5), (1.1, 1.0), (0.5, 1.0))]
+)
 ROUND = [(0.3 * k, -0.8 + 0.1 * math.sin(0.7 * k), 0.6 * k) for k in range(8)]
 
 
@@ -54,7 +56,9 @@ def test_seeing_the_same_again_does_not_make_the_map_grow():
 
 
 def test_a_wall_seen_from_both_sides_is_two_curves():
-    spline_map = taken(np.array([(1.0, -1.0, 1.0, 1.0), (1.05, -1.0, 1.05, 1.0)]), [(0, 0, 0), (2, 0, math.pi)], noise=0.0)
+    spline_map = taken(
+        np.array([(1.0, -1.0, 1.0, 1.0), (1.05, -1.0, 1.05, 1.0)]), [(0, 0, 0), (2, 0, math.pi)], noise=0.0
+    )
     assert len(spline_map.curves) == 2
     first, second = (curve.spline.tangents([0.5])[0] for curve in spline_map.curves)
     assert float(first @ second) < -0.99
@@ -67,7 +71,10 @@ def test_two_views_of_one_wall_grow_together_when_a_third_joins_them():
     assert len(apart.curves) == 3
     joined = SplineMap()
     for walls in (np.vstack([wall, block]), wall):
-        joined.update(observe(scan_points(scan(walls, (0, 0, math.pi / 2), LASER), LASER)), Transform(0.0, 0.0, math.pi / 2))
+        joined.update(
+            observe(scan_points(scan(walls, (0, 0, math.pi / 2), LASER), LASER)),
+            Transform(0.0, 0.0, math.pi / 2),
+        )
     assert len(joined.curves) == 2
     assert max(curve.spline.length() for curve in joined.curves) > 6.0
 

@@ -1,8 +1,9 @@
 """The program that times VMAS, in an interpreter of its own: it needs vmas and torch, not lidarium.
 
-VMAS is under the GPL: this file is run as a separate process and nothing of lidarium imports it. It reads one line of JSON
-(boxes, poses, rays, reach, field_of_view, threads, batches) and answers with its version and the batch size that was fastest;
-after that each line it reads is a number of seconds to run, and each line it writes the seconds that one agent's step took.
+VMAS is under the GPL: this file is run as a separate process and nothing of lidarium imports it. It reads one
+line of JSON (boxes, poses, rays, reach, field_of_view, threads, batches) and answers with its version and the
+batch size that was fastest; after that each line it reads is a number of seconds to run, and each line it
+writes the seconds that one agent's step took.
 """
 
 import json
@@ -22,7 +23,9 @@ from vmas.simulator.sensors import Lidar
 class Rooms(BaseScenario):
     """Differential-drive agents with lidars among boxes."""
 
-    def make_world(self, batch_dim: int, device: torch.device, floor: dict[str, Any], **kwargs: object) -> World:
+    def make_world(
+        self, batch_dim: int, device: torch.device, floor: dict[str, Any], **kwargs: object
+    ) -> World:
         """Put agents and boxes into the world."""
         world = World(batch_dim, device, dt=0.1, substeps=1)
         self.floor = floor
@@ -30,7 +33,16 @@ class Rooms(BaseScenario):
             half = floor["field_of_view"] / 2
             lidar = Lidar(world, -half, half, n_rays=floor["rays"], max_range=floor["reach"], render=False)
             drive = DiffDrive(world, integration="euler")
-            world.add_agent(Agent(f"agent_{k}", shape=Sphere(0.18), collide=True, u_range=[0.5, 1.0], dynamics=drive, sensors=[lidar]))
+            world.add_agent(
+                Agent(
+                    f"agent_{k}",
+                    shape=Sphere(0.18),
+                    collide=True,
+                    u_range=[0.5, 1.0],
+                    dynamics=drive,
+                    sensors=[lidar],
+                )
+            )
         for k, (x_low, y_low, x_high, y_high) in enumerate(floor["boxes"]):
             shape = Box(length=x_high - x_low, width=y_high - y_low)
             world.add_landmark(Landmark(f"box_{k}", collide=True, movable=False, shape=shape))
@@ -41,8 +53,13 @@ class Rooms(BaseScenario):
         for agent, (x, y, theta) in zip(self.world.agents, self.floor["poses"], strict=True):
             agent.set_pos(torch.tensor([x, y], dtype=torch.float32), batch_index=env_index)
             agent.set_rot(torch.tensor([theta], dtype=torch.float32), batch_index=env_index)
-        for landmark, (x_low, y_low, x_high, y_high) in zip(self.world.landmarks, self.floor["boxes"], strict=True):
-            landmark.set_pos(torch.tensor([(x_low + x_high) / 2, (y_low + y_high) / 2], dtype=torch.float32), batch_index=env_index)
+        for landmark, (x_low, y_low, x_high, y_high) in zip(
+            self.world.landmarks, self.floor["boxes"], strict=True
+        ):
+            landmark.set_pos(
+                torch.tensor([(x_low + x_high) / 2, (y_low + y_high) / 2], dtype=torch.float32),
+                batch_index=env_index,
+            )
 
     def reward(self, agent: Agent) -> torch.Tensor:
         """Reward nothing."""
@@ -58,7 +75,9 @@ class Batch:
 
     def __init__(self, floor: dict[str, Any], size: int) -> None:
         self.agents = len(floor["poses"])
-        self.env = make_env(Rooms(), num_envs=size, device="cpu", continuous_actions=True, seed=0, floor=floor)
+        self.env = make_env(
+            Rooms(), num_envs=size, device="cpu", continuous_actions=True, seed=0, floor=floor
+        )
         self.actions = [torch.rand(size, 2) - 0.5 for _ in range(self.agents)]
         self.size = size
 

@@ -1,0 +1,100 @@
+"""The same short drives, run in batches of any size: what differs between sizes is how much memory is in use, and nothing else."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.benchmarks.speed.scenes.floors import BenchFloor, team_poses
+from lidarium.benchmarks.speed.scenes.teams import LIDAR
+from lidarium.envs.settings.robots import ROBOTS
+from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.mapping.grids.occupancy import OccupancySettings
+
+
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """Short drives of many robots on a floor.
+
+    Attributes
+    ----------
+    tables : FloorTables
+        The floor.
+    robots : int
+        Robots of a team; teams do not see each other.
+    starts : (drives, 3) float64
+        Where each drive begins [m, rad].
+    commands : (drives, 2) float64
+        Its speed and turn rate [m/s, rad/s].
+    steps : int
+        How long it takes.
+    """
+
+    tables: FloorTables
+    robots: int
+    starts: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    steps: int
+
+
+def drawn_drives(floor: BenchFloor, drives: int, robots: int, steps: int) -> Drives:
+    """Draw drives on a floor, at speeds and turn rates as those of ``teams``."""
+    generator = np.random.default_rng(0)
+    commands = np.column_stack([generator.uniform(0.2, 0.7, drives), generator.uniform(-1.0, 1.0, drives)])
+    return Drives(floor.tables(), robots, team_poses(floor, drives // robots, robots), commands, steps)
+
+
+class Histories:
+    """Runs all drives, one batch after the other, on one thread.
+
+    Each batch is put where its drives begin and keeps its maps.
+
+    Parameters
+    ----------
+    drives : Drives
+        What is driven.
+    rows : int
+        Robots of a batch.
+    resolution : float
+        Side of a cell of the maps [m].
+    maps : int or None
+        Let all robots write to the maps and masks of so many, so that the same arithmetic uses less memory;
+        None for all their own.
+    """
+
+    def __init__(self, drives: Drives, rows: int, resolution: float, maps: int | None = None) -> None:
+        self._drives, self._rows = drives, rows
+        robots = drives.robots
+        self.world = world = KinematicWorld(
+            [ROBOTS["kobuki"]] * robots, LIDAR, OccupancySettings(resolution=resolution), 0.1, rows // robots
+        )
+        for episode in range(world.episodes):
+            world.place(
+                episode, drives.tables, drives.starts[episode * robots : (episode + 1) * robots], seed=episode
+            )
+        if maps is not None:
+            world.belief_rows[:] = np.resize(world.belief_rows[:maps], world.belief_rows.shape)
+            world._mask_rows[:] = np.resize(world._mask_rows[:maps], world._mask_rows.shape)
+
+    @property
+    def working_set(self) -> int:
+        """Bytes of the maps and masks that the robots write to."""
+        world = self.world
+        maps = {int(row[0]): int(row[1] * row[2]) for row in world.belief_rows}
+        masks = {int(row[place]): int(row[3] * row[4] * 8) for row in world._mask_rows for place in (0, 1)}
+        return sum(maps.values()) + sum(masks.values())
+
+    def run(self) -> float:
+        """Run all drives once and return the seconds per agent step."""
+        world, drives, spent = self.world, self._drives, 0.0
+        for first in range(0, len(drives.starts), self._rows):
+            chosen = slice(first, first + self._rows)
+            world.poses[:], world.velocities[:] = drives.starts[chosen], 0.0
+            commands = drives.commands[chosen]
+            began = time.perf_counter()
+            for _ in range(drives.steps):
+                world.step(commands)
+            spent += time.perf_counter() - began
+        return spent / (len(drives.starts) * drives.steps)

@@ -1,0 +1,126 @@
+"""How much memory a robot takes that stands still, beside that of its map.
+
+python benchmarks/speed/growth/idle_memory.py
+"""
+
+import gc
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lidarium.benchmarks.speed.harness.batches import OBSERVED, ROBOTS
+from lidarium.benchmarks.speed.scenes.floors import straight_floor
+from lidarium.benchmarks.speed.scenes.teams import LIDAR
+from lidarium.envs.batch.vector_env import ExplorationVectorEnv
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
+
+
+@dataclass(frozen=True, slots=True)
+class IdleMemory:
+    """Memory of a robot that stands still at the level of velocities.
+
+    Attributes
+    ----------
+    robots : int
+        How many stood there.
+    map_bytes : int
+        Of the robot's map.
+    own_bytes : float
+        Of all arrays that belong to the robot: map, mask, scan, poses and so on.
+    all_bytes : float
+        Of all arrays of the environment, by the number of robots: the team's masks and the observations'
+        buffers, too.
+    resident_bytes : float or None
+        By how much a robot makes the process grow, as the system tells; None where it does not.
+    """
+
+    robots: int
+    map_bytes: int
+    own_bytes: float
+    all_bytes: float
+    resident_bytes: float | None
+
+
+def own_bytes(world: KinematicWorld) -> float:
+    """Return the size of the arrays that belong to a robot: the mean of those over rows, and of its map and mask."""
+    rows = world.robots * world.episodes
+    over_rows = sum(
+        array.nbytes for array in vars(world).values() if isinstance(array, np.ndarray) and len(array) == rows
+    )
+    grids = sum(array.nbytes for array in world.log_odds) + sum(array.nbytes for array in world.masks)
+    return (over_rows + grids) / rows
+
+
+def array_bytes(thing: Any) -> int:  # noqa: ANN401
+    """Return the size of all arrays that an object holds, directly or through what it is made of; each counts once."""
+    seen: set[int] = set()
+    pending: list[Any] = [thing]
+    total = 0
+    while pending:
+        each = pending.pop()
+        while isinstance(each, np.ndarray) and isinstance(each.base, np.ndarray):
+            each = each.base
+        if id(each) in seen or isinstance(each, type) or callable(each):
+            continue
+        seen.add(id(each))
+        if isinstance(each, np.ndarray):
+            total += each.nbytes
+        elif isinstance(each, dict | list | tuple) or type(each).__module__.startswith("lidarium."):
+            pending += gc.get_referents(each)
+    return total
+
+
+def resident() -> int | None:
+    """Return how much memory of this process lies in the machine's [bytes].
+
+    None where the system does not tell.
+    """
+    try:
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return None
+    return next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmRSS"))
+
+
+def standing(robots: int) -> ExplorationVectorEnv:
+    """Return an environment in which so many robots have stood still for a second, in teams on the straight floor."""
+    floor = straight_floor()
+    env = ExplorationVectorEnv(
+        robots // ROBOTS,
+        floor.floor(),
+        robots=ROBOTS,
+        lidar=LIDAR,
+        resolution=floor.resolution,
+        observe=OBSERVED,
+        threads=1,
+        copy=False,
+    )
+    env.reset(seed=0)
+    for _ in range(10):
+        env.step(np.zeros((robots, 2), np.float32))
+    return env
+
+
+def measure(few: int = 64, many: int = 1024) -> IdleMemory:
+    """Measure what the robots of a batch of ``many`` take after one of ``few``.
+
+    A fresh process gives the truest figure.
+    """
+    first = standing(few)
+    gc.collect()
+    before = resident()
+    second = standing(many)
+    gc.collect()
+    after = resident()
+    world = second.batch.world
+    growth = None if before is None or after is None else (after - before) / many
+    # What does not grow with the robots, such as the floor's tables, drops out of the difference.
+    everything = (array_bytes(second) - array_bytes(first)) / (many - few)
+    return IdleMemory(many, world.log_odds[0].nbytes, own_bytes(world), everything, growth)
+
+
+if __name__ == "__main__":
+    print(json.dumps(asdict(measure())))

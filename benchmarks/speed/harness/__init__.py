@@ -1,0 +1,1 @@
+"""What all measurements of speed share: timing, lines, the report."""

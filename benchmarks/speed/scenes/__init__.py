@@ -1,0 +1,1 @@
+"""Floors with teams on them, for measurements of speed."""

@@ -1,0 +1,78 @@
+"""Our side of the comparisons: robots in the kinematic world, driven by drawn commands."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.benchmarks.speed.scenes.floors import BenchFloor, free_poses
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.robots import ROBOTS
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.mapping.grids.occupancy import OccupancySettings
+
+BEAMS, RANGE_MAX = 720, 5.6
+LIDAR = Lidar(beams=BEAMS, range_max=RANGE_MAX, noise_floor=0.01, noise_share=0.01)
+
+HOLD = 20
+"""Steps for which a robot drives at the same speed and turn rate."""
+
+DRAWS = 50
+
+
+def drawn_commands(robots: int, seed: int) -> NDArray[np.float64]:
+    """Draw speeds and turn rates, each to be held for ``HOLD`` steps, shape (DRAWS, robots, 2) [m/s, rad/s]."""
+    generator = np.random.default_rng(seed)
+    speeds = generator.uniform(0.2, 0.7, (DRAWS, robots))
+    turns = generator.uniform(-1.0, 1.0, (DRAWS, robots))
+    return np.stack([speeds, turns], axis=2)
+
+
+class DrivenTeam:
+    """Robots that drive at drawn speeds and turn rates, each pair held for 2 s, into walls and each other as it comes.
+
+    Parameters
+    ----------
+    floor : BenchFloor
+        Where they drive; the maps have its cells.
+    robots : int
+        How many.
+    lidar : Lidar
+        The laser of each.
+    scales : tuple of int
+        Scales at which maps are pooled for observations [cells].
+    """
+
+    def __init__(
+        self, floor: BenchFloor, robots: int, lidar: Lidar = LIDAR, scales: tuple[int, ...] = ()
+    ) -> None:
+        self.robots = robots
+        self._floor, self._tables = floor, floor.tables()
+        settings = OccupancySettings(resolution=floor.resolution)
+        self.world = KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, settings, scales=scales)
+        self._count, self._starts = 0, 0
+        self.start()
+
+    def start(self) -> None:
+        """Begin anew: blank maps, other places."""
+        poses = free_poses(self._floor, self.robots, seed=self._starts)
+        self.world.place(0, self._tables, poses, seed=self._starts)
+        self._commands = drawn_commands(self.robots, self._starts)
+        self.world.step(self._commands[0], moves_bodies=False)
+        self._count = 0
+        self._starts = (self._starts + 1) % 8
+
+    @property
+    def commands(self) -> NDArray[np.float64]:
+        """Speeds and turn rates of the next step, (robots, 2) [m/s, rad/s]."""
+        return np.asarray(self._commands[self._count // HOLD % DRAWS])
+
+    def step(self) -> None:
+        """Move, sense, score and map, for all robots."""
+        self.world.step(self.commands)
+        self._count += 1
+
+
+def full_circle(beams: int, reach: float) -> Lidar:
+    """Return a noise-free laser that looks all around."""
+    return Lidar(beams=beams, field_of_view=2.0 * math.pi, range_max=reach)

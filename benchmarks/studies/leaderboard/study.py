@@ -1,0 +1,185 @@
+"""The leaderboard: all policies on the floors of the test set and on real floors, 1, 2 and 3 robots that know where they start."""
+
+import json
+import platform
+from collections.abc import Iterable, Mapping
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import lidarium
+from lidarium.evaluation.report import write_report
+from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
+
+POLICIES = ("nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite", "random_walk")
+BASELINE = "nearest_frontier"
+TEAMS = (1, 2, 3)
+SETTINGS = {"resolution": 0.025, "stop_coverage": 0.99, "horizon_s": 1800.0}
+
+CHANCE = 0.05
+"""Least p value that is no evidence."""
+
+KINDS = {
+    "test": "generated floors of the set `test`",
+    "kth": "KTH campus floors, of which at least 80 % are connected",
+    "lifull": "LIFULL apartments",
+    "slam": "maps that robots made of real buildings",
+    "dungeon": "dungeons, 0.1 m a pixel",
+}
+
+
+def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
+    """Return the suites by kind of floor.
+
+    Parameters
+    ----------
+    data : Path or None
+        Folder of real floors; generated floors alone where None.
+    every : int
+        Of each kind every so many-th floor is run.
+    """
+    from lidarium.envs.floors.catalogue.names import set_floors
+
+    floors = {"test": list(set_floors("test"))}
+    if data is not None:
+        floors |= {kind: [str(path) for path in paths] for kind, paths in real_floors(data).items()}
+    return {
+        kind: Suite(
+            policies=POLICIES,
+            floors=tuple(found[::every]),
+            robots=TEAMS,
+            seeds=(0,),
+            variants={DEFAULT_VARIANT: SETTINGS},
+        )
+        for kind, found in floors.items()
+        if found
+    }
+
+
+def real_floors(data: Path) -> dict[str, list[Path]]:
+    """Return the files of real floors below a folder, by kind.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where the folder holds none of them.
+    """
+    plans = Path(data) / "floorplans"
+    meta = plans / "kth" / "meta.json"
+    connected = (
+        {name for name, entry in json.loads(meta.read_text()).items() if entry["conn"] >= 0.8}
+        if meta.is_file()
+        else set()
+    )
+    found = {
+        "kth": [
+            path
+            for path in sorted((plans / "kth" / "xml").glob("*.xml.gz"))
+            if path.name.removesuffix(".xml.gz") in connected
+        ],
+        "lifull": sorted((plans / "lifull" / "txt").glob("*.txt")),
+        "slam": sorted((Path(data) / "slam_maps").glob("*.yaml")),
+        "dungeon": sorted((plans / "synthetic_dungeon").glob("*.png")),
+    }
+    if not any(found.values()):
+        raise FileNotFoundError(
+            f"no real floors below {data}; want the folders floorplans and slam_maps there"
+        )
+    return found
+
+
+def page(folder: Path, command: str) -> str:
+    """Write the report of each suite into its folder, and return the leaderboard as markdown."""
+    parts = [
+        "# Leaderboard",
+        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python {platform.python_version()}. "
+        "Simulated time; perfect poses, no noise, the URG laser (240 deg, 5.6 m), maps of 2.5 cm, known starts, cut at 1,800 s. "
+        "Starts are drawn by the seed, the same for every policy. An entry of time is the median with its 95 % interval; "
+        "runs that did not get there count as never. The difference is that of the restricted means to `nearest_frontier`, pair by "
+        "pair, with its 95 % interval; in bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm).",
+    ]
+    is_run = {kind: (folder / kind / "episodes.jsonl").exists() for kind in KINDS}
+    if "--every" in command:
+        parts.append(
+            "A part of the floors of each kind, too few for firm words: the intervals say so. Without `--every` the command runs all."
+        )
+    if not all(is_run.values()):
+        parts.append(f"Not in it: {', '.join(about for kind, about in KINDS.items() if not is_run[kind])}.")
+    for kind, about in KINDS.items():
+        if not is_run[kind]:
+            continue
+        numbers = write_report(folder / kind, folder / kind / "report", BASELINE)
+        floors = sorted({floor for group in numbers["groups"] for floor in group["floors"]})
+        parts += [f"## {about[0].upper()}{about[1:]} ({len(floors)})", _table(numbers["groups"])]
+        if any("fewer than" in warning for warning in numbers["warnings"]):
+            parts.append(
+                "Fewer than 50 runs or pairs: intervals may hold the truth less often than they say ([how often](interval_coverage.md))."
+            )
+    return "\n\n".join(parts) + "\n"
+
+
+def _table(groups: Iterable[Mapping[str, Any]]) -> str:
+    by_team: dict[int, list[Mapping[str, Any]]] = {}
+    for group in groups:
+        by_team.setdefault(group["robots"], []).append(group)
+    lines = [
+        "| robots | policy | runs | reached 99 % | time to 90 % [s] | time to 99 % [s] | less the baseline [s] | path of all [m] | "
+        "overlap [%] |",
+        "|---:|---|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for robots, members in sorted(by_team.items()):
+        for group in members:
+            lines += [
+                _row(robots, policy, group)
+                for policy in sorted(group["times"]["t99_s"], key=lambda name: _order(name, group))
+            ]
+    return "\n".join(lines)
+
+
+def _order(policy: str, group: Mapping[str, Any]) -> float:
+    """Best first: by the restricted mean of the time to 99 %."""
+    mean = group["times"]["t99_s"][policy]["restricted_mean"]
+    return float("inf") if mean is None else float(mean["estimate"])
+
+
+def _row(robots: int, policy: str, group: Mapping[str, Any]) -> str:
+    t90, t99 = (group["times"][key][policy] for key in ("t90_s", "t99_s"))
+    values = group["values"][policy]
+    cells = [
+        str(robots),
+        f"`{policy}`",
+        str(t99["size"]),
+        f"{100.0 * t99['success']['estimate']:.0f} %",
+        _interval(t90["median"]),
+        _interval(t99["median"]),
+        _difference(policy, group),
+        _estimate(values, "path_m"),
+        _estimate(values, "overlap_percent"),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def _interval(figure: Mapping[str, Any]) -> str:
+    def shown(value: float | None) -> str:
+        return "never" if value is None else f"{value:.0f}"
+
+    if figure["low"] is None:
+        return f"{shown(figure['estimate'])} (too few for an interval)"
+    return f"{shown(figure['estimate'])} ({shown(figure['low'])} to {shown(figure['high'])})"
+
+
+def _difference(policy: str, group: Mapping[str, Any]) -> str:
+    for comparison in group["comparisons"]:
+        figure = comparison["difference"]
+        if comparison["policy"] == policy and comparison["key"] == "t99_s" and figure is not None:
+            bounds = [figure["low"], figure["high"]]
+            # Of very few pairs there is an estimate alone.
+            text = f"{figure['estimate']:+.0f}" + (
+                "" if None in bounds else f" ({bounds[0]:+.0f} to {bounds[1]:+.0f})"
+            )
+            return f"**{text}**" if comparison["p_holm"] < CHANCE else text
+    return "-"
+
+
+def _estimate(values: Mapping[str, Any], key: str) -> str:
+    return f"{values[key]['median']['estimate']:.0f}"

@@ -1,0 +1,154 @@
+"""Runs of the tree towards the goals of the worlds: what is measured of each."""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.srt.policy import SensorBasedRandomTree
+from lidarium.benchmarks.studies.srt.map_figures import MapFigures, map_figures
+from lidarium.benchmarks.studies.srt.shortest_path import shortest_path
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.runner import Episode, run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.suites.episodes_file import KEY
+from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
+
+WORLDS = (
+    "srt_corridor",
+    "srt_l_room",
+    "srt_lab",
+    "srt_t_junction",
+    "srt_cluttered",
+    "srt_cluttered_reachable",
+)
+MODES = ("thesis", "default")
+GOAL_RADIUS = 0.2
+
+SETTINGS: dict[str, Any] = {
+    "robots": 1,
+    "robot": "pioneer",
+    "noise": "datasheet",
+    "odometry": "typical",
+    "localization": "splines",
+    "resolution": 0.05,
+    "raster_resolution": 0.01,
+    "stop_coverage": None,
+    "horizon_s": 1200.0,
+    "goal_radius": GOAL_RADIUS,
+    "observe": ("scan", "pose", "bumper"),
+    "map_cells": 2,
+}
+"""A Pioneer with the laser of the thesis, its range noise, and wheels that tell 5 % too much or too little."""
+
+CURVE_PERIOD = 10
+"""Steps between the points of a curve of coverage."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoalRun:
+    """A run: the mode of the tree, the world and the seed."""
+
+    mode: str
+    world: str
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """The run in one line; no other run has the same."""
+        return f"{self.mode} | {self.world} | {self.seed}"
+
+
+class Way:
+    """What a robot measured and believed on its way, and the truth; a ``Watcher``."""
+
+    def __init__(self) -> None:
+        self.ranges: list[NDArray[np.float32]] = []
+        self.true: list[NDArray[np.float64]] = []
+        self.believed: list[NDArray[np.float64]] = []
+        self.odometry: list[NDArray[np.float64]] = []
+        self.coverage: list[float] = []
+        self.returns = 0
+        self._updates = 0
+
+    def begin(self, env: ExplorationEnv) -> None:
+        """Note the start."""
+        self.step(env, np.empty(0))
+
+    def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
+        """Note a time step."""
+        world = env.world
+        self.ranges.append(world.ranges[0].copy())
+        self.true.append(world.poses[0].copy())
+        self.believed.append(world.believed[0].copy())
+        self.odometry.append(world.odometry[0].copy())
+        self.coverage.append(env.scorer.coverage)
+        updates = tracker_of(env).map.updates
+        if updates > self._updates:
+            self.returns += int((self.ranges[-1] < env.settings.lidar.range_max).sum())
+        self._updates = updates
+
+    def outcome(self, env: ExplorationEnv) -> None:
+        """Note nothing."""
+
+
+def tracker_of(env: ExplorationEnv) -> SplineTracker:
+    """Return the localizer on curves of the robot.
+
+    Raises
+    ------
+    ValueError
+        Where the robot has another one.
+    """
+    localizer = env.perception.localizers[0]
+    if not isinstance(localizer, SplineTracker):
+        raise ValueError(f"localization is {env.settings.localization!r}; want splines or splines_ekf")
+    return localizer
+
+
+def drive_to_goal(run: GoalRun) -> tuple[Episode, SensorBasedRandomTree, Way]:
+    """Let a robot look for the goal of a world."""
+    way, policy = Way(), SensorBasedRandomTree(run.mode)
+    env = WatchedExploration(run.world, make_settings(**SETTINGS), watchers=[way])
+    return run_episode(policy, env, run.seed), policy, way
+
+
+def measure_goal_run(run: GoalRun) -> dict[str, Any]:
+    """Run and measure; returns the run's line."""
+    episode, policy, way = drive_to_goal(run)
+    env = episode.env
+    world, floor, goal, tables = env.world, env.floor, env.goal, env.world.floors[0]
+    assert floor is not None
+    assert goal is not None
+    assert tables is not None
+    start = way.true[0][:2]
+    shortest = shortest_path(tables, (float(start[0]), float(start[1])), goal, env.settings.robot.radius)
+    curve = [*way.coverage[::CURVE_PERIOD], way.coverage[-1]]
+    return {
+        KEY: run.key,
+        "mode": run.mode,
+        "world": run.world,
+        "seed": run.seed,
+        "ending": env.scorer.ended_because[env.possible_agents[0]],
+        "time_s": env.scorer.time,
+        "nodes": len(policy.tree.nodes),
+        "path_m": float(world.travelled[0]),
+        "shortest_m": None if shortest is None else shortest - GOAL_RADIUS,
+        "from_start_m": math.dist(way.true[-1][:2], start),
+        "coverage": env.scorer.coverage,
+        "coverage_curve": [round(share, 4) for share in curve],
+        "collisions": int(world.collisions.sum()),
+        **asdict(figures_of(env, way)),
+    }
+
+
+def figures_of(env: ExplorationEnv, way: Way) -> MapFigures:
+    """Return how well the robot's localizer did."""
+    assert env.floor is not None
+    true, believed, odometry = (np.array(poses) for poses in (way.true, way.believed, way.odometry))
+    return map_figures(
+        env.floor, tracker_of(env).map, env.settings.lidar, true, believed, odometry, way.returns
+    )

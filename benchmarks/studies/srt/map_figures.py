@@ -1,0 +1,117 @@
+"""How well a localizer on a spline map did on a way: its poses, its map, and how small that is."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import Floor
+from lidarium.evaluation.metrics import (
+    absolute_error,
+    curve_precision,
+    end_point_bytes,
+    grid_bytes,
+    hits_of_beams,
+    moved,
+    seen_walls,
+    wall_error,
+    wall_recall,
+)
+from lidarium.mapping.files.spline_files import compact_bytes
+from lidarium.mapping.geometry.rigid import relative
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.splines.spline_map import SplineMap
+
+SPACING = 0.01
+"""Distance of the points along curves and walls that are compared [m]."""
+
+Poses = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class MapFigures:
+    """Figures of a way: lengths in metres, angles in degrees, shares, bytes.
+
+    Attributes
+    ----------
+    ate_m, end_m, end_deg : float
+        Error of the poses: root of the mean square over the way, and at its end.
+    odometry_ate_m : float
+        The same of odometry alone.
+    wall_mean_m, wall_p95_m : float
+        How far curves lie from walls.
+    recall, precision : float
+        Share of the walls within 5 cm of a curve, of those where true beams end; share of the curves within 5
+        cm of a wall.
+    curves, control_points, size_bytes : int
+        Size of the map, the last in its compact form.
+    of_end_points, of_grid : float
+        Its bytes as a share of those of the end points of the scans that went into it, and of a 5 cm grid.
+    """
+
+    ate_m: float
+    end_m: float
+    end_deg: float
+    odometry_ate_m: float
+    wall_mean_m: float
+    wall_p95_m: float
+    recall: float
+    precision: float
+    curves: int
+    control_points: int
+    size_bytes: int
+    of_end_points: float
+    of_grid: float
+
+
+def map_figures(
+    floor: Floor,
+    spline_map: SplineMap,
+    geometry: ScanGeometry,
+    true: Poses,
+    believed: Poses,
+    odometry: Poses,
+    returns: int,
+) -> MapFigures:
+    """Compare what a localizer believed with the truth.
+
+    Parameters
+    ----------
+    floor : Floor
+        The truth.
+    spline_map : SplineMap
+        The map in the end, in the floor's frame.
+    geometry : ScanGeometry
+        The laser.
+    true, believed, odometry : (times, 3) float64
+        Poses x, y, theta [m, rad]; odometry in a frame of its own.
+    returns : int
+        End points of the scans that went into the map.
+    """
+    curves = spline_map.sample(SPACING)
+    edges = np.concatenate([solid.edges for solid in floor.solids])
+    walls, size = wall_error(curves, edges), compact_bytes(spline_map)
+    turn = float(believed[-1, 2] - true[-1, 2])
+    alone = moved(_from_first(odometry), true[0])
+    hits = hits_of_beams(edges, true, geometry.angles, geometry.range_max)
+    return MapFigures(
+        ate_m=absolute_error(believed, true, is_aligned=False),
+        end_m=math.dist(believed[-1, :2], true[-1, :2]),
+        end_deg=math.degrees(abs(math.remainder(turn, math.tau))),
+        odometry_ate_m=absolute_error(alone, true, is_aligned=False),
+        wall_mean_m=walls.mean,
+        wall_p95_m=walls.p95,
+        recall=wall_recall(seen_walls(edges, hits), curves),
+        precision=curve_precision(curves, edges),
+        curves=len(spline_map.curves),
+        control_points=sum(len(curve.spline.control_points) for curve in spline_map.curves),
+        size_bytes=size,
+        of_end_points=size / end_point_bytes(max(returns, 1)),
+        of_grid=size / grid_bytes(floor.bounds),
+    )
+
+
+def _from_first(poses: Poses) -> Poses:
+    """Return poses in the frame of the first one."""
+    return np.asarray(relative(np.repeat(poses[:1], len(poses), axis=0), poses))

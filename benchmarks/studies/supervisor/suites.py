@@ -1,0 +1,217 @@
+"""What the experiments of supervised teams run: the thesis's scenarios, generated and real floors, and each extension by itself."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
+
+POLICIES = ("supervised", "independent", "oracle_starts")
+ALONE = "independent"
+"""Who explores where there is one robot: of one, all policies do the same."""
+
+SCENARIOS = ("apartment", "clinic")
+"""The thesis's two scenarios.
+
+Their starts A, B and C are those of Jade, Luna and Mars.
+"""
+
+SEEDS = 10
+RUNS_ALONE = 3
+FEWEST_SEEDS = 5
+"""Seeds of the extensions."""
+
+SETTINGS: Mapping[str, Any] = {
+    "realism": "lab",
+    "known_starts": False,
+    "reveals_starts": True,
+    "resolution": 0.05,
+    "stop_coverage": 0.99,
+    "horizon_s": 1200.0,
+}
+"""Reports tell the true starts to whoever trusts in them, ``oracle_starts`` alone."""
+
+TO_THE_END: Mapping[str, Any] = {"stop_coverage": None, "horizon_s": 900.0}
+"""In place of these settings, where it is of interest what robots do when all is seen."""
+
+GENERATED: Mapping[str, float] = {
+    "building:3000003": 72.0,
+    "building:3000004": 81.0,
+    "building:3000016": 86.0,
+    "building:3000013": 93.0,
+    "building:3000018": 112.0,
+    "building:3000012": 151.0,
+    "building:3000010": 173.0,
+    "building:3000007": 210.0,
+    "building:3000011": 380.0,
+    "building:3000009": 398.0,
+}
+"""Floors of the set ``test`` by name, with what the robot sweeps of them [m2]."""
+
+REAL: Mapping[str, float] = {
+    "lifull/txt/02_58_b85499c6cb2b53ca84ae1b6e2023_0002.txt": 65.0,
+    "kth/xml/A0043012__50045365.xml.gz": 127.0,
+    "kth/xml/A0093003__0510030969_A-40.xml.gz": 181.0,
+    "kth/xml/A0043020__0510032199_A_40_1_107.xml.gz": 232.0,
+    "kth/xml/A0093002__50025630.xml.gz": 319.0,
+}
+"""Files below ``floorplans`` of the folder of real data, with what the robot sweeps of them [m2]."""
+
+STAND_INS: Mapping[str, float] = {
+    "office:7": 0.0,
+    "office:8": 0.0,
+    "office:9": 0.0,
+    "corridors:7": 0.0,
+    "corridors:8": 0.0,
+}
+"""Generated floors of other kinds in place of real ones, where there are no data."""
+
+LARGE_M2 = 300.0
+"""From this area on a floor is large."""
+
+FIVE_FLOORS = 5
+"""Floors on which five robots work, and on which robots fail: every third of the others'."""
+
+EXTENDED = ("building:3000010", "building:3000009")
+"""Floors on which each extension is switched on, one of them large: what helps on the one may not on the other."""
+
+EXTENSIONS: Mapping[str, Mapping[str, Any]] = {
+    "hungarian": {"assignment": "hungarian"},
+    "utility": {"assignment": "utility"},
+    "avoids rendezvous": {"avoids_rendezvous": True},
+    "returns home": {"returns_home": True},
+}
+"""Settings of the supervisor by what they are called."""
+
+BUDGET: Mapping[str, Any] = {"capacity_j": 1000.0}
+"""A battery that is empty before the floor is explored."""
+
+MARGIN = 1.5
+RADIOS: Mapping[str, Mapping[str, Any]] = {
+    "radio of 10 m": {"kind": "range", "reach": 10.0},
+    "radio in line of sight": {"kind": "line_of_sight", "reach": 10.0},
+}
+
+
+def floors_of(data: Path | None) -> dict[str, tuple[str, ...]]:
+    """Return the floors by kind, ``generated`` and ``real``.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where a folder of real data is given that lacks one of them.
+    """
+    if data is None:
+        return {"generated": tuple(GENERATED), "real": tuple(STAND_INS)}
+    paths = [Path(data) / "floorplans" / name for name in REAL]
+    for path in paths:
+        if not path.is_file():
+            raise FileNotFoundError(
+                f"no floor {path}; want the folder that holds floorplans/{path.relative_to(data).parts[1]}"
+            )
+    return {"generated": tuple(GENERATED), "real": tuple(str(path) for path in paths)}
+
+
+def area_m2(floor: str) -> float:
+    """Return what a robot sweeps of a floor of these experiments [m2], 0 where that is not known."""
+    known = {**GENERATED, **{Path(name).name: area for name, area in REAL.items()}}
+    return known.get(floor, known.get(Path(floor).name, 0.0))
+
+
+def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
+    """Return the suites by name.
+
+    Parameters
+    ----------
+    data : Path or None
+        Folder of real floors; generated ones stand in for them where None.
+    every : int
+        Every so many-th seed is run, and where there are not as many seeds, so many fewer floors.
+    """
+    seeds = tuple(range(SEEDS))[::every]
+    few = max(round(every / SEEDS), 1)
+    by_kind = {kind: floors[::few] for kind, floors in floors_of(data).items()}
+    floors = tuple(floor for group in by_kind.values() for floor in group)
+    found = {
+        "alone": Suite(
+            policies=(ALONE,),
+            floors=SCENARIOS,
+            seeds=tuple(range(RUNS_ALONE))[::every],
+            variants=_variants(),
+            starts=_starts((0,), (1,), (2,)),
+        ),
+        "pairs": Suite(
+            policies=POLICIES,
+            floors=SCENARIOS,
+            robots=(2,),
+            seeds=seeds,
+            variants=_variants(),
+            starts=_starts((0, 1), (0, 2)),
+        ),
+        "three": Suite(
+            policies=POLICIES,
+            floors=SCENARIOS[:1],
+            robots=(3,),
+            seeds=seeds,
+            variants=_variants(),
+            starts={SCENARIOS[0]: _starts((0, 1, 2))[SCENARIOS[0]]},
+        ),
+        "one": Suite(policies=(ALONE,), floors=floors, robots=(1,), seeds=seeds, variants=_variants()),
+        "teams": Suite(policies=POLICIES, floors=floors, robots=(2, 3), seeds=seeds, variants=_variants()),
+        "five": Suite(
+            policies=POLICIES, floors=five_floors(floors), robots=(5,), seeds=seeds, variants=_variants()
+        ),
+    }
+    return {**found, **_extensions(seeds[:FEWEST_SEEDS], few)}
+
+
+def five_floors(floors: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the floors on which five robots work, and on which robots fail."""
+    return floors[:: max(len(floors) // FIVE_FLOORS, 1)][:FIVE_FLOORS]
+
+
+def _extensions(seeds: tuple[int, ...], few: int) -> dict[str, Suite]:
+    """Return the suites of extensions."""
+    floors = EXTENDED[::few]
+    budget = {"energy budget": {"policy": "supervised", "battery_margin": MARGIN}}
+    every = {
+        "assignment": "utility",
+        "avoids_rendezvous": True,
+        "returns_home": True,
+        "battery_margin": MARGIN,
+    }
+    radio = {"radio": RADIOS["radio in line of sight"]}
+
+    def suite(options: Mapping[str, Mapping[str, Any]], variants: Mapping[str, Mapping[str, Any]]) -> Suite:
+        settings = {name: {"policy": "supervised", **values} for name, values in options.items()}
+        return Suite(
+            policies=("supervised", *settings),
+            floors=floors,
+            robots=(3,),
+            seeds=seeds,
+            policy_settings=settings,
+            variants={name: {**SETTINGS, **TO_THE_END, **values} for name, values in variants.items()},
+        )
+
+    return {
+        "extensions": suite(EXTENSIONS, {DEFAULT_VARIANT: {}}),
+        "radio": suite({}, {name: {"radio": values} for name, values in RADIOS.items()}),
+        "energy": suite(budget, {"battery": {"battery": BUDGET}}),
+        "together": suite(
+            {"all together": every}, {"battery, radio in line of sight": {"battery": BUDGET, **radio}}
+        ),
+    }
+
+
+def _variants() -> dict[str, Mapping[str, Any]]:
+    return {DEFAULT_VARIANT: SETTINGS}
+
+
+def _starts(*teams: tuple[int, ...]) -> dict[str, tuple[tuple[tuple[float, float, float], ...], ...]]:
+    """Return teams of the starts of both scenarios, by the numbers of the starts."""
+    found = {}
+    for name in SCENARIOS:
+        places = [(float(x), float(y), float(theta)) for x, y, theta in load_floor(name).starts]
+        found[name] = tuple(tuple(places[start] for start in team) for team in teams)
+    return found

@@ -1,0 +1,218 @@
+"""Parts of frames, drawn from plain arrays: what part of a floor is seen, ways, robots, a header."""
+
+import colorsys
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Frame = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+SIZE = 960
+"""Longer side of the floor in a frame by default [pixels]."""
+
+RECENT_S = 60.0
+"""How far back a robot's path is drawn [s]."""
+
+INK: Colour = (31, 41, 55)
+FAINT_INK: Colour = (107, 114, 128)
+BACKGROUND: Colour = (182, 190, 201)
+UNEXPLORED: Colour = (214, 220, 229)
+NOT_COUNTED: Colour = (236, 240, 245)
+EXPLORED: Colour = (255, 255, 255)
+WALL: Colour = (38, 50, 66)
+
+_TEAM: tuple[Colour, ...] = (
+    (37, 99, 235),
+    (234, 88, 12),
+    (22, 163, 74),
+    (192, 38, 211),
+    (8, 145, 178),
+    (202, 138, 4),
+    (225, 29, 72),
+    (101, 78, 163),
+)
+_MARGIN = 0.25
+SHIFT = 4
+"""Fractional bits of OpenCV's coordinates."""
+
+BORDER = 10
+
+
+def team_colours(robots: int) -> list[Colour]:
+    """Return a colour (red, green, blue) for each robot.
+
+    The first eight are far apart, the others evenly around the circle.
+    """
+    colours = list(_TEAM[:robots])
+    for k in range(len(colours), robots):
+        red, green, blue = colorsys.hsv_to_rgb((k * 0.618034) % 1.0, 0.75, 0.75)
+        colours.append((round(red * 255), round(green * 255), round(blue * 255)))
+    return colours
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What part of a raster a frame shows, and how large.
+
+    Attributes
+    ----------
+    rows, columns : slice
+        Cells of the raster.
+    origin : (x, y)
+        Lower left corner of those cells [m].
+    scale : float
+        Pixels per metre.
+    height, width : int
+        Size of the picture [pixels].
+    block : int
+        Side of the blocks of cells that are drawn as one, where there are more cells than pixels.
+    """
+
+    rows: slice
+    columns: slice
+    origin: tuple[float, float]
+    scale: float
+    height: int
+    width: int
+    block: int
+
+    def pixels(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Return points (..., 2) as x, y [m] in OpenCV's pixels with `SHIFT` fractional bits."""
+        x = (points[..., 0] - self.origin[0]) * self.scale - 0.5
+        y = self.height - (points[..., 1] - self.origin[1]) * self.scale - 0.5
+        return np.rint(np.stack([x, y], axis=-1) * (1 << SHIFT)).astype(np.int32)
+
+
+def view_around(shown: NDArray[np.bool_], origin: tuple[float, float], resolution: float, size: int) -> View:
+    """Return the view on the cells of a grid that are to be shown, with a margin, the longer side ``size`` pixels.
+
+    Parameters
+    ----------
+    shown : (rows, columns) bool
+        What must be seen.
+    origin : (x, y)
+        Lower left corner of cell (0, 0) [m].
+    resolution : float
+        Side of a cell [m].
+    size : int
+        Longer side [pixels].
+    """
+    rows, columns = (
+        _span(np.asarray(shown.any(axis=axis)), math.ceil(_MARGIN / resolution)) for axis in (1, 0)
+    )
+    tall, wide = ((span.stop - span.start) * resolution for span in (rows, columns))
+    scale = size / max(tall, wide)
+    corner = (origin[0] + columns.start * resolution, origin[1] + rows.start * resolution)
+    block = max(max(rows.stop - rows.start, columns.stop - columns.start) // size, 1)
+    return View(rows, columns, corner, scale, max(round(tall * scale), 1), max(round(wide * scale), 1), block)
+
+
+def _span(is_used: NDArray[np.bool_], margin: int) -> slice:
+    used = np.flatnonzero(is_used)
+    low, high = (int(used[0]), int(used[-1]) + 1) if used.size else (0, len(is_used))
+    return slice(max(low - margin, 0), min(high + margin, len(is_used)))
+
+
+def enlarged(picture: Frame, view: View) -> Frame:
+    """Return a picture of a view's cells (or blocks of them), row 0 at the lowest y, as large as the view and the right way up."""
+    interpolation = cv2.INTER_NEAREST if view.height >= picture.shape[0] else cv2.INTER_AREA
+    return np.ascontiguousarray(
+        cv2.resize(picture, (view.width, view.height), interpolation=interpolation)[::-1], dtype=np.uint8
+    )
+
+
+def draw_paths(frame: Frame, view: View, ways: NDArray[np.float64], colours: Sequence[Colour]) -> None:
+    """Draw the ways of robots, positions (times, robots, 2) [m]."""
+    thickness = max(round(0.04 * view.scale), 2)
+    for robot, colour in enumerate(colours):
+        cv2.polylines(frame, [view.pixels(ways[:, robot])], False, colour, thickness, cv2.LINE_AA, SHIFT)
+
+
+def draw_robots(
+    frame: Frame,
+    view: View,
+    poses: NDArray[np.float64],
+    radius: float,
+    has_ended: Sequence[bool],
+    colours: Sequence[Colour],
+) -> None:
+    """Draw robots of a radius [m] with their headings at poses (robots, 3) [m, rad], paler those that have ended."""
+    fixed = 1 << SHIFT
+    shown = max(radius * view.scale, 6.0)
+    for (x, y, theta), colour, is_over in zip(poses, colours, has_ended, strict=True):
+        ahead = np.array([math.cos(theta), math.sin(theta)]) * (shown / view.scale)
+        centre, tip = view.pixels(np.stack([(x, y), (x + ahead[0], y + ahead[1])]))
+        place = (int(centre[0]), int(centre[1]))
+        cv2.circle(frame, place, round((shown + 1.5) * fixed), EXPLORED, -1, cv2.LINE_AA, SHIFT)
+        cv2.circle(
+            frame, place, round(shown * fixed), _paler(colour) if is_over else colour, -1, cv2.LINE_AA, SHIFT
+        )
+        cv2.line(
+            frame, place, (int(tip[0]), int(tip[1])), EXPLORED, max(round(shown / 4), 1), cv2.LINE_AA, SHIFT
+        )
+
+
+def _paler(colour: Colour) -> Colour:
+    red, green, blue = (channel + (220 - channel) // 2 for channel in colour)
+    return red, green, blue
+
+
+def with_header(picture: Frame, name: str, coverage: float, time_s: float) -> Frame:
+    """Return a picture in a frame below a line of text and a bar of coverage.
+
+    Both sides even, as video codecs want them.
+    """
+    width = max(picture.shape[1] + 2 * BORDER, 360)
+    return _even(np.concatenate([_header(name, coverage, time_s, width), _framed(picture, width)]))
+
+
+def _header(name: str, share: float, time_s: float, width: int) -> Frame:
+    """Draw a line of text over a bar of coverage."""
+    scale = min(max(width / 960.0, 0.45), 1.0)
+    height = round(44 * scale) + 8
+    header = np.full((height, width, 3), 255, np.uint8)
+    name = _plain(name)
+    baseline, margin = round(29 * scale), round(12 * scale)
+    right = f"{100.0 * share:.1f} % explored    {time_s:.1f} s"
+    _put(header, right, (width - margin - _text_width(right, 0.72 * scale), baseline), INK, 0.72 * scale)
+    room = width - 3 * margin - _text_width(right, 0.72 * scale)
+    while name and _text_width(name, 0.6 * scale) > room:
+        name = name[:-1]
+    _put(header, name, (margin, baseline), FAINT_INK, 0.6 * scale)
+    header[-6:] = UNEXPLORED
+    header[-6:, : round(width * min(share, 1.0))] = (22, 163, 74)
+    return header
+
+
+def _plain(text: str) -> str:
+    """Keep what OpenCV's fonts can write."""
+    return text.encode("ascii", "replace").decode()
+
+
+def _text_width(text: str, scale: float) -> int:
+    return int(cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)[0][0])
+
+
+def _put(picture: Frame, text: str, place: tuple[int, int], colour: Colour, scale: float) -> None:
+    cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, scale, colour, 1, cv2.LINE_AA)
+
+
+def _framed(picture: Frame, width: int) -> Frame:
+    left = (width - picture.shape[1]) // 2
+    right = width - picture.shape[1] - left
+    return np.asarray(
+        cv2.copyMakeBorder(picture, BORDER, BORDER, left, right, cv2.BORDER_CONSTANT, value=BACKGROUND),
+        np.uint8,
+    )
+
+
+def _even(picture: Frame) -> Frame:
+    rows, columns = picture.shape[0] % 2, picture.shape[1] % 2
+    return np.asarray(
+        cv2.copyMakeBorder(picture, 0, rows, 0, columns, cv2.BORDER_CONSTANT, value=BACKGROUND), np.uint8
+    )

@@ -1,0 +1,252 @@
+"""Frames: the floor from above, what is explored, the robots and what their lasers see."""
+
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.drawing.frame_parts import (
+    BACKGROUND,
+    EXPLORED,
+    NOT_COUNTED,
+    RECENT_S,
+    SHIFT,
+    SIZE,
+    UNEXPLORED,
+    WALL,
+    Colour,
+    Frame,
+    View,
+    draw_paths,
+    draw_robots,
+    enlarged,
+    team_colours,
+    view_around,
+    with_header,
+)
+from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.scoring.scorer import TRACK_PERIOD_S
+from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+
+if TYPE_CHECKING:
+    from lidarium.envs.exploration import ExplorationEnv
+
+_NEAR = 0.125
+_FAN_OPACITY = 0.22
+_SOLID, _WALL, _UNEXPLORED, _NOT_COUNTED, _EXPLORED = range(5)
+PALETTE = np.array([BACKGROUND, WALL, UNEXPLORED, NOT_COUNTED, EXPLORED], np.uint8)
+"""Colours of what `classify` returns."""
+
+
+def view_of(tables: FloorTables, size: int) -> View:
+    """Return the view on a floor's free cells with a margin, the longer side ``size`` pixels."""
+    raster = tables.laser
+    return view_around(raster.solid == 0, raster.origin, raster.resolution, size)
+
+
+def draw_frame(
+    env: "ExplorationEnv", size: int = SIZE, draw_over: Callable[[Frame, View], None] | None = None
+) -> Frame:
+    """Draw an environment from above.
+
+    The truth: free floor is faint where unexplored and white where the team has sensed it, walls are dark
+    where the team has been near. On it the robots with their headings, their last scans as fans, and their
+    ways of the last minute.
+
+    Parameters
+    ----------
+    env : ExplorationEnv
+        After ``reset``.
+    size : int
+        Longer side of the floor in the frame [pixels], at least 64.
+    draw_over : callable or None
+        Takes the picture and the view on the floor, and draws what else is to be seen.
+
+    Returns
+    -------
+    (rows, columns, 3) uint8
+        Red, green, blue; both sides even, as video codecs want them. The caller's own.
+
+    Raises
+    ------
+    ValueError
+        Where the size is too small, or the environment was not reset.
+    """
+    if size < 64:
+        raise ValueError(f"size of the frame is {size} pixels; want at least 64")
+    tables = env.world.floors[0]
+    if tables is None:
+        raise ValueError("the environment was not reset, there is nothing to draw; call reset() first")
+    view = view_of(tables, size)
+    frame = _draw_floor(env, tables, view)
+    colours = team_colours(env.settings.robots)
+    _draw_fans(frame, env, view, colours)
+    recent = env.scorer.track[-round(RECENT_S / TRACK_PERIOD_S) :]
+    draw_paths(
+        frame, view, np.stack([poses[:, :2] for _, poses in recent] + [env.world.poses[:, :2]]), colours
+    )
+    has_ended = [agent not in env.agents for agent in env.possible_agents]
+    draw_robots(frame, view, env.world.poses, env.settings.robot.radius, has_ended, colours)
+    if draw_over is not None:
+        draw_over(frame, view)
+    return with_header(
+        frame, "" if env.floor is None else env.floor.name, env.scorer.coverage, env.scorer.time
+    )
+
+
+def _draw_floor(env: "ExplorationEnv", tables: FloorTables, view: View) -> Frame:
+    raster = tables.laser
+    multiple = round(env.settings.occupancy.resolution / raster.resolution)
+    solid = _shrunk(raster.solid[view.rows, view.columns], view.block)
+    seen, counted = (
+        _shrunk(_on_raster(mask, raster.solid.shape, multiple)[view.rows, view.columns], view.block)
+        for mask in (env.world.team_masks[0], env.world.counted_masks[0])
+    )
+    picture = PALETTE[classify(solid, seen, counted, raster.resolution * view.block)]
+    return enlarged(picture, view)
+
+
+def _on_raster(mask: NDArray[np.uint64], shape: tuple[int, int], multiple: int) -> NDArray[np.uint8]:
+    """Unpack a mask and enlarge its cells, which are ``multiple`` cells of the raster wide and begin at the same corner."""
+    cells = unpack_bits(mask, -(-shape[1] // multiple)).view(np.uint8)
+    if multiple > 1:
+        cells = np.repeat(np.repeat(cells, multiple, axis=0), multiple, axis=1)
+    return cells[: shape[0], : shape[1]]
+
+
+def _shrunk(cells: NDArray[np.uint8], block: int) -> NDArray[np.uint8]:
+    """Return 1 for each block of ``block`` x ``block`` cells of which any is not 0."""
+    if block == 1:
+        return cells
+    rows, columns = (side // block for side in cells.shape)
+    whole = cells[: rows * block, : columns * block]
+    return np.asarray(
+        whole.reshape(rows, block, columns * block).max(axis=1).reshape(rows, columns, block).max(axis=2)
+    )
+
+
+def classify(
+    solid: NDArray[np.uint8], seen: NDArray[np.uint8], counted: NDArray[np.uint8], resolution: float
+) -> NDArray[np.uint8]:
+    """Return what each cell is drawn as, an index into `PALETTE`.
+
+    Parameters
+    ----------
+    solid, seen, counted : (rows, columns) uint8
+        Solid cells, cells that the team has sensed, and those that count.
+    resolution : float
+        Side of a cell [m].
+
+    Returns
+    -------
+    (rows, columns) uint8
+        0 solid, 1 wall beside something sensed, 2 floor, 3 floor that does not count beside something sensed,
+        4 floor sensed.
+    """
+    side = 2 * max(round(_NEAR / resolution), 1) + 1
+    near_seen = cv2.dilate(seen, np.ones((side, side), np.uint8))
+    beside = np.where(solid != 0, np.uint8(_WALL), np.uint8(_NOT_COUNTED))
+    beyond = np.where(solid != 0, np.uint8(_SOLID), np.uint8(_UNEXPLORED))
+    # A block of cells may hold both floor and wall: the wall shows.
+    classes = np.where((near_seen != 0) & ((counted == 0) | (solid != 0)), beside, beyond)
+    classes[(seen != 0) & (solid == 0)] = _EXPLORED
+    return classes
+
+
+def _draw_fans(frame: Frame, env: "ExplorationEnv", view: View, colours: list[Colour]) -> None:
+    lidar, world = env.settings.lidar, env.world
+    tinted = frame.copy()
+    for robot, colour in enumerate(colours):
+        x, y, theta = world.poses[robot]
+        # No return is drawn to the greatest range, an invalid beam not at all.
+        lengths = np.clip(
+            np.nan_to_num(world.ranges[robot].astype(np.float64), nan=0.0, posinf=lidar.range_max),
+            0.0,
+            lidar.range_max,
+        )
+        angles = theta + lidar.angles
+        ends = np.column_stack([x + lengths * np.cos(angles), y + lengths * np.sin(angles)])
+        if not lidar.is_full_circle:
+            ends = np.concatenate([[(x, y)], ends])
+        cv2.fillPoly(tinted, [view.pixels(ends)], colour, cv2.LINE_AA, SHIFT)
+    cv2.addWeighted(tinted, _FAN_OPACITY, frame, 1.0 - _FAN_OPACITY, 0.0, dst=frame)
+
+
+class FrameWindow:
+    """A window that shows frames.
+
+    Where there is no display it says so once and does nothing.
+
+    Parameters
+    ----------
+    title : str
+        Title of the window.
+    """
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._figure: Any = None
+        self._image: Any = None
+        self._is_off = False
+
+    def show(self, frame: Frame) -> None:
+        """Show a frame; opens the window with the first one.
+
+        A window that the user has closed stays closed.
+        """
+        if self._is_off:
+            return
+        from matplotlib import pyplot
+
+        if self._figure is None:
+            self._open(frame)
+            if self._figure is None:
+                return
+        elif not pyplot.fignum_exists(self._figure.number):
+            self._is_off = True
+            return
+        if self._image.get_array().shape != frame.shape:
+            self._image.set_extent((-0.5, frame.shape[1] - 0.5, frame.shape[0] - 0.5, -0.5))
+        self._image.set_data(frame)
+        self._figure.canvas.draw_idle()
+        self._figure.canvas.flush_events()
+
+    def close(self) -> None:
+        """Close the window, if there is one; closing again does nothing."""
+        if self._figure is not None:
+            from matplotlib import pyplot
+
+            pyplot.close(self._figure)
+            self._figure = self._image = None
+
+    def _open(self, frame: Frame) -> None:
+        from matplotlib import pyplot
+
+        figure = None
+        try:
+            # Making a figure settles which backend there is; each toolkit has an error of its own for want of
+            # a display.
+            figure = pyplot.figure(
+                self._title, figsize=(frame.shape[1] / 100.0, frame.shape[0] / 100.0), dpi=100
+            )
+            has_display = figure.canvas.required_interactive_framework is not None
+        except Exception:
+            has_display = False
+        if not has_display or figure is None:
+            if figure is not None:
+                pyplot.close(figure)
+            self._is_off = True
+            warnings.warn(
+                "render_mode is 'human', but there is no display to open a window on; nothing is shown (use 'rgb_array' for frames)",
+                UserWarning,
+                stacklevel=4,
+            )
+            return
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_axis_off()
+        self._image = axes.imshow(frame, interpolation="antialiased")
+        self._figure = figure
+        pyplot.show(block=False)

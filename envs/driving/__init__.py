@@ -1,0 +1,1 @@
+"""How a robot drives to a target among others."""

@@ -1,0 +1,308 @@
+"""Planning of paths for many robots at once, in kernels: to their targets, round teammates, and anew where a path is blocked."""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.driving.drives import Drives, drop_path
+from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE, MAX_POINTS
+from lidarium.envs.onboard.navigation import COLUMNS, ROWS, TeamMaps, closeness_of, log_odds_of, refresh_team
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.work_queue import take_turn
+from lidarium.mapping.planning.path_search import Passage, budget_of, find_path
+from lidarium.mapping.planning.path_smoothing import kept_places, line_is_clear
+
+MATE_DISTANCE = 0.06
+"""Paths round teammates keep this gap to them [m]."""
+
+
+class Planning(NamedTuple):
+    """What planning needs to know of the robots, their maps and the world.
+
+    Attributes
+    ----------
+    robots : int
+        Robots of a team.
+    knows_mates : bool
+        Whether all teammates' poses are known at once.
+    contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
+        Where they are not: of whom each robot heard lately, and where they were then [m, rad].
+    radius : float
+        Of every body [m].
+    resolution : float
+        Side of a map cell [m].
+    tight : float
+        Clearance below which a path ends in the middle of its last cell [m].
+    farthest : float
+        Clearance is told up to this [m].
+    limit, half_costs, roomy, least_clearance, preferred : as of ``Passage``
+        How a body passes over a map; written out, because loops on threads take no tuples within tuples.
+    records, sharing : (maps, 10) int64 and int
+        Records of the maps that the robots plan on, and how many rows share one.
+    memory : (pieces, 6) int64
+        For searches, a piece for each thread.
+    believed, origins, offsets : (rows, 3), (rows, 2), (rows, 2) float64
+        Believed poses, lower left corners of the maps and origins of the map frames [m, rad].
+    has_ended : (rows,) bool
+        Which robots have ended and stand where they are.
+    """
+
+    robots: int
+    knows_mates: bool
+    contact: NDArray[np.uint8]
+    heard: NDArray[np.float64]
+    radius: float
+    resolution: float
+    tight: float
+    farthest: float
+    limit: int
+    half_costs: NDArray[np.int32]
+    roomy: int
+    least_clearance: float
+    preferred: float
+    records: NDArray[np.int64]
+    sharing: int
+    memory: NDArray[np.int64]
+    believed: NDArray[np.float64]
+    origins: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    has_ended: NDArray[np.bool_]
+
+
+@kernel(inline=True)
+def passage_in(planning: Planning) -> Passage:
+    """Return how a body passes over a map (kernel)."""
+    return Passage(
+        planning.limit, planning.half_costs, planning.roomy, planning.least_clearance, planning.preferred
+    )
+
+
+@kernel
+def _place_along(first: int, last: int, step: int, steps: int, is_straight: bool) -> int:
+    """Return the cell, along rows or columns, at one of the steps from a cell to another, rounded to even."""
+    if step == steps:
+        return last
+    rise = float(last - first)
+    way = (step / steps) * rise if is_straight else step * (rise / steps)
+    return int(np.rint(way + first))
+
+
+@kernel
+def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> float:
+    """Least room beside the body on the piece of a path that leads to its point k [m]."""
+    before = max(k - 1, 0)
+    row, column, to_row, to_column = cells[before, 0], cells[before, 1], cells[k, 0], cells[k, 1]
+    steps = max(abs(to_row - row), abs(to_column - column)) // 2 + 1
+    is_straight = row == to_row or column == to_column
+    nearest = 0
+    for step in range(steps + 1):
+        cell_row = _place_along(row, to_row, step, steps, is_straight)
+        cell_column = _place_along(column, to_column, step, steps, is_straight)
+        nearest = max(nearest, int(closeness[cell_row, cell_column]))
+    return math.sqrt(max(planning.limit - nearest, 0)) * 0.5 * planning.resolution - planning.radius
+
+
+@kernel
+def _discs(planning: Planning, row: int, avoided: Array) -> Array:
+    """Bodies of the avoided teammates (robots,) as discs (row, column, radius) that a robot's centre must not enter, in cells."""
+    first = row // planning.robots * planning.robots
+    discs = np.empty((avoided.sum(), 3))
+    count = 0
+    for mate in range(planning.robots):
+        if avoided[mate]:
+            x, y = planning.believed[first + mate, 0], planning.believed[first + mate, 1]
+            if not planning.knows_mates:
+                x, y = planning.heard[row, 3 * mate], planning.heard[row, 3 * mate + 1]
+            discs[count, 0] = (y - planning.origins[row, 1]) / planning.resolution - 0.5
+            discs[count, 1] = (x - planning.origins[row, 0]) / planning.resolution - 0.5
+            discs[count, 2] = (planning.radius + planning.radius + MATE_DISTANCE) / planning.resolution
+            count += 1
+    return discs
+
+
+@kernel
+def drive_to(
+    planning: Planning,
+    drives: Drives,
+    row: int,
+    goal_row: int,
+    goal_column: int,
+    avoided: Array,
+    heading: float,
+    maximum_cost: float,
+    end_x: float,
+    end_y: float,
+    piece: int,
+) -> bool:
+    """Plan a robot's path round bodies of teammates and start on it (kernel).
+
+    Parameters
+    ----------
+    planning, drives : Planning, Drives
+        All robots.
+    row : int
+        Which one.
+    goal_row, goal_column : int
+        The cell to go to; outside of the map there is no way.
+    avoided : (robots,) bool
+        Whose bodies to go round.
+    heading : float
+        Wanted heading at the end [rad], nan for any.
+    maximum_cost : float
+        Most that the way may cost [m].
+    end_x, end_y : float
+        Where to end within the last cell, if there is room [m]; nan for its centre.
+    piece : int
+        Which piece of the memory to use.
+
+    Returns
+    -------
+    bool
+        Whether there is a way; where there is none nothing changes.
+    """
+    record = planning.records[row // planning.sharing]
+    if not (0 <= goal_row < record[ROWS] and 0 <= goal_column < record[COLUMNS]):
+        return False
+    log_odds, closeness, passage, resolution = (
+        log_odds_of(record),
+        closeness_of(record),
+        passage_in(planning),
+        planning.resolution,
+    )
+    origin_x, origin_y = planning.origins[row, 0], planning.origins[row, 1]
+    start_row = int(math.floor((planning.believed[row, 1] - origin_y) / resolution))
+    start_column = int(math.floor((planning.believed[row, 0] - origin_x) / resolution))
+    if not (0 <= start_row < record[ROWS] and 0 <= start_column < record[COLUMNS]):
+        return False
+    discs = _discs(planning, row, avoided)
+    cost, path = find_path(
+        log_odds,
+        closeness,
+        passage,
+        planning.memory[piece],
+        discs,
+        start_row,
+        start_column,
+        goal_row,
+        goal_column,
+        budget_of(maximum_cost, resolution),
+    )
+    if cost < 0:
+        return False
+    kept = kept_places(path, log_odds, closeness, passage.limit, passage.radius, passage.preferred, discs)
+    count = min(len(kept), MAX_POINTS)
+    cells, points = drives.cells[row], drives.paths[row]
+    for k in range(count):
+        cells[k, 0], cells[k, 1] = path[kept[k], 0], path[kept[k], 1]
+        points[k, 0] = (cells[k, 1] + 0.5) * resolution + origin_x
+        points[k, 1] = (cells[k, 0] + 0.5) * resolution + origin_y
+        drives.room[row, k] = _room_before(cells, k, closeness, planning)
+    if max(abs(points[count - 1, 0] - end_x), abs(points[count - 1, 1] - end_y)) <= resolution:
+        # Within the last cell the target itself is as good as the cell's centre where there is room.
+        squared = passage.limit - int(closeness[cells[count - 1, 0], cells[count - 1, 1]])
+        if min(math.sqrt(squared) * 0.5 * resolution, planning.farthest) >= planning.tight:
+            points[count - 1, 0], points[count - 1, 1] = end_x, end_y
+    drives.counts[row], drives.places[row], drives.headings[row] = count, min(1, count - 1), heading
+    drives.states[row], drives.stood[row], drives.has_path[row] = DRIVING, 0, True
+    return True
+
+
+@kernel
+def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
+    """Whether the rest of a robot's path still keeps clear of what is known by now."""
+    record = planning.records[row // planning.sharing]
+    log_odds, closeness, cells = log_odds_of(record), closeness_of(record), drives.cells[row]
+    needed = planning.radius / planning.resolution
+    for k in range(max(drives.places[row], 1), drives.counts[row]):
+        if not line_is_clear(
+            log_odds,
+            closeness,
+            planning.limit,
+            cells[k - 1, 0],
+            cells[k - 1, 1],
+            cells[k, 0],
+            cells[k, 1],
+            needed,
+        ):
+            return False
+    return True
+
+
+@kernel
+def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> None:
+    """Drop a robot's path where it is not clear any more, and plan one to its target where it has none (kernel)."""
+    if drives.passing[row] >= 0 or not drives.is_ordered[row]:
+        return
+    if drives.has_path[row]:
+        if _path_is_clear(planning, drives, row):
+            return
+        drop_path(drives, row)
+    drives.states[row] = IDLE
+    record = planning.records[row // planning.sharing]
+    place_x = drives.targets[row, 0] + planning.offsets[row, 0]
+    place_y = drives.targets[row, 1] + planning.offsets[row, 1]
+    goal_row = math.floor((place_y - planning.origins[row, 1]) / planning.resolution)
+    goal_column = math.floor((place_x - planning.origins[row, 0]) / planning.resolution)
+    if not (0.0 <= goal_row < record[ROWS] and 0.0 <= goal_column < record[COLUMNS]):
+        return
+    first = row // planning.robots * planning.robots
+    avoided, ended = np.zeros(planning.robots, np.bool_), np.zeros(planning.robots, np.bool_)
+    for mate in range(planning.robots):
+        other = first + mate
+        if other != row and (planning.knows_mates or planning.contact[row, mate] != 0):
+            ended[mate] = planning.has_ended[other]
+            avoided[mate] = ended[mate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
+    # First round all that stand; of these only those that have ended can never give way.
+    for _ in range(2):
+        if drive_to(
+            planning,
+            drives,
+            row,
+            int(goal_row),
+            int(goal_column),
+            avoided,
+            drives.target_headings[row],
+            np.inf,
+            place_x,
+            place_y,
+            piece,
+        ):
+            return
+        if ended.sum() == avoided.sum():
+            return
+        avoided = ended
+
+
+def _prepare_teams(
+    planning: Planning,
+    drives: Drives,
+    maps: TeamMaps,
+    episodes: Array,
+    is_blocked: Array,
+    turns: Array,
+    pieces: int,
+) -> None:
+    """Prepare the live robots of some teams, in their order, on fresh maps, in so many pieces; note where a robot is blocked."""
+    for piece in numba.prange(pieces):
+        k = take_turn(turns)
+        while k < len(episodes):
+            first = episodes[k] * planning.robots
+            is_fresh = False
+            for row in range(first, first + planning.robots):
+                if planning.has_ended[row]:
+                    continue
+                if drives.is_ordered[row] and drives.passing[row] < 0:
+                    if not is_fresh:
+                        refresh_team(maps, episodes[k])
+                        is_fresh = True
+                    prepare_robot(planning, drives, row, piece)
+                if drives.states[row] == BLOCKED:
+                    is_blocked[k] = True
+            k = take_turn(turns)
+
+
+prepare_teams_serial = kernel(_prepare_teams)
+prepare_teams_parallel = kernel(parallel=True)(_prepare_teams)

@@ -1,0 +1,116 @@
+"""The world of episodes, and how one begins: floor, starts, seed and goal, drawn the same way alone and in a batch."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.starts import check_goal, check_starts, draw_starts
+from lidarium.envs.scoring.scorer import reward_weights
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
+from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beginning:
+    """What an episode begins with.
+
+    Attributes
+    ----------
+    floor : Floor
+        Where it takes place.
+    tables : FloorTables
+        What kernels look up for the floor.
+    starts : (robots, 3) float64
+        x, y, theta of each robot in the floor's frame [m, rad].
+    seed : int
+        Where the noise comes from.
+    goal : (x, y) or None
+        In the floor's frame [m].
+    """
+
+    floor: Floor
+    tables: FloorTables
+    starts: NDArray[np.float64]
+    seed: int
+    goal: tuple[float, float] | None
+
+
+def begin(
+    generator: np.random.Generator, choice: FloorChoice, chosen: ResetOptions, settings: ExplorationSettings
+) -> Beginning:
+    """Draw how an episode begins.
+
+    Parameters
+    ----------
+    generator : numpy.random.Generator
+        Where all draws come from.
+    choice : FloorChoice
+        The floor, or a set of which one is drawn.
+    chosen : ResetOptions
+        Floor, starts and goal where the caller names them.
+    settings : ExplorationSettings
+        The team.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        Where the floor or an option cannot be used.
+    """
+    choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
+    floor = choice_here.load(generator)
+    radius = settings.robot.radius
+    tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
+    if chosen.starts is not None:
+        check_starts(tables.body, radius, chosen.starts)
+        starts = chosen.starts
+    else:
+        starts = draw_starts(tables.body, radius, settings.robots, generator, floor.starts)
+    goal = (chosen.goal or floor.goal) if choice.has_goal else None
+    if goal is not None:
+        check_goal(tables.body, goal)
+    seed = int(generator.integers(2**63))
+    return Beginning(floor, tables, starts, seed, goal)
+
+
+def make_world(settings: ExplorationSettings, episodes: int = 1) -> KinematicWorld:
+    """Return the world of so many episodes."""
+    return KinematicWorld(
+        [settings.robot] * settings.robots,
+        settings.lidar,
+        settings.occupancy,
+        settings.time_step,
+        episodes,
+        settings.threads,
+        settings.egocentric_scales,
+        reward_weights(settings),
+        settings.localization,
+        settings.odometry,
+        settings.faults,
+        settings.horizon_s,
+        settings.radio.is_ideal,
+    )
+
+
+def map_frames(beginning: Beginning, settings: ExplorationSettings) -> NDArray[np.float64]:
+    """Return the origin of each robot's map frame in the frame of its believed pose [m], shape (robots, 2)."""
+    if not settings.known_starts:
+        return np.zeros((settings.robots, 2))
+    # The map frame begins at the corner of the cell in which the robot starts.
+    cell = settings.occupancy.resolution
+    origin = np.asarray(beginning.tables.laser.origin)
+    return np.asarray(origin + np.floor((beginning.starts[:, :2] - origin) / cell) * cell)
+
+
+def goal_of_robots(beginning: Beginning, settings: ExplorationSettings) -> tuple[float, float]:
+    """Return the goal as the robots know it, in the frame of their believed poses [m].
+
+    Nan where they know none.
+
+    A robot that does not know where it starts does not know where the goal is either.
+    """
+    return beginning.goal if beginning.goal is not None and settings.known_starts else (np.nan, np.nan)

@@ -1,0 +1,219 @@
+"""A store on disk that all processes share: arrays that are dear to make and small to keep, found by what determines them.
+
+An entry is one file of compressed arrays. It is written beside and renamed, so that it appears whole; it
+carries a hash of its key and content, so that one that is damaged, cut short or another's is seen and made
+anew. Keys hold a hash of the code and libraries that make the arrays, so that a stale entry is never found.
+
+The entries lie in a few folders, each bounded by its share of the whole: a process that writes makes room in
+one of them without looking at the others, and no process has to know what others write. The entry used
+longest ago goes first; who reads it meanwhile reads on.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import platform
+import tempfile
+import zlib
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.kernels.cache_folders import first_writable, user_cache_folder
+
+Arrays = Mapping[str, NDArray[Any]]
+"""Arrays by name, as entries hold them."""
+
+FOLDER_VARIABLE = "LIDARIUM_FLOOR_STORE"
+"""Environment variable: the store's folder, or ``off``."""
+
+SIZE_VARIABLE = "LIDARIUM_FLOOR_STORE_MIB"
+"""Environment variable: the most that the store takes on disk [MiB]."""
+
+DEFAULT_MIB = 1024.0
+"""The most that the store takes on disk where nothing is said [MiB]."""
+
+PARTS = 16
+"""Folders that the entries are spread over, by the first digit of the hash of their keys."""
+
+_MAGIC = b"lidarium"
+_DIGEST_BYTES = 32
+_BLOCK = 4096
+_PACKAGE = Path(__file__).resolve().parents[3]
+
+
+class Store:
+    """Arrays by key, on disk.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Where the entries lie; None for a store that keeps nothing. A folder that cannot be written to is read
+        from.
+    max_bytes : int
+        The most that the entries take on disk.
+    """
+
+    def __init__(self, folder: Path | None, max_bytes: int) -> None:
+        self.folder, self.max_bytes = folder, max_bytes
+
+    def load(self, key: str) -> Arrays | None:
+        """Return the arrays of a key, read-only, or None where there are none that are whole."""
+        if self.folder is None:
+            return None
+        path = self._path(key)
+        try:
+            content = path.read_bytes()
+        except OSError:
+            return None
+        head = len(_MAGIC) + _DIGEST_BYTES
+        if content[:head] != _MAGIC + _digest(key, content[head:]):
+            return None
+        with contextlib.suppress(OSError):
+            os.utime(path)
+        return _unpacked(content[head:])
+
+    def save(self, key: str, arrays: Arrays) -> None:
+        """Keep arrays, where there is room and the folder can be written to."""
+        if self.folder is None:
+            return
+        packed = _packed(arrays)
+        content = _MAGIC + _digest(key, packed) + packed
+        path, room = self._path(key), self.max_bytes // PARTS - _on_disk(len(content))
+        if room < 0:
+            return
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _shrink(path.parent, room)
+            write_whole(path, content)
+
+    def size(self) -> int:
+        """Return how many bytes the entries take."""
+        return (
+            0
+            if self.folder is None
+            else sum(size for part in self.folder.glob("?") for _, size, _ in _files(part))
+        )
+
+    def _path(self, key: str) -> Path:
+        assert self.folder is not None
+        name = hashlib.blake2b(key.encode(), digest_size=16).hexdigest()
+        return self.folder / name[0] / name
+
+
+def floor_store() -> Store:
+    """Return the store of floors, as the environment variables want it.
+
+    Raises
+    ------
+    ValueError
+        Where the size that the environment variable gives is not a number.
+    """
+    return _store(os.environ.get(FOLDER_VARIABLE, ""), mebibytes(SIZE_VARIABLE, DEFAULT_MIB))
+
+
+@lru_cache(maxsize=8)
+def _store(folder: str, max_bytes: int) -> Store:
+    if folder == "off":
+        return Store(None, max_bytes)
+    if folder:
+        return Store(Path(folder).expanduser().absolute(), max_bytes)
+    return Store(
+        first_writable(
+            (user_cache_folder() / "lidarium" / "floors", Path(tempfile.gettempdir()) / "lidarium-floors")
+        ),
+        max_bytes,
+    )
+
+
+def mebibytes(variable: str, default: float) -> int:
+    """Read a size in MiB from an environment variable; returns bytes.
+
+    Raises
+    ------
+    ValueError
+        Where it is not a number of zero or more.
+    """
+    text = os.environ.get(variable, "")
+    try:
+        size = float(text or default)
+    except ValueError:
+        size = -1.0
+    if not 0.0 <= size < float("inf"):
+        raise ValueError(
+            f"environment variable {variable} is {text!r}; want a size in MiB, such as {default:g}"
+        )
+    return int(size * 2**20)
+
+
+@lru_cache(maxsize=8)
+def hash_of_code(*sources: str) -> str:
+    """Hash what makes an entry's arrays: sources of the package, files or whole folders, with the libraries and the processor's kind."""
+    libraries = (platform.machine(), np.__version__, scipy.__version__, cv2.__version__)
+    digest = hashlib.blake2b(" ".join(libraries).encode(), digest_size=16)
+    for source in sources:
+        path = _PACKAGE / source
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            digest.update(file.relative_to(_PACKAGE).as_posix().encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+def _digest(key: str, packed: bytes) -> bytes:
+    digest = hashlib.blake2b(key.encode() + b"\0", digest_size=_DIGEST_BYTES)
+    digest.update(packed)
+    return digest.digest()
+
+
+def _packed(arrays: Arrays) -> bytes:
+    """Return a line of JSON (name, type, shape and length of each array), then the arrays, each compressed by itself."""
+    streams = [zlib.compress(np.ascontiguousarray(array).tobytes()) for array in arrays.values()]
+    table = [
+        (name, array.dtype.str, array.shape, len(stream))
+        for (name, array), stream in zip(arrays.items(), streams, strict=True)
+    ]
+    return json.dumps(table).encode() + b"\n" + b"".join(streams)
+
+
+def _unpacked(packed: bytes) -> Arrays:
+    place = packed.index(b"\n") + 1
+    arrays = {}
+    for name, kind, shape, length in json.loads(packed[:place]):
+        arrays[name] = np.frombuffer(zlib.decompress(packed[place : place + length]), kind).reshape(shape)
+        place += length
+    return arrays
+
+
+def _on_disk(length: int) -> int:
+    """Return what a file of that length takes in the blocks of usual file systems."""
+    return -(-length // _BLOCK) * _BLOCK
+
+
+def _files(folder: Path) -> list[tuple[float, int, Path]]:
+    """Return time of last use, size and path of what lies in a folder, unfinished writes of broken processes too."""
+    files = []
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            with contextlib.suppress(OSError):
+                told = entry.stat()
+                files.append((told.st_mtime, _on_disk(told.st_size), Path(entry.path)))
+    return files
+
+
+def _shrink(folder: Path, max_bytes: int) -> None:
+    """Remove what was used longest ago until a folder holds no more than that."""
+    files = _files(folder)
+    size = sum(size for _, size, _ in files)
+    for _, length, path in sorted(files):
+        if size <= max_bytes:
+            return
+        with contextlib.suppress(OSError):
+            path.unlink()
+        size -= length

@@ -1,0 +1,1 @@
+"""Floors generated from a seed."""

@@ -1,0 +1,1 @@
+"""What an action is: a command, a waypoint, a frontier."""

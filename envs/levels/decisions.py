@@ -1,0 +1,62 @@
+"""What the wrappers of the levels of decision share: all but the decisions is the environment's."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.radio.messages import Order
+
+
+class DecisionWrapper(ParallelEnv[str, Observation, Any]):
+    """Lets another level of decision drive an environment, which stays the one that keeps the episode.
+
+    Parameters
+    ----------
+    env : ExplorationEnv
+        The environment to drive in.
+    name : str
+        Name of the wrapped environment.
+    """
+
+    def __init__(self, env: ExplorationEnv, name: str) -> None:
+        self.env = env
+        self.metadata = {**env.metadata, "name": name, "render_fps": 1.0 / env.settings.decision_period_s}
+        self.possible_agents = env.possible_agents
+        self.agents: list[str] = env.agents
+        self.render_mode = env.render_mode
+        self.settings = env.settings
+
+    @property
+    def unwrapped(self) -> ExplorationEnv:
+        """The environment below."""
+        return self.env
+
+    def stop(self, agent: str, reason: str) -> None:
+        """End an agent at its next step, with a reason."""
+        self.env.stop(agent, reason)
+
+    def order(self, agent: str, order: Order) -> None:
+        """Send an agent an order, as ``ExplorationEnv.order``."""
+        self.env.order(agent, order)
+
+    def state(self) -> NDArray[np.float64]:
+        """Return the true state of the team."""
+        return self.env.state()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draw the environment."""
+        return self.env.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self.env.close()
+
+
+def boxes_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
+    """Return the parts of a space of observations, by key."""
+    assert isinstance(space, spaces.Dict)
+    return dict(space.spaces)

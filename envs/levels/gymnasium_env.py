@@ -1,0 +1,110 @@
+"""One robot alone: the Gymnasium form of the environment."""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+from numpy.typing import NDArray
+
+from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.levels.frontiers import FrontierExploration
+from lidarium.envs.levels.waypoints import WaypointExploration
+from lidarium.envs.radio.messages import Order
+from lidarium.envs.settings.exploration import make_settings
+
+AGENT = "robot_0"
+
+
+class SoloExploration(gymnasium.Env[Observation, Any]):
+    """One robot explores a floor (Gymnasium).
+
+    Parameters
+    ----------
+    floor : str, Path or Floor
+        As for ``lidarium.parallel_env``.
+    level : str
+        What an action is: ``velocity``, ``waypoint`` or ``frontier``.
+    render_mode : str or None
+        ``human``, ``rgb_array`` or None.
+    image_resolution : float or None
+        Side of a pixel [m] where the floor is a plain image.
+    **options
+        As for ``lidarium.parallel_env``, without ``robots``.
+
+    Raises
+    ------
+    ValueError
+        Where an option has a bad value, or more than one robot is asked for.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
+
+    def __init__(
+        self,
+        floor: str | Path | Floor = "apartment",
+        level: str = "velocity",
+        render_mode: str | None = None,
+        image_resolution: float | None = None,
+        **options: Any,  # noqa: ANN401
+    ) -> None:
+        if options.setdefault("robots", 1) != 1:
+            raise ValueError(
+                f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.parallel_env for a team"
+            )
+        base = ExplorationEnv(floor, make_settings(**options), render_mode, image_resolution)
+        self.parallel = at_level(base, level)
+        self.metadata = {**type(self).metadata, "render_fps": self.parallel.metadata["render_fps"]}
+        self.render_mode = render_mode
+        self.observation_space = self.parallel.observation_space(AGENT)
+        self.action_space = self.parallel.action_space(AGENT)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode; options are those of ``ExplorationEnv.reset``."""
+        super().reset(seed=seed)
+        observations, infos = self.parallel.reset(seed=seed, options=options)
+        return observations[AGENT], infos[AGENT]
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:  # noqa: ANN401
+        """Take one step (velocity) or one decision (waypoint, frontier)."""
+        if not self.parallel.agents:
+            raise RuntimeError("the episode is over or was not started; call reset() before step()")
+        observations, rewards, terminations, truncations, infos = self.parallel.step({AGENT: action})
+        return observations[AGENT], rewards[AGENT], terminations[AGENT], truncations[AGENT], infos[AGENT]
+
+    def stop(self, reason: str) -> None:
+        """End the episode at the next step, with a reason."""
+        self.parallel.stop(AGENT, reason)
+
+    def order(self, order: Order) -> None:
+        """Give the robot an order, as ``ExplorationEnv.order``."""
+        self.parallel.order(AGENT, order)
+
+    def render(self) -> NDArray[Any] | None:
+        """Draw the environment."""
+        return self.parallel.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self.parallel.close()
+
+
+def at_level(
+    env: ExplorationEnv, level: str, shares_map: bool = True
+) -> ExplorationEnv | WaypointExploration | FrontierExploration:
+    """Put the wrapper of a level of decision around an environment.
+
+    Raises
+    ------
+    ValueError
+        Where the level is unknown.
+    """
+    if level == "velocity":
+        return env
+    if level == "waypoint":
+        return WaypointExploration(env, shares_map)
+    if level == "frontier":
+        return FrontierExploration(env, shares_map)
+    raise ValueError(f"level is {level!r}; want velocity, waypoint or frontier")

@@ -1,0 +1,1 @@
+"""What robots send each other, with the links that carry it."""

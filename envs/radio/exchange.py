@@ -1,0 +1,376 @@
+"""What the robots of a team tell each other over a radio that is not ideal, and what has reached whom.
+
+In every step each robot tells where it is; once a period, over each link, what the other does not have of any
+map that it holds: its own, and copies of others that reached it. So news travels on over robots that meet
+later. A message carries blocks of 64 cells.
+
+Where robots report, a station listens at the place where the first of them started. With every map goes what
+its robot told of itself when the map was as it is, and the station gets both over the same links, from the
+robots themselves or from those that hold copies.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.radio.messages import Status
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.faults import DEAD_RADIO, has_fault
+from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.radio import RADIO_STREAM, links, links_to
+from lidarium.mapping.kernels.compilation import Array, kernel
+
+BLOCK = 64
+"""Cells of a block of a map."""
+
+POSE_BYTES = 32
+"""A message that tells a pose: x, y, theta and the time, 8 bytes each."""
+
+HEADER_BYTES, BLOCK_BYTES = 32, 4 + BLOCK
+"""A message with a part of a map: sender, whose map, when, and how many blocks.
+
+Each block is its number and a byte for each cell.
+"""
+
+STATUS_BYTES = 80
+"""What a robot tells of itself with its map: pose, target and three figures, 8 bytes each, and its states."""
+
+STATION_STREAM = 1
+"""Sets the draws for the station's links apart from those of the robots, which are the same with and without it."""
+
+NEVER = -2
+"""Step of news that never came.
+
+The scan at the start is of step 0, before which is -1.
+"""
+
+CONTACT_S = 0.5
+"""A teammate's pose is good for driving round it for this long [s]."""
+
+
+@kernel
+def _differing_blocks(source: Array, target: Array, low: int, high: int, found: Array) -> int:
+    """Fill ``found`` with the numbers of the blocks of rows ``low`` to ``high`` in which two maps differ; return how many."""
+    columns, count = source.shape[1], 0
+    words = columns // 64
+    for row in range(low, high):
+        for word in range(words):
+            for column in range(64 * word, 64 * word + 64):
+                if source[row, column] != target[row, column]:
+                    found[count] = row * words + word
+                    count += 1
+                    break
+    return count
+
+
+@dataclass(frozen=True, slots=True)
+class _Message:
+    """Something on its way: a pose, or blocks of a map where there are any.
+
+    Attributes
+    ----------
+    arrives : int
+        The step at which it is there.
+    receiver, source : int
+        Who gets it, and whom it is about.
+    step : int
+        The step at which it was true.
+    pose : (3,) float64 or None
+        x, y, theta as the source believed [m, rad].
+    has_ended : bool
+        Whether the source had ended.
+    blocks, cells : (blocks,) int64, (blocks, 64) int8
+        Blocks of the source's map.
+    status : Status or None
+        What the source told of itself with its map.
+    """
+
+    arrives: int
+    receiver: int
+    source: int
+    step: int
+    pose: NDArray[np.float64] | None
+    has_ended: bool
+    blocks: NDArray[np.int64]
+    cells: NDArray[np.int8]
+    status: Status | None = None
+
+
+_NO_BLOCKS, _NO_CELLS = np.zeros(0, np.int64), np.zeros((0, BLOCK), np.int8)
+
+
+class Exchange:
+    """The radio traffic of one episode.
+
+    Parameters
+    ----------
+    world : KinematicWorld
+        Whose robots talk.
+    settings : ExplorationSettings
+        The team and its radio.
+    episode : int
+        Which episode of the world.
+
+    Attributes
+    ----------
+    links : (robots, robots) bool
+        Who reached whom in the last step: sender, receiver.
+    heard, heard_at : (robots, robots, 3) float64, (robots, robots) int64
+        The last pose of each robot that reached each other (receiver, source), and the step at which it was
+        true.
+    heard_ended : (robots, robots) bool
+        Whether the source said that it has ended.
+    copies : list of list of (rows, columns) int8 arrays
+        What each robot, and last the station, holds of each map (receiver, source), the map itself where it
+        is its own.
+    copied_at : (robots + 1, robots) int64
+        The step at which each copy was true.
+    statuses : list of list of Status or None
+        What each robot, and last the station, holds of what each robot told of itself (receiver, source) with
+        its map.
+    tells : callable or None
+        Takes the number of a robot and returns what it tells of itself; where None, nobody reports and there
+        is no station.
+    station_links : (robots,) bool
+        Who reached the station, and was reached by it, when maps were told or an order was sent last.
+    windows : (robots, 4) int64
+        What part of the copies that each robot holds has changed since it was last looked at: rows and
+        columns, low and high.
+    bytes_sent : (robots,) int64
+        Bytes that each robot has sent to others, lost ones included.
+    bytes_reported : (robots,) int64
+        Bytes that each robot has sent for the station's sake beside: to it, and as what goes with maps to
+        others.
+    """
+
+    def __init__(self, world: KinematicWorld, settings: ExplorationSettings, episode: int = 0) -> None:
+        self._world, self._settings, self._episode = world, settings, episode
+        robots = settings.robots
+        self._first = episode * robots
+        self._period = max(round(settings.radio.period_s / settings.time_step), 1)
+        self._latency = round(settings.radio.latency_s / settings.time_step)
+        self.links = np.zeros((robots, robots), np.bool_)
+        self.station_links = np.zeros(robots, np.bool_)
+        self.tells: Callable[[int], Status] | None = None
+        self.start(0)
+
+    def start(self, seed: int) -> None:
+        """Begin an episode in which nobody knows anything of the others.
+
+        Chance comes from ``seed``.
+        """
+        robots, maps = (
+            self._settings.robots,
+            self._world.log_odds[self._first : self._first + self._settings.robots],
+        )
+        self._generator = np.random.default_rng([seed, RADIO_STREAM])
+        self._station_generator = np.random.default_rng([seed, RADIO_STREAM, STATION_STREAM])
+        self._station_chance = np.zeros(robots)
+        self._chance = np.zeros((robots, robots))
+        self._under_way: list[_Message] = []
+        self.links[:], self.station_links[:] = False, False
+        self.heard, self.heard_at = np.zeros((robots, robots, 3)), np.full((robots, robots), NEVER, np.int64)
+        self.heard_ended = np.zeros((robots, robots), np.bool_)
+        self.copies = [
+            [log_odds if i == j else np.zeros((0, BLOCK), np.int8) for j, log_odds in enumerate(maps)]
+            for i in range(robots + 1)
+        ]
+        self.copied_at = np.full((robots + 1, robots), NEVER, np.int64)
+        self.statuses: list[list[Status | None]] = [[None] * robots for _ in range(robots + 1)]
+        self.windows = np.zeros((robots, 4), np.int64)
+        for robot in range(robots):
+            self._forget_changes(robot)
+        self.bytes_sent, self.bytes_reported = np.zeros(robots, np.int64), np.zeros(robots, np.int64)
+
+    def take_window(self, robot: int) -> NDArray[np.int64]:
+        """Return what part of a robot's copies has changed since the last call: rows, columns (4,); empty where low is not below high."""
+        window: NDArray[np.int64] = self.windows[robot].copy()
+        self._forget_changes(robot)
+        return window
+
+    def _forget_changes(self, robot: int) -> None:
+        rows, columns = self._world.log_odds[self._first + robot].shape
+        self.windows[robot] = (rows, 0, columns, 0)
+
+    def step(self) -> None:
+        """Let the robots talk, after they have sensed.
+
+        Called once in every step of the episode and at its start.
+        """
+        world, radio = self._world, self._settings.radio
+        step = int(world.steps[self._episode])
+        is_time = step % self._period == 0
+        if is_time and radio.shadowing > 0.0:
+            self._chance = self._generator.standard_normal(self._chance.shape)
+        floor = world.floors[self._episode]
+        assert floor is not None
+        rows = slice(self._first, self._first + self._settings.robots)
+        self.links = links(
+            radio, world.poses[rows], floor.laser, self._chance if radio.shadowing > 0.0 else None
+        )
+        works = self._works(step)
+        self.links &= works[:, None] & works[None, :]
+        if is_time and self.tells is not None:
+            if radio.shadowing > 0.0:
+                self._station_chance = self._station_generator.standard_normal(len(self.station_links))
+            self._find_station()
+        self._tell_poses(step)
+        if is_time:
+            self._tell_maps(step)
+        due = [message for message in self._under_way if message.arrives <= step]
+        self._under_way = [message for message in self._under_way if message.arrives > step]
+        for message in due:
+            self._receive(message)
+
+    def _works(self, step: int) -> NDArray[np.bool_]:
+        """Return whose radio works, (robots,)."""
+        world, rows = self._world, range(self._first, self._first + self._settings.robots)
+        return np.array(
+            [world.failed[row] == 0 and not has_fault(world.faults[row], DEAD_RADIO, step) for row in rows]
+        )
+
+    def _find_station(self) -> None:
+        """Find out which robots reach the place where the first of them started."""
+        world, radio, team = (
+            self._world,
+            self._settings.radio,
+            slice(self._first, self._first + self._settings.robots),
+        )
+        floor = world.floors[self._episode]
+        assert floor is not None
+        chance = self._station_chance if radio.shadowing > 0.0 else None
+        is_linked = links_to(radio, world.poses[team], world.starts[self._first], floor.laser, chance)
+        self.station_links = is_linked & self._works(int(world.steps[self._episode]))
+
+    def order_delay(self, receiver: int) -> int | None:
+        """Return after how many steps an order of the station that is sent now reaches a robot.
+
+        An order goes over links that stand now, from robot to robot; None where there are none, or it is lost
+        by chance.
+        """
+        self._find_station()
+        reached, known = self.station_links.copy(), np.zeros_like(self.station_links)
+        while (reached != known).any():
+            known = reached
+            reached = known | self.links[known].any(axis=0)
+        is_lost = self._is_lost(self._station_generator)
+        return self._latency if reached[receiver] and not is_lost else None
+
+    def _is_lost(self, generator: np.random.Generator) -> bool:
+        return self._settings.radio.loss > 0.0 and bool(generator.random() < self._settings.radio.loss)
+
+    def _send(self, message: _Message) -> None:
+        is_to_station = message.receiver == self._settings.robots
+        if not self._is_lost(self._station_generator if is_to_station else self._generator):
+            self._under_way.append(message)
+
+    def _tell_poses(self, step: int) -> None:
+        for sender in np.flatnonzero(self.links.any(axis=1)).tolist():
+            row = self._first + sender
+            pose, has_ended = self._world.believed[row].copy(), bool(self._world.flags[row] & ENDED)
+            # A pose is sent to all at once.
+            self.bytes_sent[sender] += POSE_BYTES
+            for receiver in np.flatnonzero(self.links[sender]).tolist():
+                self._send(
+                    _Message(
+                        step + self._latency, receiver, sender, step, pose, has_ended, _NO_BLOCKS, _NO_CELLS
+                    )
+                )
+
+    def _tell_maps(self, step: int) -> None:
+        robots = self._settings.robots
+        np.fill_diagonal(self.copied_at, step)
+        if self.tells is not None:
+            for robot in range(robots):
+                self.statuses[robot][robot] = self.tells(robot)
+        # What is sent is what was held when the exchange began: nothing goes on over two links at once.
+        chosen = [
+            (self._best_sender(receiver, source), receiver, source)
+            for receiver in range(robots if self.tells is None else robots + 1)
+            for source in range(robots)
+            if receiver != source
+        ]
+        messages = [
+            (sender, self._news(sender, receiver, source, step))
+            for sender, receiver, source in chosen
+            if sender is not None
+        ]
+        for sender, message in messages:
+            size = HEADER_BYTES + BLOCK_BYTES * len(message.blocks)
+            is_to_station = message.receiver == robots
+            self.bytes_sent[sender] += 0 if is_to_station else size
+            self.bytes_reported[sender] += (size if is_to_station else 0) + (
+                0 if message.status is None else STATUS_BYTES
+            )
+            self._send(message)
+
+    def _best_sender(self, receiver: int, source: int) -> int | None:
+        """Return which of the robots that reach a receiver holds the latest copy of a map.
+
+        None where none has news or it is under way.
+        """
+        if any(
+            message.pose is None and (message.receiver, message.source) == (receiver, source)
+            for message in self._under_way
+        ):
+            return None
+        robots = self._settings.robots
+        is_linked = self.station_links if receiver == robots else self.links[:, receiver]
+        held_at = np.where(is_linked, self.copied_at[:robots, source], NEVER)
+        best = int(np.argmax(held_at))
+        return best if held_at[best] > self.copied_at[receiver, source] else None
+
+    def _news(self, sender: int, receiver: int, source: int, step: int) -> _Message:
+        """Return what a sender holds of a map that the receiver does not."""
+        held = self.copies[sender][source]
+        copy = self._copy_of(receiver, source)
+        # A correction of the past may have emptied rows that the receiver still holds.
+        used = np.flatnonzero(held.view(np.uint64).any(axis=1) | copy.view(np.uint64).any(axis=1))
+        low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
+        found = np.empty((high - low) * (held.shape[1] // BLOCK), np.int64)
+        blocks = found[: _differing_blocks(held, copy, low, high, found)].copy()
+        cells = held.reshape(-1, BLOCK)[blocks]
+        true_at = int(self.copied_at[sender, source])
+        return _Message(
+            step + self._latency,
+            receiver,
+            source,
+            true_at,
+            None,
+            False,
+            blocks,
+            cells,
+            self.statuses[sender][source],
+        )
+
+    def _copy_of(self, receiver: int, source: int) -> NDArray[np.int8]:
+        """Return what a robot holds of another's map, blank at first."""
+        if self.copies[receiver][source].size == 0:
+            self.copies[receiver][source] = np.zeros(
+                self._world.log_odds[self._first + source].shape, np.int8
+            )
+        return self.copies[receiver][source]
+
+    def _receive(self, message: _Message) -> None:
+        receiver, source = message.receiver, message.source
+        if message.pose is not None:
+            if message.step > self.heard_at[receiver, source]:
+                self.heard[receiver, source], self.heard_at[receiver, source] = message.pose, message.step
+                self.heard_ended[receiver, source] = message.has_ended
+            return
+        if message.step <= self.copied_at[receiver, source]:
+            return
+        copy = self._copy_of(receiver, source)
+        copy.reshape(-1, BLOCK)[message.blocks] = message.cells
+        self.copied_at[receiver, source], self.statuses[receiver][source] = message.step, message.status
+        if len(message.blocks) and receiver < self._settings.robots:
+            rows, words = np.divmod(message.blocks, copy.shape[1] // BLOCK)
+            window = self.windows[receiver]
+            window[0], window[1] = min(window[0], rows.min()), max(window[1], rows.max() + 1)
+            window[2], window[3] = (
+                min(window[2], BLOCK * words.min()),
+                max(window[3], BLOCK * (words.max() + 1)),
+            )

@@ -1,0 +1,166 @@
+"""Orders that a robot takes and states that it reports."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.geometry.rigid import Transform
+
+
+class DriveState(Enum):
+    """What a robot's driving is about."""
+
+    IDLE = "idle"
+    DRIVING = "driving"
+    ARRIVED = "arrived"
+    BLOCKED = "blocked"
+    NO_PATH = "no_path"
+    GIVING_WAY = "giving_way"
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where a robot should drive to, in its map frame.
+
+    Attributes
+    ----------
+    x, y : float
+        Position [m].
+    heading : float or None
+        Heading to turn to at the end [rad]; None for any.
+    """
+
+    x: float
+    y: float
+    heading: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.x) and math.isfinite(self.y)):
+            raise ValueError(f"target is ({self.x}, {self.y}); want finite metres")
+        if self.heading is not None and not math.isfinite(self.heading):
+            raise ValueError(f"heading of the target is {self.heading}; want a finite angle or None")
+
+
+class OperatingState(Enum):
+    """Whether a robot takes part in the work of its team."""
+
+    OPERATING = "operating"
+    PAUSED = "paused"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
+    @classmethod
+    def _missing_(cls, value: object) -> None:
+        raise ValueError(
+            f"operating state is {value!r}; want one of {', '.join(state.value for state in cls)}"
+        )
+
+
+class OrderKind(Enum):
+    """What a robot can be told to do."""
+
+    PAUSE = "pause"
+    RESUME = "resume"
+    STOP = "stop"
+    EXPLORE = "explore"
+    GO_TO = "go_to"
+
+    @classmethod
+    def _missing_(cls, value: object) -> None:
+        raise ValueError(
+            f"kind of the order is {value!r}; want one of {', '.join(kind.value for kind in cls)}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What a robot is told to do.
+
+    Attributes
+    ----------
+    kind : OrderKind
+        What; its name is taken, too.
+    target : Target or None
+        Where to, in the robot's map frame, with ``GO_TO``; None with all others.
+    reason : str
+        Why, for the records; with ``STOP`` what the robot ends with.
+    """
+
+    kind: OrderKind
+    target: Target | None = None
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kind", OrderKind(self.kind))
+        if self.kind is OrderKind.GO_TO and not isinstance(self.target, Target):
+            raise ValueError(
+                f"target of the order {self.kind.value!r} is {self.target!r}; want a Target, the place to go to"
+            )
+        if self.kind is not OrderKind.GO_TO and self.target is not None:
+            raise ValueError(
+                f"target of the order {self.kind.value!r} is {self.target!r}; want None, only 'go_to' has a target"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What a robot tells of itself beside its map; positions are in its map frame.
+
+    Attributes
+    ----------
+    pose : Transform
+        Where it believes to be.
+    state : OperatingState
+        Whether it takes part in the work.
+    drive : DriveState
+        What its driving is about.
+    target : Target or None
+        Where it drives to.
+    path_left_m : float
+        What is left of its path, 0 without one [m].
+    travelled_m : float
+        How far it has come by its own odometry [m].
+    energy_left_j : float or None
+        What is left in its battery; None where it has no limit [J].
+    """
+
+    pose: Transform
+    state: OperatingState
+    drive: DriveState
+    target: Target | None
+    path_left_m: float
+    travelled_m: float
+    energy_left_j: float | None
+
+
+class Orders(NamedTuple):
+    """Targets of many robots.
+
+    Attributes
+    ----------
+    is_ordered : (rows,) bool
+        Whether the robot has a target; otherwise it stays where it is and gives way.
+    targets : (rows, 2) float64
+        Positions in the robots' map frames, finite where ordered [m].
+    headings : (rows,) float64
+        Headings to turn to at the end [rad], nan for any.
+    """
+
+    is_ordered: NDArray[np.bool_]
+    targets: NDArray[np.float64]
+    headings: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, targets: Sequence[Target | None]) -> "Orders":
+        """Return the orders of a list of targets, one for each row."""
+        places = [(0.0, 0.0) if target is None else (target.x, target.y) for target in targets]
+        headings = [
+            math.nan if target is None or target.heading is None else target.heading for target in targets
+        ]
+        is_ordered = np.array([target is not None for target in targets])
+        return cls(is_ordered, np.array(places, np.float64).reshape(-1, 2), np.array(headings, np.float64))

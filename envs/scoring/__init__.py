@@ -1,0 +1,1 @@
+"""What a team has covered of a floor."""

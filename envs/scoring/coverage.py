@@ -1,0 +1,179 @@
+"""What counts as explored, and what a robot earns for it.
+
+The scorer keeps a bit per robot and cell of the floor, at the resolution of the beliefs: the cells seen by
+true beams from true poses, before noise. Of these only the cells of F count: those that the disc of the
+smallest robot sweeps over its configuration space, connected to the starts.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.grids.cell_blocks import fetch_block
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import word_grid_at
+
+ROWS_AHEAD = 24
+"""So many rows before a row of a mask is looked at it is fetched from memory."""
+
+
+def pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
+    """Pack a (rows, columns) mask into (rows, words) uint64, bit 0 of word 0 at column 0."""
+    rows, columns = cells.shape
+    words = -(-columns // 64)
+    padded = np.zeros((rows, words * 64), np.bool_)
+    padded[:, :columns] = cells
+    return np.packbits(padded, axis=1, bitorder="little").view("<u8").astype(np.uint64).copy()
+
+
+def unpack_bits(bits: NDArray[np.uint64], columns: int) -> NDArray[np.bool_]:
+    """Unpack (rows, words) uint64 into a (rows, columns) mask."""
+    return np.unpackbits(bits.astype("<u8").view(np.uint8), axis=1, bitorder="little")[:, :columns].astype(
+        np.bool_
+    )
+
+
+@kernel(inline=True)
+def count_bits(value: np.uint64) -> int:
+    """Count the set bits of a uint64."""
+    value = value - ((value >> np.uint64(1)) & np.uint64(0x5555555555555555))
+    value = (value & np.uint64(0x3333333333333333)) + (
+        (value >> np.uint64(2)) & np.uint64(0x3333333333333333)
+    )
+    value = (value + (value >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+    return int((value * np.uint64(0x0101010101010101)) >> np.uint64(56))
+
+
+@kernel(borrowing=True)
+def mark_seen(
+    own: Array,
+    counted: Array,
+    bits: Array,
+    box: tuple[int, int, int, int],
+    row_offset: int,
+    word_offset: int,
+    news: Array,
+) -> int:
+    """Add a scan's seen cells to a robot's mask.
+
+    Parameters
+    ----------
+    own, counted : (rows, words) uint64
+        What the robot has seen (updated), and F.
+    bits : (window rows, words) uint64
+        The seen area.
+    box : tuple of int
+        row_low, row_high, word_low, word_high of the window that may hold bits.
+    row_offset, word_offset : int
+        Place of the window in the masks.
+    news : (4,) int64
+        Result: the part of the mask that holds the cells new to the robot (row_low, row_high, word_low,
+        word_high).
+
+    Returns
+    -------
+    int
+        Cells new to the robot.
+    """
+    rows, words = own.shape
+    new = 0
+    word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
+    row_low, row_high = rows, 0
+    for row in range(max(box[0], -row_offset), min(box[1], rows - row_offset)):
+        i = row + row_offset
+        fetch_block(own.ctypes.data + (i + ROWS_AHEAD) * words * 8)
+        found = np.uint64(0)
+        for word in range(word_low, word_high):
+            j = word + word_offset
+            value = bits[row, word] & counted[i, j] & ~own[i, j]
+            if value != np.uint64(0):
+                own[i, j] |= value
+                new += count_bits(value)
+                found |= value
+        if found != np.uint64(0):
+            row_low, row_high = min(row_low, i), i + 1
+    news[0], news[1], news[2], news[3] = row_low, row_high, word_low + word_offset, word_high + word_offset
+    return new
+
+
+@kernel(borrowing=True)
+def share_news(owns: Array, team: Array, news: Array, first: int, robots: int, gains: Array) -> int:
+    """Credit each cell that is new to the team in equal parts to the robots that saw it in this step, in robot order.
+
+    What a robot's mask holds and the team's does not is what the robot saw in this step.
+
+    Parameters
+    ----------
+    owns : (maps,) int64
+        Addresses of the robots' masks, of the shape of ``team``.
+    team : (rows, words) uint64
+        What the team has seen; updated.
+    news : (maps, 4) int64
+        Where ``mark_seen`` found cells that are new to each robot.
+    first, robots : int
+        The episode's robots in these arrays.
+    gains : (maps,) float64
+        Result: cells credited to each robot.
+
+    Returns
+    -------
+    int
+        Cells new to the team.
+    """
+    rows, words = team.shape
+    total = 0
+    for robot in range(first, first + robots):
+        gain = 0.0
+        own = word_grid_at(owns[robot], rows, words)
+        for row in range(news[robot, 0], news[robot, 1]):
+            for word in range(news[robot, 2], news[robot, 3]):
+                value = own[row, word] & ~team[row, word]
+                if value == np.uint64(0):
+                    continue
+                others = np.uint64(0)
+                for other in range(first, first + robots):
+                    if other != robot and news[other, 0] < news[other, 1]:
+                        others |= word_grid_at(owns[other], rows, words)[row, word]
+                gain += count_bits(value & ~others)
+                value &= others
+                while value != np.uint64(0):
+                    bit = value & (~value + np.uint64(1))
+                    value ^= bit
+                    seen_by = 1
+                    for other in range(first, first + robots):
+                        if other != robot and word_grid_at(owns[other], rows, words)[row, word] & bit:
+                            seen_by += 1
+                    gain += 1.0 / seen_by
+        gains[robot] = gain
+    for robot in range(first, first + robots):
+        own = word_grid_at(owns[robot], rows, words)
+        for row in range(news[robot, 0], news[robot, 1]):
+            for word in range(news[robot, 2], news[robot, 3]):
+                value = own[row, word] & ~team[row, word]
+                total += count_bits(value)
+                team[row, word] |= value
+    return total
+
+
+@kernel(borrowing=True)
+def add_rewards(
+    gains: Array, contacts: Array, travelled: Array, weights: Array, travelled_before: Array, rewards: Array
+) -> None:
+    """Add each robot's reward of a step: its share of the new cells less the prices of time, contact and energy.
+
+    Parameters
+    ----------
+    gains, contacts, travelled : (robots,) arrays
+        Cells credited in the step, whether the body touched anything, and length of the path [m].
+    weights : (4,) float64
+        What a new cell earns, and what a step, a contact and a metre cost.
+    travelled_before : (robots,) float64
+        Length of the path at the last reward [m]; updated.
+    rewards : (robots,) float64
+        Added to.
+    """
+    for robot in range(gains.shape[0]):
+        driven = travelled[robot] - travelled_before[robot]
+        travelled_before[robot] = travelled[robot]
+        rewards[robot] += (
+            weights[0] * gains[robot] - weights[1] - weights[2] * contacts[robot] - weights[3] * driven
+        )

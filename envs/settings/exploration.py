@@ -1,0 +1,396 @@
+"""Every knob of the exploration environments, with its unit and default."""
+
+import difflib
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from numbers import Integral
+from typing import Any
+
+from lidarium.envs.settings.battery import BATTERIES, Battery
+from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
+from lidarium.envs.settings.radio import RADIO, RadioSettings
+from lidarium.envs.settings.robots import ROBOTS, Robot
+from lidarium.mapping.grids.occupancy import OccupancySettings
+from lidarium.mapping.localization.registry import localizer_names
+
+MAX_ROBOTS = 64
+MAX_MAP_CELLS = 4096
+MAX_EGOCENTRIC_CELLS = 1024
+MAX_EGOCENTRIC_SCALE = 64
+
+OBSERVABLES = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
+"""What a robot can observe, in the order in which observations have it.
+
+A goal is observed wherever the floor has one.
+"""
+
+NOISE: dict[str, tuple[float, float]] = {"none": (0.0, 0.0), "datasheet": (0.01, 0.01), "thesis": (0.03, 0.0)}
+"""Names of the range noise: floor [m] and share of the range of its standard deviation."""
+
+LIDARS: dict[str, Lidar] = {
+    "urg": Lidar(),
+    "lidar_360_6m": Lidar(beams=180, field_of_view=2.0 * math.pi, range_max=6.0),
+    "lidar_360_20m": Lidar(beams=720, field_of_view=2.0 * math.pi, range_min=0.1, range_max=20.0),
+}
+"""Lasers by name: the URG-04LX-UG01 as simulated in the theses, and two that look all around."""
+
+KERNEL_LOCALIZATIONS = ("truth", "odometry")
+"""Who can say where a robot is within the kernels of a step: the truth, or the wheels alone."""
+
+BACKENDS = ("kinematic",)
+
+
+REALISM: dict[str, dict[str, Any]] = {
+    "ideal": {
+        "noise": "none",
+        "odometry": "ideal",
+        "localization": "truth",
+        "radio": "all",
+        "faults": NO_FAULTS,
+    },
+    "lab": {
+        "noise": "datasheet",
+        "odometry": "typical",
+        "localization": "slam",
+        "radio": "all",
+        "faults": NO_FAULTS,
+    },
+    "field": {
+        "noise": "datasheet",
+        "odometry": "poor",
+        "localization": "slam",
+        "radio": RadioSettings(kind="signal", shadowing=4.0, loss=0.05, latency_s=0.2),
+        "faults": FaultSettings(laser_dropout=6.0, blind_sector=6.0, stuck_wheel=2.0, dead_radio=1.0),
+    },
+}
+"""How real the world is, by name: what each preset stands for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RewardSettings:
+    """What a robot earns and pays.
+
+    Attributes
+    ----------
+    area : float
+        Per square metre of F that the team had not sensed, shared among the robots that sense it first
+        [1/m2].
+    time : float
+        Price of a second [1/s].
+    contact : float
+        Price of a step in contact [1].
+    energy : float
+        Price of a metre driven [1/m].
+    """
+
+    area: float = 1.0
+    time: float = 0.01
+    contact: float = 0.1
+    energy: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name in ("area", "time", "contact", "energy"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(
+                    f"weight {name} of the reward is {getattr(self, name)}; want a finite number"
+                )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExplorationSettings:
+    """A team on a floor.
+
+    Attributes
+    ----------
+    robots : int
+        Number of robots, 1 to 64.
+    robot : Robot
+        The body of each.
+    lidar : Lidar
+        The laser of each.
+    occupancy : OccupancySettings
+        Their maps.
+    reward : RewardSettings
+        Weights of the reward.
+    known_starts : bool
+        Whether the robots know where they start; otherwise each believes to start at (0, 0, 0).
+    reveals_starts : bool
+        Whether reports tell where robots with unknown starts truly started, as a bound for what merging maps
+        can reach.
+    localization : str
+        Who says where the robot is: ``truth``, ``odometry`` or one of ``localizer_names``.
+    odometry : OdometrySettings
+        How well wheels tell the way.
+    radio : RadioSettings
+        How robots reach each other.
+    faults : FaultSettings
+        What goes wrong with them.
+    battery : Battery
+        What energy each has.
+    pauses_when_blocked : bool
+        Whether a robot whose bumper touches anything, or whose way is blocked, pauses until it is told to
+        resume.
+    backend : str
+        The world: ``kinematic``.
+    time_step : float
+        Simulated time of a step [s].
+    horizon_s : float or None
+        Simulated time after which the episode is truncated [s]; None for no horizon.
+    stop_coverage : float or None
+        Share of F at which all robots end as ``covered``; None for off.
+    stop_on_contact : bool
+        Whether a robot that touches anything ends as ``collision``.
+    goal_radius : float
+        Distance to the goal, where the floor has one, at which a robot ends as ``reached`` [m].
+    observe : tuple of str
+        What the robots observe, any of ``OBSERVABLES``; given in any order, kept in that of ``OBSERVABLES``.
+    map_cells : int
+        Side of the observed ``map`` [cells], a multiple of 2; half of it is how far a waypoint of the level
+        of waypoints can lie.
+    egocentric_cells : int
+        Side of each crop of the ``egocentric_map`` [cells of the crop], a multiple of 2.
+    egocentric_scales : tuple of int
+        Side of a cell of each crop of the ``egocentric_map`` [cells of the map].
+    raster_resolution : float
+        Side of a cell of the world's raster [m]; the maps' cell is a whole multiple of it.
+    decision_period_s : float
+        How long a waypoint or a frontier holds [s].
+    threads : int
+        Threads of the kernels; the result does not depend on it.
+    """
+
+    robots: int = 3
+    robot: Robot = field(default_factory=lambda: ROBOTS["kobuki"])
+    lidar: Lidar = field(default_factory=lambda: LIDARS["urg"])
+    occupancy: OccupancySettings = field(default_factory=OccupancySettings)
+    reward: RewardSettings = field(default_factory=RewardSettings)
+    known_starts: bool = True
+    reveals_starts: bool = False
+    localization: str = "truth"
+    odometry: OdometrySettings = ODOMETRY["ideal"]
+    radio: RadioSettings = RADIO["all"]
+    faults: FaultSettings = NO_FAULTS
+    battery: Battery = BATTERIES["none"]
+    pauses_when_blocked: bool = False
+    backend: str = "kinematic"
+    time_step: float = 0.1
+    horizon_s: float | None = 600.0
+    stop_coverage: float | None = 0.99
+    stop_on_contact: bool = False
+    goal_radius: float = 0.3
+    observe: tuple[str, ...] = ("scan", "pose", "velocity", "bumper", "map")
+    map_cells: int = 256
+    egocentric_cells: int = 64
+    egocentric_scales: tuple[int, ...] = (1, 4)
+    raster_resolution: float = 0.025
+    decision_period_s: float = 2.0
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name, kind in (
+            ("robots", Integral),
+            ("map_cells", Integral),
+            ("egocentric_cells", Integral),
+            ("threads", Integral),
+        ):
+            if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), kind):
+                raise ValueError(
+                    f"{name} is {getattr(self, name)!r}; want a whole number{' from 1 to 64' if name == 'robots' else ''}"
+                )
+        for name, wanted in PARTS.items():
+            if not isinstance(getattr(self, name), wanted):
+                raise ValueError(
+                    f"{name} is {getattr(self, name)!r}; want {wanted.__name__}{' or its name' if name in _NAMES else ''}"
+                )
+        if not 1 <= self.robots <= MAX_ROBOTS:
+            raise ValueError(f"robots is {self.robots}; a team has 1 to {MAX_ROBOTS}")
+        if not (math.isfinite(self.goal_radius) and self.goal_radius > 0.0):
+            raise ValueError(f"goal_radius is {self.goal_radius} m; want more than 0")
+        if self.localization not in localizations():
+            raise ValueError(
+                f"localization is {self.localization!r}; want one of {', '.join(localizations())}"
+            )
+        if self.backend not in BACKENDS:
+            raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(BACKENDS)}")
+        if not (math.isfinite(self.time_step) and self.time_step > 0.0):
+            raise ValueError(f"time_step is {self.time_step} s; want more than 0")
+        if self.horizon_s is not None and not 0.0 < self.horizon_s < math.inf:
+            raise ValueError(f"horizon_s is {self.horizon_s}; want more than 0 s, or None for no horizon")
+        if self.stop_coverage is not None and not 0.0 < self.stop_coverage <= 1.0:
+            raise ValueError(
+                f"stop_coverage is {self.stop_coverage}; want a share in (0, 1], or None for off"
+            )
+        if not 2 <= self.map_cells <= MAX_MAP_CELLS or self.map_cells % 2:
+            raise ValueError(f"map_cells is {self.map_cells}; want an even number from 2 to {MAX_MAP_CELLS}")
+        if not 2 <= self.egocentric_cells <= MAX_EGOCENTRIC_CELLS or self.egocentric_cells % 2:
+            raise ValueError(
+                f"egocentric_cells is {self.egocentric_cells}; want an even number from 2 to {MAX_EGOCENTRIC_CELLS}"
+            )
+        # Lists, as files of settings have them, become tuples: settings can be compared and hashed.
+        object.__setattr__(self, "observe", _observed(self.observe))
+        object.__setattr__(self, "egocentric_scales", _scales(self.egocentric_scales))
+        if not (math.isfinite(self.raster_resolution) and self.raster_resolution > 0.0):
+            raise ValueError(f"raster_resolution is {self.raster_resolution} m; want more than 0")
+        multiple = self.occupancy.resolution / self.raster_resolution
+        if round(multiple) < 1 or abs(multiple - round(multiple)) > 1e-6:
+            raise ValueError(
+                f"resolution of the maps is {self.occupancy.resolution} m; "
+                f"want a whole multiple of raster_resolution {self.raster_resolution} m"
+            )
+        if not self.time_step <= self.decision_period_s < math.inf:
+            raise ValueError(
+                f"decision_period_s is {self.decision_period_s} s; want at least the time step of {self.time_step} s"
+            )
+        if self.threads < 1:
+            raise ValueError(f"threads is {self.threads}; want at least 1")
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether sensors, poses, radio and robots are perfect."""
+        is_plain = self.localization == "truth" and self.odometry.is_ideal and self.radio.is_ideal
+        return is_plain and not self.lidar.is_noisy and self.faults == NO_FAULTS
+
+    @property
+    def may_fail(self) -> bool:
+        """Whether a robot can die, or take itself to be beyond its map."""
+        return self.localization != "truth" or self.faults != NO_FAULTS
+
+    @property
+    def agents(self) -> list[str]:
+        """Names of the robots."""
+        return [f"robot_{robot}" for robot in range(self.robots)]
+
+    @property
+    def horizon_steps(self) -> int | None:
+        """Steps until the horizon, or None."""
+        return None if self.horizon_s is None else max(round(self.horizon_s / self.time_step), 1)
+
+    @property
+    def decision_steps(self) -> int:
+        """Steps of a decision period."""
+        return max(round(self.decision_period_s / self.time_step), 1)
+
+
+PARTS: dict[str, type] = {
+    "robot": Robot,
+    "lidar": Lidar,
+    "occupancy": OccupancySettings,
+    "reward": RewardSettings,
+    "odometry": OdometrySettings,
+    "radio": RadioSettings,
+    "faults": FaultSettings,
+    "battery": Battery,
+}
+"""Settings that are made of others."""
+
+_NAMES: dict[str, dict[str, Any]] = {
+    "robot": ROBOTS,
+    "lidar": LIDARS,
+    "odometry": ODOMETRY,
+    "radio": RADIO,
+    "battery": BATTERIES,
+}
+"""Those of them that have names."""
+
+
+def localizations() -> tuple[str, ...]:
+    """Return the names of all who can say where a robot is."""
+    return ("truth", *localizer_names())
+
+
+def _observed(names: Iterable[str]) -> tuple[str, ...]:
+    """Return names of what is observed in the order of ``OBSERVABLES``, checked."""
+    wanted = f"want one or more of {', '.join(OBSERVABLES)}"
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise ValueError(f"observe is {names!r}; {wanted}, in a list or tuple")
+    names = tuple(names)
+    for name in names:
+        if name not in OBSERVABLES:
+            near = difflib.get_close_matches(str(name), OBSERVABLES, n=1, cutoff=0.3)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise ValueError(f"observe has the unknown name {name!r}{hint} (known: {', '.join(OBSERVABLES)})")
+        if names.count(name) > 1:
+            raise ValueError(f"observe is {names}; want {name!r} once")
+    if not names:
+        raise ValueError(f"observe is empty ({names}); {wanted}")
+    return tuple(name for name in OBSERVABLES if name in names)
+
+
+def _scales(scales: Iterable[int]) -> tuple[int, ...]:
+    """Return the scales of the egocentric map as a tuple, checked."""
+    wanted = f"want one or more whole numbers from 1 to {MAX_EGOCENTRIC_SCALE}, in a list or tuple"
+    if isinstance(scales, str) or not isinstance(scales, Iterable):
+        raise ValueError(f"egocentric_scales is {scales!r}; {wanted}")
+    scales = tuple(scales)
+    for scale in scales:
+        if (
+            isinstance(scale, bool)
+            or not isinstance(scale, Integral)
+            or not 1 <= scale <= MAX_EGOCENTRIC_SCALE
+        ):
+            raise ValueError(f"egocentric_scales is {scales}; {wanted}")
+    if not scales:
+        raise ValueError(f"egocentric_scales is empty ({scales}); {wanted}")
+    return tuple(int(scale) for scale in scales)
+
+
+def make_settings(settings: ExplorationSettings | None = None, **options: Any) -> ExplorationSettings:  # noqa: ANN401
+    """Fill settings from the short options of ``lidarium.parallel_env``.
+
+    Parameters
+    ----------
+    settings : ExplorationSettings or None
+        Where to start from; the defaults where None.
+    **options
+        Any attribute of ``ExplorationSettings``; ``robot``, ``lidar``, ``odometry``, ``radio`` and
+        ``battery`` also by name, ``noise`` (none, datasheet or thesis) for the laser's noise, ``resolution``
+        for the maps' cell [m], ``max_cycles`` (steps) in place of ``horizon_s``; ``realism`` (ideal, lab or
+        field) for all of noise, odometry, localization, radio and faults that is not given itself.
+
+    Returns
+    -------
+    ExplorationSettings
+        The settings.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Where an option has a bad value or is unknown.
+    """
+    base = settings or ExplorationSettings()
+    realism = options.pop("realism", None)
+    if realism is not None:
+        options = {**_named("realism", realism, REALISM), **options}
+    for name, table in _NAMES.items():
+        if isinstance(options.get(name), str):
+            options[name] = _named(name, options[name], table)
+    lidar = options.pop("lidar", base.lidar)
+    noise = options.pop("noise", None)
+    if noise is not None:
+        noise_floor, noise_share = _named("noise", noise, NOISE)
+        lidar = replace(lidar, noise_floor=noise_floor, noise_share=noise_share)
+    options["lidar"] = lidar
+    resolution = options.pop("resolution", None)
+    if resolution is not None:
+        options["occupancy"] = replace(options.get("occupancy", base.occupancy), resolution=resolution)
+    max_cycles = options.pop("max_cycles", None)
+    if max_cycles is not None:
+        if max_cycles < 1:
+            raise ValueError(f"max_cycles is {max_cycles}; want at least 1 step")
+        options["horizon_s"] = max_cycles * options.get("time_step", base.time_step)
+    known = ExplorationSettings.__dataclass_fields__
+    for name in options:
+        if name not in known:
+            raise TypeError(
+                f"unknown option {name!r}; known are {', '.join(sorted([*known, 'noise', 'realism', 'resolution', 'max_cycles']))}"
+            )
+    return replace(base, **options)
+
+
+def _named(kind: str, name: str, table: dict[str, Any]) -> Any:  # noqa: ANN401
+    if name not in table:
+        raise ValueError(f"unknown {kind} {name!r}; known are {', '.join(table)}")
+    return table[name]

@@ -1,0 +1,81 @@
+"""Settings of the radio.
+
+References
+----------
+Parameters of ``signal``: IR2 (Tan et al., "IR2: Implicit Rendezvous for Robotic Exploration Teams under
+Sparse Intermittent Connectivity", IROS 2024); its pixels are taken as 0.1 m.
+"""
+
+import math
+from dataclasses import dataclass
+
+from lidarium.mapping.geometry.checks import check_from_zero, check_positive
+
+RADIO_KINDS = ("all", "none", "range", "line_of_sight", "signal")
+"""How robots reach each other."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RadioSettings:
+    """How robots of a team reach each other.
+
+    Attributes
+    ----------
+    kind : str
+        ``all``, ``none``, ``range`` (within ``reach``), ``line_of_sight`` (within ``reach`` and nothing solid
+        between) or ``signal`` (``power`` less the path loss is above ``threshold``).
+    reach : float
+        Of ``range`` and ``line_of_sight`` [m].
+    power, threshold : float
+        Of the sender, and what the receiver needs [dBm].
+    reference_distance, reference_loss : float
+        Where the loss in free space is known [m], and what it is there [dB].
+    free_exponent, wall_exponent : float
+        How loss grows with the free way and with the way through what is solid [1].
+    wall_loss : float
+        Loss where anything solid is between [dB].
+    shadowing : float
+        Standard deviation of what a link loses or gains by chance, drawn at every exchange [dB].
+    loss : float
+        Probability that a message is lost [1].
+    latency_s : float
+        Time until a message arrives [s].
+    period_s : float
+        Time between exchanges of maps; poses are told in every step [s].
+    """
+
+    kind: str = "all"
+    reach: float = 10.0
+    power: float = -20.0
+    threshold: float = -70.0
+    reference_distance: float = 3.5
+    reference_loss: float = 31.0
+    free_exponent: float = 2.0
+    wall_exponent: float = 4.0
+    wall_loss: float = 6.5
+    shadowing: float = 0.0
+    loss: float = 0.0
+    latency_s: float = 0.0
+    period_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in RADIO_KINDS:
+            raise ValueError(f"kind of the radio is {self.kind!r}; want one of {', '.join(RADIO_KINDS)}")
+        check_positive(self, "the radio", ("reach", "reference_distance", "period_s"))
+        check_from_zero(
+            self, "the radio", ("free_exponent", "wall_exponent", "wall_loss", "shadowing", "latency_s")
+        )
+        for name in ("power", "threshold", "reference_loss"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"{name} of the radio is {getattr(self, name)}; want a finite number")
+        if not 0.0 <= self.loss < 1.0:
+            raise ValueError(f"loss of the radio is {self.loss}; want a probability in [0, 1)")
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether every message reaches everybody at once."""
+        return self.kind == "all" and self.loss == 0.0 and self.latency_s == 0.0
+
+
+RADIO: dict[str, RadioSettings] = {kind: RadioSettings(kind=kind) for kind in RADIO_KINDS}
+"""Radios by name."""

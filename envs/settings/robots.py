@@ -1,0 +1,126 @@
+"""The robots of the catalogue: bodies and drives.
+
+References
+----------
+Pioneer P3-DX: data sheet of Adept MobileRobots. Kobuki: user guide of Yujin Robot.
+"""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robot:
+    """A differential-drive robot with a round body.
+
+    Attributes
+    ----------
+    radius : float
+        Radius of the body [m].
+    height : float
+        Height of the body [m]; solids and other robots' lasers below it meet the body.
+    cruise_speed, max_speed : float
+        Speed that its own driving keeps to, and the limit of the drive [m/s].
+    max_turn_rate : float
+        Limit of the turn rate [rad/s].
+    max_acceleration, max_turn_acceleration : float
+        Limits of the drive [m/s2, rad/s2].
+    wheel_base : float
+        Distance between the driven wheels [m].
+    ticks_per_metre : float
+        Ticks that the encoder of a wheel counts on a metre [1/m].
+    length, width : float
+        Outline of the body [m].
+    """
+
+    radius: float = 0.18
+    height: float = 0.52
+    cruise_speed: float = 0.33
+    max_speed: float = 0.77
+    max_turn_rate: float = 3.14
+    max_acceleration: float = 1.0
+    max_turn_acceleration: float = 6.0
+    wheel_base: float = 0.23
+    ticks_per_metre: float = 11724.0
+    length: float = 0.352
+    width: float = 0.352
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (0.0 < value < float("inf")):
+                raise ValueError(f"{field.name} of the robot is {value}; want a number above 0")
+        if self.cruise_speed > self.max_speed:
+            raise ValueError(f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s")
+
+    def wheel_speeds(self, speed: float, turn_rate: float) -> tuple[float, float]:
+        """Return the speeds of the left and the right wheel [m/s] for a speed [m/s] and turn rate [rad/s] of the body."""
+        side = 0.5 * turn_rate * self.wheel_base
+        return speed - side, speed + side
+
+    def body_motion(self, left: float, right: float) -> tuple[float, float]:
+        """Return speed [m/s] and turn rate [rad/s] of the body for the speeds of its wheels [m/s]."""
+        return 0.5 * (left + right), (right - left) / self.wheel_base
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """What the kernels know, shape (8,): radius, greatest speed, turn rate and their changes, height, wheel base, ticks."""
+        return np.array(
+            [
+                self.radius,
+                self.max_speed,
+                self.max_turn_rate,
+                self.max_acceleration,
+                self.max_turn_acceleration,
+                self.height,
+                self.wheel_base,
+                self.ticks_per_metre,
+            ]
+        )
+
+
+ROBOTS: dict[str, Robot] = {
+    "kobuki": Robot(),
+    "pioneer": Robot(
+        radius=0.267,
+        height=0.24,
+        cruise_speed=0.5,
+        max_speed=1.2,
+        max_turn_rate=5.24,
+        max_acceleration=0.8,
+        max_turn_acceleration=3.0,
+        wheel_base=0.331,
+        ticks_per_metre=500 / (2 * math.pi * 0.0975),
+        length=0.455,
+        width=0.381,
+    ),
+    "service": Robot(
+        radius=0.30,
+        height=1.2,
+        cruise_speed=0.5,
+        max_speed=1.0,
+        max_turn_rate=1.8,
+        max_acceleration=0.6,
+        max_turn_acceleration=2.0,
+        wheel_base=0.45,
+        ticks_per_metre=4000.0,
+        length=0.6,
+        width=0.6,
+    ),
+    "point": Robot(
+        radius=0.01,
+        height=0.5,
+        cruise_speed=1.0,
+        max_speed=1.0,
+        max_turn_rate=6.28,
+        max_acceleration=100.0,
+        max_turn_acceleration=600.0,
+        wheel_base=0.02,
+        ticks_per_metre=100000.0,
+        length=0.02,
+        width=0.02,
+    ),
+}

@@ -1,0 +1,1 @@
+"""The kinematic world: bodies that follow commands, scans cast by kernels."""

@@ -1,0 +1,130 @@
+"""Tables of floors, shared: in memory by the environments of a process, on disk by all processes.
+
+On disk lies what is dear to make and small: the rasters as bits and the distance bound
+(`FloorTables.packed`), some 20 kB a floor. The tables of the rays, four bytes a cell, are made from them in
+the time that it would take to read or unpack them.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import lru_cache
+from threading import Lock
+from weakref import WeakValueDictionary
+
+from lidarium.envs.floors.catalogue.store import Store, floor_store, hash_of_code, mebibytes
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+
+SIZE_VARIABLE = "LIDARIUM_FLOOR_CACHE_MIB"
+"""Environment variable: the most that tables no episode uses take in a process [MiB]."""
+
+DEFAULT_MIB = 256.0
+"""The most that they take where nothing is said [MiB]."""
+
+MADE_BY = (
+    "envs/floors",
+    "envs/simulation/kinematic/floor_tables.py",
+    "envs/simulation/kinematic/motion.py",
+    "envs/simulation/kinematic/ray_tables.py",
+    "mapping/files/output.py",
+    "mapping/kernels/compilation.py",
+)
+"""Sources that determine what the store holds for a floor."""
+
+
+class TablesCache:
+    """Tables used last, bounded in bytes.
+
+    Tables in use elsewhere are found, too, and never made twice.
+
+    Tables grow by what episodes make their rasters keep: how large they are is asked whenever they are used.
+
+    Parameters
+    ----------
+    max_bytes : int
+        The most that the cache keeps alive.
+
+    Attributes
+    ----------
+    nbytes : int
+        How much it keeps alive.
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        self.max_bytes, self.nbytes = max_bytes, 0
+        self._kept: OrderedDict[str, tuple[FloorTables, int]] = OrderedDict()
+        self._alive: WeakValueDictionary[str, FloorTables] = WeakValueDictionary()
+        self._lock = Lock()
+
+    def get(self, key: str, make: Callable[[], FloorTables]) -> FloorTables:
+        """Return the tables of a key; ``make`` is called where nobody has them."""
+        tables = self._alive.get(key)
+        if tables is None:
+            tables = make()
+        with self._lock:
+            # Of two threads that made the same, one wins.
+            tables = self._alive.setdefault(key, tables)
+            size = tables.nbytes
+            self.nbytes += size - self._kept.get(key, (tables, 0))[1]
+            self._kept[key] = tables, size
+            self._kept.move_to_end(key)
+            while self.nbytes > self.max_bytes:
+                _, (_, size) = self._kept.popitem(last=False)
+                self.nbytes -= size
+        return tables
+
+
+def floor_tables(
+    floor: Floor, raster_resolution: float, laser_height: float, body_height: float
+) -> FloorTables:
+    """Return the kernels' tables of a floor: those of this process, else those of the store, else new ones.
+
+    Parameters
+    ----------
+    floor : Floor
+        What stands there.
+    raster_resolution : float
+        Side of a cell of the world's raster [m].
+    laser_height, body_height : float
+        Height of the laser's plane and of the highest body [m].
+
+    Returns
+    -------
+    FloorTables
+        Shared and read-only.
+    """
+    key = _key(floor, raster_resolution, laser_height, body_height)
+
+    def make() -> FloorTables:
+        kept = floor_store().load(key)
+        if kept is not None:
+            return FloorTables.unpacked(kept)
+        tables = FloorTables.of_floor(floor, raster_resolution, laser_height, body_height)
+        floor_store().save(key, tables.packed())
+        return tables
+
+    return _cache(mebibytes(SIZE_VARIABLE, DEFAULT_MIB)).get(key, make)
+
+
+def prepare_tables(
+    store: Store, floor: Floor, raster_resolution: float, laser_height: float, body_height: float
+) -> bool:
+    """Put a floor's tables into a store.
+
+    Returns False where they are there already, whole.
+    """
+    key = _key(floor, raster_resolution, laser_height, body_height)
+    if store.load(key) is not None:
+        return False
+    store.save(key, FloorTables.of_floor(floor, raster_resolution, laser_height, body_height).packed())
+    return True
+
+
+@lru_cache(maxsize=1)
+def _cache(max_bytes: int) -> TablesCache:
+    return TablesCache(max_bytes)
+
+
+def _key(floor: Floor, raster_resolution: float, laser_height: float, body_height: float) -> str:
+    numbers = " ".join(float(number).hex() for number in (raster_resolution, laser_height, body_height))
+    return f"tables {floor.geometry_sha256} {numbers} {hash_of_code(*MADE_BY)}"

@@ -1,0 +1,288 @@
+"""Bodies: differential drive with limits, exact contact of discs with solid cells and with each other.
+
+Far from everything a robot drives its arc in one piece. Near contact the arc is cut into short pieces, and
+after each the disc is pushed out of what it entered along the shortest way, so that it slides along walls;
+where there is no way out the piece is undone. No robot ever ends a step inside a solid cell or another robot.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import uint8_grid_at, vector_at
+
+CONTACT_TOLERANCE = 1e-9
+"""Gap that is left when a disc is pushed out of contact [m]."""
+
+PRESSED = 1e-6
+"""A disc that had to be pushed out by more than this touched something [m]."""
+
+PIECE = 0.25
+"""Longest piece of an arc near contact [cells]."""
+
+_AT_ONCE = 8
+"""Cells of a row that are looked at together: most around a body are free."""
+
+CENTRE_BUMPER, SIDE_BUMPER = math.radians(30.0), math.radians(90.0)
+"""Bearings of a contact up to which it presses the centre bumper, and the one on its side [rad]."""
+
+
+def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a lower bound of the distance from any point of each cell to the nearest solid cell, in whole cells.
+
+    Parameters
+    ----------
+    solid : (rows, columns) uint8
+        1 where the world is solid.
+
+    Returns
+    -------
+    (rows, columns) uint8
+        Floor of the distance between cell centres less a cell's diagonal, within [0, 255].
+    """
+    centres = np.asarray(ndimage.distance_transform_edt(solid == 0), np.float32)
+    return np.asarray(np.clip(np.floor(centres - math.sqrt(2.0) - 1e-4), 0, 255), np.uint8)
+
+
+@kernel(inline=True)
+def _wrapped(angle: float) -> float:
+    """Angle in (-pi, pi]."""
+    wrapped = angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+    return math.pi if wrapped <= -math.pi else wrapped
+
+
+@kernel(borrowing=True)
+def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float, float, float]:
+    """Find the solid cell that a disc enters deepest; positions and radius in cells.
+
+    Returns
+    -------
+    depth, normal_x, normal_y : float
+        How far the disc reaches into it (0 where it enters none), and the unit vector that leads out.
+    """
+    rows, columns = solid.shape
+    depth, normal_x, normal_y = 0.0, 0.0, 0.0
+    low_row, high_row = max(int(y - radius), 0), min(int(y + radius), rows - 1)
+    low_column, high_column = max(int(x - radius), 0), min(int(x + radius), columns - 1)
+    size = rows * columns
+    for row in range(low_row, high_row + 1):
+        gap_y = y - min(max(y, float(row)), row + 1.0)
+        if gap_y * gap_y >= (radius - depth) ** 2:
+            continue
+        column = low_column - 1
+        while column < high_column:
+            column += 1
+            place = row * columns + column
+            if place + _AT_ONCE <= size and vector_at(solid.ctypes.data + place, 1, np.uint64)[
+                0
+            ] == np.uint64(0):
+                column += _AT_ONCE - 1
+                continue
+            if solid[row, column] == 0:
+                continue
+            gap_x = x - min(max(x, float(column)), column + 1.0)
+            squared = gap_x * gap_x + gap_y * gap_y
+            if squared >= (radius - depth) ** 2:
+                continue
+            distance = math.sqrt(squared)
+            depth = radius - distance
+            if distance > 0.0:
+                normal_x, normal_y = gap_x / distance, gap_y / distance
+            else:
+                normal_x, normal_y = 0.0, 0.0
+    return depth, normal_x, normal_y
+
+
+@kernel(borrowing=True)
+def _deepest_robot(poses: Array, bodies: Array, robot: int, x: float, y: float) -> tuple[float, float, float]:
+    """Find the robot that the disc of ``robot`` at x, y [m] enters deepest."""
+    depth, normal_x, normal_y = 0.0, 0.0, 0.0
+    for other in range(poses.shape[0]):
+        if other == robot:
+            continue
+        gap_x, gap_y = x - poses[other, 0], y - poses[other, 1]
+        reach = bodies[robot, 0] + bodies[other, 0]
+        squared = gap_x * gap_x + gap_y * gap_y
+        if squared >= (reach - depth) ** 2:
+            continue
+        distance = math.sqrt(squared)
+        depth = reach - distance
+        if distance > 0.0:
+            normal_x, normal_y = gap_x / distance, gap_y / distance
+    return depth, normal_x, normal_y
+
+
+@kernel(borrowing=True)
+def _free_of_contact(
+    bound: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, margin: float
+) -> bool:
+    """Whether nothing is within ``margin`` [m] of the disc at x, y, by bounds alone."""
+    resolution = frame[2]
+    radius = bodies[robot, 0] + margin
+    column, row = int((x - frame[0]) / resolution), int((y - frame[1]) / resolution)
+    if row < 0 or row >= bound.shape[0] or column < 0 or column >= bound.shape[1]:
+        return False
+    if bound[row, column] * resolution <= radius:
+        return False
+    for other in range(poses.shape[0]):
+        reach = radius + bodies[other, 0]
+        if other != robot and (x - poses[other, 0]) ** 2 + (y - poses[other, 1]) ** 2 <= reach * reach:
+            return False
+    return True
+
+
+@kernel(borrowing=True)
+def _push_out(
+    solid: Array,
+    frame: Array,
+    poses: Array,
+    bodies: Array,
+    robot: int,
+    x: float,
+    y: float,
+    heading: float,
+    bumpers: Array,
+) -> tuple[float, float, bool, bool]:
+    """Push the disc out of walls and robots.
+
+    Returns x, y [m], whether it touched, and whether it is free now; presses the bumpers on the sides of
+    contact.
+    """
+    resolution = frame[2]
+    radius = bodies[robot, 0]
+    touched = False
+    for _ in range(8):
+        cell_x, cell_y = (x - frame[0]) / resolution, (y - frame[1]) / resolution
+        depth, normal_x, normal_y = deepest_wall(solid, cell_x, cell_y, radius / resolution)
+        depth *= resolution
+        robot_depth, robot_x, robot_y = _deepest_robot(poses, bodies, robot, x, y)
+        if robot_depth > depth:
+            depth, normal_x, normal_y = robot_depth, robot_x, robot_y
+        if depth <= 0.0:
+            return x, y, touched, True
+        if depth > PRESSED:
+            touched = True
+            side = _wrapped(math.atan2(-normal_y, -normal_x) - heading)
+            if abs(side) <= CENTRE_BUMPER:
+                bumpers[1] = 1
+            elif abs(side) <= SIDE_BUMPER:
+                bumpers[0 if side > 0.0 else 2] = 1
+        if normal_x == 0.0 and normal_y == 0.0:
+            return x, y, touched, False
+        x += normal_x * (depth + CONTACT_TOLERANCE)
+        y += normal_y * (depth + CONTACT_TOLERANCE)
+    return x, y, touched, False
+
+
+@kernel(inline=True)
+def _along_arc(
+    x: float, y: float, heading: float, speed: float, turn_rate: float, duration: float
+) -> tuple[float, float, float]:
+    """Pose after driving at constant speed and turn rate (exact)."""
+    turn = turn_rate * duration
+    if abs(turn) < 1e-9:
+        middle = heading + 0.5 * turn
+        return (
+            x + speed * duration * math.cos(middle),
+            y + speed * duration * math.sin(middle),
+            heading + turn,
+        )
+    arc = speed / turn_rate
+    after = heading + turn
+    return (
+        x + arc * (math.sin(after) - math.sin(heading)),
+        y + arc * (math.cos(heading) - math.cos(after)),
+        after,
+    )
+
+
+@kernel(borrowing=True)
+def move_robots(
+    bound_address: int,
+    solid_address: int,
+    rows: int,
+    columns: int,
+    frame: Array,
+    bodies: Array,
+    moves: Array,
+    poses: Array,
+    velocities: Array,
+    commands: Array,
+    duration: float,
+    bumpers: Array,
+    contacts: Array,
+    travelled: Array,
+    collisions: Array,
+) -> None:
+    """Drive the robots of one episode for one step, in their order.
+
+    Each meets the others where they are by then.
+
+    Parameters
+    ----------
+    bound_address, solid_address, rows, columns : int
+        ``distance_bound`` and solid cells of the floor at the bodies' height (uint8).
+    frame : (3,) float64
+        Origin x, y [m] and resolution [m/cell] of the floor's raster.
+    bodies : (robots, 6) float64
+        Radius, limits and height of each robot.
+    moves : (robots,) uint8
+        Whether the robot drives; the others stand where they are.
+    poses, velocities : (robots, 3), (robots, 2) float64
+        x, y, theta and speed, turn rate; updated.
+    commands : (robots, 2) float64
+        Wanted speed and turn rate [m/s, rad/s]; cut to the limits of the drive.
+    duration : float
+        Length of the step [s].
+    bumpers : (robots, 3) int8
+        Left, centre, right; 1 where pressed in this step.
+    contacts : (robots,) uint8
+        Whether the robot touched anything in this step.
+    travelled : (robots,) float64
+        Length of each robot's path, added to [m].
+    collisions : (robots,) int64
+        How often each robot came into contact, added to where a contact begins.
+    """
+    bound = uint8_grid_at(bound_address, rows, columns)
+    solid = uint8_grid_at(solid_address, rows, columns)
+    for robot in range(poses.shape[0]):
+        bumpers[robot, 0] = bumpers[robot, 1] = bumpers[robot, 2] = 0
+        was_in_contact = contacts[robot] != 0
+        contacts[robot] = 0
+        if moves[robot] == 0:
+            velocities[robot, 0] = velocities[robot, 1] = 0.0
+            continue
+        body = bodies[robot]
+        wanted_speed = min(max(commands[robot, 0], -body[1]), body[1])
+        wanted_turn = min(max(commands[robot, 1], -body[2]), body[2])
+        gain, turn_gain = body[3] * duration, body[4] * duration
+        speed = velocities[robot, 0] + min(max(wanted_speed - velocities[robot, 0], -gain), gain)
+        turn_rate = velocities[robot, 1] + min(max(wanted_turn - velocities[robot, 1], -turn_gain), turn_gain)
+        x, y, heading = poses[robot, 0], poses[robot, 1], poses[robot, 2]
+        start_x, start_y = x, y
+        length = abs(speed) * duration
+        if length == 0.0 or _free_of_contact(bound, frame, poses, bodies, robot, x, y, length):
+            x, y, heading = _along_arc(x, y, heading, speed, turn_rate, duration)
+        else:
+            pieces = int(math.ceil(length / (PIECE * frame[2])))
+            for _ in range(pieces):
+                next_x, next_y, next_heading = _along_arc(x, y, heading, speed, turn_rate, duration / pieces)
+                next_x, next_y, touched, is_free = _push_out(
+                    solid, frame, poses, bodies, robot, next_x, next_y, next_heading, bumpers[robot]
+                )
+                heading = next_heading
+                if touched:
+                    contacts[robot] = 1
+                if is_free:
+                    x, y = next_x, next_y
+            if contacts[robot] != 0:
+                # What the body could not do, the wheels did not do either.
+                advance = (x - start_x) * math.cos(heading) + (y - start_y) * math.sin(heading)
+                speed = min(max(advance / duration, -abs(speed)), abs(speed))
+                collisions[robot] += 0 if was_in_contact else 1
+        travelled[robot] += math.hypot(x - start_x, y - start_y)
+        poses[robot, 0], poses[robot, 1], poses[robot, 2] = x, y, _wrapped(heading)
+        velocities[robot, 0], velocities[robot, 1] = speed, turn_rate

@@ -1,0 +1,111 @@
+"""What the ray casters look up for one floor: the largest free squares, and the faces of the walls."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+
+TILE = 128
+"""Side of the square tiles that group the faces [cells]."""
+
+MAX_SQUARE = 255
+"""Largest side of a free square that is told [cells]: what a byte holds."""
+
+
+@kernel
+def _fill_squares(solid: Array, squares: Array) -> None:
+    rows, columns = solid.shape
+    beyond = np.zeros(columns, np.uint8)
+    for quadrant in range(4):
+        for i in range(rows):
+            row = rows - 1 - i if quadrant & 2 == 0 else i
+            cells, sides = solid[row], squares[quadrant, row]
+            ahead = beyond if i == 0 else squares[quadrant, row + 1 if quadrant & 2 == 0 else row - 1]
+            side, corner = 0, 0
+            for j in range(columns):
+                column = columns - 1 - j if quadrant & 1 == 0 else j
+                above = int(ahead[column])
+                smallest = min(min(above, corner), MAX_SQUARE - 1)
+                side = min(side, smallest) + 1 if cells[column] == 0 else 0
+                sides[column] = side
+                corner = above
+
+
+def _faces(
+    solid: NDArray[np.uint8], direction: int, tile_columns: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the group (tile * 4 + direction) of each wall face that is met along +x, -x, +y or -y, and the faces (F, 3)."""
+    # Faces lie along lines; of those that run along y, the transposed raster holds the cells side by side.
+    is_free = np.ascontiguousarray((solid.T if direction < 2 else solid) == 0)
+    looks_up = direction % 2 == 0
+    is_face = np.zeros_like(is_free)
+    if looks_up:
+        np.greater(is_free[:-1], is_free[1:], out=is_face[:-1])
+    else:
+        np.greater(is_free[1:], is_free[:-1], out=is_face[1:])
+    cells = np.flatnonzero(is_face)
+    line, place = np.divmod(cells, solid.shape[0] if direction < 2 else solid.shape[1])
+    begins = (np.diff(cells, prepend=-2) != 1) | (place % TILE == 0)
+    ends = np.append(begins[1:], True)[: cells.size]
+    line, low, high = line[begins], place[begins], place[ends] + 1
+    row, column = (low, line) if direction < 2 else (line, low)
+    group = (row // TILE * tile_columns + column // TILE) * 4 + direction
+    return group, np.column_stack([line + looks_up, low, high])
+
+
+class RayTables:
+    """What the casters look up for one raster of solid cells.
+
+    Shared by all episodes on that floor.
+
+    Parameters
+    ----------
+    solid : (rows, columns) uint8
+        1 where the world is solid; the outermost ring must be solid.
+
+    Attributes
+    ----------
+    squares : (4, rows, columns) uint8
+        Side of the largest free square that opens from the cell into each quadrant [cells]; 0 in solid cells.
+    faces : (F, 3) int32
+        Wall faces as fixed coordinate, low end and high end [cells], grouped by tile and direction.
+    face_starts : (tiles * 4 + 1,) int32
+        First face of each group.
+    """
+
+    def __init__(self, solid: NDArray[np.uint8]) -> None:
+        if solid.ndim != 2 or min(solid.shape) < 3:
+            raise ValueError(
+                f"the raster of solid cells has shape {solid.shape}; want at least 3 rows and 3 columns"
+            )
+        border = (solid[0], solid[-1], solid[:, 0], solid[:, -1])
+        if not all(side.all() for side in border):
+            raise ValueError("the outermost ring of the raster is not all solid; a ray could leave the floor")
+        self.rows, self.columns = solid.shape
+        self.squares = np.empty((4, *solid.shape), np.uint8)
+        _fill_squares(solid, self.squares)
+        tile_rows, self.tile_columns = -(-self.rows // TILE), -(-self.columns // TILE)
+        found = [_faces(solid, direction, self.tile_columns) for direction in range(4)]
+        groups = np.concatenate([group for group, _ in found])
+        counts = np.bincount(groups + 1, minlength=tile_rows * self.tile_columns * 4 + 1)
+        self.face_starts = np.cumsum(counts, dtype=np.int32)
+        faces = np.concatenate([face for _, face in found])[np.argsort(groups, kind="stable")]
+        # Never empty, so that it has an address.
+        self.faces = np.ascontiguousarray(faces if faces.size else np.zeros((1, 3)), np.int32)
+
+    @property
+    def addresses(self) -> NDArray[np.int64]:
+        """Row of the kernels' table of floors: where the arrays lie, and their sizes."""
+        return np.array(
+            [
+                self.squares.ctypes.data,
+                self.rows,
+                self.columns,
+                self.faces.ctypes.data,
+                self.faces.shape[0],
+                self.face_starts.ctypes.data,
+                self.face_starts.shape[0],
+                self.tile_columns,
+            ],
+            np.int64,
+        )

@@ -1,0 +1,390 @@
+"""The two stages of a robot's step in kernels: its scan and the scorer.
+
+Then its map.
+
+Stage one senses, after all bodies have moved; stage two updates the robot's map at the pose that its
+localizer believes. The fused step runs both in one call; both ways call the same functions for each robot, so
+they agree to the bit. Where a robot's believed pose is the true one, its map has the floor's lattice and
+ranges carry no noise, the area seen is computed once for the scorer and the map.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarium.envs.scoring.coverage import mark_seen
+from lidarium.envs.simulation.faults import blind_beams
+from lidarium.envs.simulation.kinematic.arrays import (
+    KNOWN_MATES,
+    OWN_FRAME,
+    SOME_MATES,
+    TRUE_POSE,
+    WorldArrays,
+)
+from lidarium.envs.simulation.kinematic.ray_casting import cast_scan, cut_by_disc
+from lidarium.envs.simulation.noise import fill_gaussian, stream_key
+from lidarium.mapping.grids.noisy_returns import settle_returns
+from lidarium.mapping.grids.occupancy import integrate_scan
+from lidarium.mapping.grids.pooled_maps import touched_words
+from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
+from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import int8_grid_at, scratch_grid, scratch_vector, word_grid_at
+
+(
+    ANGLE_FIRST,
+    ANGLE_INCREMENT,
+    FULL_CIRCLE,
+    RANGE_MIN,
+    RANGE_MAX,
+    NOISE_FLOOR,
+    NOISE_SHARE,
+    LASER_HEIGHT,
+    MAP_RESOLUTION,
+    TIME_STEP,
+) = range(10)
+"""Places in the array of sensor numbers."""
+
+MATE_MARGIN = 1.5
+"""A beam that ends within this of a teammate's body is taken to have met it [map cells]."""
+
+RANGE_GAP = 1e-3
+"""A hit tells at least this much less than the longest range [m], which in an observation means no return."""
+
+ROUND_UP = 1.0 + 1.2e-7
+"""Ranges are rounded up to float32, so that the end of a beam lies in the cell that it met."""
+
+
+class ScanScratch(NamedTuple):
+    """What a scan is worked out in; one serves robot after robot.
+
+    Attributes
+    ----------
+    directions, lengths, ends : (4, beams), (beams,), (2, beams) float64
+        Of the beams, see ``beam_directions`` and ``scan_ends``.
+    windows : (2, window rows, words) uint64
+        Bits of the cells around the robot: those seen, and those in which beams ended.
+    """
+
+    directions: Array
+    lengths: Array
+    ends: Array
+    windows: Array
+
+
+@kernel(borrowing=True)
+def _measure(
+    world: WorldArrays, row: int, first: int, robots: int, directions: Array, ranges: Array, lengths: Array
+) -> None:
+    """Take the scan of one robot without noise: ``ranges`` [m], inf for no return, and ``lengths`` of the beams [map cells]."""
+    robot, episode = row - first, first // robots
+    sensor, frame, poses = world.sensor, world.frames[episode], world.poses
+    resolution = frame[2]
+    reach = sensor[RANGE_MAX] / resolution
+    x, y, heading = (
+        (poses[row, 0] - frame[0]) / resolution,
+        (poses[row, 1] - frame[1]) / resolution,
+        poses[row, 2],
+    )
+    angle_first, increment = sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
+    beam_directions(heading, world.unit_vectors, directions)
+    cast_scan(world.floors[episode], x, y, heading, angle_first, increment, directions, reach, lengths)
+    for other in range(robots):
+        if other != robot and world.bodies[other, 5] > sensor[LASER_HEIGHT]:
+            other_x, other_y = (
+                (poses[first + other, 0] - frame[0]) / resolution,
+                (poses[first + other, 1] - frame[1]) / resolution,
+            )
+            radius = world.bodies[other, 0] / resolution
+            cut_by_disc(
+                x, y, heading, angle_first, increment, directions, other_x, other_y, radius, reach, lengths
+            )
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    longest = sensor[RANGE_MAX]
+    for beam in range(lengths.shape[0]):
+        met = lengths[beam] < reach
+        true_range = np.float32(lengths[beam] * resolution * ROUND_UP)
+        ranges[beam] = true_range if met else np.float32(np.inf)
+        lengths[beam] = min(true_range, longest) * scale if met else longest * scale
+    blind_beams(world.faults[row], world.steps[episode], angle_first, increment, ranges, lengths)
+
+
+@kernel(borrowing=True)
+def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
+    """Take the scan of one robot: the world's ranges as the sensor tells, and ``lengths`` of the true beams [map cells]."""
+    sensor, ranges = world.sensor, world.ranges[row]
+    _measure(world, row, first, robots, directions, ranges, lengths)
+    if _is_noisy(sensor):
+        beams = lengths.shape[0]
+        episode = first // robots
+        noise = scratch_vector(beams, np.float32)
+        fill_gaussian(
+            stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise
+        )
+        floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
+        low, high = np.float32(sensor[RANGE_MIN]), np.float32(sensor[RANGE_MAX] - RANGE_GAP)
+        for beam in range(beams):
+            true_range = ranges[beam]
+            noisy = true_range + max(floor_deviation, share * true_range) * noise[beam]
+            ranges[beam] = min(max(noisy, low), high) if true_range < np.float32(np.inf) else true_range
+
+
+@kernel(spliced=True)
+def _is_noisy(sensor: Array) -> bool:
+    return bool(sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0)
+
+
+@kernel(spliced=True)
+def _window_corner(x: float, y: float, reach: float) -> tuple[int, int]:
+    """Row and column of the map at which the window of a scan from x, y begins [cells]; the column is a multiple of 64."""
+    margin = int(reach) + 3
+    return int(math.floor(y)) - margin, ((int(math.floor(x)) - margin) >> 6) << 6
+
+
+@kernel(inline=True, borrowing=True)
+def _seen_area(
+    world: WorldArrays,
+    row: int,
+    first: int,
+    robots: int,
+    lengths: Array,
+    directions: Array,
+    ends: Array,
+    bits: Array,
+) -> tuple[tuple[int, int, int, int], int, int]:
+    """Fill the area that the true beams have seen.
+
+    Returns the box that holds bits, and the row and word of the masks where it begins.
+    """
+    sensor, frame = world.sensor, world.frames[first // robots]
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    x, y = (world.poses[row, 0] - frame[0]) * scale, (world.poses[row, 1] - frame[1]) * scale
+    row_offset, column_offset = _window_corner(x, y, sensor[RANGE_MAX] * scale)
+    local_x, local_y = x - column_offset, y - row_offset
+    scan_ends(lengths, directions, local_x, local_y, ends)
+    box: tuple[int, int, int, int] = fill_scan_polygon(
+        lengths, directions, ends, local_x, local_y, sensor[ANGLE_INCREMENT], sensor[FULL_CIRCLE] != 0.0, bits
+    )
+    return box, row_offset, column_offset >> 6
+
+
+@kernel(borrowing=True)
+def _score(
+    world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch
+) -> tuple[int, int, int, int]:
+    """Fill the area that the true beams have seen and add it to the robot's mask.
+
+    Returns the box that holds bits.
+    """
+    box: tuple[int, int, int, int]
+    bits = scratch.windows[0]
+    box, row_offset, word_offset = _seen_area(
+        world, row, first, robots, scratch.lengths, scratch.directions, scratch.ends, bits
+    )
+    masks = world.masks[row]
+    own, counted = word_grid_at(masks[0], masks[3], masks[4]), word_grid_at(masks[2], masks[3], masks[4])
+    world.seen[row] += mark_seen(own, counted, bits, box, row_offset, word_offset, world.boxes[row])
+    return box
+
+
+@kernel
+def footprint(
+    world: WorldArrays, row: int, first: int, robots: int, bits: Array
+) -> tuple[tuple[int, int, int, int], int, int]:
+    """Fill the area that a robot's true beams see from where it stands now, and change nothing in the world.
+
+    Parameters
+    ----------
+    world : WorldArrays
+        The world after a step.
+    row, first, robots : int
+        The robot's row, the first row of its episode, and the size of its team.
+    bits : (window rows, words) uint64
+        Zero on entry; of the shape of ``window_rows`` and ``window_words``.
+
+    Returns
+    -------
+    box : tuple of int
+        row_low, row_high, word_low, word_high of the window that may hold bits, high ends exclusive.
+    row_offset, word_offset : int
+        Place of the window in the scorer's masks.
+    """
+    sensor, beams = world.sensor, world.ranges.shape[1]
+    directions, lengths, ends = np.empty((4, beams)), np.empty(beams), np.empty((2, beams))
+    if _is_noisy(sensor):
+        _measure(world, row, first, robots, directions, np.empty(beams, np.float32), lengths)
+    else:
+        # The sensor told the true ranges: nothing has to be cast again.
+        scale = 1.0 / sensor[MAP_RESOLUTION]
+        beam_directions(world.poses[row, 2], world.unit_vectors, directions)
+        for beam in range(beams):
+            value = world.ranges[row, beam]
+            lengths[beam] = min(value, sensor[RANGE_MAX]) * scale if value == value else 0.0
+    return _seen_area(world, row, first, robots, lengths, directions, ends, bits)  # type: ignore[no-any-return]
+
+
+@kernel(borrowing=True)
+def _filter_mates(
+    world: WorldArrays, row: int, first: int, robots: int, x: float, y: float, ends: Array, is_hit: Array
+) -> None:
+    """Take out the hits on teammates, whose believed poses are known: they are no part of the floor."""
+    sensor, believed = world.sensor, world.believed
+    beams = is_hit.shape[0]
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    reach = sensor[RANGE_MAX] * scale
+    turn = 2.0 * math.pi / sensor[ANGLE_INCREMENT]
+    knows_all = world.flags[row] & KNOWN_MATES != 0
+    for other in range(first, first + robots):
+        mate = other - first
+        if other == row or not (knows_all or world.contact[row, mate] != 0):
+            continue
+        mate_x = believed[other, 0] if knows_all else world.heard[row, 3 * mate]
+        mate_y = believed[other, 1] if knows_all else world.heard[row, 3 * mate + 1]
+        gap_x, gap_y = (mate_x - believed[row, 0]) * scale, (mate_y - believed[row, 1]) * scale
+        radius = world.bodies[other - first, 0] * scale + MATE_MARGIN
+        if gap_x * gap_x + gap_y * gap_y > (reach + radius) ** 2:
+            continue
+        begin, count = beams_towards(
+            gap_x, gap_y, radius, believed[row, 2], sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
+        )
+        for lap in range(2):
+            low = max(int(math.floor(begin - lap * turn)) - 1, 0)
+            high = min(int(math.floor(begin - lap * turn + count)) + 2, beams - 1)
+            for beam in range(low, high + 1):
+                end_x, end_y = ends[0, beam] - x - gap_x, ends[1, beam] - y - gap_y
+                if end_x * end_x + end_y * end_y <= radius * radius:
+                    is_hit[beam] = False
+
+
+@kernel
+def invalidate_mates(world: WorldArrays, row: int, first: int, robots: int, ranges: Array) -> None:
+    """Make the beams of a scan (beams,) invalid that met teammates, as far as the robot knows where these are."""
+    beams, scale = ranges.shape[0], 1.0 / world.sensor[MAP_RESOLUTION]
+    directions, ends, is_hit = np.empty((4, beams)), np.empty((2, beams)), np.empty(beams, np.bool_)
+    lengths = np.empty(beams)
+    beam_directions(world.believed[row, 2], world.unit_vectors, directions)
+    for beam in range(beams):
+        is_hit[beam] = ranges[beam] <= world.sensor[RANGE_MAX]
+        lengths[beam] = ranges[beam] * scale if is_hit[beam] else 0.0
+    scan_ends(lengths, directions, 0.0, 0.0, ends)
+    _filter_mates(world, row, first, robots, 0.0, 0.0, ends, is_hit)
+    for beam in range(beams):
+        if not is_hit[beam] and ranges[beam] <= world.sensor[RANGE_MAX]:
+            ranges[beam] = np.float32(np.nan)
+
+
+@kernel(borrowing=True)
+def _update_map(
+    world: WorldArrays,
+    row: int,
+    first: int,
+    robots: int,
+    scratch: ScanScratch,
+    box: tuple[int, int, int, int],
+    is_filled: bool,
+) -> None:
+    """Update one robot's map from its scan, whose beams' directions ``scratch`` holds.
+
+    Where ``is_filled``, its ends and first window hold the seen area, of this ``box``, already; whatever
+    window is not filled is zero.
+    """
+    directions, lengths, ends, bits = scratch.directions, scratch.lengths, scratch.ends, scratch.windows[0]
+    sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]
+    ranges, belief = world.ranges[row], world.maps[row]
+    beams = ranges.shape[0]
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    reach = sensor[RANGE_MAX] * scale
+    x, y = (believed[0] - origin[0]) * scale, (believed[1] - origin[1]) * scale
+    if not (0.0 <= x < belief[2] and 0.0 <= y < belief[1]):
+        # Whoever takes himself to be beyond his map is lost.
+        world.failed[row] = 1
+        return
+    is_hit = scratch_vector(beams, np.bool_)
+    for beam in range(beams):
+        is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
+    log_odds = int8_grid_at(belief[0], belief[1], belief[2])
+    row_offset, column_offset = _window_corner(x, y, reach)
+    local_x, local_y = x - column_offset, y - row_offset
+    if not is_filled:
+        for beam in range(beams):
+            value = ranges[beam]
+            lengths[beam] = min(value * scale, reach) if value == value else 0.0
+        if _is_noisy(sensor):
+            deviation, share = sensor[NOISE_FLOOR] * scale, sensor[NOISE_SHARE]
+            settle_returns(log_odds, x, y, lengths, directions, is_hit, deviation, share, world.increments[0])
+        scan_ends(lengths, directions, local_x, local_y, ends)
+        box = fill_scan_polygon(
+            lengths,
+            directions,
+            ends,
+            local_x,
+            local_y,
+            sensor[ANGLE_INCREMENT],
+            sensor[FULL_CIRCLE] != 0.0,
+            bits,
+        )
+    if world.flags[row] & (KNOWN_MATES | SOME_MATES):
+        _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
+    touched = word_grid_at(belief[3], belief[4], touched_words(belief[2]))
+    integrate_scan(
+        log_odds,
+        bits,
+        box,
+        ends,
+        is_hit,
+        row_offset,
+        column_offset,
+        world.increments,
+        scratch.windows[1],
+        touched,
+    )
+    # A hit may lie one cell beyond the seen area.
+    window = world.windows[row]
+    window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
+    window[1] = min(max(window[1], box[1] + row_offset + 1), belief[1])
+    window[2] = max(min(window[2], 64 * box[2] + column_offset - 1), 0)
+    window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[2])
+
+
+@kernel(spliced=True)
+def scan_scratch(world: WorldArrays) -> ScanScratch:
+    """Return scratch for the scans of a world, that is gone when the kernel that asks for it returns; not within a loop."""
+    beams, reach = world.ranges.shape[1], world.sensor[RANGE_MAX] / world.sensor[MAP_RESOLUTION]
+    # The windows of a laser that reaches far on a fine map are too large for the stack.
+    windows = np.empty((2, window_rows(reach), window_words(reach)), np.uint64)
+    return ScanScratch(
+        scratch_grid(4, beams, np.float64),
+        scratch_vector(beams, np.float64),
+        scratch_grid(2, beams, np.float64),
+        windows,
+    )
+
+
+@kernel(spliced=True)
+def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
+    """Run stage two alone: update one robot's map from its ranges at its believed pose."""
+    scratch.windows[:] = np.uint64(0)
+    beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
+    _update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)
+
+
+@kernel(spliced=True)
+def sense_and_perceive(
+    world: WorldArrays, row: int, first: int, robots: int, perceives: bool, scratch: ScanScratch
+) -> None:
+    """Run both stages for one robot (or the first alone, where not ``perceives``).
+
+    ``first`` is the first row of its episode.
+    """
+    scratch.windows[:] = np.uint64(0)
+    _sense(world, row, first, robots, scratch.directions, scratch.lengths)
+    box = _score(world, row, first, robots, scratch)
+    if not perceives:
+        return
+    is_same = world.flags[row] & (TRUE_POSE | OWN_FRAME) == TRUE_POSE and not _is_noisy(world.sensor)
+    if not is_same:
+        scratch.windows[0] = np.uint64(0)
+        if world.believed[row, 2] != world.poses[row, 2]:
+            beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
+    _update_map(world, row, first, robots, scratch, box, is_same)

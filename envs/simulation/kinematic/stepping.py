@@ -1,0 +1,259 @@
+"""A step of the world in kernels over episodes x robots: bodies move, robots sense, the scorer shares out, maps follow.
+
+Episodes do not touch each other, and within an episode only the motion and the sharing out need the robots in
+their order. So threads may take the robots of an episode, or whole episodes (``envs/batch/running.py``); all
+forms run the same functions and agree to the bit.
+"""
+
+import math
+
+import numba
+
+from lidarium.envs.scoring.coverage import add_rewards, share_news
+from lidarium.envs.simulation.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
+from lidarium.envs.simulation.kinematic.arrays import (
+    DEAD_RECKONING,
+    ENDED,
+    KNOWN_MATES,
+    OWN_FRAME,
+    SOME_MATES,
+    TRUE_POSE,
+    WorldArrays,
+    world_at,
+)
+from lidarium.envs.simulation.kinematic.motion import move_robots
+from lidarium.envs.simulation.kinematic.stages import (
+    TIME_STEP,
+    invalidate_mates,
+    perceive_robot,
+    scan_scratch,
+    sense_and_perceive,
+)
+from lidarium.envs.simulation.noise import stream_key
+from lidarium.envs.simulation.odometry import (
+    TICKS_PER_METRE,
+    WHEEL_BASE,
+    disturb_commands,
+    read_encoders,
+    within_half_turns,
+)
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import word_grid_at
+
+
+@kernel(spliced=True)
+def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array) -> None:
+    """Localize perfectly: in the floor's axes, or in the frame of the start."""
+    if not is_relative:
+        believed[0], believed[1], believed[2] = pose[0], pose[1], pose[2]
+        return
+    cosine, sine = math.cos(start[2]), math.sin(start[2])
+    gap_x, gap_y = pose[0] - start[0], pose[1] - start[1]
+    believed[0], believed[1] = cosine * gap_x + sine * gap_y, cosine * gap_y - sine * gap_x
+    believed[2] = within_half_turns(pose[2] - start[2])
+
+
+@kernel(spliced=True)
+def _believe_odometry(odometry: Array, start: Array, is_relative: bool, believed: Array) -> None:
+    """Localize by dead reckoning from the start: in the floor's axes, or in the frame of the start."""
+    if is_relative:
+        believed[0], believed[1], believed[2] = odometry[0], odometry[1], odometry[2]
+        return
+    cosine, sine = math.cos(start[2]), math.sin(start[2])
+    believed[0] = start[0] + cosine * odometry[0] - sine * odometry[1]
+    believed[1] = start[1] + sine * odometry[0] + cosine * odometry[1]
+    believed[2] = within_half_turns(odometry[2] + start[2])
+
+
+@kernel(borrowing=True)
+def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> None:
+    """Let the faults of the episode's robots happen, and write into ``world.driven`` what drives make of ``commands`` (rows, 2)."""
+    first, step = episode * robots, world.steps[episode]
+    last = first + robots
+    for row in range(first, last):
+        world.driven[row, 0], world.driven[row, 1] = commands[row, 0], commands[row, 1]
+    if world.odometry_model.shape[0] > 0:
+        disturb_commands(
+            world.odometry_model, world.noise_table, world.seeds[episode], step, world.driven[first:last]
+        )
+    for row in range(first, last):
+        faults = world.faults[row]
+        stick_wheels(faults, step, world.bodies[row - first, WHEEL_BASE], world.driven[row])
+        if has_fault(faults, DEAD_ROBOT, step) and world.failed[row] == 0:
+            world.moves[row], world.failed[row] = 0, 1
+        if kidnap(faults, step, row - first, world.bodies, world.poses[first:last]):
+            world.velocities[row, 0] = world.velocities[row, 1] = 0.0
+
+
+@kernel(spliced=True)
+def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
+    """Move the bodies of an episode by ``commands`` (rows, 2), localize, and forget what was new in the step before."""
+    first, last = episode * robots, (episode + 1) * robots
+    has_odometry = world.odometry_model.shape[0] > 0
+    if moves_bodies:
+        if has_odometry or world.faults.shape[1] > 0:
+            _drive(world, episode, robots, commands)
+            commands = world.driven
+        table = world.floors[episode]
+        move_robots(
+            table[8],
+            table[9],
+            table[1],
+            table[2],
+            world.frames[episode],
+            world.bodies,
+            world.moves[first:last],
+            world.poses[first:last],
+            world.velocities[first:last],
+            commands[first:last],
+            world.sensor[TIME_STEP],
+            world.bumpers[first:last],
+            world.contacts[first:last],
+            world.travelled[first:last],
+            world.collisions[first:last],
+        )
+    for row in range(first, last):
+        world.boxes[row] = 0
+        if moves_bodies and has_odometry:
+            read_encoders(
+                world.odometry_model,
+                world.noise_table,
+                stream_key(world.seeds[episode], row - first, world.steps[episode]),
+                world.wheels[row],
+                world.bodies[row - first, WHEEL_BASE],
+                world.bodies[row - first, TICKS_PER_METRE],
+                world.velocities[row],
+                world.sensor[TIME_STEP],
+                world.measured[row],
+                world.odometry[row],
+            )
+        if world.flags[row] & TRUE_POSE:
+            _believe_truth(
+                world.poses[row], world.starts[row], world.flags[row] & OWN_FRAME != 0, world.believed[row]
+            )
+        elif world.flags[row] & DEAD_RECKONING:
+            _believe_odometry(
+                world.odometry[row], world.starts[row], world.flags[row] & OWN_FRAME != 0, world.believed[row]
+            )
+
+
+@kernel(spliced=True)
+def _share(world: WorldArrays, episode: int, robots: int) -> None:
+    """Credit the episode's robots with what they saw first, reward them, and count the step."""
+    first, last = episode * robots, (episode + 1) * robots
+    team = word_grid_at(world.masks[first, 1], world.masks[first, 3], world.masks[first, 4])
+    world.team_seen[episode] += share_news(world.masks[:, 0], team, world.boxes, first, robots, world.gains)
+    world.steps[episode] += 1
+    add_rewards(
+        world.gains[first:last],
+        world.contacts[first:last],
+        world.travelled[first:last],
+        world.reward_weights,
+        world.rewarded[first:last],
+        world.rewards[first:last],
+    )
+
+
+@kernel
+def step_episode(
+    table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool, perceives: bool
+) -> None:
+    """Run a step of one episode: move, sense, score and (where ``perceives``) map."""
+    world = world_at(table)
+    _move(world, episode, robots, commands, moves_bodies)
+    scratch = scan_scratch(world)
+    for row in range(episode * robots, (episode + 1) * robots):
+        if not world.flags[row] & ENDED:
+            sense_and_perceive(world, row, episode * robots, robots, perceives, scratch)
+    _share(world, episode, robots)
+
+
+@kernel
+def _move_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
+    _move(world_at(table), episode, robots, commands, moves_bodies)
+
+
+@kernel
+def _share_episode(table: Array, episode: int, robots: int) -> None:
+    _share(world_at(table), episode, robots)
+
+
+@kernel
+def _step_row(table: Array, row: int, robots: int, perceives: bool) -> None:
+    """Run both stages for the robot of a row, if it has not ended."""
+    world = world_at(table)
+    if not world.flags[row] & ENDED:
+        sense_and_perceive(world, row, row // robots * robots, robots, perceives, scan_scratch(world))
+
+
+@kernel
+def _perceive_row(table: Array, row: int, robots: int, runs: Array) -> None:
+    world = world_at(table)
+    if runs[row // robots] and not world.flags[row] & ENDED:
+        perceive_robot(world, row, row // robots * robots, robots, scan_scratch(world))
+
+
+@kernel
+def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array) -> None:
+    """Update a robot's map from scans (scans, beams) taken at poses (scans, 3), and nothing else."""
+    world = world_at(table)
+    flags, pose, scan = world.flags[row], world.believed[row].copy(), world.ranges[row].copy()
+    # Where teammates were at the time is not known any more.
+    world.flags[row] = flags & ~(KNOWN_MATES | SOME_MATES)
+    scratch = scan_scratch(world)
+    for k in range(poses.shape[0]):
+        world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = (
+            poses[k, 0],
+            poses[k, 1],
+            poses[k, 2],
+        )
+        world.ranges[row, :] = ranges[k]
+        perceive_robot(world, row, row // robots * robots, robots, scratch)
+    world.flags[row] = flags
+    world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = pose[0], pose[1], pose[2]
+    world.ranges[row, :] = scan
+
+
+@kernel
+def ranges_without_mates(table: Array, row: int, robots: int, ranges: Array) -> None:
+    """Copy a robot's scan into ``ranges`` (beams,), beams that met teammates where it knows them made invalid."""
+    world = world_at(table)
+    ranges[:] = world.ranges[row]
+    if world.flags[row] & (KNOWN_MATES | SOME_MATES):
+        invalidate_mates(world, row, row // robots * robots, robots, ranges)
+
+
+def _step_serial(
+    table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool
+) -> None:
+    """Run a step of the episodes with ``runs`` (episodes,)."""
+    for episode in range(runs.shape[0]):
+        if runs[episode]:
+            step_episode(table, episode, robots, commands, moves_bodies, perceives)
+
+
+def _step_rows(
+    table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool, perceives: bool
+) -> None:
+    """Run a step of the episodes with ``runs``; threads take single robots."""
+    for episode in range(runs.shape[0]):
+        if runs[episode]:
+            _move_episode(table, episode, robots, commands, moves_bodies)
+    for row in numba.prange(runs.shape[0] * robots):
+        if runs[row // robots]:
+            _step_row(table, row, robots, perceives)
+    for episode in range(runs.shape[0]):
+        if runs[episode]:
+            _share_episode(table, episode, robots)
+
+
+def _perceive(table: Array, robots: int, runs: Array) -> None:
+    """Run stage two of the episodes with ``runs``."""
+    for row in numba.prange(runs.shape[0] * robots):
+        _perceive_row(table, row, robots, runs)
+
+
+step_serial = kernel(_step_serial)
+step_rows = kernel(parallel=True)(_step_rows)
+perceive_serial = kernel(_perceive)
+perceive_parallel = kernel(parallel=True)(_perceive)

@@ -1,0 +1,1 @@
+"""The station of a team: operating states, reports, the map of the team."""

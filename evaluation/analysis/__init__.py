@@ -1,0 +1,1 @@
+"""Episodes read again, grouped for reports."""

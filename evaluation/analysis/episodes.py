@@ -1,0 +1,184 @@
+"""Reads the episodes of a directory that `lidarium evaluate` wrote, and refuses what does not belong together."""
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lidarium.evaluation.suites.episodes_file import TIMINGS, read_lines
+
+Row = dict[str, Any]
+"""A line of ``episodes.jsonl``: what `evaluation.result.result_of` returns."""
+
+FILE = "episodes.jsonl"
+
+_WANTED: dict[str, type | tuple[type, ...]] = {
+    "floor": str,
+    "floor_sha256": str,
+    "robots": int,
+    "policy": str,
+    "seed": int,
+    "interrupted": bool,
+    "coverage_final": (int, float),
+    "time_s": (int, float),
+    "path_m": list,
+    "overlap": (int, float),
+    "collisions": int,
+    "ended_because": dict,
+    "version": str,
+    "settings_sha256": str,
+}
+_MAY_BE_NULL = ("horizon_s", "t90_s", "t99_s")
+_OF_SETTINGS = ("backend", "localization", "realism", "horizon_s")
+"""Keys of a line that tell something of the settings behind their hash."""
+
+
+@dataclass(frozen=True, slots=True)
+class Episodes:
+    """Episodes of one version and, for each number of robots, of one set of settings.
+
+    Attributes
+    ----------
+    rows : tuple of dict
+        One for each episode, in the order of the file.
+    version : str
+        What they were run with.
+    warnings : tuple of str
+        What was left out, and why.
+    """
+
+    rows: tuple[Row, ...]
+    version: str
+    warnings: tuple[str, ...] = ()
+
+
+def read_episodes(directory: Path) -> Episodes:
+    """Read ``episodes.jsonl``.
+
+    Parameters
+    ----------
+    directory : Path
+        What `lidarium evaluate --out` wrote.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is no such file.
+    ValueError
+        Where there are no episodes, a line cannot be read or lacks something, two lines tell of the same
+        episode differently, or versions or settings differ. A last line that breaks off is dropped with a
+        warning, and so is a line that is there twice.
+    """
+    path = Path(directory) / FILE
+    if not path.is_file():
+        raise FileNotFoundError(
+            f"no {FILE} in {directory}; want a folder that `lidarium evaluate --out` wrote"
+        )
+    lines = read_lines(path)
+    numbered, warnings = lines.numbered, []
+    if lines.cut_off is not None:
+        number, size = lines.cut_off
+        warnings = [
+            f"Line {number} of {path.name} breaks off ({size} bytes) and was left out: its episode was not finished."
+        ]
+    for number, row in numbered:
+        _check_row(row, f"{path}, line {number}")
+    kept, doubled = _without_doubles(numbered, path)
+    if not kept:
+        raise ValueError(f"{path} has no finished episode; run `lidarium evaluate` on")
+    _check_alike(kept, path)
+    return Episodes(tuple(row for _, row in kept), str(kept[0][1]["version"]), (*warnings, *doubled))
+
+
+def key_of(row: Row) -> tuple[Any, ...]:
+    """Return what tells episodes apart: who ran, and the pairing key."""
+    return str(row["policy"]), *pair_key_of(row)
+
+
+def pair_key_of(row: Row) -> tuple[Any, ...]:
+    """Return what partners of a pair share: settings, floor, starts, seed and number of robots."""
+    return (
+        variant_of(row),
+        row["floor"],
+        row["floor_sha256"],
+        json.dumps(row.get("starts")),
+        row["seed"],
+        row["robots"],
+    )
+
+
+def variant_of(row: Row) -> str:
+    """Return the name of an episode's settings, empty where it has none."""
+    return str(row.get("variant") or "")
+
+
+def name_of(row: Row) -> str:
+    """Name an episode for people."""
+    return f"{row['policy']} on {row['floor']}, {row['robots']} robots, seed {row['seed']}"
+
+
+def _check_row(row: Row, where: str) -> None:
+    for key in (*_WANTED, *_MAY_BE_NULL):
+        if key not in row:
+            raise ValueError(f"{where} has no key {key!r}; want what `lidarium run` writes to result.json")
+    for key, kinds in _WANTED.items():
+        if not isinstance(row[key], kinds) or (isinstance(row[key], bool) and kinds is not bool):
+            raise ValueError(
+                f"{where} has {key} {row[key]!r}; want what `lidarium run` writes to result.json"
+            )
+    for key in _MAY_BE_NULL:
+        if row[key] is not None and not (isinstance(row[key], int | float) and 0.0 <= row[key] < math.inf):
+            raise ValueError(f"{where} has {key} {row[key]!r}; want seconds or null")
+
+
+def _without_doubles(
+    numbered: Iterable[tuple[int, Row]], path: Path
+) -> tuple[list[tuple[int, Row]], list[str]]:
+    kept: dict[tuple[Any, ...], tuple[int, Row]] = {}
+    warnings = []
+    for number, row in numbered:
+        known = kept.setdefault((*key_of(row), row["version"], row["settings_sha256"]), (number, row))
+        if known[1] is row:
+            continue
+        differing = [
+            key for key in sorted({*known[1], *row} - set(TIMINGS)) if known[1].get(key) != row.get(key)
+        ]
+        if differing:
+            raise ValueError(
+                f"{path}, lines {known[0]} and {number} tell of the same episode ({name_of(row)}) but differ in {', '.join(differing)}; "
+                "want each episode once"
+            )
+        warnings.append(
+            f"Lines {known[0]} and {number} of {path.name} are the same episode ({name_of(row)}), which is counted once."
+        )
+    return list(kept.values()), warnings
+
+
+def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
+    """Refuse episodes of two versions, or for one name of settings and one number of robots of two sets of settings."""
+    first: tuple[int, Row] | None = None
+    alike: dict[tuple[str, int], tuple[int, Row]] = {}
+    for number, row in numbered:
+        first = first or (number, row)
+        if row["version"] != first[1]["version"]:
+            raise ValueError(
+                f"{path} has episodes of two versions: {first[1]['version']} in line {first[0]} and {row['version']} in line {number}; "
+                "want one version in a directory"
+            )
+        known_number, known = alike.setdefault((variant_of(row), row["robots"]), (number, row))
+        if row["settings_sha256"] != known["settings_sha256"]:
+            seen = [
+                f"{key} {known.get(key)} and {row.get(key)}"
+                for key in _OF_SETTINGS
+                if known.get(key) != row.get(key)
+            ]
+            told = (
+                ", ".join(seen)
+                or f"settings_sha256 {known['settings_sha256'][:12]}... and {row['settings_sha256'][:12]}..."
+            )
+            raise ValueError(
+                f"{path} has episodes of two settings with {row['robots']} robots, in lines {known_number} and {number}: {told}; "
+                "want a name for each set of settings"
+            )

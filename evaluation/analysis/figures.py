@@ -1,0 +1,241 @@
+"""The figures of a report: of each policy alone, and of policies against a baseline pair by pair."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.evaluation.analysis.episodes import Row
+from lidarium.evaluation.analysis.groups import Group, paired, times_to
+from lidarium.evaluation.statistics import (
+    Interval,
+    PairedTest,
+    holm,
+    interquartile_mean_interval,
+    mean_interval,
+    median_interval,
+    paired_difference,
+    paired_ratio,
+    restricted_difference,
+    restricted_mean,
+    restricted_ratio,
+    share_interval,
+    sign_test,
+    wilcoxon_test,
+)
+
+TIMES = {"t90_s": "time to 90 %", "t99_s": "time to 99 %"}
+"""Keys of times to a share of the floor, and their titles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A figure that every run has.
+
+    Attributes
+    ----------
+    key, title, unit : str
+        In ``report.json``, for people, and what it is measured in.
+    of : callable
+        The figure of a run.
+    digits : int
+        Behind the point, for people.
+    """
+
+    key: str
+    title: str
+    unit: str
+    of: Callable[[Row], float]
+    digits: int = 1
+
+
+VALUES = (
+    Value("coverage_percent", "coverage at the end", "%", lambda row: 100.0 * row["coverage_final"]),
+    Value("path_m", "path of the team", "m", lambda row: float(sum(row["path_m"]))),
+    Value("longest_path_m", "longest path of a robot", "m", lambda row: float(max(row["path_m"]))),
+    Value("overlap_percent", "overlap", "%", lambda row: 100.0 * row["overlap"]),
+    Value("collisions", "collisions", "", lambda row: float(row["collisions"]), 2),
+)
+COMPARED = ("coverage_percent", "path_m", "overlap_percent")
+"""Values in the table of comparisons, beside the times."""
+
+_NOT_FIGURES = ("robots", "seed", "horizon_s", "coverage_final", "overlap", "collisions", *TIMES)
+
+
+@dataclass(frozen=True, slots=True)
+class TimeFigure:
+    """When the runs of a policy reached a share of the floor.
+
+    Attributes
+    ----------
+    reached, size, cut : int
+        How many did, of how many, and how many were cut before the horizon without it.
+    success : Interval
+        Share of the runs that did, up to the horizon.
+    median : Interval
+        Of all runs; inf is later than the horizon.
+    restricted_mean : Interval or None
+        Of min(time, horizon); None where no run reached the share or where cuts leave it unknown.
+    """
+
+    reached: int
+    size: int
+    cut: int
+    success: Interval
+    median: Interval
+    restricted_mean: Interval | None
+
+
+@dataclass(frozen=True, slots=True)
+class ValueFigure:
+    """A figure of all runs of a policy: its median, mean and interquartile mean."""
+
+    median: Interval
+    mean: Interval
+    interquartile_mean: Interval
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A policy against the baseline, pair by pair, in one figure.
+
+    Attributes
+    ----------
+    policy, key : str
+        Who, and in what.
+    pairs : int
+        Number of pairs.
+    difference, ratio : Interval or None
+        Policy less baseline, policy over baseline; of times, of their restricted means. None where there is
+        none.
+    wilcoxon, sign : PairedTest
+        Tests; less means that the policy has the smaller figure.
+    p_holm : float
+        Wilcoxon's p value, corrected for the number of comparisons of the table.
+    """
+
+    policy: str
+    key: str
+    pairs: int
+    difference: Interval | None
+    ratio: Interval | None
+    wilcoxon: PairedTest
+    sign: PairedTest
+    p_holm: float
+
+
+def time_figure(rows: Sequence[Row], key: str, horizon_s: float, seed: int) -> TimeFigure:
+    """Return the figures of a time to a share of the floor."""
+    found = times_to(rows, key, horizon_s)
+    reached = int(found.is_reached.sum())
+    try:
+        mean = restricted_mean(found.times, found.is_reached, horizon_s, seed=seed)
+    except ValueError:
+        # None reached the share, or the longest run was cut before the horizon.
+        mean = None
+    return TimeFigure(
+        reached,
+        len(rows),
+        found.cut,
+        share_interval(reached, len(rows)),
+        median_interval(found.or_never),
+        mean,
+    )
+
+
+def value_figure(values: Sequence[float], seed: int) -> ValueFigure:
+    """Return the figures of a value that every run has."""
+    return ValueFigure(
+        median_interval(values),
+        mean_interval(values, seed=seed),
+        interquartile_mean_interval(values, seed=seed),
+    )
+
+
+def further_keys(rows: Sequence[Row]) -> list[str]:
+    """Return the other keys under which every run has a number, times that were not reached among them as null."""
+    first = rows[0]
+    candidates = [key for key in first if key not in _NOT_FIGURES and not key.endswith("_sha256")]
+    return [key for key in candidates if all(_is_figure(key, row.get(key, "")) for row in rows)]
+
+
+def further_figure(rows: Sequence[Row], key: str) -> Interval:
+    """Return the median of any other figure of the runs.
+
+    A time that was not reached is later than all others.
+    """
+    return median_interval([np.inf if row[key] is None else float(row[key]) for row in rows])
+
+
+def compared(group: Group, baseline: str, seed: int) -> list[Comparison]:
+    """Return the comparisons of all other policies with the baseline.
+
+    Those without a pair are left out.
+    """
+    found = []
+    for policy, rows in group.runs.items():
+        ours, theirs = paired(rows, group.runs[baseline])
+        if policy != baseline and ours:
+            found += [_compared_times(policy, key, ours, theirs, group.horizon_s, seed) for key in TIMES]
+            found += [
+                _compared_values(policy, value, ours, theirs, seed)
+                for value in VALUES
+                if value.key in COMPARED
+            ]
+    if not found:
+        return []
+    corrected = holm([each.wilcoxon.p_value for each in found])
+    return [
+        Comparison(
+            each.policy,
+            each.key,
+            each.pairs,
+            each.difference,
+            each.ratio,
+            each.wilcoxon,
+            each.sign,
+            float(p_value),
+        )
+        for each, p_value in zip(found, corrected, strict=True)
+    ]
+
+
+def _compared_times(
+    policy: str, key: str, ours: Sequence[Row], theirs: Sequence[Row], horizon_s: float, seed: int
+) -> Comparison:
+    a, b = times_to(ours, key, horizon_s), times_to(theirs, key, horizon_s)
+    difference = ratio = None
+    try:
+        difference = restricted_difference(a.censored, b.censored, seed=seed)
+        ratio = restricted_ratio(a.censored, b.censored, seed=seed)
+    except ValueError:
+        # As above: without restricted means there is nothing to subtract; the tests still know who was
+        # faster.
+        pass
+    return _tested(policy, key, a.up_to_horizon, b.up_to_horizon, difference, ratio)
+
+
+def _compared_values(
+    policy: str, value: Value, ours: Sequence[Row], theirs: Sequence[Row], seed: int
+) -> Comparison:
+    a, b = (np.array([value.of(row) for row in rows]) for rows in (ours, theirs))
+    ratio = paired_ratio(a, b, seed=seed) if min(a.min(), b.min()) > 0.0 else None
+    return _tested(policy, value.key, a, b, paired_difference(a, b, seed=seed), ratio)
+
+
+def _tested(
+    policy: str,
+    key: str,
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    difference: Interval | None,
+    ratio: Interval | None,
+) -> Comparison:
+    return Comparison(policy, key, len(a), difference, ratio, wilcoxon_test(a, b), sign_test(a, b), 1.0)
+
+
+def _is_figure(key: str, value: Any) -> bool:  # noqa: ANN401
+    is_time = key.startswith("t") and key.endswith("_s") and key[1:-2].isdigit()
+    return (value is None and is_time) or (isinstance(value, int | float) and not isinstance(value, bool))

@@ -1,0 +1,193 @@
+"""Sorts episodes into groups whose figures may be put side by side, and into pairs."""
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.catalogue.names import GENERATORS, SETS, floor_names
+from lidarium.evaluation.analysis.episodes import Row, pair_key_of, variant_of
+from lidarium.evaluation.statistics import CensoredTimes
+from lidarium.evaluation.suites.episodes_file import TIMINGS
+from lidarium.evaluation.suites.suite import DEFAULT_VARIANT
+
+_NAMES = ("seed", "key", "record")
+"""What tells a run from others, without saying what came of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Episodes with one set of settings and one number of robots on the floors of one set.
+
+    Attributes
+    ----------
+    variant : str
+        Name of the settings, empty where they have none.
+    robots : int
+        Number of robots.
+    floor_set : str
+        As `floor_set_of` names it.
+    runs : dict
+        Episodes by policy, policies in alphabetical order.
+    horizon_s : float
+        Up to when times count: the horizon of the runs, or where they had none the longest run of the group.
+    """
+
+    variant: str
+    robots: int
+    floor_set: str
+    runs: dict[str, list[Row]]
+    horizon_s: float
+
+    @property
+    def title(self) -> str:
+        """Heading for people."""
+        settings = "" if self.variant in ("", DEFAULT_VARIANT) else f"{self.variant}: "
+        return f"{settings}{self.robots} robot{'s' if self.robots != 1 else ''}, {self.floor_set}"
+
+    @property
+    def slug(self) -> str:
+        """Part of names of files."""
+        settings = "" if self.variant in ("", DEFAULT_VARIANT) else f"{self.variant}_"
+        return "".join(
+            letter if letter.isalnum() else "_" for letter in f"{settings}{self.robots}_{self.floor_set}"
+        )
+
+    @property
+    def floors(self) -> list[str]:
+        """Names of the floors."""
+        return sorted({str(row["floor"]) for rows in self.runs.values() for row in rows}, key=_natural)
+
+    def on_floor(self, floor: str) -> dict[str, list[Row]]:
+        """Return the episodes on one floor by policy."""
+        return {policy: [row for row in rows if row["floor"] == floor] for policy, rows in self.runs.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """When the runs of a policy reached a share of the floor.
+
+    Attributes
+    ----------
+    times : (n,) float64
+        When they did, or until when they had not [s].
+    is_reached : (n,) bool
+        Whether they did, up to the horizon.
+    horizon_s : float
+        Up to when times count [s].
+    cut : int
+        How many did not and were cut before the horizon: nobody knows when they would have.
+    """
+
+    times: NDArray[np.float64]
+    is_reached: NDArray[np.bool_]
+    horizon_s: float
+    cut: int
+
+    @property
+    def censored(self) -> CensoredTimes:
+        """For restricted means; raises as `CensoredTimes`."""
+        return CensoredTimes(self.times, self.is_reached, self.horizon_s)
+
+    @property
+    def or_never(self) -> NDArray[np.float64]:
+        """The times, inf where the share was not reached."""
+        return np.where(self.is_reached, self.times, np.inf)
+
+    @property
+    def up_to_horizon(self) -> NDArray[np.float64]:
+        """The times, the horizon where the share was not reached."""
+        return np.where(self.is_reached, self.times, self.horizon_s)
+
+
+def grouped(rows: Iterable[Row]) -> list[Group]:
+    """Return the groups, by settings, floor set and number of robots."""
+    sorted_rows: dict[tuple[str, str, int], dict[str, list[Row]]] = {}
+    for row in rows:
+        runs = sorted_rows.setdefault((variant_of(row), floor_set_of(row["floor"]), row["robots"]), {})
+        runs.setdefault(row["policy"], []).append(row)
+    groups = []
+    for (variant, floor_set, robots), runs in sorted(sorted_rows.items()):
+        everything = [row for policy_rows in runs.values() for row in policy_rows]
+        horizons = [row["horizon_s"] if row["horizon_s"] is not None else row["time_s"] for row in everything]
+        groups.append(
+            Group(
+                variant,
+                robots,
+                floor_set,
+                {policy: runs[policy] for policy in sorted(runs)},
+                float(max(horizons)),
+            )
+        )
+    return groups
+
+
+def floor_set_of(floor: str) -> str:
+    """Name the set that a floor belongs to: one of those of the catalogue, other generated floors, drawn ones, or files."""
+    kind, _, seed = floor.partition(":")
+    if kind not in GENERATORS or not seed.isdigit():
+        return "drawn floors" if floor in floor_names() else "floors from files"
+    # A building is named by its kind, whatever it was asked for as.
+    within = (name for name, (first, count) in SETS.items() if first <= int(seed) < first + count)
+    return next((f"set:{name}" for name in within), "generated floors")
+
+
+def times_to(rows: Sequence[Row], key: str, horizon_s: float) -> Reached:
+    """Return when runs reached a share of the floor.
+
+    A run that missed it is never dropped. Where it ended by itself, with nothing left to do, it would not
+    have reached the share later either, and counts as not there at the horizon. Where it was cut (by the
+    horizon, by the user, by the physics), it is censored then.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        The runs.
+    key : str
+        Such as ``t90_s``.
+    horizon_s : float
+        Up to when times count [s].
+    """
+    times, is_reached, cut = [], [], 0
+    for row in rows:
+        reached = row[key] is not None and row[key] <= horizon_s
+        until = float(row["time_s"]) if _is_cut(row) else horizon_s
+        cut += not reached and until < horizon_s
+        times.append(float(row[key]) if reached else until)
+        is_reached.append(reached)
+    return Reached(np.array(times), np.array(is_reached, np.bool_), horizon_s, cut)
+
+
+def paired(a: Iterable[Row], b: Iterable[Row]) -> tuple[list[Row], list[Row]]:
+    """Return the runs of both that have a partner on the same floor, starts and seed, in the same order."""
+    partners = {pair_key_of(row): row for row in b}
+    pairs = [(row, partners[pair_key_of(row)]) for row in a if pair_key_of(row) in partners]
+    return [first for first, _ in pairs], [second for _, second in pairs]
+
+
+def repeats(rows: Iterable[Row]) -> int:
+    """Return how many runs say what another run on the same floor said already, seed and wall time aside.
+
+    Where neither starts nor noise are drawn, a policy without chance does the same whatever the seed.
+    """
+    said = [
+        json.dumps(
+            {key: value for key, value in row.items() if key not in _NAMES and key not in TIMINGS},
+            sort_keys=True,
+        )
+        for row in rows
+    ]
+    return len(said) - len(set(said))
+
+
+def _is_cut(row: Row) -> bool:
+    return bool(row["interrupted"]) or any(
+        reason in (None, "horizon", "physics") for reason in row["ended_because"].values()
+    )
+
+
+def _natural(name: str) -> tuple[str, int, str]:
+    kind, _, number = name.partition(":")
+    return kind, int(number) if number.isdigit() else -1, name

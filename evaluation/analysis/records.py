@@ -1,0 +1,123 @@
+"""What a report takes from the records of episodes: coverage over time, ways and maps."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.evaluation.analysis.episodes import Row
+from lidarium.evaluation.record import read_record
+from lidarium.mapping.grids.speckle_filter import without_specks
+
+FOLDER = "records"
+
+Key = str
+"""Where an episode's line says that its record is, in the directory.
+
+Empty for no record.
+"""
+
+_SAME = ("policy", "floor", "floor_sha256", "seed", "robots", "settings_sha256")
+"""What a record and the line of its episode both tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A record, as far as all of them are kept.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    coverage : (m, 2) float64
+        Time [s] and coverage from then on.
+    """
+
+    path: Path
+    coverage: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """What a picture of one episode shows.
+
+    Attributes
+    ----------
+    times : (n,) float64
+        When poses were taken [s].
+    poses : (n, robots, 3) float64
+        [m, m, rad].
+    levels : (rows, columns) uint8
+        The team's map at the end: 0 occupied, 127 unknown, 255 free.
+    origin : (x, y)
+        Lower left corner of its cell (0, 0) [m].
+    resolution : float
+        Side of a cell [m].
+    """
+
+    times: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    levels: NDArray[np.uint8]
+    origin: tuple[float, float]
+    resolution: float
+
+
+def read_records(directory: Path, rows: Iterable[Row]) -> tuple[dict[Key, Entry], list[str]]:
+    """Read the coverage of the recorded episodes.
+
+    Parameters
+    ----------
+    directory : Path
+        What `lidarium evaluate --out` wrote.
+    rows : iterable of dict
+        The episodes.
+
+    Returns
+    -------
+    dict
+        Records by `record_key`.
+    list of str
+        Which files could not be read, and why.
+    """
+    found: dict[Key, Entry] = {}
+    warnings = []
+    for row in rows:
+        key = record_key(row)
+        path = Path(directory) / key
+        if not key or not path.exists():
+            continue
+        try:
+            record = read_record(path)
+        except (ValueError, OSError) as error:
+            warnings.append(f"The record {path.name} was left out: {error}.")
+            continue
+        differing = [name for name in _SAME if record.header.get(name, row[name]) != row[name]]
+        if differing:
+            warnings.append(
+                f"The record {path.name} was left out: it is of an episode with another {differing[0]}."
+            )
+            continue
+        found[key] = Entry(path, np.asarray(record.display.coverage, np.float64))
+    return found, warnings
+
+
+def record_key(row: Row) -> Key:
+    """Return what joins an episode and its record."""
+    return str(row.get("record") or "")
+
+
+def read_track(entry: Entry) -> Track:
+    """Read ways and the last map of a record."""
+    display = read_record(entry.path).display
+    levels = without_specks(display.map_at(float(display.times[-1])))
+    return Track(
+        display.times, display.poses, levels, (display.origin[0], display.origin[1]), display.resolution
+    )
+
+
+def coverage_at(coverage: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the coverage of a step function at given times, the last value from the end on."""
+    places = np.searchsorted(coverage[:, 0], times + 1e-9, side="right") - 1
+    return np.where(places >= 0, coverage[np.maximum(places, 0), 1], 0.0)

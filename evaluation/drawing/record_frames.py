@@ -1,0 +1,227 @@
+"""Pictures and films of what any version can show of a record: the team's map, ways, coverage, targets, endings."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from lidarium.envs.drawing.frame_parts import (
+    EXPLORED,
+    RECENT_S,
+    SHIFT,
+    SIZE,
+    UNEXPLORED,
+    WALL,
+    Frame,
+    View,
+    draw_paths,
+    draw_robots,
+    enlarged,
+    team_colours,
+    view_around,
+    with_header,
+)
+from lidarium.envs.scoring.scorer import THRESHOLDS
+from lidarium.evaluation.drawing.picture_parts import (
+    INK,
+    SOLID,
+    box_around,
+    draw_curve,
+    draw_ways,
+    drawn_together,
+    list_robots,
+    page,
+    rgb,
+    save_page,
+    show_cells,
+)
+from lidarium.evaluation.drawing.video import FRAMES_PER_SECOND, LAST_FRAME_S, check_speed, film_writer
+from lidarium.evaluation.metrics import path_lengths
+from lidarium.evaluation.record.episode_record import EpisodeRecord
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.grids.speckle_filter import without_specks
+
+_PALETTE = np.zeros((256, 3), np.uint8)
+_PALETTE[[OCCUPIED, UNKNOWN, FREE]] = WALL, UNEXPLORED, EXPLORED
+_DEFAULT_RADIUS = 0.18
+_UNSEEN = "#dfe3ea"
+
+
+class TrackFrames:
+    """Draws what a record shows at any time.
+
+    Parameters
+    ----------
+    record : EpisodeRecord
+        The record.
+    size : int
+        Longer side of the explored part in a frame [pixels].
+    """
+
+    def __init__(self, record: EpisodeRecord, size: int = SIZE) -> None:
+        self._record, self._display = record, record.display
+        display = record.display
+        known = display.map_at(math.inf) != UNKNOWN
+        self.view = view_around(known, display.origin, display.resolution, size)
+        self._agents = [f"robot_{robot}" for robot in range(display.poses.shape[1])]
+        self._colours = team_colours(len(self._agents))
+
+    def draw(self, time_s: float) -> Frame:
+        """Return the frame at a time: the team's map, the ways of the last minute, targets as rings, robots with their headings."""
+        display, view = self._display, self.view
+        levels = without_specks(display.map_at(time_s))[view.rows, view.columns]
+        frame = enlarged(_PALETTE[_blocks(levels, view)], view)
+        recent = (display.times >= time_s - RECENT_S) & (display.times <= time_s + 1e-9)
+        poses = display.poses_at(time_s)
+        draw_paths(
+            frame, view, np.concatenate([display.poses[recent, :, :2], poses[None, :, :2]]), self._colours
+        )
+        self._draw_targets(frame, time_s, poses)
+        ended = {
+            event["agent"]
+            for event in display.events
+            if event["kind"] == "ended" and event["time_s"] <= time_s + 1e-9
+        }
+        has_ended = [agent in ended for agent in self._agents]
+        draw_robots(frame, view, poses, radius_of(self._record), has_ended, self._colours)
+        return with_header(frame, self._record.header["floor"], display.coverage_at(time_s), time_s)
+
+    def _draw_targets(self, frame: Frame, time_s: float, poses: NDArray[np.float64]) -> None:
+        """Draw the target of each robot as a ring, with a thin line to it."""
+        targets: dict[str, tuple[float, float] | None] = {}
+        for event in self._display.events:
+            if event["time_s"] > time_s + 1e-9:
+                break
+            if event["kind"] == "decision" and "x" in event:
+                targets[event["agent"]] = None if event["x"] is None else (event["x"], event["y"])
+            elif event["kind"] == "ended":
+                targets[event["agent"]] = None
+        radius = max(round(0.12 * self.view.scale), 5)
+        for agent, pose, colour in zip(self._agents, poses, self._colours, strict=True):
+            target = targets.get(agent)
+            if target is not None:
+                here, there = (
+                    tuple(int(value) for value in point)
+                    for point in self.view.pixels(np.array([pose[:2], target]))
+                )
+                cv2.line(frame, here, there, colour, 1, cv2.LINE_AA, SHIFT)
+                cv2.circle(frame, there, radius << SHIFT, EXPLORED, -1, cv2.LINE_AA, SHIFT)
+                cv2.circle(frame, there, radius << SHIFT, colour, 2, cv2.LINE_AA, SHIFT)
+
+
+def save_track_film(path: Path, record: EpisodeRecord, speed: float = 10.0, size: int = SIZE) -> None:
+    """Film what a record shows (mp4, H.264), at the speed of so many simulated seconds per second.
+
+    Raises
+    ------
+    ValueError
+        Where the speed is not positive.
+    OSError
+        Where nothing can be written there.
+    """
+    check_speed(speed)
+    frames, end = TrackFrames(record, size), float(record.display.times[-1])
+    count = math.ceil(end * FRAMES_PER_SECOND / speed)
+    with film_writer(path) as writer:
+        for frame in range(count):
+            writer.append_data(frames.draw(frame * speed / FRAMES_PER_SECOND))
+        last = frames.draw(end)
+        for _ in range(round(LAST_FRAME_S * FRAMES_PER_SECOND)):
+            writer.append_data(last)
+
+
+def save_track_picture(path: Path, record: EpisodeRecord) -> None:
+    """Draw what a record shows at its end: the team's map, all ways, coverage over time, endings (PNG, whole or not at all)."""
+    header, display = record.header, record.display
+    levels = without_specks(display.map_at(math.inf))
+    box = box_around(levels != UNKNOWN, display.origin, display.resolution)
+    figure, floor_axes, curve_axes, team_axes = page(box.aspect)
+    # In the order of what shows where cells are drawn together.
+    classes = np.zeros(levels.shape, np.uint8)
+    classes[levels == FREE], classes[levels == OCCUPIED] = 1, 2
+    palette = np.stack([rgb(colour) for colour in (_UNSEEN, "#ffffff", INK)])
+    show_cells(floor_axes, palette[drawn_together(classes[box.rows, box.columns])], box, _UNSEEN)
+    draw_ways(floor_axes, display.poses, radius_of(record))
+    _draw_legend(figure)
+    end, coverage = float(display.times[-1]), float(display.coverage[-1, 1])
+    reached = {
+        share: float(display.coverage[display.coverage[:, 1] >= share, 0][0])
+        for share in THRESHOLDS
+        if coverage >= share
+    }
+    draw_curve(curve_axes, display.coverage, reached, end)
+    lengths = path_lengths(display.poses)
+    endings = {event["agent"]: event["reason"] for event in display.events if event["kind"] == "ended"}
+    robots = [
+        (endings.get(f"robot_{robot}", "still at work"), f"{length:.1f} m")
+        for robot, length in enumerate(lengths)
+    ]
+    below = [f"{kind}: {count}" for kind, count in _counts(display.events).items()]
+    list_robots(team_axes, ("drove",), robots, below)
+    how = ", interrupted" if header["interrupted"] else ""
+    title = f"{header['floor']}: {100.0 * coverage:.1f} % explored in {end:.1f} s{how}"
+    team = "1 robot" if len(lengths) == 1 else f"{len(lengths)} robots"
+    about = [
+        team,
+        header["policy"],
+        "" if header["seed"] is None else f"seed {header['seed']}",
+        f"lidarium {header['version']}",
+    ]
+    save_page(path, figure, title, ", ".join(part for part in about if part))
+
+
+def radius_of(record: EpisodeRecord) -> float:
+    """Return the radius of the bodies [m], as the settings of the record have it."""
+    robot = record.header["settings"].get("robot", {})
+    return float(robot.get("radius", _DEFAULT_RADIUS)) if isinstance(robot, dict) else _DEFAULT_RADIUS
+
+
+def _blocks(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
+    """Return a map with blocks of cells as one where there are more cells than pixels.
+
+    Occupied cells show.
+    """
+    if view.block == 1:
+        return levels
+    rows, columns = (side // view.block for side in levels.shape)
+    whole = levels[: rows * view.block, : columns * view.block]
+    return np.asarray(whole.reshape(rows, view.block, columns, view.block).min(axis=(1, 3)))
+
+
+def _counts(events: list[dict[str, Any]]) -> dict[str, int]:
+    """Count the events of each kind but endings, which are listed by themselves."""
+    names = {
+        "decision": "decisions",
+        "contact": "contacts",
+        "given_up": "given up on the way",
+        "message": "messages",
+        "merge": "merges",
+    }
+    kinds = [str(event["kind"]) for event in events if event["kind"] != "ended"]
+    return {names.get(kind, kind): kinds.count(kind) for kind in dict.fromkeys(kinds)}
+
+
+def _draw_legend(figure: Figure) -> None:
+    start: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 1.6}
+    entries: list[Patch | Line2D] = [
+        Patch(facecolor="white", edgecolor=SOLID, label="free on the team's map"),
+        Patch(facecolor=INK, label="occupied"),
+        Patch(facecolor=_UNSEEN, label="unknown"),
+        Line2D([], [], marker="o", markersize=9, linewidth=0, label="start", **start),
+        Line2D([], [], marker="o", markersize=9, color=INK, linewidth=0, label="end"),
+    ]
+    figure.legend(
+        handles=entries,
+        loc="outside lower left",
+        ncols=5,
+        frameon=False,
+        fontsize=8.5,
+        labelcolor=INK,
+        handlelength=1.2,
+    )

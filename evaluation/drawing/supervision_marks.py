@@ -1,0 +1,116 @@
+"""Marks of a supervisor's decisions on pictures, with those on films."""
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from lidarium.agents.policy import Policy
+from lidarium.agents.supervisor.log import Decision
+from lidarium.agents.supervisor.policy import Supervised
+from lidarium.envs.drawing.frame_parts import SHIFT, Frame, View, team_colours
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.radio.messages import OrderKind
+from lidarium.evaluation.drawing.picture_parts import INK, hex_colours
+from lidarium.evaluation.drawing.video import DrawOver
+from lidarium.evaluation.episodes.events import in_floor_frame
+
+SHOWN_S = 4.0
+"""How long a film shows an order or a join [s]."""
+
+_JOIN_COLOUR = "#0f766e"
+
+
+def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Line2D]:
+    """Draw where robots were joined, redirected and stopped by rules on a map of the floor; return the entries of the legend."""
+    if not (isinstance(policy, Supervised) and policy.has_begun):
+        return []
+    colours = dict(zip(env.possible_agents, hex_colours(env.settings.robots), strict=True))
+    drawn: dict[str, Line2D] = {}
+    for agent, start, end in _redirections(env, policy.decisions):
+        axes.annotate(
+            "",
+            end,
+            start,
+            arrowprops={"arrowstyle": "->", "color": colours[agent], "linestyle": ":", "alpha": 0.8},
+            zorder=5,
+        )
+        drawn["redirected"] = Line2D([], [], color=INK, linestyle=":", label="redirected")
+    for decision in policy.decisions:
+        if decision.order == OrderKind.STOP.value:
+            x, y = in_floor_frame(env, decision.agent, *decision.place)
+            axes.plot(
+                [x],
+                [y],
+                marker="s",
+                markersize=6,
+                color=colours[decision.agent],
+                markeredgecolor="white",
+                linewidth=0,
+                zorder=9,
+            )
+            drawn["stopped"] = Line2D(
+                [], [], marker="s", markersize=6, color=INK, linewidth=0, label="stopped by the supervisor"
+            )
+    for join in policy.joins:
+        if join.is_used:
+            x, y = in_floor_frame(env, join.b, *join.at)
+            axes.plot(
+                [x],
+                [y],
+                marker="*",
+                markersize=11,
+                color=_JOIN_COLOUR,
+                markeredgecolor="white",
+                linewidth=0,
+                zorder=9,
+            )
+            drawn["joined"] = Line2D(
+                [], [], marker="*", markersize=10, color=_JOIN_COLOUR, linewidth=0, label="maps joined"
+            )
+    return list(drawn.values())
+
+
+def recent_supervision(policy: Policy) -> DrawOver | None:
+    """Return what draws on frames of a film where robots have been sent lately, and that maps were joined; None without a supervisor."""
+    if not isinstance(policy, Supervised):
+        return None
+
+    def draw(env: ExplorationEnv, frame: Frame, view: View) -> None:
+        if not policy.has_begun:
+            return
+        since = env.scorer.time - SHOWN_S
+        colours = dict(zip(env.possible_agents, team_colours(env.settings.robots), strict=True))
+        for agent, start, end in _redirections(env, [one for one in policy.decisions if one.time_s >= since]):
+            first, last = ((int(x), int(y)) for x, y in view.pixels(np.array([start, end])))
+            cv2.line(frame, first, last, colours[agent], 2, cv2.LINE_AA, SHIFT)
+            cv2.circle(frame, last, round(8 * (1 << SHIFT)), colours[agent], 2, cv2.LINE_AA, SHIFT)
+        joined = [f"{join.a} + {join.b}" for join in policy.joins if join.is_used and join.time_s >= since]
+        for line, words in enumerate(joined):
+            cv2.putText(
+                frame,
+                f"joined: {words}",
+                (12, 28 + 24 * line),
+                cv2.FONT_HERSHEY_SIMPLEX,
+                0.6,
+                (15, 118, 110),
+                2,
+                cv2.LINE_AA,
+            )
+
+    return draw
+
+
+def _redirections(
+    env: ExplorationEnv, decisions: list[Decision]
+) -> Iterator[tuple[str, tuple[float, float], tuple[float, float]]]:
+    """Yield who was redirected from where to where, in the floor's frame [m]."""
+    for decision in decisions:
+        if decision.goal is not None:
+            yield (
+                decision.agent,
+                in_floor_frame(env, decision.agent, *decision.place),
+                in_floor_frame(env, decision.agent, *decision.goal),
+            )

@@ -1,0 +1,1 @@
+"""One episode: how it is run, watched, stopped, scored."""

@@ -1,0 +1,57 @@
+"""What is told of an episode in words: events of orders, states and merges, ready for JSON, with positions in the floor's frame."""
+
+import math
+from typing import Any
+
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.station.operating import OperatingEvent
+from lidarium.envs.wrappers.merged_maps import MergeEvent
+from lidarium.evaluation.metrics.merges import transform_error
+
+
+def in_floor_frame(env: ExplorationEnv, agent: str, x: float, y: float) -> tuple[float, float]:
+    """Return a position of a robot's map frame in the floor's frame [m]."""
+    row = env.possible_agents.index(agent)
+    if env.settings.known_starts:
+        offset = env.perception.offset(row)
+        return float(x + offset[0]), float(y + offset[1])
+    start_x, start_y, theta = env.world.starts[row]
+    return (
+        float(start_x + math.cos(theta) * x - math.sin(theta) * y),
+        float(start_y + math.sin(theta) * x + math.cos(theta) * y),
+    )
+
+
+def place_of(env: ExplorationEnv, agent: str, place: tuple[float, float] | None) -> dict[str, float | None]:
+    """Return a position of a robot's map frame as an event has it: ``x`` and ``y`` in the floor's frame to a millimetre, null for none."""
+    if place is None:
+        return {"x": None, "y": None}
+    x, y = in_floor_frame(env, agent, *place)
+    return {"x": round(x, 3), "y": round(y, 3)}
+
+
+def operating_events(env: ExplorationEnv) -> list[dict[str, Any]]:
+    """Return what became of the robots' operating states and orders, in the order of time."""
+    return [_operating_event(env, event) for event in env.operating.events]
+
+
+def _operating_event(env: ExplorationEnv, event: OperatingEvent) -> dict[str, Any]:
+    told = {"time_s": round(event.time_s, 6), "kind": event.kind, "agent": event.agent}
+    told["state" if event.kind == "state" else "order"] = event.what
+    place = {} if event.target is None else place_of(env, event.agent, (event.target.x, event.target.y))
+    return {**told, **place, "reason": event.reason}
+
+
+def merge_event(env: ExplorationEnv, merge: MergeEvent) -> dict[str, Any]:
+    """Return a merge as an event of the record: who was joined with whom, where, and how far off the truth."""
+    distance, angle = transform_error(merge.found, merge.true, merge.at)
+    place = place_of(env, merge.b, merge.at)
+    errors = {"error_m": round(distance, 6), "error_rad": round(angle, 6)}
+    return {
+        "time_s": round(merge.time_s, 6),
+        "kind": "merge",
+        "agent": merge.a,
+        "other": merge.b,
+        **place,
+        **errors,
+    }

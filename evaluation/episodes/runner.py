@@ -1,0 +1,228 @@
+"""Runs a policy through an episode."""
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.policy import GivenUp, Policy, Stop
+from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.levels.frontiers import FrontierExploration
+from lidarium.envs.levels.gymnasium_env import at_level
+from lidarium.envs.levels.waypoints import WaypointExploration
+from lidarium.envs.onboard.belief import Belief
+from lidarium.envs.radio.messages import DriveState, OperatingState, Order
+from lidarium.envs.station.reports import Report
+from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings, true_frames
+from lidarium.evaluation.episodes.events import merge_event
+from lidarium.evaluation.episodes.interrupts import PatientInterrupt
+from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.mapping.merging.fusion import FusedMap
+
+Progress = Callable[[ExplorationEnv], None]
+
+
+@dataclass(slots=True)
+class Episode:
+    """What an episode left, beside the environment itself.
+
+    Attributes
+    ----------
+    env : ExplorationEnv
+        The environment at the end of the episode.
+    policy : Policy
+        The policy.
+    seed : int
+        The seed of the episode.
+    decision_seconds : list of float
+        Wall time of each call of the policy and of planning [s].
+    wall_seconds : float
+        Wall time of the whole episode [s].
+    given_up : list of GivenUp
+        What the policy left unexplored, and why.
+    is_interrupted : bool
+        Whether the user broke it off.
+    merges : list of MergeEvent
+        Which robots were joined, where maps are merged: by the environment, or by a policy that has
+        ``joins``.
+    """
+
+    env: ExplorationEnv
+    policy: Policy
+    seed: int
+    decision_seconds: list[float] = field(default_factory=list)
+    wall_seconds: float = 0.0
+    given_up: list[GivenUp] = field(default_factory=list)
+    is_interrupted: bool = False
+    merges: list[MergeEvent] = field(default_factory=list)
+
+
+class RunningTeam:
+    """What a policy may ask about its team in a running episode."""
+
+    def __init__(self, env: ExplorationEnv, driver: WaypointExploration | None) -> None:
+        self._env, self._driver = env, driver
+
+    @property
+    def agents(self) -> list[str]:
+        """Live agents."""
+        return list(self._env.agents)
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        return self._env.scorer.time
+
+    def belief(self, agent: str) -> Belief:
+        """Return what an agent's onboard software knows."""
+        return self._env.perception.belief(agent)
+
+    def drive_state(self, agent: str) -> DriveState:
+        """Return what its driving is about."""
+        return DriveState.IDLE if self._driver is None else self._driver.drive_state(agent)
+
+    def operating_state(self, agent: str) -> OperatingState:
+        """Return whether it takes part in the work, as it knows itself."""
+        return self._env.operating.states[self._env.possible_agents.index(agent)]
+
+    def report(self, agent: str) -> Report | None:
+        """Return what last reached the station of an agent, an ended one too.
+
+        None where nothing ever did.
+        """
+        return self._env.station.report(self._env.possible_agents.index(agent))
+
+    def last_order(self, agent: str) -> Order | None:
+        """Return the last order that an agent took, None where it took none."""
+        return self._env.operating.orders[self._env.possible_agents.index(agent)]
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        """Tell an agent that does not know its start what others know, in its map frame.
+
+        Return whether that reached it.
+        """
+        return self._env.station.tell(self._env.possible_agents.index(agent), others)
+
+    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
+        """Tell an agent where another robot drove, in its map frame.
+
+        Return whether that reached it.
+        """
+        return self._env.station.forget_walls(self._env.possible_agents.index(agent), trail)
+
+
+def run_episode(
+    policy: Policy,
+    env: ExplorationEnv,
+    seed: int,
+    options: Mapping[str, Any] | None = None,
+    on_decision: Progress | None = None,
+    raise_interrupt: bool = True,
+    merging: MergingSettings | None = None,
+) -> Episode:
+    """Run a policy from reset until every robot has ended.
+
+    Parameters
+    ----------
+    policy : Policy
+        What decides; its ``Stop`` ends a robot at its next step.
+    env : ExplorationEnv
+        Where; the wrapper of the policy's level is put around it.
+    seed : int
+        Where all draws come from: of the environment, and of the policy.
+    options : mapping or None
+        Options of ``reset``.
+    on_decision : callable or None
+        Called with the environment after the reset and after every decision, for progress, pictures and
+        records.
+    raise_interrupt : bool
+        Whether ``KeyboardInterrupt`` is passed on. Otherwise a first Ctrl-C ends the episode after the step
+        at hand, and the episode so far is returned; a second one, and one before the first step, is passed on
+        all the same.
+    merging : MergingSettings or None
+        How the robots merge their maps (`MergedMaps`); they do not where None.
+
+    Returns
+    -------
+    Episode
+        What it left.
+    """
+    level = at_level(env, policy.level, policy.shares_map)
+    driver = level.waypoints if isinstance(level, FrontierExploration) else level
+    world = level if merging is None else MergedMaps(level, merging)
+    episode = Episode(env, policy, seed)
+    began = time.perf_counter()
+    observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))
+    policy.reset(RunningTeam(env, driver if isinstance(driver, WaypointExploration) else None), seed)
+    with nullcontext() if raise_interrupt else PatientInterrupt() as interrupt:
+        try:
+            if on_decision is not None:
+                on_decision(env)
+            while env.agents and not (interrupt and interrupt.is_asked):
+                decided = time.perf_counter()
+                actions = decide(policy, world, observations)
+                episode.decision_seconds.append(time.perf_counter() - decided)
+                observations = world.step(actions)[0]
+                observations = {agent: observations[agent] for agent in env.agents}
+                if isinstance(env, WatchedExploration):
+                    orders = driver.driver.orders() if isinstance(driver, WaypointExploration) else None
+                    env.decided(orders, getattr(policy, "given_up", ()))
+                if on_decision is not None:
+                    on_decision(env)
+        except KeyboardInterrupt:
+            if interrupt is None or interrupt.is_asked:
+                raise
+            episode.is_interrupted = True
+        episode.is_interrupted |= interrupt is not None and interrupt.is_asked and bool(env.agents)
+    episode.wall_seconds = time.perf_counter() - began
+    episode.given_up = list(getattr(policy, "given_up", []))
+    episode.merges = world.events if isinstance(world, MergedMaps) else merges_of(policy, env)
+    if isinstance(env, WatchedExploration):
+        for merge in episode.merges:
+            env.tell(merge_event(env, merge))
+    return episode
+
+
+def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
+    """Return the joins that a policy's decisions were built on beside the truth.
+
+    None where it has no ``joins``.
+    """
+    used = [join for join in getattr(policy, "joins", []) if join.is_used]
+    if not used:
+        return []
+    truth = true_frames(env)
+    poses = [(join, join.found, truth[join.a, join.b]) for join in used]
+    return [
+        MergeEvent(
+            join.time_s,
+            join.a,
+            join.b,
+            (found.x, found.y, found.theta),
+            (true.x, true.y, true.theta),
+            join.at,
+            join.is_direct,
+        )
+        for join, found, true in poses
+    ]
+
+
+def decide(
+    policy: Policy,
+    world: ExplorationEnv | WaypointExploration | FrontierExploration | MergedMaps,
+    observations: Mapping[str, Observation],
+) -> dict[str, NDArray[np.float32] | Any]:
+    """Ask a policy, and hand each ``Stop`` and ``Order`` to the environment: these agents have no action."""
+    actions: dict[str, Any] = {}
+    for agent, action in policy.act(observations).items():
+        if isinstance(action, Stop):
+            world.stop(agent, action.reason)
+        elif isinstance(action, Order):
+            world.order(agent, action)
+        else:
+            actions[agent] = action
+    return actions

@@ -1,0 +1,107 @@
+"""When an episode of an evaluation ends, beside what the environment's settings say: the rules of other projects."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.evaluation.episodes.history import History
+
+_FIGURES: dict[str, Callable[[ExplorationEnv, History], float]] = {
+    "c_free": lambda env, _: env.scorer.coverage,
+    "c_known": lambda _, history: float(history.curves.c_known[-1]),
+    "c_valid": lambda _, history: float(history.curves.c_valid[-1]),
+    "c_own_min": lambda _, history: float(history.curves.c_own[-1].min()),
+    "remaining_cells": lambda env, _: float(env.world.counted[0] - env.world.team_seen[0]),
+}
+"""What a rule may ask for, as docs/reference/metrics.md defines it.
+
+``remaining_cells`` are those of F that are not sensed.
+"""
+
+STOP_REASON = "stop_rule"
+"""Why robots ended that a rule has ended."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopRule:
+    """Ends an episode where a figure is good enough, or after some decisions.
+
+    Attributes
+    ----------
+    figure : str or None
+        ``c_free``, ``c_known``, ``c_valid``, ``c_own_min`` or ``remaining_cells``.
+    at_least, above, at_most : float or None
+        What it has to be; one of them.
+    decisions : int or None
+        After how many decisions the episode ends in any case.
+
+    Raises
+    ------
+    ValueError
+        Where the figure is unknown, or it is not clear what it has to be.
+    """
+
+    figure: str | None = None
+    at_least: float | None = None
+    above: float | None = None
+    at_most: float | None = None
+    decisions: int | None = None
+
+    def __post_init__(self) -> None:
+        bounds = [bound for bound in (self.at_least, self.above, self.at_most) if bound is not None]
+        if self.figure is not None and self.figure not in _FIGURES:
+            raise ValueError(f"figure of the stop rule is {self.figure!r}; want one of {', '.join(_FIGURES)}")
+        if len(bounds) != (0 if self.figure is None else 1):
+            raise ValueError(
+                f"the stop rule asks for {self.figure!r} with {len(bounds)} bounds; want a figure with one of at_least, above, at_most"
+            )
+        if self.decisions is not None and self.decisions < 1:
+            raise ValueError(f"decisions of the stop rule is {self.decisions}; want at least 1")
+        if self.figure is None and self.decisions is None:
+            raise ValueError("the stop rule ends nothing; want a figure with its bound, decisions, or both")
+
+    def is_met(self, env: ExplorationEnv, history: History, decisions: int) -> bool:
+        """Whether the episode ends now, after so many decisions."""
+        if self.decisions is not None and decisions >= self.decisions:
+            return True
+        if self.figure is None:
+            return False
+        value = _FIGURES[self.figure](env, history)
+        if self.at_least is not None:
+            return value >= self.at_least
+        return value > self.above if self.above is not None else value <= (self.at_most or 0.0)
+
+
+class Stopper:
+    """Stops all robots of an episode by a rule.
+
+    Called after every decision, as ``run_episode`` calls ``on_decision``.
+    """
+
+    def __init__(self, rule: StopRule, history: History) -> None:
+        self._rule, self._history, self._decisions = rule, history, -1
+
+    def __call__(self, env: ExplorationEnv) -> None:
+        """Look at the episode after its reset and after every decision."""
+        self._decisions += 1
+        if env.agents and self._rule.is_met(env, self._history, self._decisions):
+            for agent in env.agents:
+                env.stop(agent, STOP_REASON)
+
+
+def stop_rule_of(content: Mapping[str, Any] | None) -> StopRule | None:
+    """Make a rule of what a file of a suite holds.
+
+    Raises
+    ------
+    ValueError
+        Where it is not clear what it asks for.
+    """
+    if content is None:
+        return None
+    known = StopRule.__dataclass_fields__
+    unknown = sorted(set(content) - set(known))
+    if unknown:
+        raise ValueError(f"a stop rule has no {unknown[0]!r}; it has {', '.join(known)}")
+    return StopRule(**content)

@@ -1,0 +1,1 @@
+"""Suites of episodes: their settings, workers, results."""

@@ -1,0 +1,250 @@
+"""Runs a suite into a folder: every finished episode is kept at once, and what was interrupted goes on where it stopped.
+
+A folder holds ``suite.json`` (what was asked for), ``episodes.jsonl`` (a line per finished episode) and
+``records/`` (a record per episode). Episodes depend on their trial alone, never on the worker or on those
+before, so that any number of workers leaves the same lines, though in another order.
+"""
+
+import json
+import shutil
+import time
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lidarium
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.evaluation.episodes.output import write_json
+from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
+from lidarium.evaluation.suites.suite import Suite, Trial
+from lidarium.evaluation.suites.workers import shared_out
+
+SUITE_FILE, EPISODES_FILE, RECORDS_FOLDER = "suite.json", "episodes.jsonl", "records"
+
+
+@dataclass(slots=True)
+class Campaign:
+    """A suite that runs into a folder.
+
+    Parameters
+    ----------
+    suite : Suite
+        What is asked for.
+    folder : Path
+        Where to. A folder of an earlier call goes on: what it has is not run again; other policies, floors,
+        teams and seeds may be added, other settings or another version may not.
+    workers : int
+        How many processes; the calling one does the work where 1.
+    records : bool
+        Whether every episode's record is kept.
+    trials : sequence of Trial or None
+        Those of the suite that are run; all where None.
+
+    Attributes
+    ----------
+    failures : list of (Trial, Exception)
+        Trials that came to no end, and why.
+    done : int
+        Episodes of the suite that are finished.
+    total : int
+        Episodes of the suite.
+    """
+
+    suite: Suite
+    folder: Path
+    workers: int = 1
+    records: bool = True
+    trials: Sequence[Trial] | None = None
+    failures: list[tuple[Trial, Exception]] = field(default_factory=list)
+    done: int = 0
+    total: int = 0
+
+    def run(self) -> Generator[dict[str, Any], None, None]:
+        """Run what is missing, and yield each episode's line when it is on the disk.
+
+        Raises
+        ------
+        ValueError
+            Where the folder holds episodes of another version or other settings, or is being written to by
+            someone else.
+        OSError
+            Where the folder cannot be written to, or the disk is full; finished episodes are kept.
+        """
+        if self.workers < 1:
+            raise ValueError(f"workers is {self.workers}; want at least 1")
+        trials = list(self.suite.trials() if self.trials is None else self.trials)
+        self.total, self.failures = len(trials), []
+        with EpisodesFile(self.folder / EPISODES_FILE) as file:
+            check_same(file.episodes, self.suite, self.folder)
+            _write_suite(self.folder / SUITE_FILE, self.suite)
+            records = self.folder / RECORDS_FOLDER if self.records else None
+            _clear_rests(self.folder / RECORDS_FOLDER)
+            finished = {episode[KEY] for episode in file.episodes}
+            missing = [trial for trial in trials if trial.key not in finished]
+            self.done = self.total - len(missing)
+            for trial, result in shared_out(
+                partial(run_trial, self.suite, records=records), missing, self.workers
+            ):
+                if isinstance(result, Exception):
+                    self.failures.append((trial, result))
+                    continue
+                file.append(result)
+                self.done += 1
+                yield result
+
+
+def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[str, Any]:
+    """Run one episode and return its line.
+
+    Its record is written before, where a folder is given.
+    """
+    from lidarium.evaluation.episodes.history import History
+    from lidarium.evaluation.episodes.result import result_of
+    from lidarium.evaluation.episodes.runner import run_episode
+    from lidarium.evaluation.episodes.stop_rules import Stopper, stop_rule_of
+    from lidarium.evaluation.episodes.watching import WatchedExploration
+    from lidarium.evaluation.record import Recorder, write_record
+
+    began = time.perf_counter()
+    settings = suite.settings(trial.variant, trial.robots)
+    history = History()
+    image_resolution = _image_resolution(suite, trial)
+    recorder = Recorder(trial.policy, trial.seed, trial.floor, image_resolution)
+    env = WatchedExploration(
+        trial.floor, settings, image_resolution, [history] if records is None else [history, recorder]
+    )
+    rule = stop_rule_of(suite.stop)
+    starts = suite.starts_of(trial) or (
+        drawn_starts(trial.floor, settings, trial.seed, image_resolution) if suite.draws_starts else None
+    )
+    options = None if starts is None else {"starts": starts}
+    episode = run_episode(
+        suite.make_policy(trial.policy),
+        env,
+        trial.seed,
+        options,
+        None if rule is None else Stopper(rule, history),
+    )
+    result = result_of(episode, trial.policy, history)
+    if records is not None:
+        write_record(records / f"{trial.file_name}.npz", recorder.finish())
+    where = [[round(float(number), 6) for number in start] for start in env.world.starts]
+    record = None if records is None else f"{RECORDS_FOLDER}/{trial.file_name}.npz"
+    about = {KEY: trial.key, "variant": trial.variant, "starts": where, "record": record}
+    return {
+        **about,
+        **result,
+        "decisions": len(episode.decision_seconds),
+        "wall_s": round(time.perf_counter() - began, 4),
+    }
+
+
+def drawn_starts(
+    floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
+) -> list[list[float]] | None:
+    """Draw where robots start on a floor that has starts of its own.
+
+    None on others, where a reset draws by the seed.
+
+    Returns
+    -------
+    list or None
+        x, y, theta of each robot [m, rad].
+    """
+    from lidarium.envs.floors.catalogue.names import load_floor
+    from lidarium.envs.floors.starts import draw_starts
+    from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+
+    loaded = load_floor(floor, image_resolution)
+    if not len(loaded.starts):
+        return None
+    tables = floor_tables(loaded, settings.raster_resolution, settings.lidar.height, settings.robot.height)
+    drawn = draw_starts(tables.body, settings.robot.radius, settings.robots, np.random.default_rng(seed))
+    return [[float(number) for number in start] for start in drawn]
+
+
+def check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:
+    """Check that episodes that are there already are of this version and of the suite's settings.
+
+    Raises
+    ------
+    ValueError
+        Where they are not; the difference is named.
+    """
+    for episode in episodes:
+        if episode.get("version") != lidarium.__version__:
+            raise ValueError(
+                f"{folder} holds episodes of lidarium {episode.get('version')}, this is {lidarium.__version__}; "
+                "results of two versions are not compared, choose another folder"
+            )
+    kept = _kept_suite(folder / SUITE_FILE)
+    for name, options in kept.get("variants", {}).items():
+        if name in suite.variants:
+            _check_same_options(folder, name, options, suite.as_dict()["variants"][name])
+    for name, options in kept.get("policy_settings", {}).items():
+        if name in suite.policies and suite.as_dict()["policy_settings"].get(name) != options:
+            raise ValueError(
+                f"{folder} holds episodes of policy {name!r} with other settings, {options}; choose another folder"
+            )
+    if kept and kept.get("stop") != suite.as_dict()["stop"]:
+        raise ValueError(
+            f"{folder} holds episodes that ended by the rule {kept.get('stop')}, this suite has {suite.stop}; choose another folder"
+        )
+    for floor, teams in kept.get("starts", {}).items():
+        if floor in suite.floors and suite.as_dict()["starts"].get(floor) != teams:
+            raise ValueError(f"{folder} holds episodes with other starts on {floor!r}; choose another folder")
+
+
+def _check_same_options(
+    folder: Path, variant: str, kept: Mapping[str, Any], asked: Mapping[str, Any]
+) -> None:
+    for option in sorted({*kept, *asked}):
+        before, now = kept.get(option, "its default"), asked.get(option, "its default")
+        if before != now:
+            raise ValueError(
+                f"{folder} holds episodes of variant {variant!r} with {option} = {before}, this suite has {option} = {now}; "
+                "choose another folder, or another name for the variant"
+            )
+
+
+def _kept_suite(path: Path) -> dict[str, Any]:
+    if not path.exists():
+        return {}
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path} is not JSON: {error}; mend it, or choose another folder") from error
+    return kept if isinstance(kept, dict) else {}
+
+
+def _write_suite(path: Path, suite: Suite) -> None:
+    """Write what was asked for, by this and the calls before."""
+    kept, asked = _kept_suite(path), suite.as_dict()
+    joined: dict[str, Any] = {"version": lidarium.__version__}
+    for name, value in asked.items():
+        before = kept.get(name)
+        if isinstance(value, list):
+            joined[name] = [*(before or []), *(each for each in value if each not in (before or []))]
+        elif isinstance(value, dict):
+            joined[name] = {**(before or {}), **value}
+        else:
+            joined[name] = value
+    if joined != kept:
+        write_json(path, joined)
+
+
+def _clear_rests(records: Path) -> None:
+    """Take away what writers left that were killed."""
+    for rest in records.glob(".*"):
+        if rest.is_dir():
+            shutil.rmtree(rest, ignore_errors=True)
+
+
+def _image_resolution(suite: Suite, trial: Trial) -> float | None:
+    from lidarium.envs.floors.catalogue.names import is_file_name
+
+    return suite.image_resolution if is_file_name(trial.floor) else None

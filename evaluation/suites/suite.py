@@ -1,0 +1,310 @@
+"""What an evaluation asks for: policies x floors x robots x seeds x settings, and the single trials that this makes."""
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from lidarium.agents import Policy, make_policy
+from lidarium.envs.floors.catalogue.names import is_generated, load_floor, set_floors
+from lidarium.envs.settings.battery import Battery
+from lidarium.envs.settings.exploration import ExplorationSettings, RewardSettings, make_settings
+from lidarium.envs.settings.faults import FaultSettings
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.radio import RadioSettings
+from lidarium.envs.settings.robots import Robot
+from lidarium.evaluation.episodes.stop_rules import stop_rule_of
+from lidarium.mapping.grids.occupancy import OccupancySettings
+
+Starts = tuple[tuple[float, float, float], ...]
+
+DEFAULT_VARIANT = "default"
+
+_PARTS: dict[str, Callable[..., Any]] = {
+    "robot": Robot,
+    "lidar": Lidar,
+    "occupancy": OccupancySettings,
+    "reward": RewardSettings,
+    "battery": Battery,
+    "radio": RadioSettings,
+    "faults": FaultSettings,
+}
+"""Settings that are tables of their own, where they are not named."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Trial:
+    """One episode of a suite.
+
+    Attributes
+    ----------
+    variant : str
+        Name of the settings.
+    floor : str
+        As for ``load_floor``.
+    robots : int
+        Size of the team.
+    start : int
+        Which of the suite's starts on this floor, -1 where the seed draws them.
+    seed : int
+        Where all draws come from.
+    policy : str
+        Name of the policy.
+    """
+
+    variant: str
+    floor: str
+    robots: int
+    start: int
+    seed: int
+    policy: str
+
+    @property
+    def key(self) -> str:
+        """The trial in one line; no other trial has the same."""
+        start = "" if self.start < 0 else f" start {self.start}"
+        return f"{self.variant} | {self.floor} | {self.robots} | seed {self.seed}{start} | {self.policy}"
+
+    @property
+    def file_name(self) -> str:
+        """The key as the stem of a file's name: readable, and no other trial's."""
+        letters = "".join(
+            letter if letter.isalnum() or letter in "._-" else "-"
+            for letter in self.key.replace(" | ", "__").replace(" ", "")
+        )
+        return f"{letters[-150:]}-{hashlib.sha256(self.key.encode()).hexdigest()[:8]}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Suite:
+    """What an evaluation asks for.
+
+    Trials that differ in the policy alone are paired: same floor, same starts, same seed.
+
+    Attributes
+    ----------
+    policies, floors : tuple of str
+        Names of policies, or of ``policy_settings``; floors as for ``load_floor``, and ``set:NAME`` for all
+        floors of a set.
+    robots, seeds : tuple of int
+        Sizes of teams; seeds.
+    variants : dict
+        Settings by name, as the options of ``lidarium.parallel_env``.
+    starts : dict
+        By floor: teams of starts (x, y, theta) in the floor's frame [m, rad], tried one after the other in
+        place of drawn ones; a team takes as many of them as it has robots.
+    draws_starts : bool
+        Whether the seed draws starts also on floors that have starts of their own; these would be the same
+        for every seed.
+    stop : dict or None
+        When episodes end beside what the settings say, as ``StopRule``.
+    image_resolution : float or None
+        Metres per pixel, where floors are plain images.
+    policy_settings : dict
+        By a name among the policies: options that the policy is made with, and ``policy``, which one it is,
+        where the name is another.
+
+    Raises
+    ------
+    ValueError
+        Where there is nothing to try, something is named twice, or a policy, floor, number or setting cannot
+        be used.
+    """
+
+    policies: tuple[str, ...]
+    floors: tuple[str, ...]
+    robots: tuple[int, ...] = (1,)
+    seeds: tuple[int, ...] = (0,)
+    variants: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: {DEFAULT_VARIANT: {}})
+    starts: Mapping[str, Sequence[Starts]] = field(default_factory=dict)
+    draws_starts: bool = True
+    stop: Mapping[str, Any] | None = None
+    image_resolution: float | None = None
+    policy_settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("policies", "floors", "robots", "seeds", "variants"):
+            values = list(getattr(self, name))
+            if not values:
+                raise ValueError(f"the suite has no {name}; want at least one")
+            twice = next((value for value in values if values.count(value) > 1), None)
+            if twice is not None:
+                raise ValueError(f"the suite names {twice!r} twice among its {name}")
+        for numbers, least, what in ((self.robots, 1, "robots"), (self.seeds, 0, "seeds")):
+            for number in numbers:
+                if isinstance(number, bool) or not isinstance(number, int) or number < least:
+                    raise ValueError(
+                        f"{what} of the suite has {number!r}; want whole numbers of at least {least}"
+                    )
+        for name in self.policy_settings:
+            if name not in self.policies:
+                raise ValueError(
+                    f"the suite has settings of a policy {name!r}, which is not among its policies"
+                )
+        for name in self.policies:
+            self.make_policy(name)
+        for floor in self.floors:
+            _check_floor(floor, self.image_resolution)
+        for variant in self.variants:
+            for robots in self.robots:
+                self.settings(variant, robots)
+        stop_rule_of(self.stop)
+        for floor, teams in self.starts.items():
+            if floor not in self.floors:
+                raise ValueError(f"the suite has starts on {floor!r}, which is not among its floors")
+            for team in teams:
+                if len(team) < max(self.robots) or any(len(start) != 3 for start in team):
+                    raise ValueError(
+                        f"a team of starts on {floor!r} is {team}; want x, y, theta of at least {max(self.robots)} robots"
+                    )
+
+    def settings(self, variant: str, robots: int) -> ExplorationSettings:
+        """Return the settings of a variant for a team; each episode runs on one thread.
+
+        Raises
+        ------
+        ValueError
+            Where a setting cannot be used; the variant is named.
+        """
+        options = dict(self.variants[variant])
+        for name, why in (("robots", "the suite's robots"), ("threads", "one thread an episode")):
+            if name in options:
+                raise ValueError(f"variant {variant!r} sets {name}, which is fixed by {why}; leave it out")
+        try:
+            for name, kind in _PARTS.items():
+                if isinstance(options.get(name), Mapping):
+                    options[name] = kind(**options[name])
+            return make_settings(robots=robots, **options)
+        except (ValueError, TypeError) as error:
+            raise ValueError(f"variant {variant!r} with {robots} robots cannot be used: {error}") from error
+
+    def make_policy(self, name: str) -> Policy:
+        """Return a new policy by its name among the policies.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such policy, or its settings cannot be used; the name is told.
+        """
+        options = dict(self.policy_settings.get(name, {}))
+        try:
+            return make_policy(options.pop("policy", name), **options)
+        except (ValueError, TypeError) as error:
+            if name not in self.policy_settings:
+                raise
+            raise ValueError(f"policy {name!r} of the suite cannot be made: {error}") from error
+
+    def trials(self) -> Iterator[Trial]:
+        """Yield all trials; those that are paired come one after the other, so that a suite that is cut short is still paired."""
+        for variant in self.variants:
+            for floor in self.floors:
+                teams = range(len(self.starts[floor])) if floor in self.starts else (-1,)
+                for single in set_floors(floor) if floor.startswith("set:") else (floor,):
+                    for robots in self.robots:
+                        for start in teams:
+                            for seed in self.seeds:
+                                for policy in self.policies:
+                                    yield Trial(variant, single, robots, start, seed, policy)
+
+    def starts_of(self, trial: Trial) -> list[list[float]] | None:
+        """Return the starts of a trial's robots, None where they are not given."""
+        if trial.start < 0:
+            return None
+        return [list(start) for start in self.starts[trial.floor][trial.start][: trial.robots]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what JSON can hold of it."""
+        content: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        return content
+
+
+def read_suite(path: Path) -> Suite:
+    """Read a suite from a TOML file (docs/reference/files.md).
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        Where there is no such file, or what it holds cannot be used; the message names the file.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"no suite {path}; want a TOML file, as docs/reference/files.md shows one")
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is not TOML: {error}") from error
+    try:
+        return suite_of(content)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
+def suite_of(content: Mapping[str, Any]) -> Suite:
+    """Make a suite of what a TOML file holds.
+
+    Parameters
+    ----------
+    content : mapping
+        ``policies``, ``floors``, ``robots``, ``seeds`` (a list, or how many from 0 on), ``settings`` (for all
+        variants), ``variants``, ``starts``, ``draws_starts``, ``stop``, ``image_resolution``,
+        ``policy_settings``.
+
+    Raises
+    ------
+    ValueError
+        Where something is missing, unknown or cannot be used.
+    """
+    known = {each.name for each in fields(Suite)} | {"settings"}
+    unknown = sorted(set(content) - known)
+    if unknown:
+        raise ValueError(f"a suite has no {unknown[0]!r}; it has {', '.join(sorted(known))}")
+    for name in ("policies", "floors"):
+        if name not in content:
+            raise ValueError(f"the suite has no {name}; want a list of names")
+    common = content.get("settings", {})
+    variants = content.get("variants", {DEFAULT_VARIANT: {}})
+    if not isinstance(common, Mapping) or not all(
+        isinstance(variant, Mapping) for variant in dict(variants).values()
+    ):
+        raise ValueError(
+            "settings and each of the variants are tables, as in [settings] and [variants.noisy]"
+        )
+    seeds = content.get("seeds", 1)
+    starts = {
+        floor: tuple(tuple(tuple(start) for start in team) for team in teams)
+        for floor, teams in content.get("starts", {}).items()
+    }
+    return Suite(
+        policies=_listed(content, "policies"),
+        floors=_listed(content, "floors"),
+        robots=_listed(content, "robots") if "robots" in content else (1,),
+        seeds=tuple(range(seeds)) if isinstance(seeds, int) else _listed(content, "seeds"),
+        variants={name: {**common, **variant} for name, variant in variants.items()},
+        starts=starts,
+        draws_starts=bool(content.get("draws_starts", True)),
+        stop=content.get("stop"),
+        image_resolution=content.get("image_resolution"),
+        policy_settings=content.get("policy_settings", {}),
+    )
+
+
+def _listed(content: Mapping[str, Any], name: str) -> tuple[Any, ...]:
+    values = content[name]
+    if isinstance(values, list | tuple):
+        return tuple(values)
+    if isinstance(values, str | int):
+        return (values,)
+    raise ValueError(f"{name} of the suite is {values!r}; want a list")
+
+
+def _check_floor(floor: str, image_resolution: float | None) -> None:
+    """Check that there is such a floor, without generating any."""
+    if not isinstance(floor, str):
+        raise ValueError(f"floors of the suite has {floor!r}; want names or paths")
+    if floor.startswith("set:"):
+        set_floors(floor)
+    elif not is_generated(floor):
+        load_floor(floor, image_resolution)

@@ -1,0 +1,138 @@
+"""Work shared out to processes: results come as they are ready, and no worker's death is anyone's but its own task's."""
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
+from typing import TypeVar
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+"""Gives freed memory back to the system, where the C library has that."""
+
+WAITING_PER_WORKER = 2
+"""Tasks that are handed over before a worker is free, so that it never waits."""
+
+
+def shared_out(
+    work: Callable[[Task], Result], tasks: Iterable[Task], workers: int, *, is_apart: bool = False
+) -> Iterator[tuple[Task, Result | Exception]]:
+    """Do tasks in this process (one worker) or in several of their own, and yield each with its result as it is ready.
+
+    Parameters
+    ----------
+    work : callable
+        Does a task; a function of a module, as processes import it.
+    tasks : iterable
+        Tasks and results go between processes, so they can be pickled.
+    workers : int
+        How many processes.
+    is_apart : bool
+        Whether one worker, too, is a process of its own, in which libraries keep to one thread: for what is
+        timed.
+
+    Yields
+    ------
+    task, result
+        An exception that the task has raised is its result. A task whose process died has a ``RuntimeError``;
+        those that were under way beside it are done again.
+    """
+    if workers <= 1 and not is_apart:
+        for task in tasks:
+            yield task, _attempted(work, task)
+        return
+    pending = iter(tasks)
+    suspects: list[Task] = []
+    while True:
+        lost = yield from _in_pool(work, pending, max(workers, 1))
+        for suspect in lost:
+            # Who brought the others down does it again, alone.
+            suspects = yield from _in_pool(work, iter([suspect]), 1)
+            if suspects:
+                yield suspect, RuntimeError("its process died, twice: out of memory, or killed from outside")
+        if not lost:
+            return
+
+
+def _in_pool(
+    work: Callable[[Task], Result], tasks: Iterator[Task], workers: int
+) -> Generator[tuple[Task, Result | Exception], None, list[Task]]:
+    """Do tasks in a pool of processes.
+
+    Returns those that were lost because a process died.
+    """
+    context = multiprocessing.get_context("spawn")
+    lost: list[Task] = []
+    running: dict[Future[Result], Task] = {}
+    # Linear algebra reads its number of threads when it is loaded.
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+    is_whole = False
+    try:
+        for task in islice(tasks, WAITING_PER_WORKER * workers):
+            running[pool.submit(_done, work, task)] = task
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                task = running.pop(future)
+                error = future.exception()
+                if isinstance(error, BrokenProcessPool):
+                    lost.append(task)
+                    continue
+                if error is not None and not isinstance(error, Exception):
+                    raise error
+                yield task, future.result() if error is None else error
+                if lost:
+                    continue
+                for following in islice(tasks, 1):
+                    try:
+                        running[pool.submit(_done, work, following)] = following
+                    except BrokenProcessPool:
+                        lost.append(following)
+        is_whole = True
+    finally:
+        pool.shutdown(wait=is_whole, cancel_futures=True)
+        if not is_whole:
+            for process in multiprocessing.active_children():
+                process.terminate()
+    return lost
+
+
+def _attempted(work: Callable[[Task], Result], task: Task) -> Result | Exception:
+    try:
+        return _done(work, task)
+    except Exception as error:  # whatever it is, it is the task's result
+        return error
+
+
+def _done(work: Callable[[Task], Result], task: Task) -> Result:
+    """Do a task and give the memory back that it has freed: between maps of all sizes, the C library's heap only grows."""
+    try:
+        return work(task)
+    finally:
+        if _TRIM is not None:
+            _TRIM(0)
+
+
+def _begin_worker() -> None:
+    """Leave interrupts to the parent, and keep libraries to one thread: there are as many processes as cores."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    import cv2
+
+    cv2.setNumThreads(1)
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
+
+
+def _leave_with_parent() -> None:
+    """End this process when its parent is gone, killed perhaps, with nobody left to take the results."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

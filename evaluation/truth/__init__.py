@@ -1,0 +1,1 @@
+"""What is true of a floor, for the figures of a run."""

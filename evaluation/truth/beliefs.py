@@ -1,0 +1,98 @@
+"""What the robots' maps say, laid over the lattice of the scorer's masks."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.exploration import ExplorationEnv
+
+
+def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
+    """Return the robots' log-odds on the lattice of the scorer's masks, (robots, rows, columns) int8; 0 beyond a map.
+
+    Maps of robots that do not know their starts are laid over it by their true starts: with true poses that
+    is the best fit of the trajectories.
+    """
+    world, settings = env.world, env.settings
+    tables, resolution = world.floors[0], settings.occupancy.resolution
+    assert tables is not None
+    if settings.known_starts:
+        return np.stack([on_floor(env, row, log_odds) for row, log_odds in enumerate(world.log_odds)])
+    origin = tables.laser.origin
+    rows, words = world.counted_masks[0].shape
+    laid = np.zeros((settings.robots, rows, words * 64), np.int8)
+    y, x = np.meshgrid(*((np.arange(size) + 0.5) * resolution for size in laid.shape[1:]), indexing="ij")
+    for row, log_odds in enumerate(world.log_odds):
+        start_x, start_y, theta = world.starts[row]
+        east, north = x + origin[0] - start_x, y + origin[1] - start_y
+        own_x = math.cos(theta) * east + math.sin(theta) * north - world.origins[row, 0]
+        own_y = math.cos(theta) * north - math.sin(theta) * east - world.origins[row, 1]
+        columns, lines = (np.floor(own / resolution).astype(np.int64) for own in (own_x, own_y))
+        is_inside = (
+            (lines >= 0) & (lines < log_odds.shape[0]) & (columns >= 0) & (columns < log_odds.shape[1])
+        )
+        laid[row][is_inside] = log_odds[lines[is_inside], columns[is_inside]]
+    return laid
+
+
+def cells_beyond(env: ExplorationEnv, row: int) -> tuple[int, int]:
+    """Return by how many rows and columns the map of a robot that knows its start begins before the lattice of the scorer's masks."""
+    tables, resolution = env.world.floors[0], env.settings.occupancy.resolution
+    assert tables is not None
+    x, y = (corner - own for corner, own in zip(tables.laser.origin, env.world.origins[row], strict=True))
+    return round(float(y) / resolution), round(float(x) / resolution)
+
+
+def on_floor(env: ExplorationEnv, row: int, log_odds: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Return the part of the map of a robot that knows its start that lies on the lattice of the scorer's masks, (rows, columns)."""
+    first_row, first_column = cells_beyond(env, row)
+    rows, words = env.world.counted_masks[0].shape
+    return log_odds[first_row : first_row + rows, first_column : first_column + words * 64]
+
+
+def team_log_odds(env: ExplorationEnv) -> tuple[NDArray[np.int16], tuple[float, float]]:
+    """Return the sum of the robots' maps, and the lower left corner of its cell (0, 0) in the floor's frame [m].
+
+    The lattice is that of the scorer's masks; see `maps_on_floor`.
+    """
+    tables = env.world.floors[0]
+    assert tables is not None
+    return np.asarray(np.sum(maps_on_floor(env), axis=0, dtype=np.int16)), tables.laser.origin
+
+
+def shares_one_map(env: ExplorationEnv) -> bool:
+    """Return whether the robots' maps reach all of them: with known starts and the ideal radio each holds the sum of all."""
+    return env.settings.known_starts and env.settings.robots > 1 and env.settings.radio.is_ideal
+
+
+def held_maps(env: ExplorationEnv) -> list[NDArray[np.int8]]:
+    """Return what each robot holds by a radio that is not ideal: its map and those that reached it, summed, on the masks' lattice."""
+    held = [env.perception.shared_map(row) for row in range(env.settings.robots)]
+    return [
+        on_floor(env, row, navigation.log_odds)
+        for row, navigation in enumerate(held)
+        if navigation is not None
+    ]
+
+
+def free_as_held(env: ExplorationEnv, maps: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Return which cells each robot holds to be free, by its own map or, where it reaches it, the team's.
+
+    Parameters
+    ----------
+    env : ExplorationEnv
+        The environment.
+    maps : (robots, rows, columns) int8
+        Log-odds of `maps_on_floor`.
+
+    Returns
+    -------
+    (robots, rows, columns) bool
+        Where it is less than 0; read-only.
+    """
+    if env.perception.hears:
+        return np.stack(held_maps(env)) < 0
+    if not shares_one_map(env):
+        return np.asarray(maps < 0)
+    return np.broadcast_to(np.sum(maps, axis=0, dtype=np.int16) < 0, maps.shape)

@@ -1,0 +1,109 @@
+"""What is true of a floor, on the lattice of the robots' maps.
+
+The scorer's masks lie on it, too.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.floor import Raster
+from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.simulation.kinematic.world import counted_cells
+from lidarium.evaluation.metrics import surface
+from lidarium.evaluation.metrics.shares import Mask
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """Cells of a floor, each (rows, columns) bool.
+
+    Attributes
+    ----------
+    occupied : Mask
+        Cells of which any of the world's cells is solid in the laser's plane.
+    counted : Mask
+        F: free cells that the smallest robot's disc sweeps over its configuration space, connected to the
+        starts.
+    knowable : Mask
+        What a sensor that fits everywhere would come to know: free cells connected to a start through free
+        cells, and the occupied cells 8-adjacent to them. The rest, the inside of solids, sealed rooms and all
+        that lies outside, is unknown in a perfect map.
+    valid : Mask
+        F and the occupied cells 8-adjacent to it.
+    """
+
+    occupied: Mask
+    counted: Mask
+    knowable: Mask
+    valid: Mask
+
+
+def truth_of(env: ExplorationEnv) -> Truth:
+    """Return what is true of the floor of an episode, after its reset."""
+    world = env.world
+    occupied = occupied_in_truth(env)
+    counted = unpack_bits(world.counted_masks[0], occupied.shape[1])
+    free = _connected_free(env, occupied)
+    return Truth(occupied, counted, free | surface(occupied, free), counted | surface(occupied, counted))
+
+
+def left_by_failed(env: ExplorationEnv) -> Mask | None:
+    """Return the part of F that the others can get to past the bodies of robots that have failed, from where they are now.
+
+    None where none has failed, or all have.
+    """
+    world, tables = env.world, env.world.floors[0]
+    failed = world.failed.astype(np.bool_)
+    if tables is None or not failed.any() or failed.all():
+        return None
+    body, resolution = tables.body, tables.body.resolution
+    solid = body.solid.copy()
+    rows, columns = np.indices(solid.shape)
+    for x, y, _ in world.poses[failed]:
+        # A cell less than the body: a robot that touches it still fits beside it.
+        near = np.hypot(
+            body.origin[0] + (columns + 0.5) * resolution - x, body.origin[1] + (rows + 0.5) * resolution - y
+        )
+        solid[near < env.settings.robot.radius - resolution] = 1
+    swept = swept_free_space(
+        Raster(solid, body.origin, resolution), world.smallest_radius, world.poses[~failed]
+    )
+    free = swept & (tables.laser.solid == 0)
+    left = counted_cells(free, round(env.settings.occupancy.resolution / resolution))
+    counted = unpack_bits(world.counted_masks[0], left.shape[1])
+    return np.asarray(left & counted)
+
+
+def occupied_in_truth(env: ExplorationEnv) -> NDArray[np.bool_]:
+    """Return the truth on the lattice of the maps: cells of which any of the world's cells is solid; free beyond the world's raster."""
+    tables = env.world.floors[0]
+    assert tables is not None
+    raster = tables.laser
+    multiple = round(env.settings.occupancy.resolution / raster.resolution)
+    rows, words = env.world.counted_masks[0].shape
+    solid = np.zeros((rows * multiple, words * 64 * multiple), np.bool_)
+    solid[: raster.solid.shape[0], : raster.solid.shape[1]] = raster.solid
+    if multiple == 1:
+        return solid
+    return np.asarray(solid.reshape(rows, multiple, words * 64, multiple).any(axis=(1, 3)))
+
+
+def _connected_free(env: ExplorationEnv, occupied: Mask) -> Mask:
+    """Return the free cells that are 4-connected to the cell of a start."""
+    tables = env.world.floors[0]
+    assert tables is not None
+    reached, resolution = 2, env.settings.occupancy.resolution
+    cells = occupied.astype(np.uint8)
+    for x, y, _ in env.world.starts:
+        column, row = (
+            int((value - corner) / resolution)
+            for value, corner in zip((x, y), tables.laser.origin, strict=True)
+        )
+        if cells[row, column] == 0:
+            cv2.floodFill(cells, None, (column, row), (float(reached),), flags=4)
+    return np.asarray(cells == reached)

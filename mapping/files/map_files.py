@@ -1,0 +1,311 @@
+"""Occupancy maps as files: the map format of ROS (yaml and image).
+
+References
+----------
+The interpretation of pixels follows ROS map_server (trinary, scale, raw), http://wiki.ros.org/map_server.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from lidarium.mapping.files.output import write_whole
+
+OCCUPIED, UNKNOWN, FREE = 0, 127, 255
+
+_MODES = ("trinary", "scale", "raw")
+_REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+_PGM_LEVELS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapImage:
+    """An occupancy map of three levels.
+
+    Attributes
+    ----------
+    levels : (rows, columns) uint8
+        0 occupied, 127 unknown, 255 free; row 0 at the lowest y of the map's own axes.
+    origin : (x, y, yaw)
+        Pose of the lower left corner of cell (0, 0) [m, rad].
+    resolution : float
+        Side of a cell [m].
+    """
+
+    levels: NDArray[np.uint8]
+    origin: tuple[float, float, float]
+    resolution: float
+
+
+def read_ros_map(yaml_path: Path) -> MapImage:
+    """Read a map of ROS map_server.
+
+    Parameters
+    ----------
+    yaml_path : Path
+        The yaml file; its image is found beside it.
+
+    Returns
+    -------
+    MapImage
+        The map. In scale and raw mode too, what is between the thresholds is unknown.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the yaml file or its image is not there.
+    ValueError
+        If a key is missing or has a bad value, or the image cannot be read.
+    """
+    yaml_path = Path(yaml_path)
+    header = _read_header(yaml_path)
+    image_path = yaml_path.parent / str(header["image"])
+    pixels = read_image(image_path)
+    shades, opacity = _shades(pixels)
+    low, high = _number(yaml_path, header, "free_thresh"), _number(yaml_path, header, "occupied_thresh")
+    if not 0.0 <= low < high <= 1.0:
+        raise ValueError(
+            f"{yaml_path}: free_thresh is {low} and occupied_thresh {high}; want 0 <= free_thresh < occupied_thresh <= 1"
+        )
+    mode = str(header.get("mode", "trinary"))
+    if mode not in _MODES:
+        raise ValueError(f"{yaml_path}: mode is {mode!r}; want one of {', '.join(_MODES)}")
+    levels = (
+        _raw_levels(shades, low, high)
+        if mode == "raw"
+        else _levels(shades, bool(_number(yaml_path, header, "negate")), low, high)
+    )
+    if mode == "scale":
+        levels[opacity < 1.0] = UNKNOWN
+    return MapImage(
+        np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header)
+    )
+
+
+def read_grey_map(path: Path, resolution: float) -> MapImage:
+    """Read a plain image as a map: black is occupied, white free, and what lies between is unknown.
+
+    Parameters
+    ----------
+    path : Path
+        The image; colours count as their mean.
+    resolution : float
+        Side of a cell [m].
+
+    Returns
+    -------
+    MapImage
+        The map, its origin at (0, 0).
+
+    Raises
+    ------
+    FileNotFoundError
+        If it is not there.
+    ValueError
+        If it cannot be read, or the resolution is not a positive number.
+    """
+    if not (math.isfinite(resolution) and resolution > 0.0):
+        raise ValueError(f"{path}: resolution is {resolution} m; want a positive number")
+    shades, opacity = _shades(read_image(Path(path)))
+    levels = _levels(shades, negate=False, low=0.196, high=0.65)
+    levels[opacity < 1.0] = UNKNOWN
+    return MapImage(np.ascontiguousarray(levels[::-1]), (0.0, 0.0, 0.0), resolution)
+
+
+def write_ros_map(
+    folder: Path, name: str, levels: NDArray[np.uint8], origin: tuple[float, float, float], resolution: float
+) -> Path:
+    """Write a map for ROS map_server: ``name.yaml`` and ``name.pgm``.
+
+    Both files are written beside and then renamed, the yaml last, so that a reader never finds half a map.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to write; made if absent.
+    name : str
+        Stem of both files.
+    levels : (rows, columns) uint8
+        0 occupied, 127 unknown, 255 free; row 0 at the lowest y.
+    origin : (x, y, yaw)
+        Pose of the lower left corner [m, rad].
+    resolution : float
+        Side of a cell [m].
+
+    Returns
+    -------
+    Path
+        The yaml file.
+
+    Raises
+    ------
+    ValueError
+        If a level is none of the three, the map is empty, or origin or resolution are no good.
+    """
+    levels = np.asarray(levels)
+    if levels.ndim != 2 or levels.size == 0:
+        raise ValueError(f"map {name!r} has shape {levels.shape}; want rows and columns")
+    if not np.isin(levels, list(_PGM_LEVELS)).all():
+        raise ValueError(
+            f"map {name!r} has levels {np.unique(levels)[:6]}; want only {OCCUPIED} occupied, {UNKNOWN} unknown, {FREE} free"
+        )
+    if len(origin) != 3 or not np.isfinite(origin).all():
+        raise ValueError(f"map {name!r} has origin {origin}; want (x, y, yaw) in metres and radians")
+    if not (math.isfinite(resolution) and resolution > 0.0):
+        raise ValueError(f"map {name!r} has a resolution of {resolution} m; want a positive number")
+    table = np.zeros(256, dtype=np.uint8)
+    for level, grey in _PGM_LEVELS.items():
+        table[level] = grey
+    pixels = table[levels[::-1].astype(np.uint8)]
+    header = {
+        "image": f"{name}.pgm",
+        "mode": "trinary",
+        "resolution": float(resolution),
+        "origin": [float(value) for value in origin],
+        "negate": 0,
+        "occupied_thresh": 0.65,
+        "free_thresh": 0.196,
+    }
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(
+        folder / f"{name}.pgm", f"P5\n{pixels.shape[1]} {pixels.shape[0]}\n255\n".encode() + pixels.tobytes()
+    )
+    write_whole(folder / f"{name}.yaml", yaml.safe_dump(header, sort_keys=False).encode())
+    return folder / f"{name}.yaml"
+
+
+def cropped(
+    levels: NDArray[np.uint8], origin: tuple[float, float], resolution: float, margin: int = 4
+) -> tuple[NDArray[np.uint8], tuple[float, float]]:
+    """Return the part of a map that is known, with a margin [cells] where the map has one, and its lower left corner [m].
+
+    Parameters
+    ----------
+    levels : (rows, columns) uint8
+        0 occupied, 127 unknown, 255 free; row 0 at the lowest y.
+    origin : (x, y)
+        Lower left corner [m].
+    resolution : float
+        Side of a cell [m].
+    """
+    is_known = levels != UNKNOWN
+    if not is_known.any():
+        return levels, origin
+    rows, columns = np.flatnonzero(is_known.any(axis=1)), np.flatnonzero(is_known.any(axis=0))
+    row, column = max(int(rows[0]) - margin, 0), max(int(columns[0]) - margin, 0)
+    part = levels[row : int(rows[-1]) + 1 + margin, column : int(columns[-1]) + 1 + margin]
+    return np.ascontiguousarray(part), (origin[0] + column * resolution, origin[1] + row * resolution)
+
+
+def read_image(path: Path) -> NDArray[Any]:
+    """Read an image file with all its channels.
+
+    Parameters
+    ----------
+    path : Path
+        Any format that OpenCV reads (png, pgm, bmp, jpg, tif, ...).
+
+    Returns
+    -------
+    (rows, columns) or (rows, columns, channels) uint8 or uint16
+        The pixels, row 0 at the top, channels in OpenCV's order (blue first).
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is a folder or not an image.
+    """
+    path = Path(path)
+    check_file(path)
+    content = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    try:
+        pixels = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
+    except cv2.error:
+        pixels = None
+    if pixels is None:
+        raise ValueError(f"{path} is not an image that can be read; want png, pgm, bmp, jpg or tif")
+    return pixels
+
+
+def check_file(path: Path) -> None:
+    """Raise FileNotFoundError where nothing is, ValueError where a folder is."""
+    if not path.exists():
+        raise FileNotFoundError(f"there is no file {path}")
+    if path.is_dir():
+        raise ValueError(f"{path} is a folder; want a file")
+
+
+def _read_header(path: Path) -> dict[str, Any]:
+    check_file(path)
+    try:
+        header = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is not a yaml file: {' '.join(str(error).split())}") from error
+    if not isinstance(header, dict):
+        raise ValueError(f"{path} has no keys; want the yaml file of a ROS map with {', '.join(_REQUIRED)}")
+    missing = [key for key in _REQUIRED if key not in header]
+    if missing:
+        raise ValueError(f"{path} has no key {', '.join(missing)}; a ROS map has {', '.join(_REQUIRED)}")
+    return header
+
+
+def _number(path: Path, header: dict[str, Any], key: str) -> float:
+    try:
+        value = float(header[key])
+    except (TypeError, ValueError):
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{path}: {key} is {header[key]!r}; want a number")
+    return value
+
+
+def _resolution(path: Path, header: dict[str, Any]) -> float:
+    resolution = _number(path, header, "resolution")
+    if resolution <= 0.0:
+        raise ValueError(f"{path}: resolution is {resolution} m; want a positive number")
+    return resolution
+
+
+def _origin(path: Path, header: dict[str, Any]) -> tuple[float, float, float]:
+    try:
+        x, y, yaw = (float(value) for value in header["origin"])
+    except (TypeError, ValueError):
+        x = y = yaw = math.nan
+    if not np.isfinite([x, y, yaw]).all():
+        raise ValueError(f"{path}: origin is {header['origin']!r}; want [x, y, yaw] in metres and radians")
+    return x, y, yaw
+
+
+def _shades(pixels: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean of the colour channels in 0..255 and the opacity in 0..1."""
+    scaled = pixels.astype(np.float64) * (255.0 / np.iinfo(pixels.dtype).max)
+    if scaled.ndim == 2:
+        return scaled, np.ones(scaled.shape)
+    if scaled.shape[2] in (2, 4):
+        return scaled[..., :-1].mean(axis=2), scaled[..., -1] / 255.0
+    return scaled.mean(axis=2), np.ones(scaled.shape[:2])
+
+
+def _levels(shades: NDArray[np.float64], negate: bool, low: float, high: float) -> NDArray[np.uint8]:
+    occupancy = (shades if negate else 255.0 - shades) / 255.0
+    levels = np.full(shades.shape, UNKNOWN, dtype=np.uint8)
+    levels[occupancy > high] = OCCUPIED
+    levels[occupancy < low] = FREE
+    return levels
+
+
+def _raw_levels(shades: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
+    """Read pixels as occupancy in percent; above 100 is unknown."""
+    levels = np.full(shades.shape, UNKNOWN, dtype=np.uint8)
+    levels[(shades > high * 100.0) & (shades <= 100.0)] = OCCUPIED
+    levels[shades < low * 100.0] = FREE
+    return levels

@@ -1,0 +1,1 @@
+"""Rigid transforms of the plane."""

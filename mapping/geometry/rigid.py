@@ -1,0 +1,123 @@
+"""Rigid motions of the plane."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """A rotation and then a translation; as ``a_from_b`` it maps points of b into a.
+
+    Attributes
+    ----------
+    x, y : float
+        Translation [m].
+    theta : float
+        Rotation, counter-clockwise [rad].
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    theta: float = 0.0
+
+    def apply(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Map points, shape (..., 2) [m]."""
+        places = np.asarray(points, np.float64)
+        cosine, sine = math.cos(self.theta), math.sin(self.theta)
+        x, y = places[..., 0], places[..., 1]
+        moved = np.empty(places.shape)
+        moved[..., 0] = cosine * x - sine * y + self.x
+        moved[..., 1] = sine * x + cosine * y + self.y
+        return moved
+
+    def __matmul__(self, other: "Transform") -> "Transform":
+        """Return the motion that does ``other`` first and then this one."""
+        cosine, sine = math.cos(self.theta), math.sin(self.theta)
+        x, y = cosine * other.x - sine * other.y + self.x, sine * other.x + cosine * other.y + self.y
+        return Transform(x, y, wrapped(self.theta + other.theta))
+
+    def inverse(self) -> "Transform":
+        """Return the motion that undoes this one."""
+        cosine, sine = math.cos(self.theta), math.sin(self.theta)
+        return Transform(
+            -cosine * self.x - sine * self.y, sine * self.x - cosine * self.y, wrapped(-self.theta)
+        )
+
+    def difference(self, other: "Transform", at: ArrayLike = (0.0, 0.0)) -> tuple[float, float]:
+        """Return how far the images of a point under both lie apart [m], and the angle between them [rad]."""
+        return float(np.linalg.norm(self.apply(at) - other.apply(at))), abs(wrapped(self.theta - other.theta))
+
+
+def wrapped(angle: float) -> float:
+    """Return an angle in (-pi, pi]."""
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+
+
+def yaw_of_quaternion(z: float, w: float) -> float:
+    """Return the angle in (-pi, pi] of a rotation about the vertical, of the quaternion (0, 0, z, w), of whatever length and sign."""
+    return wrapped(2.0 * math.atan2(z, w))
+
+
+def halfway(first: Transform, second: Transform, at: ArrayLike) -> Transform:
+    """Return the motion half way between two, which takes a point half way between its images."""
+    turn = Transform(0.0, 0.0, wrapped(first.theta + 0.5 * wrapped(second.theta - first.theta)))
+    x, y = (0.5 * (first.apply(at) + second.apply(at)) - turn.apply(at)).tolist()
+    return Transform(x, y, turn.theta)
+
+
+def fit(source: NDArray[np.float64], target: NDArray[np.float64]) -> Transform:
+    """Return the rigid motion that brings points nearest to others in the sense of least squares.
+
+    Parameters
+    ----------
+    source, target : (n, 2) float64
+        Pairs of points [m].
+
+    Returns
+    -------
+    Transform
+        Maps source to target; a mere translation where all source points are one.
+
+    Raises
+    ------
+    ValueError
+        Where there are no pairs or not equally many points.
+    """
+    if len(source) == 0 or source.shape != target.shape:
+        raise ValueError(
+            f"source and target have shapes {source.shape} and {target.shape}; want (n, 2) each with n >= 1"
+        )
+    source_centre, target_centre = source.mean(axis=0), target.mean(axis=0)
+    p, q = source - source_centre, target - target_centre
+    theta = math.atan2(float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum()))
+    x, y = (target_centre - Transform(0.0, 0.0, theta).apply(source_centre)).tolist()
+    return Transform(x, y, theta)
+
+
+def composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses x, y, theta (..., 3) given in the frames ``outer`` (..., 3), in the frame of these [m, rad]."""
+    cosine, sine = np.cos(outer[..., 2]), np.sin(outer[..., 2])
+    x, y = inner[..., 0], inner[..., 1]
+    return np.stack(
+        [
+            cosine * x - sine * y + outer[..., 0],
+            sine * x + cosine * y + outer[..., 1],
+            _turned(outer, inner, 1.0),
+        ],
+        axis=-1,
+    )
+
+
+def relative(frame: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses x, y, theta (..., 3) as seen from the frames (..., 3) [m, rad]: ``composed(frame, relative(frame, pose)) = pose``."""
+    cosine, sine = np.cos(frame[..., 2]), np.sin(frame[..., 2])
+    x, y = pose[..., 0] - frame[..., 0], pose[..., 1] - frame[..., 1]
+    return np.stack([cosine * x + sine * y, cosine * y - sine * x, _turned(pose, frame, -1.0)], axis=-1)
+
+
+def _turned(first: NDArray[np.float64], second: NDArray[np.float64], sign: float) -> NDArray[np.float64]:
+    """Return the first heading plus or minus the second, in (-pi, pi]."""
+    return np.asarray(math.pi - (math.pi - first[..., 2] - sign * second[..., 2]) % (2.0 * math.pi))

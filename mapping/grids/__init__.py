@@ -1,0 +1,1 @@
+"""Occupancy grids: their cells, their updates by scans, crops of them."""

@@ -1,0 +1,210 @@
+"""Crops of a map around a robot as three levels: along the axes of the map, and turned with the robot at several scales.
+
+A crop at scale s shows s x s cells of the map as one, by their greatest log-odds: occupied where any is, else
+unknown where any is, else free. Such pooled maps are kept beside the map and brought up to date where it has
+changed, so that a crop reads no more cells than it shows. A turned crop is looked up block by block in
+registers where the processor can do that; elsewhere the pooled cells that it can touch are copied into a
+small patch, and each cell of the crop is looked up there.
+"""
+
+import math
+
+import numpy as np
+
+from lidarium.mapping.grids.cell_blocks import BLOCK, HALF_BLOCK, write_block_of_levels, write_levels
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.grids.turned_crops import CAN_LOOK_UP_IN_REGISTERS, turn_blocks
+from lidarium.mapping.grids.turned_crops import SIDE as BLOCK_SIDE
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import bytes_at, int8_at, int8_grid_at, scratch_grid
+
+_FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIED)
+
+HALF_STEP = 32768.0
+"""Half a cell in the numbers with 16 binary places by which a crop is looked up.
+
+Whole numbers throughout: crops at headings a quarter apart look up the same cells, and no sum of steps
+drifts. """
+
+
+@kernel(inline=True)
+def _level(log_odds: int) -> np.uint8:
+    return _FREE if log_odds < 0 else (_OCCUPIED if log_odds > 0 else _UNKNOWN)
+
+
+@kernel(inline=True, borrowing=True)
+def _write_row(log_odds: int, count: int, levels: int) -> None:
+    """Write ``count`` cells from one address on as levels from another on."""
+    if count < HALF_BLOCK:
+        source, target = int8_at(log_odds, count), bytes_at(levels, count)
+        for j in range(count):
+            target[j] = _level(source[j])
+        return
+    # The last ones may overlap those before: nothing remains to go through one by one.
+    if count < BLOCK:
+        write_levels(log_odds, levels)
+        write_levels(log_odds + count - HALF_BLOCK, levels + count - HALF_BLOCK)
+        return
+    for place in range(0, count - BLOCK, BLOCK):
+        write_block_of_levels(log_odds + place, levels + place)
+    write_block_of_levels(log_odds + count - BLOCK, levels + count - BLOCK)
+
+
+@kernel(borrowing=True)
+def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
+    """Copy the cells around (row, column) into ``crop`` (side, side), contiguous, as levels; unknown outside of the map."""
+    side = crop.shape[0]
+    first_row, first_column = row - side // 2, column - side // 2
+    rows, columns = log_odds.shape
+    low, high = min(max(0, -first_column), side), max(min(side, columns - first_column), 0)
+    for i in range(side):
+        map_row, target = first_row + i, crop.ctypes.data + i * side
+        if map_row < 0 or map_row >= rows or low >= high:
+            crop[i, :] = _UNKNOWN
+            continue
+        if low > 0 or high < side:
+            crop[i, :low] = _UNKNOWN
+            crop[i, high:] = _UNKNOWN
+        _write_row(log_odds.ctypes.data + map_row * columns + first_column + low, high - low, target + low)
+
+
+@kernel
+def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
+    """Fill the crops of ``crop_turned`` cell by cell: of any side, on any processor."""
+    cells, cosine, sine = crops.shape[1], math.cos(heading), math.sin(heading)
+    half = _half_patch(cells, cosine, sine)
+    width = (2 * half + HALF_BLOCK - 1) // HALF_BLOCK * HALF_BLOCK
+    spans = np.empty((2 * half, 2), np.int64)
+    _touched_columns(cells, half, cosine, sine, spans)
+    places = _places(half, width, round(cosine * HALF_STEP), round(sine * HALF_STEP), cells)
+    patch = np.empty(2 * half * width, np.uint8)
+    for k in range(scales.shape[0]):
+        row, column = _nearest_corner(x, y, scales[k])
+        _copy_levels(
+            int8_grid_at(pools[k, 0], pools[k, 1], pools[k, 2]), row - half, column - half, spans, patch
+        )
+        _look_up(patch, places, crops[k].reshape(cells * cells).view(np.uint32))
+
+
+@kernel(borrowing=True)
+def turn_in_registers(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
+    """Fill the crops of ``crop_turned`` by blocks: of a side that is a multiple of ``BLOCK_SIDE``, where ``CAN_LOOK_UP_IN_REGISTERS``."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    half = _half_patch(crops.shape[1], cosine, sine)
+    corners = scratch_grid(scales.shape[0], 2, np.int64)
+    for k in range(scales.shape[0]):
+        row, column = _nearest_corner(x, y, scales[k])
+        corners[k, 0], corners[k, 1] = row - half, column - half
+    turn_blocks(pools, corners, half, round(cosine * HALF_STEP), round(sine * HALF_STEP), crops)
+
+
+_turn_whole_blocks = turn_in_registers if CAN_LOOK_UP_IN_REGISTERS else turn_by_cells
+"""What a processor cannot run is not compiled for it."""
+
+
+@kernel(inline=True)
+def _half_patch(cells: int, cosine: float, sine: float) -> int:
+    """Return half the rows and columns of the patch that a turned crop touches."""
+    return int(math.ceil(0.5 * cells * (abs(cosine) + abs(sine))))
+
+
+@kernel(inline=True)
+def _nearest_corner(x: float, y: float, scale: int) -> tuple[int, int]:
+    """Return row and column of the corner of pooled cells that is nearest to a place [cells of the map]."""
+    return int(math.floor(y / scale + 0.5)), int(math.floor(x / scale + 0.5))
+
+
+@kernel
+def _look_up(patch: Array, places: Array, crop: Array) -> None:
+    """Write what a patch has at each of the places into a crop, four cells at a time: a core loads more often than it can store."""
+    for word in range(crop.size):
+        place = 4 * word
+        low = np.uint32(patch[places[place]]) | (np.uint32(patch[places[place + 1]]) << np.uint32(8))
+        high = np.uint32(patch[places[place + 2]]) | (np.uint32(patch[places[place + 3]]) << np.uint32(8))
+        crop[word] = low | (high << np.uint32(16))
+
+
+@kernel
+def _touched_columns(cells: int, half: int, cosine: float, sine: float, spans: Array) -> None:
+    """Tell which columns of each row of a patch the turned crop covers, in whole blocks: (rows, 2), high ends exclusive."""
+    # Each pair of parallel sides of the crop bounds the columns of a row; near the axes one of them hardly
+    # does.
+    along, across = max(abs(cosine), 1e-9), max(abs(sine), 1e-9)
+    reach_along, reach_across = 0.5 * (cells + across) / along, 0.5 * (cells + along) / across
+    slope_along, slope_across = (
+        -math.copysign(sine, sine * cosine) / along,
+        math.copysign(cosine, sine * cosine) / across,
+    )
+    for row in range(spans.shape[0]):
+        y = row + 0.5 - half
+        middle_along, middle_across = slope_along * y, slope_across * y
+        low = max(middle_along - reach_along, middle_across - reach_across, -half)
+        high = min(middle_along + reach_along, middle_across + reach_across, half)
+        spans[row, 0] = (int(math.floor(low)) + half) // HALF_BLOCK * HALF_BLOCK
+        spans[row, 1] = (int(math.ceil(high)) + half + HALF_BLOCK - 1) // HALF_BLOCK * HALF_BLOCK
+
+
+@kernel
+def _copy_levels(pooled: Array, first_row: int, first_column: int, spans: Array, patch: Array) -> None:
+    """Fill the spans of a patch (rows * width) with the levels of a pooled map from (first_row, first_column) on."""
+    (rows, columns), width = pooled.shape, patch.size // spans.shape[0]
+    inside_low, inside_high = min(max(0, -first_column), width), max(min(width, columns - first_column), 0)
+    for row in range(spans.shape[0]):
+        low, high, map_row = spans[row, 0], spans[row, 1], first_row + row
+        if map_row < 0 or map_row >= rows or low < inside_low or high > inside_high:
+            patch[row * width + low : row * width + high] = _UNKNOWN
+            low, high = max(low, inside_low), min(high, inside_high)
+        if 0 <= map_row < rows and low < high:
+            source = pooled.ctypes.data + map_row * columns + first_column + low
+            _write_row(source, high - low, patch.ctypes.data + row * width + low)
+
+
+@kernel
+def _places(half: int, width: int, step_x: int, step_y: int, cells: int) -> Array:
+    """Return where in a patch, row * width + column, the centre of each cell of the crop lies: (cells * cells,) uint32."""
+    stride = np.uint32(width)
+    forward_x, forward_y = np.empty(cells, np.int32), np.empty(cells, np.int32)
+    for j in range(cells):
+        forward_x[j] = (half << 16) + (2 * j + 1 - cells) * step_x
+        forward_y[j] = (half << 16) + (2 * j + 1 - cells) * step_y
+    places = np.empty((cells, cells), np.uint32)
+    for i in range(cells):
+        left_x, left_y = np.int32((cells - 1 - 2 * i) * step_y), np.int32((2 * i + 1 - cells) * step_x)
+        places_of_row = places[i]
+        for j in range(cells):
+            # The compiler widens sums to 64 bits unless told otherwise, and goes through half as many at a
+            # time.
+            x, y = (
+                np.uint32(left_x + forward_x[j]) >> np.uint32(16),
+                np.uint32(left_y + forward_y[j]) >> np.uint32(16),
+            )
+            places_of_row[j] = np.uint32(np.uint32(y) * stride) + np.uint32(x)
+    return places.reshape(cells * cells)
+
+
+@kernel(borrowing=True)
+def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
+    """Fill crops that are turned with a robot, as levels; unknown outside of the map.
+
+    Rows of a crop go to the robot's left, columns forward; the robot is at the centre. The crop turns about
+    the corner of the pooled cells that is nearest to the robot, so that at headings along the axes a crop is
+    exactly the pooled cells around that corner, turned by quarters. In between, a cell of the crop shows the
+    pooled cell in which its centre lies.
+
+    Parameters
+    ----------
+    pools : (scales, 3) int64
+        Address, rows and columns of the pooled map of each scale; at scale 1 the map itself.
+    x, y : float
+        Where the robot is [cells of the map].
+    heading : float
+        Where it looks in the map [rad].
+    scales : (scales,) int64
+        Side of a crop's cell [cells of the map].
+    crops : (scales, side, side) uint8
+        Written: 0 occupied, 127 unknown, 255 free; side an even number.
+    """
+    if CAN_LOOK_UP_IN_REGISTERS and crops.shape[1] % BLOCK_SIDE == 0:
+        _turn_whole_blocks(pools, x, y, heading, scales, crops)
+    else:
+        turn_by_cells(pools, x, y, heading, scales, crops)

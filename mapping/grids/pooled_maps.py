@@ -1,0 +1,122 @@
+"""Maps of which a cell shows the greatest log-odds of a square of cells, kept beside a map and made anew only where it has changed.
+
+Where that is, is told by bits: one for each word of 64 cells in which a level has changed, and one for each
+row that has such words, behind the last row, so that rows in which nothing has changed are not even looked
+at.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.grids.cell_blocks import write_greatest
+from lidarium.mapping.grids.occupancy import WORD
+from lidarium.mapping.kernels.bit_words import first_bit
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import scratch_vector, vector_at
+
+
+@kernel(inline=True)
+def touched_words(columns: int) -> int:
+    """Return how many words hold a bit for each word of 64 cells of a row of a map."""
+    return (columns + WORD * WORD - 1) // (WORD * WORD)
+
+
+def untouched(rows: int, columns: int) -> NDArray[np.uint64]:
+    """Return the bits of what has changed in a map, where nothing has: (rows + rows / 64, ``touched_words``); none for no rows."""
+    return np.zeros((rows + -(-rows // WORD), touched_words(columns)), np.uint64)
+
+
+def touch(touched: NDArray[np.uint64], rows: tuple[int, int], words: tuple[int, int]) -> None:
+    """Note that a map has changed in rows and in words of 64 cells of them (low, high)."""
+    of_rows = len(touched) - -(-len(touched) // (WORD + 1))
+    for word in range(*words):
+        touched[rows[0] : rows[1], word // WORD] |= np.uint64(1 << word % WORD)
+    for row in range(*rows):
+        touched[of_rows + row // WORD, 0] |= np.uint64(1 << row % WORD)
+
+
+@kernel(borrowing=True)
+def pool_touched(log_odds: Array, touched: Array, scale: int, pooled: Array) -> None:
+    """Bring a pooled map up to date where levels of the map have changed.
+
+    Parameters
+    ----------
+    log_odds : (rows, columns) int8
+        The map; columns a multiple of 64.
+    touched : (rows + rows / 64, touched_words) uint64
+        Bits of the words of 64 cells in which a level has changed, and of their rows, see ``untouched``.
+    scale : int
+        Side of a pooled cell [cells of the map].
+    pooled : (ceil(rows / scale), ceil(columns / scale)) int8
+        Of the sign of the greatest log-odds of the cells of each pooled cell; what a pooled cell has beyond
+        the map counts as unknown.
+    """
+    rows, greatest = log_odds.shape[0], scratch_vector(WORD, np.int8)
+    for group in range(rows, touched.shape[0]):
+        left = touched[group, 0]
+        while left != np.uint64(0):
+            row = (group - rows) * WORD + first_bit(left)
+            # The rows of one row of pooled cells are pooled together, as far as this word of rows goes.
+            end = min((row // scale + 1) * scale, (group - rows + 1) * WORD)
+            for place in range(touched.shape[1]):
+                words = np.uint64(0)
+                for other in range(row, min(end, rows)):
+                    words |= touched[other, place]
+                while words != np.uint64(0):
+                    _pool_word(
+                        log_odds, row // scale, place * WORD + first_bit(words), scale, greatest, pooled
+                    )
+                    words &= words - np.uint64(1)
+            left = left >> np.uint64(end & 63) << np.uint64(end & 63) if end & 63 else np.uint64(0)
+
+
+@kernel(borrowing=True)
+def forget_touched(touched: Array, rows: int) -> None:
+    """Forget where a map of so many rows has changed."""
+    for group in range(rows, touched.shape[0]):
+        left = touched[group, 0]
+        touched[group, 0] = np.uint64(0)
+        while left != np.uint64(0):
+            touched[(group - rows) * WORD + first_bit(left), :] = np.uint64(0)
+            left &= left - np.uint64(1)
+
+
+@kernel(inline=True, borrowing=True)
+def _pool_word(log_odds: Array, row: int, word: int, scale: int, greatest: Array, pooled: Array) -> None:
+    """Write the pooled cells of a word of 64 cells in a row of pooled cells.
+
+    ``greatest`` (64,) int8 is scratch.
+    """
+    rows, columns = log_odds.shape
+    if scale in (2, 4, 8, 16):
+        width, halvings = WORD // scale, 0
+        while (1 << halvings) < scale:
+            halvings += 1
+        first_row, count = row * scale, min(scale, rows - row * scale)
+        source, target = (
+            log_odds.ctypes.data + first_row * columns + word * WORD,
+            pooled.ctypes.data + row * pooled.shape[1] + word * width,
+        )
+        write_greatest(source, columns, count, -128 if count == scale else 0, halvings, greatest.ctypes.data)
+        for place in range(0, width, 4):
+            vector_at(target + place, 1, np.uint32)[0] = vector_at(
+                greatest.ctypes.data + place, 1, np.uint32
+            )[0]
+        return
+    for column in range(word * WORD // scale, min(((word + 1) * WORD - 1) // scale + 1, pooled.shape[1])):
+        pooled[row, column] = _greatest(log_odds, row * scale, column * scale, scale)
+
+
+@kernel(inline=True, borrowing=True)
+def _greatest(log_odds: Array, first_row: int, first_column: int, scale: int) -> np.int8:
+    """Return the greatest log-odds of a square of cells; beyond the map they are 0."""
+    last_row, last_column = (
+        min(first_row + scale, log_odds.shape[0]),
+        min(first_column + scale, log_odds.shape[1]),
+    )
+    is_whole = last_row == first_row + scale and last_column == first_column + scale
+    greatest = np.int8(-128) if is_whole else np.int8(0)
+    for row in range(first_row, last_row):
+        for column in range(first_column, last_column):
+            greatest = max(greatest, log_odds[row, column])
+    return greatest

@@ -1,0 +1,251 @@
+"""The area that a scan has seen, as bits: one bit per cell, rows of 64-bit words.
+
+A scan is a star-shaped polygon: the laser's position and the end points of the beams in order. Neighbouring
+beams span a fan between them. Where their ranges differ so much that no surface seen at more than about seven
+degrees could join the two end points, the fan ends at the nearer range: nothing is claimed about what lies
+behind an edge. A cell is seen when its centre lies inside the polygon.
+
+Each edge of the polygon toggles one bit in every row of cells whose centre line it crosses, at the first cell
+centre right of the crossing; the running exclusive-or along a row is then the inside of the polygon, and
+every cell is visited once however many beams crossed it.
+"""
+
+import numpy as np
+
+from lidarium.mapping.kernels.bit_words import running_xor
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import scratch_vector, vector_at
+
+GRAZING = 8.0
+"""Cotangent of the flattest angle under which two neighbouring end points still belong to one surface."""
+
+JUMP = np.uint8(255)
+"""Mark of an edge that is walked by itself: from a near to a far end point, or across more rows than a byte holds."""
+
+
+@kernel(inline=True)
+def window_words(reach: float) -> int:
+    """Words per row of a scan's window: ``reach`` cells to both sides, from any alignment."""
+    return (2 * (int(reach) + 3)) // 64 + 2
+
+
+@kernel(inline=True)
+def window_rows(reach: float) -> int:
+    """Rows of a scan's window."""
+    return 2 * (int(reach) + 3) + 1
+
+
+@kernel(inline=True, borrowing=True)
+def _toggle_bit(bits: int, place: int) -> None:
+    """Toggle a bit of the words at an address.
+
+    Words are reached by address throughout: numba counts who holds an array whenever it is handed on or a
+    part of it is taken, which for the few bits of an edge would cost more than the edge.
+    """
+    vector_at(bits + (place >> 6 << 3), 1, np.uint64)[0] ^= np.uint64(1) << np.uint64(place & 63)
+
+
+@kernel(inline=True, borrowing=True)
+def _toggle_edge(
+    bits: int, width: int, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int
+) -> None:
+    """Toggle the cell centres right of the edge, in the rows of ``width`` between its ends (half open, so that corners count once)."""
+    slope = (to_x - from_x) / (to_y - from_y)
+    first, last = min(from_row, to_row), max(from_row, to_row)
+    x = from_x + (first + 0.5 - from_y) * slope + 0.5
+    for start in range(first * width, last * width, width):
+        _toggle_bit(bits, start + int(x))
+        x += slope
+
+
+@kernel(inline=True)
+def _row_of(y: float) -> int:
+    """First row whose centre line is not below y; y is not negative."""
+    return int(y + 0.5)
+
+
+@kernel(borrowing=True)
+def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array) -> None:
+    """Fill ``ends`` (2, beams) with the end points of the beams in the window [cells].
+
+    Parameters
+    ----------
+    lengths : (beams,) float64
+        How far each beam went [cells], 0 for a beam that says nothing.
+    directions : (2 or more, beams) float64
+        Unit vectors of the beams in the grid's axes.
+    x, y : float
+        Position of the laser in the window [cells].
+    ends : (2, beams) float64
+        Result.
+    """
+    for beam in range(lengths.shape[0]):
+        ends[0, beam] = x + lengths[beam] * directions[0, beam]
+    for beam in range(lengths.shape[0]):
+        ends[1, beam] = y + lengths[beam] * directions[1, beam]
+
+
+@kernel(inline=True, borrowing=True)
+def _toggle_between(
+    bits: int,
+    width: int,
+    lengths: Array,
+    directions: Array,
+    ends: Array,
+    x: float,
+    y: float,
+    previous: int,
+    beam: int,
+    steepness: float,
+) -> None:
+    """Toggle the outline between the end points of two neighbouring beams."""
+    step = lengths[beam] - lengths[previous]
+    if abs(step) <= 1.0 + steepness * min(lengths[beam], lengths[previous]):
+        from_row, to_row = _row_of(ends[1, previous]), _row_of(ends[1, beam])
+        if from_row != to_row:
+            _toggle_edge(
+                bits,
+                width,
+                ends[0, previous],
+                ends[1, previous],
+                ends[0, beam],
+                ends[1, beam],
+                from_row,
+                to_row,
+            )
+        return
+    # Between a near and a far end point the outline goes along the far beam, up to the near range only.
+    near, far = (previous, beam) if step > 0.0 else (beam, previous)
+    corner_x, corner_y = x + lengths[near] * directions[0, far], y + lengths[near] * directions[1, far]
+    row = _row_of(corner_y)
+    for end in (near, far):
+        end_row = _row_of(ends[1, end])
+        if end_row != row:
+            _toggle_edge(bits, width, ends[0, end], ends[1, end], corner_x, corner_y, end_row, row)
+
+
+@kernel(borrowing=True)
+def _find_edges(
+    lengths: Array,
+    ends: Array,
+    rows: Array,
+    steepness: float,
+    width: int,
+    crossed: Array,
+    first: Array,
+    second: Array,
+    crossings: Array,
+    slopes: Array,
+) -> None:
+    """Tell how many rows the edge from each beam to the next crosses (or ``JUMP``), which bits it toggles in the first two, its line.
+
+    The line is where it crosses the first row, and by how much farther each one after it. Loops without
+    branches over few arrays, which LLVM runs on vectors.
+    """
+    edges = lengths.shape[0] - 1
+    from_x, to_x, from_y, to_y = ends[0, :-1], ends[0, 1:], ends[1, :-1], ends[1, 1:]
+    from_row, to_row, from_length, to_length = rows[:-1], rows[1:], lengths[:-1], lengths[1:]
+    for k in range(edges):
+        step = abs(to_length[k] - from_length[k])
+        climb = abs(to_row[k] - from_row[k])
+        is_surface = (step <= 1.0 + steepness * min(from_length[k], to_length[k])) & (climb < JUMP)
+        crossed[k] = np.uint8(climb) if is_surface else JUMP
+    for k in range(edges):
+        slopes[k] = (to_x[k] - from_x[k]) / (to_y[k] - from_y[k])
+    for k in range(edges):
+        crossings[k] = from_x[k] + (min(from_row[k], to_row[k]) + 0.5 - from_y[k]) * slopes[k] + 0.5
+    stride = np.int32(width)
+    for k in range(edges):
+        first[k] = min(from_row[k], to_row[k]) * stride + np.int32(crossings[k])
+    for k in range(edges):
+        second[k] = (min(from_row[k], to_row[k]) + np.int32(1)) * stride + np.int32(crossings[k] + slopes[k])
+
+
+@kernel(borrowing=True)
+def fill_scan_polygon(
+    lengths: Array,
+    directions: Array,
+    ends: Array,
+    x: float,
+    y: float,
+    increment: float,
+    is_full_circle: bool,
+    bits: Array,
+) -> tuple[int, int, int, int]:
+    """Set the bits of the cells whose centre the scan has seen.
+
+    Parameters
+    ----------
+    lengths, directions, ends : arrays
+        As for ``scan_ends``.
+    x, y : float
+        Position of the laser in the window [cells]; at least the longest range plus 2 from its borders.
+    increment : float
+        Angle between neighbouring beams [rad].
+    is_full_circle : bool
+        Whether the last beam is a neighbour of the first.
+    bits : (rows, words) uint64
+        Zero on entry; row 0 at the lowest y, bit 0 of word 0 at the lowest x.
+
+    Returns
+    -------
+    row_low, row_high, word_low, word_high : int
+        The box that may hold bits, high ends exclusive.
+    """
+    beams = lengths.shape[0]
+    flat, width = bits.ctypes.data, 64 * bits.shape[1]
+    if not is_full_circle:
+        own_row = _row_of(y)
+        for beam in (0, beams - 1):
+            end_row = _row_of(ends[1, beam])
+            if end_row != own_row:
+                _toggle_edge(flat, width, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
+    rows, columns = scratch_vector(beams, np.int32), scratch_vector(beams, np.int32)
+    for beam in range(beams):
+        rows[beam], columns[beam] = np.int32(ends[1, beam] + 0.5), np.int32(ends[0, beam])
+    low_row, high_row, low_column, high_column = np.int32(y), np.int32(y), np.int32(x), np.int32(x)
+    for beam in range(beams):
+        low_row, high_row = min(low_row, rows[beam]), max(high_row, rows[beam])
+        low_column, high_column = min(low_column, columns[beam]), max(high_column, columns[beam])
+    steepness = GRAZING * increment
+    if is_full_circle:
+        _toggle_between(flat, width, lengths, directions, ends, x, y, beams - 1, 0, steepness)
+    crossed, first, second = (
+        scratch_vector(beams, np.uint8),
+        scratch_vector(beams, np.int32),
+        scratch_vector(beams, np.int32),
+    )
+    crossings, slopes = scratch_vector(beams, np.float64), scratch_vector(beams, np.float64)
+    _find_edges(lengths, ends, rows, steepness, width, crossed, first, second, crossings, slopes)
+    toggles, listed = scratch_vector(2 * beams + 2, np.int32), np.uintp(0)
+    for k in range(beams - 1):
+        count = crossed[k]
+        if count == JUMP:
+            _toggle_between(flat, width, lengths, directions, ends, x, y, k, k + 1, steepness)
+            continue
+        # Most edges cross two rows, one or none. What they toggle is listed without branches, which could not
+        # be foreseen.
+        toggles[listed] = first[k]
+        listed += np.uintp(count > 0)
+        toggles[listed] = second[k]
+        listed += np.uintp(count > 1)
+        if count > 2:
+            start, crossing = min(rows[k], rows[k + 1]) * width + width, crossings[k] + slopes[k]
+            for _ in range(2, count):
+                start += width
+                crossing += slopes[k]
+                _toggle_bit(flat, start + int(crossing))
+    for k in range(listed):
+        _toggle_bit(flat, toggles[k])
+    row_low, row_high = max(int(low_row) - 2, 0), min(int(high_row) + 2, bits.shape[0])
+    word_low, word_high = (
+        max(int(low_column) - 1, 0) >> 6,
+        min((int(high_column) + 2) >> 6, bits.shape[1] - 1) + 1,
+    )
+    for i in range(row_low, row_high):
+        carry = np.uint64(0)
+        for word in range(word_low, word_high):
+            value = running_xor(bits[i, word]) ^ carry
+            bits[i, word] = value
+            carry = np.uint64(0) - (value >> np.uint64(63))
+    return row_low, row_high, word_low, word_high

@@ -1,0 +1,42 @@
+"""Specks of free cells within walls: what noise leaves in fine maps, and what nobody who looks at a picture of one wants to see."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
+
+LARGEST_SPECK = 3
+"""So many free cells that no other free cell touches over a side are a speck, where they lie in a wall."""
+
+_CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
+
+
+def without_specks(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a three-level map with the specks of free cells within its walls closed, for pictures.
+
+    Where cells are finer than the noise of the laser, ends of beams scatter over a wall's front, and single
+    free cells remain between them. A speck is a group of at most `LARGEST_SPECK` free cells, joined over
+    sides, half or more of whose sides are walls.
+
+    Parameters
+    ----------
+    levels : (rows, columns) uint8
+        0 occupied, 127 unknown, 255 free; not changed.
+    """
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats(
+        (levels == FREE).astype(np.uint8), connectivity=4
+    )
+    is_small = statistics[:, cv2.CC_STAT_AREA] <= LARGEST_SPECK
+    is_small[0] = False
+    if not is_small.any():
+        return levels.copy()
+    # Sides of each cell that are walls, and those that are not of its own group.
+    walls = cv2.filter2D((levels == OCCUPIED).astype(np.uint8), -1, _CROSS, borderType=cv2.BORDER_CONSTANT)
+    others = cv2.filter2D((levels != FREE).astype(np.uint8), -1, _CROSS, borderType=cv2.BORDER_CONSTANT)
+    speck = is_small[labels]
+    sides = [np.bincount(labels[speck], weights=kind[speck], minlength=count) for kind in (walls, others)]
+    is_in_wall = is_small & (2 * sides[0] >= sides[1]) & (sides[0] > 0)
+    closed = levels.copy()
+    closed[is_in_wall[labels]] = OCCUPIED
+    return closed

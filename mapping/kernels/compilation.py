@@ -1,0 +1,139 @@
+"""The one decorator of all numba kernels: exact arithmetic, cached where a directory can be written.
+
+Numba caches compiled code per source file and does not see a change in another file that the kernel calls
+into. The cache directory is therefore keyed by a hash of all sources with kernels, and is the first writable
+one of: the package's own folder, the user's cache folder, the temporary folder.
+"""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.cache_folders import first_writable, user_cache_folder
+
+Array = NDArray[Any]
+"""An array in the signature of a kernel; its docstring gives shape and type."""
+
+_numba_config: Any = config
+
+PACKAGE_FOLDERS = ("mapping", "envs", "evaluation")
+
+
+def _source_folders() -> list[Path]:
+    """Return the folders whose kernels call each other."""
+    root = Path(__file__).resolve().parents[2]
+    return [root / name for name in PACKAGE_FOLDERS]
+
+
+def _sources_hash() -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for folder in _source_folders():
+        for path in sorted(folder.rglob("*.py")):
+            source = path.read_bytes()
+            if b"@kernel" in source:
+                digest.update(path.relative_to(folder.parent).as_posix().encode())
+                digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> Path | None:
+    """Return the first writable cache folder, or None where nothing can be written."""
+    candidates = (
+        Path(__file__).resolve().parent / "__pycache__" / "kernels",
+        user_cache_folder() / "lidarium" / "kernels",
+        Path(tempfile.gettempdir()) / "lidarium-kernels",
+    )
+    return first_writable(candidate / _sources_hash() for candidate in candidates)
+
+
+_CHOSEN_BY_USER = bool(os.environ.get("NUMBA_CACHE_DIR"))
+_FOLDER = None if _CHOSEN_BY_USER else _cache_folder()
+_CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
+
+
+def is_cache_empty() -> bool:
+    """Whether no kernel has been compiled into the cache yet, so that this start compiles; False where nothing can be kept."""
+    folder = os.environ.get("NUMBA_CACHE_DIR") or _FOLDER
+    return folder is not None and next(Path(folder).rglob("*.nbi"), None) is None
+
+
+def kernel(
+    function: Callable[..., Any] | None = None,
+    *,
+    parallel: bool = False,
+    inline: bool = False,
+    spliced: bool = False,
+    borrowing: bool = False,
+) -> Any:  # noqa: ANN401
+    """Compile a function of arrays with numba: nopython, exact floating point, no GIL, cached.
+
+    Parameters
+    ----------
+    function : callable
+        The function to compile.
+    parallel : bool
+        Whether ``numba.prange`` loops run on threads. Only loops whose iterations write to places of their
+        own may, so that the result does not depend on the number of threads. Such a function calls kernels
+        and does nothing else: what it wrote itself to arrays viewed at addresses, numba would drop as of no
+        use.
+    inline : bool
+        Whether the function is inlined into its callers by LLVM (small helpers in hot loops).
+    spliced : bool
+        Whether numba puts the function's body into its callers before it compiles them. For thin functions
+        around heavy ones: what lies below a compiled function is compiled again with every caller.
+    borrowing : bool
+        Whether the function only works on arrays that others hold: it makes none but by ``scratch_vector``
+        and ``scratch_grid``, and returns none but views at addresses. Nothing is counted then, where each
+        array that is handed on is counted twice otherwise, and the forty of a world as well.
+
+    Returns
+    -------
+    callable
+        The compiled function.
+    """
+
+    def decorate(target: Callable[..., Any]) -> Any:  # noqa: ANN401
+        # Division by zero gives inf or nan, as in numpy: a check before each division would keep loops off
+        # vector registers.
+        options: dict[str, Any] = {
+            "nogil": True,
+            "fastmath": False,
+            "error_model": "numpy",
+            "parallel": parallel,
+            "cache": _CAN_CACHE,
+        }
+        # Told to every kernel: one that says nothing would take over what the first of its callers says.
+        options["_nrt"] = not borrowing
+        if inline:
+            options["forceinline"] = True
+        if spliced:
+            options["inline"] = "always"
+        previous = _numba_config.CACHE_DIR
+        folder = previous if _FOLDER is None else str(_FOLDER)
+        # The serial and the parallel form of one function would take each other's code from the cache, which
+        # knows no options.
+        _numba_config.CACHE_DIR = os.path.join(folder, "parallel") if parallel and folder else folder
+        try:
+            return numba.njit(**options)(target)
+        finally:
+            _numba_config.CACHE_DIR = previous
+
+    return decorate if function is None else decorate(function)
+
+
+def available_threads() -> int:
+    """Return how many threads parallel kernels can use."""
+    return int(_numba_config.NUMBA_NUM_THREADS)
+
+
+def use_threads(threads: int) -> None:
+    """Let parallel kernels run on so many threads of this process from now on."""
+    if numba.get_num_threads() != threads:
+        numba.set_num_threads(threads)

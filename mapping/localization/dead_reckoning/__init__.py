@@ -1,0 +1,1 @@
+"""Poses from odometry alone."""

@@ -1,0 +1,74 @@
+"""What a localizer is: it turns odometry and scans into a believed pose.
+
+A localizer works on arrays alone, so the same one runs inside a simulated robot and on recorded data. Its map
+frame is the frame of the pose that it is reset to.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Sensing:
+    """What a robot senses at a time.
+
+    Attributes
+    ----------
+    time_s : float
+        When the odometry was read and the last beam of the scan was taken [s].
+    odometry : (3,) float64
+        x, y, theta as dead reckoning tells since its own arbitrary beginning [m, rad].
+    ranges : (beams,) float32
+        The scan [m]; inf for no return, nan for an invalid beam.
+    """
+
+    time_s: float
+    odometry: NDArray[np.float64]
+    ranges: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class KeyScans:
+    """Scans at the poses where they are now believed to have been taken, of which a map is rendered.
+
+    Attributes
+    ----------
+    poses : (scans, 3) float64
+        x, y, theta of the robot [m, rad].
+    ranges : (scans, beams) float32
+        Ranges as seen from these poses, motion within the scan undone [m]; inf for no return, nan for an
+        invalid beam.
+    """
+
+    poses: NDArray[np.float64]
+    ranges: NDArray[np.float32]
+
+
+class Localizer(Protocol):
+    """Tells where a robot is, from what it senses."""
+
+    def reset(self, pose: NDArray[np.float64], seed: int) -> None:
+        """Begin anew at x, y, theta (3,) [m, rad]; whatever is drawn comes from ``seed``."""
+        ...
+
+    def localize(self, sensing: Sensing) -> NDArray[np.float64]:
+        """Take in what was sensed, later than all before.
+
+        Return x, y, theta of the robot, shape (3,) [m, rad].
+        """
+        ...
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2].
+
+        Zero where the localizer claims to know.
+        """
+        ...
+
+    def take_correction(self) -> KeyScans | None:
+        """Return what the whole map is to be rendered of anew, once after each time the past was corrected; else None."""
+        ...

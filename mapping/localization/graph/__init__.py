@@ -1,0 +1,1 @@
+"""Graphs of poses, closed by loops."""

@@ -1,0 +1,209 @@
+"""Poses that agree best with what was measured between them, by least squares on sparse matrices.
+
+Minimises the sum over the edges of ``rho(e^T W e)``, e the difference of the pose of b as seen from a from
+what was measured, W its information; rho is the identity for motions, and Cauchy's for closures, of which one
+may be wrong.
+
+References
+----------
+Grisetti et al., A tutorial on graph-based SLAM (IEEE ITS Magazine 2010).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.localization.graph.elimination import Elimination, elimination, factorise, solve
+
+
+class Edges(NamedTuple):
+    """What was measured between poses.
+
+    Attributes
+    ----------
+    a, b : (edges,) int64
+        Numbers of the poses.
+    measured : (edges, 3) float64
+        Pose b as seen from pose a: x, y, theta [m, rad].
+    information : (edges, 3, 3) float64
+        How well, in the frame of a.
+    is_robust : (edges,) bool
+        Whether the edge may be wrong.
+    """
+
+    a: NDArray[np.int64]
+    b: NDArray[np.int64]
+    measured: NDArray[np.float64]
+    information: NDArray[np.float64]
+    is_robust: NDArray[np.bool_]
+
+
+def optimised(
+    poses: NDArray[np.float64], edges: Edges, robust_scale: float, iterations: int, newest: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the poses that agree best with the edges, the first kept, and the covariance of the last.
+
+    Parameters
+    ----------
+    poses : (poses, 3) float64
+        Where to begin: x, y, theta [m, rad]; every pose but the first is joined with the first by edges.
+    edges : Edges
+        What was measured.
+    robust_scale : float
+        Residual, in standard deviations, from which on an edge that may be wrong counts less.
+    iterations : int
+        At most so many steps for each scale, at least 1.
+    newest : int
+        So many of the last edges have not had their say yet. Where they pull hard, they count fully at first,
+        and what others contradict is let go little by little.
+
+    Returns
+    -------
+    (poses, 3) float64
+        The poses; those given where no step makes them better.
+    (3, 3) float64
+        Covariance of the last pose against the first [m^2, m rad, rad^2].
+    """
+    if len(poses) < 2:
+        return poses.copy(), np.zeros((3, 3))
+    # The first pose stays where it is: the unknowns are those of all others.
+    is_free = (edges.a > 0) & (edges.b > 0)
+    places = elimination(len(poses) - 1, edges.a[is_free] - 1, edges.b[is_free] - 1)
+    factor = np.empty((len(places.rows), 3, 3))
+    best = poses.copy()
+    pull = _squares(best, edges)[len(edges.a) - newest :]
+    scale = max(robust_scale, math.sqrt(float(pull.max())) if len(pull) else 0.0)
+    while True:
+        best = _settled(best, edges, scale, iterations, places, factor)
+        if scale <= robust_scale:
+            break
+        scale = max(0.2 * scale, robust_scale)
+    best[:, 2] = math.pi - (math.pi - best[:, 2]) % (2.0 * math.pi)
+    return best, _last_covariance(places, factor)
+
+
+@kernel
+def residuals(poses: Array, edges: Edges) -> Array:
+    """Return by how much b, as seen from a, differs from what was measured, (edges, 3) float64 [m, rad]; poses are (poses, 3) float64."""
+    rest = np.empty((len(edges.a), 3))
+    for k in range(len(edges.a)):
+        a, b = poses[edges.a[k]], poses[edges.b[k]]
+        x, y, turned = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        cosine, sine = math.cos(a[2]), math.sin(a[2])
+        rest[k, 0] = cosine * x + sine * y - edges.measured[k, 0]
+        rest[k, 1] = cosine * y - sine * x - edges.measured[k, 1]
+        rest[k, 2] = math.pi - (math.pi - turned + edges.measured[k, 2]) % (2.0 * math.pi)
+    return rest
+
+
+@kernel
+def _squares(poses: Array, edges: Edges) -> Array:
+    """Return ``e^T W e`` of each edge, shape (edges,) float64."""
+    rest = residuals(poses, edges)
+    squares = np.zeros(len(rest))
+    for k in range(len(rest)):
+        for i in range(3):
+            for j in range(3):
+                squares[k] += rest[k, i] * edges.information[k, i, j] * rest[k, j]
+    return squares
+
+
+@kernel
+def _cost(poses: Array, edges: Edges, robust_scale: float) -> float:
+    scale, squares = robust_scale * robust_scale, _squares(poses, edges)
+    total = 0.0
+    for k in range(len(squares)):
+        total += scale * math.log1p(squares[k] / scale) if edges.is_robust[k] else squares[k]
+    return total
+
+
+@kernel
+def _settled(
+    poses: Array, edges: Edges, robust_scale: float, iterations: int, places: Elimination, factor: Array
+) -> Array:
+    """Return the poses of least cost near given ones (Levenberg and Marquardt), and write the factor of the last Hessian."""
+    best, cost = poses, _cost(poses, edges, robust_scale)
+    damping, step = 1e-9, 0
+    while True:
+        step += 1
+        gradient = _normal_equations(best, edges, robust_scale, places, factor)
+        for j in range(len(gradient)):
+            for i in range(3):
+                factor[places.starts[j], i, i] *= 1.0 + damping
+        trial, trial_cost = best.copy(), np.inf
+        if factorise(places, factor):
+            trial[1:] -= solve(places, factor, gradient)
+            trial_cost = _cost(trial, edges, robust_scale)
+        if trial_cost <= cost:
+            gain = cost - trial_cost
+            best, cost, damping = trial, trial_cost, max(0.1 * damping, 1e-9)
+            is_over = gain < 3e-3 * cost + 1e-9
+        else:
+            damping = max(100.0 * damping, 1e-4)
+            is_over = damping > 1e6
+        if is_over or step >= iterations:
+            return best
+
+
+@kernel
+def _normal_equations(
+    poses: Array, edges: Edges, robust_scale: float, places: Elimination, hessian: Array
+) -> Array:
+    """Return the gradient (poses - 1, 3) float64 for all poses but the first, and write the Hessian's lower triangle of blocks."""
+    rest, squares = residuals(poses, edges), _squares(poses, edges)
+    gradient = np.zeros((len(poses) - 1, 3))
+    hessian[:] = 0.0
+    jacobians, weighted = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
+    for edge in range(len(rest)):
+        ends = edges.a[edge] - 1, edges.b[edge] - 1
+        weight = 1.0 / (1.0 + squares[edge] / (robust_scale * robust_scale)) if edges.is_robust[edge] else 1.0
+        _write_jacobians(poses[edges.a[edge]], poses[edges.b[edge]], jacobians)
+        for end in range(2):
+            for i in range(3):
+                for j in range(3):
+                    weighted[end, i, j] = 0.0
+                    for k in range(3):
+                        weighted[end, i, j] += weight * jacobians[end, k, i] * edges.information[edge, k, j]
+                    if ends[end] >= 0:
+                        gradient[ends[end], i] += weighted[end, i, j] * rest[edge, j]
+        for row in range(2):
+            for column in range(2):
+                if (
+                    ends[row] >= 0
+                    and ends[column] >= 0
+                    and places.turn[ends[row]] >= places.turn[ends[column]]
+                ):
+                    block = places.starts[places.turn[ends[column]]]
+                    while places.rows[block] != places.turn[ends[row]]:
+                        block += 1
+                    for i in range(3):
+                        for j in range(3):
+                            for k in range(3):
+                                hessian[block, i, j] += weighted[row, i, k] * jacobians[column, k, j]
+    return gradient
+
+
+@kernel(inline=True)
+def _write_jacobians(a: Array, b: Array, jacobians: Array) -> None:
+    """Write the derivatives (2, 3, 3) of the residual of an edge by pose a and by pose b."""
+    cosine, sine = math.cos(a[2]), math.sin(a[2])
+    x, y = b[0] - a[0], b[1] - a[1]
+    before, after = jacobians[0], jacobians[1]
+    after[0, 0], after[0, 1], after[1, 0], after[1, 1], after[2, 2] = cosine, sine, -sine, cosine, 1.0
+    for i in range(3):
+        for j in range(3):
+            before[i, j] = -after[i, j]
+    before[0, 2], before[1, 2] = cosine * y - sine * x, -cosine * x - sine * y
+
+
+def _last_covariance(places: Elimination, factor: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the covariance of the last pose, of the factor of the last Hessian."""
+    covariance = np.empty((3, 3))
+    for k in range(3):
+        right = np.zeros((len(places.turn), 3))
+        right[-1, k] = 1.0
+        covariance[:, k] = solve(places, factor, right)[-1]
+    return np.asarray(0.5 * (covariance + covariance.T))

@@ -1,0 +1,1 @@
+"""Poses from scans matched with maps."""

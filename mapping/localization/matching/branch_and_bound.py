@@ -1,0 +1,271 @@
+"""The best placement of a scan on a local map within a wide window, found without looking at most of it.
+
+A coarse map holds for each block of cells the most that a point in it could agree by, so the sum over the
+points bounds what any placement within a block of placements can reach; blocks that cannot beat the best
+placement known are never divided.
+
+References
+----------
+Hess et al., Real-time loop closure in 2D LIDAR SLAM (ICRA 2016). Here the coarse maps are as small as their
+blocks are large, which makes them a third of the map's size together instead of several times it, for
+somewhat looser bounds.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.localization.matching.scan_search import angle_step
+from lidarium.mapping.localization.matching.submaps import AgreementGrid
+
+LEVELS = 6
+"""Coarse maps: the coarsest has blocks of 2^6 cells."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pyramid:
+    """A local map with its coarse maps.
+
+    Attributes
+    ----------
+    grid : AgreementGrid
+        The map.
+    maxima : (cells,) uint8
+        All coarse maps one after the other: cell (i, j) of level h is the most in the 2 x 2 blocks of 2^h
+        cells from block (i, j) on.
+    shapes : (LEVELS + 1, 3) int64
+        Where each level begins in ``maxima``, its rows and its columns; level 0 is the map itself.
+    """
+
+    grid: AgreementGrid
+    maxima: NDArray[np.uint8]
+    shapes: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """What a search found.
+
+    Attributes
+    ----------
+    pose : (3,) float64
+        x, y, theta in the map's frame [m, rad].
+    score : float
+        Mean level of the cells in which the points lie, from 0 to 1.
+    """
+
+    pose: NDArray[np.float64]
+    score: float
+
+
+def pyramid(grid: AgreementGrid) -> Pyramid:
+    """Return a local map with its coarse maps."""
+    blocks = grid.levels
+    maxima, shapes, begin = [grid.levels.ravel()], [(0, *grid.levels.shape)], grid.levels.size
+    for _ in range(LEVELS):
+        rows, columns = (-(-side // 2) for side in blocks.shape)
+        padded = np.zeros((2 * rows, 2 * columns), np.uint8)
+        padded[: blocks.shape[0], : blocks.shape[1]] = blocks
+        blocks = padded.reshape(rows, 2, columns, 2).max(axis=(1, 3))
+        # One more before the first: placements begin there that reach into it.
+        wide = np.zeros((rows + 2, columns + 2), np.uint8)
+        wide[1:-1, 1:-1] = blocks
+        pairs = np.maximum(np.maximum(wide[:-1, :-1], wide[1:, :-1]), np.maximum(wide[:-1, 1:], wide[1:, 1:]))
+        maxima.append(pairs.ravel())
+        shapes.append((begin, *pairs.shape))
+        begin += pairs.size
+    return Pyramid(grid, np.concatenate(maxima), np.array(shapes, np.int64))
+
+
+def place(
+    coarse: Pyramid,
+    points: NDArray[np.float64],
+    around: NDArray[np.float64],
+    reach: tuple[float, float],
+    least_score: float,
+    evaluations: int,
+    apart: tuple[NDArray[np.float64], float, float] | None = None,
+) -> tuple[Placement | None, bool]:
+    """Find the best placement of points within a window.
+
+    Parameters
+    ----------
+    coarse : Pyramid
+        The map.
+    points : (n, 2) float64
+        Points in the robot's frame [m].
+    around : (3,) float64
+        Middle of the window: x, y, theta in the map's frame [m, rad].
+    reach : (float, float)
+        How far the window goes to each side [m, rad].
+    least_score : float
+        What a placement has to reach, from 0 to 1.
+    evaluations : int
+        At most so many placements and blocks of them are looked at.
+    apart : ((3,) float64, float, float) or None
+        A pose of which placements keep away: by the first distance [m], or by the second angle [rad].
+
+    Returns
+    -------
+    Placement or None
+        The best, or None where none reaches the score.
+    bool
+        Whether the search came to its end.
+    """
+    if len(points) == 0:
+        return None, True
+    side = coarse.grid.resolution
+    step = angle_step(points, side)
+    steps, turns = math.ceil(reach[0] / side - 1e-9), math.ceil(reach[1] / step - 1e-9)
+    headings = around[2] + step * np.arange(-turns, turns + 1)
+    corner = np.array(
+        [around[0] / side - coarse.grid.column - steps, around[1] / side - coarse.grid.row - steps]
+    )
+    avoided = np.zeros(5)
+    if apart is not None:
+        pose, distance, angle = apart
+        avoided[:] = (
+            (pose[0] - around[0]) / side + steps,
+            (pose[1] - around[1]) / side + steps,
+            pose[2],
+            distance / side,
+            angle,
+        )
+    found = np.full(4, -1.0)
+    least, width = 255.0 * least_score * len(points), 2 * steps + 1
+    is_over = _place(
+        coarse.maxima,
+        coarse.shapes,
+        points / side,
+        headings,
+        corner,
+        width,
+        least,
+        evaluations,
+        avoided,
+        found,
+    )
+    if found[3] < 0.0:
+        return None, is_over
+    pose = np.array(
+        [
+            around[0] + (found[0] - steps) * side,
+            around[1] + (found[1] - steps) * side,
+            headings[int(found[2])],
+        ]
+    )
+    return Placement(pose, float(found[3]) / (255.0 * len(points))), is_over
+
+
+@kernel
+def _bound(
+    maxima: Array, begin: int, rows: int, columns: int, level: int, cells: Array, column: int, row: int
+) -> int:
+    """Sum over the points of the most that each can agree by in a block of placements that begins at (column, row)."""
+    total = 0
+    shift = 1 if level > 0 else 0
+    for k in range(cells.shape[0]):
+        j = ((cells[k, 0] + column) >> level) + shift
+        i = ((cells[k, 1] + row) >> level) + shift
+        if 0 <= j < columns and 0 <= i < rows:
+            total += int(maxima[begin + i * columns + j])
+    return total
+
+
+@kernel
+def _is_avoided(avoided: Array, column: int, row: int, heading: float) -> bool:
+    if avoided[3] <= 0.0:
+        return False
+    turn = heading - avoided[2]
+    turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+    away = (column - avoided[0]) ** 2 + (row - avoided[1]) ** 2
+    return bool(away < avoided[3] * avoided[3] and abs(turn) < avoided[4])
+
+
+@kernel
+def _place(
+    maxima: Array,
+    shapes: Array,
+    points: Array,
+    headings: Array,
+    corner: Array,
+    width: int,
+    least: float,
+    evaluations: int,
+    avoided: Array,
+    found: Array,
+) -> bool:
+    """Note column, row, number of the heading and sum of the best placement of at least a sum; return whether all were decided."""
+    count, turns = points.shape[0], headings.shape[0]
+    top = 0
+    while top < shapes.shape[0] - 1 and (1 << top) < width:
+        top += 1
+    # Blocks as large as the window bound nothing; a few by a few do.
+    top = max(top - 2, 0)
+    blocks = (width + (1 << top) - 1) >> top
+    cells = np.empty((turns, count, 2), np.int32)
+    for turn in range(turns):
+        cosine, sine = math.cos(headings[turn]), math.sin(headings[turn])
+        for k in range(count):
+            cells[turn, k, 0] = int(math.floor(cosine * points[k, 0] - sine * points[k, 1] + corner[0]))
+            cells[turn, k, 1] = int(math.floor(sine * points[k, 0] + cosine * points[k, 1] + corner[1]))
+    begin, rows, columns = shapes[top]
+    bounds = np.empty(turns * blocks * blocks, np.int64)
+    for turn in range(turns):
+        for i in range(blocks):
+            for j in range(blocks):
+                bounds[(turn * blocks + i) * blocks + j] = _bound(
+                    maxima, begin, rows, columns, top, cells[turn], j << top, i << top
+                )
+    looked_at = bounds.shape[0]
+    best = least
+    stack = np.empty((4 * (top + 2) + 4, 5), np.int64)
+    children = np.empty((4, 3), np.int64)
+    for root in np.argsort(-bounds, kind="mergesort"):
+        if bounds[root] <= best:
+            break
+        turn, i, j = root // (blocks * blocks), (root // blocks) % blocks, root % blocks
+        depth = 1
+        stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3], stack[0, 4] = (
+            bounds[root],
+            top,
+            turn,
+            j << top,
+            i << top,
+        )
+        while depth > 0:
+            depth -= 1
+            bound, level, turn, column, row = stack[depth]
+            if bound <= best:
+                continue
+            if level == 0:
+                if not _is_avoided(avoided, column, row, headings[turn]):
+                    best = bound
+                    found[0], found[1], found[2], found[3] = column, row, turn, bound
+                continue
+            if looked_at >= evaluations:
+                return False
+            below = level - 1
+            begin, rows, columns = shapes[below]
+            half, number = 1 << below, 0
+            for child in range(4):
+                x, y = column + (child & 1) * half, row + (child >> 1) * half
+                if x >= width or y >= width:
+                    continue
+                value = _bound(maxima, begin, rows, columns, below, cells[turn], x, y)
+                looked_at += 1
+                if value > best:
+                    at = number
+                    while at > 0 and children[at - 1, 0] > value:
+                        children[at] = children[at - 1]
+                        at -= 1
+                    children[at, 0], children[at, 1], children[at, 2] = value, x, y
+                    number += 1
+            for k in range(number):
+                stack[depth, 0], stack[depth, 1], stack[depth, 2] = children[k, 0], below, turn
+                stack[depth, 3], stack[depth, 4] = children[k, 1], children[k, 2]
+                depth += 1
+    return True

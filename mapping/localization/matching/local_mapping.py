@@ -1,0 +1,318 @@
+"""Where a robot is in its neighbourhood: scans are matched with local maps, and local maps begin and end on the way."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.geometry.rigid import relative
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.localization.matching.branch_and_bound import place, pyramid
+from lidarium.mapping.localization.matching.scan_matching import Match, refine
+from lidarium.mapping.localization.matching.scan_search import search
+from lidarium.mapping.localization.matching.settings import SlamSettings
+from lidarium.mapping.localization.matching.submaps import AgreementGrid, Submap
+
+
+@dataclass(slots=True, eq=False)
+class _Active:
+    """A local map that still grows.
+
+    Attributes
+    ----------
+    submap : Submap
+        What it holds.
+    node : int
+        Node of the graph in whose frame it is.
+    in_older : (3,) float64
+        That node in the frame of the local map before.
+    nodes : list of int
+        That node, and those that were set since.
+    places : list of (3,) float64
+        Where they lie in the local map's frame.
+    path : float
+        Way driven since [m].
+    """
+
+    submap: Submap
+    node: int
+    in_older: NDArray[np.float64]
+    nodes: list[int]
+    places: list[NDArray[np.float64]]
+    path: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finished:
+    """A local map that is finished.
+
+    Attributes
+    ----------
+    grid : AgreementGrid
+        What it holds.
+    nodes : (nodes,) int64
+        Nodes of the graph that were set while it grew; in the frame of the first it is.
+    places : (nodes, 3) float64
+        Where they lay in its frame then: what it holds near them lies right to them, whatever is believed of
+        the way between them later.
+    """
+
+    grid: AgreementGrid
+    nodes: NDArray[np.int64]
+    places: NDArray[np.float64]
+
+
+class LocalMapper:
+    """Two growing local maps, of which the older one says where the robot is.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        How.
+    geometry : ScanGeometry
+        Which way the beams look.
+
+    Attributes
+    ----------
+    usual_score : float
+        Agreement of matches of late.
+    contradiction : float
+        Share of the last scan's returns that lay, from where odometry led, in what the local map knows to be
+        free.
+    """
+
+    def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
+        self._matching, self._submaps = settings.matching, settings.submaps
+        self._uses_odometry, self._geometry = settings.uses_odometry, geometry
+        self._active: list[_Active] = []
+        self.usual_score, self.contradiction = 0.0, 0.0
+
+    @property
+    def node(self) -> int:
+        """Node in whose frame poses are now."""
+        return self._active[0].node
+
+    def begin(self, node: int, ranges: NDArray[np.float32]) -> list[Finished]:
+        """Begin anew at a node, by the scan taken there.
+
+        Return the local maps that this ends.
+        """
+        ended = self._ended(self._active)
+        self._active = []
+        self._add(node, np.zeros(3), ranges)
+        return ended
+
+    def match(
+        self,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        moved: NDArray[np.float64],
+        uncertainty: NDArray[np.float64],
+        failed: int,
+    ) -> Match | None:
+        """Return where a scan lies on the older local map; None where it does not match.
+
+        Near what odometry says it is searched first, weighing both. Where that does not convince, odometry
+        may be wrong (a wheel slips, the robot was pushed), and the search goes farther, without it, for scans
+        of enough returns; what is found there has to be clearly better. On new ground, and where a scan
+        hardly has a return, nothing but odometry tells where the robot is.
+
+        Parameters
+        ----------
+        points : (n, 2) float64
+            Points in the robot's frame [m].
+        predicted : (3,) float64
+            Where the robot should be, in the local map's frame [m, rad].
+        moved : (3,) float64
+            The motion since the last match that led there.
+        uncertainty : (3, 3) float64
+            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2].
+        failed : int
+            How many scans in a row did not match before.
+        """
+        settings = self._matching
+        is_blind = not self._uses_odometry or failed >= settings.wide_after
+        near = self._match_near(points, predicted, uncertainty) if self._uses_odometry else None
+        self.contradiction = 1.0 if near is None else near.contradiction
+        if near is not None and self._is_new_ground(near, len(points)):
+            return Match(
+                predicted, near.score, near.overlap, near.contradiction, np.zeros((3, 3)), near.prior
+            )
+        if (
+            near is not None
+            and self._is_good(near)
+            and near.score >= settings.convincing_share * self.usual_score
+        ):
+            return self._noted(near)
+        distance = math.hypot(float(moved[0]), float(moved[1]))
+        reach = (settings.blind_m, settings.blind_angle)
+        if not is_blind:
+            # Twice the motion and more: also where a robot is that went back while odometry said forth.
+            reach = (
+                min(settings.search_m + 2.2 * distance, reach[0]),
+                min(settings.search_angle + 2.2 * abs(float(moved[2])), reach[1]),
+            )
+        is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
+        far = None if is_sparse else self._match_far(points, predicted, reach)
+        if self._uses_odometry and is_blind and far is not None:
+            # So far from odometry something that looks a little alike, or in part, is soon found.
+            is_alike = (
+                far.score >= settings.convincing_share * self.usual_score
+                and far.overlap >= settings.blind_overlap
+            )
+            far = far if is_alike else None
+        good = [match for match in (near, far) if match is not None and self._is_good(match)]
+        if len(good) == 2:
+            return self._noted(good[1] if outweighs(good[1], good[0], settings.better_by) else good[0])
+        return self._noted(good[0]) if good else None
+
+    def _noted(self, match: Match) -> Match:
+        self.usual_score = (
+            match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
+        )
+        return match
+
+    def _is_new_ground(self, match: Match, points: int) -> bool:
+        """Whether a scan hardly sees anything that the local map has observed, or hardly anything at all."""
+        settings = self._matching
+        is_sparse = points < min(settings.least_points, self._geometry.beams // 8)
+        return is_sparse or (
+            match.overlap < settings.least_overlap and match.contradiction <= settings.most_contradiction
+        )
+
+    def _is_good(self, match: Match) -> bool:
+        settings = self._matching
+        least_score = max(settings.least_score, settings.least_share * self.usual_score)
+        agrees = match.score >= least_score and match.overlap >= settings.least_overlap
+        return agrees and match.contradiction <= settings.most_contradiction
+
+    def _match_near(
+        self, points: NDArray[np.float64], predicted: NDArray[np.float64], uncertainty: NDArray[np.float64]
+    ) -> Match:
+        settings, grid = self._matching, self._active[0].submap.grid
+        spread = np.sqrt(np.diag(uncertainty))
+        reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
+        reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
+        information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
+        weight = settings.weight(len(points))
+        start = search(grid, points, predicted, reach_m, reach_angle, information, weight, settings.unseen)
+        return refine(
+            grid, points, start, predicted, information, weight, settings.unseen, settings.surface_m
+        )
+
+    def _match_far(
+        self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]
+    ) -> Match | None:
+        settings, oldest = self._matching, self._active[0].submap
+        least = 0.5 * settings.least_score * settings.least_overlap
+        found, _ = place(pyramid(oldest.finished()), points, predicted, reach, least, settings.evaluations)
+        if found is None:
+            return None
+        weight = settings.weight(len(points))
+        return refine(
+            oldest.grid,
+            points,
+            found.pose,
+            found.pose,
+            np.zeros((3, 3)),
+            weight,
+            settings.unseen,
+            settings.surface_m,
+        )
+
+    def laid_again(self, points: NDArray[np.float64]) -> Match | None:
+        """Return where the points (n, 2) [m] of the older local map's first scan lie on what it has become; None if they do not match."""
+        settings, nowhere = self._matching, np.zeros(3)
+        grid = self._active[0].submap.grid
+        weight = settings.weight(len(points))
+        match = refine(
+            grid, points, nowhere, nowhere, np.zeros((3, 3)), weight, settings.unseen, settings.surface_m
+        )
+        return match if self._is_good(match) and not self._is_new_ground(match, len(points)) else None
+
+    def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:
+        """Take in a scan at x, y, theta (3,) in the older local map's frame, so much way [m] after the last one.
+
+        Returns
+        -------
+        bool
+            Whether the robot has left what the local maps can hold; ``begin`` has to be called then.
+        """
+        for active in self._active:
+            pose = pose if active is self._active[0] else relative(active.in_older, pose)
+            active.path += path
+            if not active.submap.insert(pose, ranges, self._geometry, self._matching.range_m):
+                return False
+        return True
+
+    def note_node(self, node: int, pose: NDArray[np.float64]) -> None:
+        """Take in that a node was set at x, y, theta (3,) in the older local map's frame."""
+        for active in self._active:
+            pose = pose if active is self._active[0] else relative(active.in_older, pose)
+            active.nodes.append(node)
+            active.places.append(pose.copy())
+
+    @property
+    def wants_another(self) -> bool:
+        """Whether it is time to begin another local map, at a new node."""
+        newest = self._active[-1]
+        is_full = (
+            newest.submap.scans >= max(self._submaps.least_scans // 2, 1)
+            and newest.path >= 0.5 * self._submaps.path_m
+        )
+        return len(self._active) == 1 and is_full
+
+    def add(self, node: int, pose: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+        """Begin another local map at a node that lies at x, y, theta (3,) in the older one's frame, by the scan taken there."""
+        self._add(node, pose, ranges)
+
+    def hand_over(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[Finished]]:
+        """End the older local map where it is full.
+
+        Return poses (n, 3) of its frame in that of the new older one, and what ended.
+        """
+        oldest = self._active[0]
+        is_full = oldest.submap.scans >= self._submaps.least_scans and oldest.path >= self._submaps.path_m
+        if len(self._active) < 2 or not is_full:
+            return poses, []
+        self._active = self._active[1:]
+        return relative(self._active[0].in_older, poses), self._ended([oldest])
+
+    def _add(self, node: int, in_older: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+        reach = min(self._matching.range_m, self._geometry.range_max) + 2.0 * self._submaps.path_m
+        active = _Active(Submap(self._submaps, reach), node, in_older.copy(), [node], [np.zeros(3)])
+        active.submap.insert(np.zeros(3), ranges, self._geometry, self._matching.range_m)
+        self._active.append(active)
+
+    def _ended(self, active: list[_Active]) -> list[Finished]:
+        ended = [one for one in active if one.submap.scans >= self._submaps.least_scans // 2]
+        return [Finished(one.submap.finished(), np.array(one.nodes), np.stack(one.places)) for one in ended]
+
+
+def outweighs(far: Match, near: Match, better_by: float) -> bool:
+    """Return whether a match against odometry is so much better than one with it that odometry has to be wrong.
+
+    Where nearly all of a scan lies near known walls, and elsewhere only a part of it, that part may agree
+    better by chance, as on the other side of a wall: all points together must not agree less.
+
+    Parameters
+    ----------
+    far, near : Match
+        The match against odometry, and that with it.
+    better_by : float
+        By how much more the points near what the map has observed have to agree.
+    """
+    return far.score > near.score + better_by and far.score * far.overlap >= near.score * near.overlap
+
+
+def turned(matrix: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """Return a covariance or an information (3, 3) of x, y, theta in a frame in which its own is turned by an angle [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(turn @ matrix @ turn.T, np.float64)
+
+
+def way(motion: NDArray[np.float64]) -> float:
+    """Return how much of a way a motion x, y, theta (3,) is, turns counted with a metre a radian [m]."""
+    return math.hypot(float(motion[0]), float(motion[1])) + abs(float(motion[2]))

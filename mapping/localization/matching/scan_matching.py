@@ -1,0 +1,408 @@
+"""Lays a scan on a local map, from near where it lies, by Gauss and Newton's method.
+
+The agreement of a point is the map's, smoothed by a cubic B-spline, which has a gradient everywhere and is
+not drawn to cells.
+
+References
+----------
+Kohlbrecher et al., A flexible and scalable SLAM system with full 3D motion estimation (SSRR 2011), here with
+an agreement that keeps fractions of cells, and odometry as a prior.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.localization.matching.submaps import UNSEEN, AgreementGrid
+
+FULL_AGREEMENT = 2.0 / 3.0
+"""Smoothed agreement in the middle of a wall that lies along a row of cells: the most that there is.
+
+With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
+"""
+
+SURFACE_GAP = 0.3
+"""Neighbouring points lie on one surface where they are nearer to each other than this share of their distance, or so many metres."""
+
+MOST_BEND = 0.15
+"""Where the variance of those points across the surface is more than this share of that along it, there is a corner."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Match:
+    """Where a scan lies on a local map.
+
+    Attributes
+    ----------
+    pose : (3,) float64
+        x, y, theta in the map's frame [m, rad].
+    score : float
+        Mean agreement, from 0 to 1, of the points that lie near what the map has observed.
+    overlap : float
+        Share of the points that do.
+    contradiction : float
+        Share of the points that lie in what the map knows to be free.
+    told, prior : (3, 3) float64
+        What the points alone tell of the pose, and what was known before [1/m^2, 1/(m rad), 1/rad^2].
+    """
+
+    pose: NDArray[np.float64]
+    score: float
+    overlap: float
+    contradiction: float
+    told: NDArray[np.float64]
+    prior: NDArray[np.float64]
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the pose, (3, 3) [m^2, m rad, rad^2].
+
+        A metre and a radian at most, for what nothing tells.
+        """
+        return np.asarray(np.linalg.inv(self.told + self.prior + np.eye(3)), np.float64)
+
+
+def refine(
+    grid: AgreementGrid,
+    points: NDArray[np.float64],
+    start: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    information: NDArray[np.float64],
+    weight: float,
+    unseen: float,
+    surface_m: float = 0.25,
+) -> Match:
+    """Return the pose near a start at which the points agree best with the map.
+
+    Minimises ``weight / n sum (1 - agreement_k)^2 + d^T information d``, d the difference of the pose from a
+    prior one; a point in what the map has not observed counts as ``unseen``. Points move across the surfaces
+    that they lie on, not along: where a wall goes on beyond what the map has observed of it, the points there
+    would draw the scan back to where the map ends, and a robot in a corridor with them.
+
+    Parameters
+    ----------
+    grid : AgreementGrid
+        The map.
+    points : (n, 2) float64
+        Points in the robot's frame, in the order of the beams [m].
+    start, prior : (3,) float64
+        Where to begin, and where odometry says the robot is: x, y, theta in the map's frame [m, rad].
+    information : (3, 3) float64
+        How much that counts [1/m^2, 1/(m rad), 1/rad^2]; zero for not at all.
+    weight : float
+        How much full disagreement of all points counts: independent points / variance of the disagreement of
+        one.
+    unseen : float
+        Square of the disagreement of a point in what the map has not observed. As that of most points, it
+        speaks neither for nor against a pose; if it counted in full, a wall that goes on beyond where the map
+        ends would hold the robot back to where the scan covers the known part of it, and in a bare corridor
+        nothing else speaks.
+    surface_m : float
+        Points of a surface so near to a point tell which way it runs there; 0 for the nearest two [m].
+    """
+    pose, hessian, told = np.array(start, np.float64), np.empty((3, 3)), np.zeros(3)
+    count = len(points)
+    if count == 0:
+        return Match(pose, 0.0, 0.0, 0.0, np.zeros((3, 3)), information)
+    normals = np.zeros((count, 2))
+    _find_normals(points, surface_m, normals)
+    _refine(
+        grid.levels,
+        grid.column,
+        grid.row,
+        grid.resolution,
+        points,
+        normals,
+        pose,
+        prior,
+        information,
+        weight / count,
+        unseen,
+        hessian,
+        told,
+    )
+    score, overlap, contradiction = told.tolist()
+    return Match(pose, score, overlap, contradiction, hessian, information)
+
+
+@kernel(inline=True)
+def _spline_weights(t: float) -> tuple[float, float, float, float]:
+    """Weights of four neighbouring cells in a cubic B-spline, t from 0 to 1 between the middle two."""
+    u, square, cube = 1.0 - t, t * t, t * t * t
+    return (
+        u * u * u / 6.0,
+        (3.0 * cube - 6.0 * square + 4.0) / 6.0,
+        (-3.0 * cube + 3.0 * square + 3.0 * t + 1.0) / 6.0,
+        cube / 6.0,
+    )
+
+
+@kernel(inline=True)
+def _spline_slopes(t: float) -> tuple[float, float, float, float]:
+    """Slopes of the weights."""
+    u, square = 1.0 - t, t * t
+    return -0.5 * u * u, 1.5 * square - 2.0 * t, -1.5 * square + t + 0.5, 0.5 * square
+
+
+@kernel(inline=True)
+def _agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
+    """Smoothed agreement at x, y [cells] and its slopes [1/cell].
+
+    Zero where the map ends.
+    """
+    u, v = x - 0.5, y - 0.5
+    column, row = int(math.floor(u)), int(math.floor(v))
+    if not (1 <= column < levels.shape[1] - 2 and 1 <= row < levels.shape[0] - 2):
+        return 0.0, 0.0, 0.0
+    across, across_slopes = _spline_weights(u - column), _spline_slopes(u - column)
+    along, along_slopes = _spline_weights(v - row), _spline_slopes(v - row)
+    value, slope_x, slope_y = 0.0, 0.0, 0.0
+    for i in range(4):
+        line, line_slope = 0.0, 0.0
+        for j in range(4):
+            level = max(float(levels[row + i - 1, column + j - 1]) - 1.0, 0.0)
+            line += across[j] * level
+            line_slope += across_slopes[j] * level
+        value += along[i] * line
+        slope_x += along[i] * line_slope
+        slope_y += along_slopes[i] * line
+    return value / 254.0, slope_x / 254.0, slope_y / 254.0
+
+
+@kernel(inline=True)
+def _is_unseen(levels: Array, x: float, y: float) -> bool:
+    """Whether the map has not observed the cell at x, y [cells]."""
+    column, row = int(math.floor(x)), int(math.floor(y))
+    return not (0 <= column < levels.shape[1] and 0 <= row < levels.shape[0]) or levels[row, column] == UNSEEN
+
+
+@kernel(inline=True)
+def _is_one_surface(points: Array, k: int) -> bool:
+    """Whether a point and the next one lie on one surface."""
+    gap = SURFACE_GAP * max(math.hypot(points[k, 0], points[k, 1]), 1.0)
+    return bool(math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]) <= gap)
+
+
+@kernel
+def _find_normals(points: Array, reach: float, normals: Array) -> None:
+    """Fill ``normals`` (n, 2) with unit vectors across the surface on which each point and its neighbours lie; zero for a point alone.
+
+    Two neighbours tell it where the surface bends; elsewhere all within reach do, since noise turns what lies
+    between two near points.
+    """
+    count = points.shape[0]
+    for k in range(count):
+        before, after = k, k
+        while before > 0 and _is_one_surface(points, before - 1) and _is_near(points, before - 1, k, reach):
+            before -= 1
+        while after + 1 < count and _is_one_surface(points, after) and _is_near(points, after + 1, k, reach):
+            after += 1
+        along_x, along_y, is_bent = _axis(points[before : after + 1])
+        if is_bent:
+            before = k - 1 if k > 0 and _is_one_surface(points, k - 1) else k
+            after = k + 1 if k + 1 < count and _is_one_surface(points, k) else k
+            along_x, along_y = points[after, 0] - points[before, 0], points[after, 1] - points[before, 1]
+        length = math.hypot(along_x, along_y)
+        if length > 0.0:
+            normals[k, 0], normals[k, 1] = -along_y / length, along_x / length
+
+
+@kernel(inline=True)
+def _is_near(points: Array, k: int, m: int, reach: float) -> bool:
+    return bool(math.hypot(points[k, 0] - points[m, 0], points[k, 1] - points[m, 1]) <= reach)
+
+
+@kernel
+def _axis(points: Array) -> tuple[float, float, bool]:
+    """Return the axis along which points vary most, not of unit length, and whether they do not lie along it, or are too few to tell."""
+    count = points.shape[0]
+    if count < 3:
+        return 0.0, 0.0, True
+    x, y = 0.0, 0.0
+    for k in range(count):
+        x += points[k, 0] / count
+        y += points[k, 1] / count
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for k in range(count):
+        xx += (points[k, 0] - x) * (points[k, 0] - x)
+        xy += (points[k, 0] - x) * (points[k, 1] - y)
+        yy += (points[k, 1] - y) * (points[k, 1] - y)
+    half, middle = math.hypot(0.5 * (xx - yy), xy), 0.5 * (xx + yy)
+    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
+    return math.cos(angle), math.sin(angle), middle - half > MOST_BEND * (middle + half)
+
+
+@kernel
+def _normal_equations(
+    levels: Array,
+    first_column: int,
+    first_row: int,
+    side: float,
+    points: Array,
+    normals: Array,
+    pose: Array,
+    unseen: float,
+    hessian: Array,
+    gradient: Array,
+) -> float:
+    """Fill the normal equations of the points' disagreement at a pose.
+
+    Return the sum of its squares.
+    """
+    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+    hessian[:], gradient[:] = 0.0, 0.0
+    cost = 0.0
+    for k in range(points.shape[0]):
+        x, y = cosine * points[k, 0] - sine * points[k, 1], sine * points[k, 0] + cosine * points[k, 1]
+        u, v = (x + pose[0]) / side - first_column, (y + pose[1]) / side - first_row
+        value, slope_x, slope_y = _agreement(levels, u, v)
+        if value == 0.0 and _is_unseen(levels, u, v):
+            cost += unseen
+            continue
+        rest = 1.0 - value / FULL_AGREEMENT
+        cost += rest * rest
+        scale = 1.0 / (side * FULL_AGREEMENT)
+        a, b = slope_x * scale, slope_y * scale
+        if normals[k, 0] != 0.0 or normals[k, 1] != 0.0:
+            across_x = cosine * normals[k, 0] - sine * normals[k, 1]
+            across_y = sine * normals[k, 0] + cosine * normals[k, 1]
+            slope = a * across_x + b * across_y
+            a, b = slope * across_x, slope * across_y
+        c = b * x - a * y
+        gradient[0] += a * rest
+        gradient[1] += b * rest
+        gradient[2] += c * rest
+        hessian[0, 0] += a * a
+        hessian[0, 1] += a * b
+        hessian[0, 2] += a * c
+        hessian[1, 1] += b * b
+        hessian[1, 2] += b * c
+        hessian[2, 2] += c * c
+    hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
+    return cost
+
+
+@kernel
+def _refine(
+    levels: Array,
+    first_column: int,
+    first_row: int,
+    side: float,
+    points: Array,
+    normals: Array,
+    pose: Array,
+    prior: Array,
+    information: Array,
+    weight: float,
+    unseen: float,
+    hessian: Array,
+    told: Array,
+) -> None:
+    """Move a pose to where the cost is least (Levenberg and Marquardt).
+
+    Tell the Hessian and what ``_judge`` says.
+    """
+    gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
+    trial = np.empty(3)
+    away = pose - prior
+    cost = (
+        weight
+        * _normal_equations(
+            levels, first_column, first_row, side, points, normals, pose, unseen, hessian, gradient
+        )
+        + away @ information @ away
+    )
+    damping = 1e-3
+    for _ in range(30):
+        whole = weight * hessian + information
+        for k in range(3):
+            whole[k, k] += damping * whole[k, k] + 1e-9
+        move = np.linalg.solve(whole, weight * gradient - information @ away)
+        trial[:] = pose + move
+        trial_away = trial - prior
+        trial_cost = weight * _normal_equations(
+            levels,
+            first_column,
+            first_row,
+            side,
+            points,
+            normals,
+            trial,
+            unseen,
+            trial_hessian,
+            trial_gradient,
+        )
+        trial_cost += trial_away @ information @ trial_away
+        if trial_cost < cost:
+            pose[:], away[:] = trial, trial_away
+            hessian[:], gradient[:] = trial_hessian, trial_gradient
+            is_still = abs(move[0]) + abs(move[1]) < 1e-4 and abs(move[2]) < 1e-5
+            cost, damping = trial_cost, 0.3 * damping
+            if is_still:
+                break
+        else:
+            damping *= 8.0
+            if damping > 1e3:
+                break
+    # On the crest of a wall slopes vanish: how steep it is, is seen half a cell away.
+    hessian[:] = 0.0
+    for k in range(4):
+        trial[:] = pose
+        trial[k >> 1] += 0.5 * side if k & 1 else -0.5 * side
+        _normal_equations(
+            levels,
+            first_column,
+            first_row,
+            side,
+            points,
+            normals,
+            trial,
+            unseen,
+            trial_hessian,
+            trial_gradient,
+        )
+        hessian += 0.25 * weight * trial_hessian
+    _judge(levels, first_column, first_row, side, points, pose, told)
+
+
+@kernel
+def _judge(
+    levels: Array, first_column: int, first_row: int, side: float, points: Array, pose: Array, told: Array
+) -> None:
+    """Tell the mean agreement of the points near observed cells, the share of points that are, and that of those in free space."""
+    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+    agreeing, known, contradicting = 0.0, 0, 0
+    for k in range(points.shape[0]):
+        x = (cosine * points[k, 0] - sine * points[k, 1] + pose[0]) / side - first_column
+        y = (sine * points[k, 0] + cosine * points[k, 1] + pose[1]) / side - first_row
+        value, _, _ = _agreement(levels, x, y)
+        agreeing += min(value / FULL_AGREEMENT, 1.0)
+        if value > 0.0:
+            known += 1
+        else:
+            lowest, highest = _extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
+            known += highest > 0
+            contradicting += lowest == 1 and highest == 1
+    told[0], told[1], told[2] = (
+        agreeing / max(known, 1),
+        known / points.shape[0],
+        contradicting / points.shape[0],
+    )
+
+
+@kernel
+def _extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
+    """Return the lowest and the highest level within three cells.
+
+    What lies outside of the map is not observed.
+    """
+    rows, columns = levels.shape
+    lowest, highest = 255, 0
+    for i in range(row - 3, row + 4):
+        for j in range(column - 3, column + 4):
+            level = int(levels[i, j]) if 0 <= i < rows and 0 <= j < columns else 0
+            lowest, highest = min(lowest, level), max(highest, level)
+    return lowest, highest

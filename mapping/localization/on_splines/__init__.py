@@ -1,0 +1,1 @@
+"""Localizers on maps of B-splines."""

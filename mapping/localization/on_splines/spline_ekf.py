@@ -1,0 +1,249 @@
+"""The extended Kalman filter on a map of curves: one Gaussian over the pose and all corners and peaks that it trusts.
+
+A landmark enters when the map has seen it often enough, with the pose's uncertainty carried over; the cost of
+a correction grows with the square of their number. Curves are measured too: how far the ends of rays lie
+beside them. They hold the pose, and through it the landmarks.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.geometry.checks import check_from_zero
+from lidarium.mapping.geometry.rigid import Transform, wrapped
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.localization.on_splines.spline_matches import Matches
+from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker, TrackingSettings, steps_of
+from lidarium.mapping.splines.features import Observation, match_points
+
+_TURNED = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplineEkfSettings:
+    """Settings of the extended Kalman filter.
+
+    Attributes
+    ----------
+    tracking : TrackingSettings
+        What is matched, and how the map is made.
+    gate_sigmas : float
+        Measurements that miss what is expected by more standard deviations are left out.
+    start_distance, start_turn : float
+        Standard deviations of the first pose [m, rad].
+    """
+
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    gate_sigmas: float = 3.0
+    start_distance: float = 0.0
+    start_turn: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_from_zero(self, "the filter", ("gate_sigmas", "start_distance", "start_turn"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Measured:
+    """Measurements, linearised: what they miss by (m,), how that changes with the first n numbers of the state (m, n), variances (m,)."""
+
+    misses: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+    variances: NDArray[np.float64]
+
+
+class SplineEkf(SplineTracker):
+    """Localizes by an extended Kalman filter on the map of curves that it makes.
+
+    Parameters
+    ----------
+    settings : SplineEkfSettings or None
+        The defaults where None.
+    geometry : ScanGeometry or None
+        The laser; the URG-04LX of the theses where None.
+
+    Attributes
+    ----------
+    landmarks : (k, 2) float64
+        Corners and peaks in the state [m].
+    state_covariance : (3 + 2 k, 3 + 2 k) float64
+        Covariance of the pose and the landmarks [m, rad].
+    """
+
+    def __init__(
+        self, settings: SplineEkfSettings | None = None, geometry: ScanGeometry | None = None
+    ) -> None:
+        self.settings = settings or SplineEkfSettings()
+        super().__init__(self.settings.tracking, geometry or ScanGeometry())
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2]."""
+        return self.state_covariance[:3, :3].copy()
+
+    def _begin(self, pose: NDArray[np.float64], seed: int) -> None:
+        settings = self.settings
+        self.landmarks = np.empty((0, 2))
+        self.state_covariance = np.diag(
+            [settings.start_distance**2, settings.start_distance**2, settings.start_turn**2]
+        )
+
+    def _predict(self, motion: Transform) -> NDArray[np.float64]:
+        first, distance, second = steps_of(motion)
+        x, y, theta = (float(value) for value in self.pose)
+        heading = theta + first
+        cosine, sine = math.cos(heading), math.sin(heading)
+        tracking = self.tracking
+        sway = tracking.turn_per_metre * abs(distance)
+        spread = np.array(
+            [
+                tracking.turn_per_turn * abs(first) + sway,
+                tracking.slip_per_metre * abs(distance) + tracking.slip_per_turn * (abs(first) + abs(second)),
+                tracking.turn_per_turn * abs(second) + sway,
+            ]
+        )
+        by_pose = np.array([[1.0, 0.0, -distance * sine], [0.0, 1.0, distance * cosine], [0.0, 0.0, 1.0]])
+        by_steps = np.array(
+            [[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]]
+        )
+        covariance = self.state_covariance
+        covariance[:3] = by_pose @ covariance[:3]
+        covariance[:, :3] = covariance[:, :3] @ by_pose.T
+        covariance[:3, :3] += (by_steps * spread**2) @ by_steps.T
+        return np.array([x + distance * cosine, y + distance * sine, wrapped(heading + second)])
+
+    def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
+        seen = np.concatenate([observation.features.corners, observation.features.peaks])
+        sigmas = np.concatenate([observation.features.corner_sigmas, observation.features.peak_sigmas])
+        here = Transform(*(float(value) for value in self.pose))
+        which, known = match_points(
+            here.apply(seen), self.landmarks, self.tracking.splines.association.point_distance
+        )
+        of_walls = [
+            self._gated(part) for part in (self._lines_measured(matches), self._rays_measured(matches))
+        ]
+        measured = [
+            self._gated(self._landmarks_measured(seen[which], known, sigmas[which])),
+            _condensed(_stacked(of_walls)),
+        ]
+        self._update(_stacked(measured))
+        self._add_landmarks(matches)
+        return self.pose
+
+    def _gated(self, measured: _Measured) -> _Measured:
+        """Leave out what misses by more than its own variance and that of the state explain."""
+        columns = measured.jacobian.shape[1]
+        spread = measured.jacobian @ self.state_covariance[:columns, :columns]
+        expected = (spread * measured.jacobian).sum(axis=1) + measured.variances
+        is_kept = measured.misses**2 <= self.settings.gate_sigmas**2 * expected
+        return _Measured(measured.misses[is_kept], measured.jacobian[is_kept], measured.variances[is_kept])
+
+    def _update(self, measured: _Measured) -> None:
+        """Correct the state by measurements."""
+        if len(measured.misses) == 0:
+            return
+        covariance, jacobian = self.state_covariance, measured.jacobian
+        spread = jacobian @ covariance[: jacobian.shape[1]]
+        innovation = spread[:, : jacobian.shape[1]] @ jacobian.T + np.diag(measured.variances)
+        gain = np.linalg.solve(innovation, spread).T
+        change = gain @ measured.misses
+        covariance = covariance - gain @ spread
+        self.state_covariance = (covariance + covariance.T) / 2.0
+        self.pose = self.pose + change[:3]
+        self.pose[2] = wrapped(float(self.pose[2]))
+        self.landmarks = self.landmarks + change[3:].reshape(-1, 2)
+
+    def _landmarks_measured(
+        self, seen: NDArray[np.float64], known: NDArray[np.int64], sigmas: NDArray[np.float64]
+    ) -> _Measured:
+        """Measure seen points (m, 2) of the robot's frame, which are landmarks: both coordinates of each in that frame."""
+        count = len(seen)
+        back = _rotation(float(self.pose[2])).T
+        offsets = self.landmarks[known] - self.pose[:2]
+        jacobian = np.zeros((count, 2, len(self.state_covariance)))
+        jacobian[:, :, :2] = -back
+        jacobian[:, :, 2] = offsets @ (back @ _TURNED.T).T
+        columns = 3 + 2 * known
+        for row, column in enumerate(columns.tolist()):
+            jacobian[row, :, column : column + 2] = back
+        misses = (seen - offsets @ back.T).reshape(-1)
+        variances = np.repeat(np.maximum(sigmas, self.tracking.feature_sigma) ** 2, 2)
+        return _Measured(misses, jacobian.reshape(2 * count, len(self.state_covariance)), variances)
+
+    def _lines_measured(self, matches: Matches) -> _Measured:
+        """Measure how lines lie beside lines of the map and against their directions."""
+        count = len(matches.lines)
+        lever = matches.lines[:, :2] @ _rotation(float(self.pose[2])).T
+        known = matches.known_lines
+        normals = np.stack([-np.sin(known[:, 2]), np.cos(known[:, 2])], axis=1)
+        asides = ((lever + self.pose[:2] - known[:, :2]) * normals).sum(axis=1)
+        turns = self.pose[2] + matches.lines[:, 2] - known[:, 2]
+        jacobian = np.zeros((2 * count, 3))
+        jacobian[:count, :2] = normals
+        jacobian[:count, 2] = ((lever @ _TURNED.T) * normals).sum(axis=1)
+        jacobian[count:, 2] = 1.0
+        sigmas = np.maximum(matches.line_sigmas, self.tracking.feature_sigma)
+        angles = np.full(count, self.tracking.line_angle_sigma)
+        misses = -np.concatenate([asides, np.arctan2(np.sin(turns), np.cos(turns))])
+        return _Measured(misses, jacobian, np.concatenate([sigmas, angles]) ** 2)
+
+    def _rays_measured(self, matches: Matches) -> _Measured:
+        """Measure how the ends of rays lie beside the curves."""
+        lever, found = matches.rays @ _rotation(float(self.pose[2])).T, matches.pieces
+        normals = np.stack([-found[:, 3], found[:, 2]], axis=1)
+        jacobian = np.empty((len(found), 3))
+        jacobian[:, :2] = normals
+        jacobian[:, 2] = ((lever @ _TURNED.T) * normals).sum(axis=1)
+        misses = -((lever + self.pose[:2] - found[:, :2]) * normals).sum(axis=1)
+        variance = self.tracking.curve_sigma**2 / self.tracking.ray_share
+        return _Measured(misses, jacobian, np.full(len(found), variance))
+
+    def _add_landmarks(self, matches: Matches) -> None:
+        """Append what the map knows well and the state does not have, with the covariance that the pose and the measurement give it."""
+        distance = self.tracking.splines.association.point_distance
+        for seen, sigma in zip(matches.points, matches.point_sigmas, strict=True):
+            rotation = _rotation(float(self.pose[2]))
+            lever = rotation @ seen
+            place = self.pose[:2] + lever
+            if len(self.landmarks) and float(np.linalg.norm(self.landmarks - place, axis=1).min()) < distance:
+                continue
+            by_pose = np.column_stack([np.eye(2), _TURNED @ lever])
+            old = self.state_covariance
+            size = len(old)
+            grown = np.empty((size + 2, size + 2))
+            grown[:size, :size] = old
+            grown[size:, :size] = by_pose @ old[:3]
+            grown[:size, size:] = grown[size:, :size].T
+            variance = max(float(sigma), self.tracking.feature_sigma) ** 2
+            grown[size:, size:] = by_pose @ old[:3, :3] @ by_pose.T + variance * np.eye(2)
+            self.state_covariance = grown
+            self.landmarks = np.concatenate([self.landmarks, place[None]])
+
+
+def _stacked(parts: list[_Measured]) -> _Measured:
+    """Return several measurements as one.
+
+    What one part does not tell of is nothing to it.
+    """
+    columns = max(part.jacobian.shape[1] for part in parts)
+    jacobians = [np.pad(part.jacobian, ((0, 0), (0, columns - part.jacobian.shape[1]))) for part in parts]
+    return _Measured(
+        np.concatenate([part.misses for part in parts]),
+        np.concatenate(jacobians),
+        np.concatenate([part.variances for part in parts]),
+    )
+
+
+def _condensed(measured: _Measured) -> _Measured:
+    """Return at most three measurements that tell of the pose what many do: the triangle of their QR decomposition."""
+    if len(measured.misses) <= 3:
+        return measured
+    scales = 1.0 / np.sqrt(measured.variances)
+    basis, triangle = np.linalg.qr(measured.jacobian * scales[:, None])
+    return _Measured(basis.T @ (measured.misses * scales), triangle, np.ones(len(triangle)))
+
+
+def _rotation(theta: float) -> NDArray[np.float64]:
+    cosine, sine = math.cos(theta), math.sin(theta)
+    return np.array([[cosine, -sine], [sine, cosine]])

@@ -1,0 +1,281 @@
+"""The particle filter on a map of curves: each particle is a pose, weighed by how well features and rays fit the map from there.
+
+A particle also has an opinion of the wheels: by what share they tell ways and turns too long or too short.
+What fits the walls survives, and carries the robot past where walls tell nothing, as along a corridor.
+
+References
+----------
+Motion by turn, way and turn, and resampling by one comb: Thrun, Burgard, Fox, "Probabilistic robotics", 2005,
+chapters 4 and 5. Printed forms that divide the prior by the proposal leave the likelihood out; here it is the
+weight.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.geometry.checks import check_from_zero
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.localization.on_splines.spline_matches import Matches
+from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker, TrackingSettings, steps_of
+from lidarium.mapping.splines.features import Observation
+
+_HIT_SHARE = 0.95
+_RECOVERY_STEPS = 10
+_LEAST_BOX = 0.1
+_ENTRIES_PER_METRE, _FARTHEST = 2000.0, 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplineFilterSettings:
+    """Settings of the particle filter.
+
+    Attributes
+    ----------
+    tracking : TrackingSettings
+        What is matched, and how the map is made.
+    particles : int
+        Number of particles.
+    start_distance, start_turn : float
+        Standard deviations of the particles around the first pose [m, rad].
+    distance_bias, turn_bias : float
+        By what share odometry may tell ways and turns too long or too short all the time, as a standard
+        deviation: particles try how much, and those that fit the walls teach it.
+    bias_wander : float
+        Standard deviation by which that share is changed whenever particles are drawn anew, so that they go
+        on trying.
+    lost_likelihood : float
+        Where rays fit worse than this in the mean for ten corrections, some particles are drawn anew; 0 for
+        never.
+    recovered_share, recovery_distance, recovery_turn : float
+        What share of particles, and half of the box around the pose from which they are drawn [m, rad]; then
+        from boxes of half the size each, down to a sixteenth.
+    """
+
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    particles: int = 200
+    start_distance: float = 0.0
+    start_turn: float = 0.0
+    distance_bias: float = 0.05
+    turn_bias: float = 0.05
+    bias_wander: float = 0.01
+    lost_likelihood: float = 0.3
+    recovered_share: float = 0.1
+    recovery_distance: float = 0.25
+    recovery_turn: float = math.radians(10.0)
+
+    def __post_init__(self) -> None:
+        if self.particles < 1:
+            raise ValueError(f"particles is {self.particles}; want at least 1")
+        spreads = ("start_distance", "start_turn", "distance_bias", "turn_bias", "bias_wander")
+        check_from_zero(
+            self,
+            "the filter",
+            (*spreads, "lost_likelihood", "recovered_share", "recovery_distance", "recovery_turn"),
+        )
+        if self.recovered_share > 1.0:
+            raise ValueError(
+                f"recovered_share of the filter is {self.recovered_share}; want a share from 0 to 1"
+            )
+
+
+class SplineFilter(SplineTracker):
+    """Localizes by particles on the map of curves that it makes.
+
+    Parameters
+    ----------
+    settings : SplineFilterSettings or None
+        The defaults where None.
+    geometry : ScanGeometry or None
+        The laser; the URG-04LX of the theses where None.
+
+    Attributes
+    ----------
+    particles : (n, 3) float64
+        Poses x, y, theta [m, rad].
+    scales : (n, 2) float64
+        What each takes a way and a turn to be, of what odometry tells.
+    weights : (n,) float64
+        Their weights, which sum to one.
+    resamplings : int
+        How often particles were drawn anew by their weights.
+    """
+
+    def __init__(
+        self, settings: SplineFilterSettings | None = None, geometry: ScanGeometry | None = None
+    ) -> None:
+        self.settings = settings or SplineFilterSettings()
+        super().__init__(self.settings.tracking, geometry or ScanGeometry())
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the particles, shape (3, 3) [m^2, m rad, rad^2]."""
+        offsets = self.particles - self.pose
+        offsets[:, 2] = np.arctan2(np.sin(offsets[:, 2]), np.cos(offsets[:, 2]))
+        return np.asarray((offsets * self.weights[:, None]).T @ offsets)
+
+    def _begin(self, pose: NDArray[np.float64], seed: int) -> None:
+        settings = self.settings
+        self._generator = np.random.default_rng(seed)
+        spread = np.array([settings.start_distance, settings.start_distance, settings.start_turn])
+        self.particles = pose + spread * self._generator.standard_normal((settings.particles, 3))
+        self.weights = np.full(settings.particles, 1.0 / settings.particles)
+        self.scales = 1.0 + np.array(
+            [settings.distance_bias, settings.turn_bias]
+        ) * self._generator.standard_normal((settings.particles, 2))
+        self.resamplings, self._lost_steps, self._box = 0, 0, 0.0
+        self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
+
+    def _predict(self, motion: Transform) -> NDArray[np.float64]:
+        first, distance, second = steps_of(motion)
+        noise, tracking = self._generator.standard_normal((3, len(self.particles))), self.tracking
+        if first == 0.0 and distance == 0.0 and second == 0.0:
+            return self.pose
+        turns = abs(first), abs(second)
+        sway = tracking.turn_per_metre * abs(distance)
+        of_way, of_turn = self.scales.T
+        firsts = first * of_turn + noise[0] * (tracking.turn_per_turn * turns[0] + sway)
+        ways = distance * of_way + noise[1] * (
+            tracking.slip_per_metre * abs(distance) + tracking.slip_per_turn * sum(turns)
+        )
+        seconds = second * of_turn + noise[2] * (tracking.turn_per_turn * turns[1] + sway)
+        headings = self.particles[:, 2] + firsts
+        self.particles[:, 0] += ways * np.cos(headings)
+        self.particles[:, 1] += ways * np.sin(headings)
+        self.particles[:, 2] = headings + seconds
+        return self._mean()
+
+    def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
+        tracking = self.tracking
+        logarithms, fits = np.zeros(len(self.particles)), np.zeros(len(self.particles))
+        _weigh_features(
+            self.particles,
+            matches.points,
+            matches.known_points,
+            np.maximum(matches.point_sigmas, tracking.feature_sigma),
+            matches.lines,
+            matches.known_lines,
+            np.maximum(matches.line_sigmas, tracking.feature_sigma),
+            tracking.line_angle_sigma,
+            logarithms,
+        )
+        _weigh_rays(
+            self.particles,
+            matches.rays,
+            matches.pieces,
+            self._ray_table,
+            tracking.ray_share,
+            logarithms,
+            fits,
+        )
+        weights = self.weights * np.exp(logarithms - logarithms.max())
+        self.weights = weights / weights.sum()
+        pose = self._mean()
+        likelihood = float(self.weights @ fits)
+        if float((self.weights**2).sum()) * len(self.particles) > 2.0:
+            self._resample()
+        self._recover(likelihood if len(matches.rays) else 1.0, pose)
+        return pose
+
+    def _mean(self) -> NDArray[np.float64]:
+        x, y = self.weights @ self.particles[:, :2]
+        headings = self.particles[:, 2]
+        return np.array(
+            [x, y, math.atan2(float(self.weights @ np.sin(headings)), float(self.weights @ np.cos(headings)))]
+        )
+
+    def _resample(self) -> None:
+        """Draw particles by their weights with one comb of evenly spaced teeth."""
+        count = len(self.particles)
+        teeth = (self._generator.random() + np.arange(count)) / count
+        chosen = np.searchsorted(np.cumsum(self.weights), teeth).clip(max=count - 1)
+        self.particles, self.weights = self.particles[chosen], np.full(count, 1.0 / count)
+        self.scales = self.scales[chosen] + self.settings.bias_wander * self._generator.standard_normal(
+            (count, 2)
+        )
+        self.resamplings += 1
+
+    def _recover(self, likelihood: float, pose: NDArray[np.float64]) -> None:
+        """Draw some particles around the pose where rays have not fitted for a while, then in ever smaller boxes.
+
+        The nearest of those that were drawn fits well enough to take all, and a robot that stands spreads
+        them no more.
+        """
+        settings = self.settings
+        is_lost = likelihood < settings.lost_likelihood
+        self._lost_steps = self._lost_steps + 1 if is_lost or self._box > _LEAST_BOX else 0
+        drawn = round(settings.recovered_share * len(self.particles))
+        if self._lost_steps >= _RECOVERY_STEPS and drawn > 0:
+            self._box = 1.0 if is_lost else 0.5 * self._box
+            box = self._box * np.array(
+                [settings.recovery_distance, settings.recovery_distance, settings.recovery_turn]
+            )
+            which = self._generator.permutation(len(self.particles))[:drawn]
+            self.particles[which] = pose + box * self._generator.uniform(-1.0, 1.0, (drawn, 3))
+            self._lost_steps = 0
+
+
+def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:
+    """Return logarithm and value of the likelihood of a ray by the distance of its end from a curve, shape (entries, 2)."""
+    gaps = (np.arange(round(_FARTHEST * _ENTRIES_PER_METRE)) + 0.5) / _ENTRIES_PER_METRE
+    likelihoods = _HIT_SHARE * np.exp(-0.5 * (gaps / sigma) ** 2) + 1.0 - _HIT_SHARE
+    likelihoods[-1] = 1.0 - _HIT_SHARE
+    return np.stack([np.log(likelihoods), likelihoods], axis=1)
+
+
+@kernel
+def _weigh_features(
+    particles: Array,
+    points: Array,
+    known_points: Array,
+    point_sigmas: Array,
+    lines: Array,
+    known_lines: Array,
+    line_sigmas: Array,
+    angle_sigma: float,
+    logarithms: Array,
+) -> None:
+    """Add to each particle's logarithm of the likelihood (particles,) how well features fit."""
+    cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
+    for k in range(points.shape[0]):
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * points[k, 0] - sines[i] * points[k, 1] - known_points[k, 0]
+            dy = particles[i, 1] + sines[i] * points[k, 0] + cosines[i] * points[k, 1] - known_points[k, 1]
+            logarithms[i] -= 0.5 * (dx * dx + dy * dy) / (point_sigmas[k] * point_sigmas[k])
+    for k in range(lines.shape[0]):
+        along_x, along_y = math.cos(known_lines[k, 2]), math.sin(known_lines[k, 2])
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * lines[k, 0] - sines[i] * lines[k, 1] - known_lines[k, 0]
+            dy = particles[i, 1] + sines[i] * lines[k, 0] + cosines[i] * lines[k, 1] - known_lines[k, 1]
+            aside = dy * along_x - dx * along_y
+            turns = (particles[i, 2] + lines[k, 2] - known_lines[k, 2]) / (2.0 * math.pi)
+            turn = (turns - math.floor(turns + 0.5)) * (2.0 * math.pi)
+            logarithms[i] -= 0.5 * ((aside / line_sigmas[k]) ** 2 + (turn / angle_sigma) ** 2)
+
+
+@kernel
+def _weigh_rays(
+    particles: Array,
+    rays: Array,
+    pieces: Array,
+    ray_table: Array,
+    share: float,
+    logarithms: Array,
+    fits: Array,
+) -> None:
+    """Add how far the ends of rays (k, 2) lie beside the pieces (k, 5) that they were matched to; write how well they fit, 0.05 to 1."""
+    last_entry = ray_table.shape[0] - 1
+    cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
+    for k in range(rays.shape[0]):
+        ray_x, ray_y = rays[k]
+        middle_x, middle_y, along_x, along_y, _ = pieces[k]
+        for i in range(particles.shape[0]):
+            dx = particles[i, 0] + cosines[i] * ray_x - sines[i] * ray_y - middle_x
+            dy = particles[i, 1] + sines[i] * ray_x + cosines[i] * ray_y - middle_y
+            entry = min(int(abs(dy * along_x - dx * along_y) * _ENTRIES_PER_METRE), last_entry)
+            logarithms[i] += share * ray_table[entry, 0]
+            fits[i] += ray_table[entry, 1] / rays.shape[0]

@@ -1,0 +1,1 @@
+"""Simultaneous localization with a graph of submaps."""

@@ -1,0 +1,103 @@
+"""What a robot learns of its odometry's own errors while it drives: wheels are not as large, nor as far apart, as it takes them to be.
+
+Matches tell how far the robot really went, wherever walls show it; where they do not, as along a bare
+corridor, odometry that knows its errors goes on without them. The errors are the scales of distance and turn,
+and a turn for each metre; their estimate is that of recursive least squares (a Kalman filter without motion),
+and old matches fade.
+
+References
+----------
+The parameters are those of Censi, Franchi, Marchionni, Oriolo, Simultaneous calibration of odometry and
+sensor parameters for mobile robots (IEEE Transactions on Robotics 2013), to first order.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.localization.matching.settings import OdometryUncertainty
+
+
+class OdometryCalibration:
+    """Systematic errors of odometry, and how well they are known.
+
+    Parameters
+    ----------
+    settings : OdometryUncertainty
+        What is known before the robot drives.
+
+    Attributes
+    ----------
+    errors : (3,) float64
+        Share by which a distance is longer than told, share by which a turn is larger, and turn for each
+        metre [m/m, rad/rad, rad/m].
+    covariance : (3, 3) float64
+        Of the errors.
+    """
+
+    def __init__(self, settings: OdometryUncertainty) -> None:
+        self._settings = settings
+        self.errors = np.zeros(3)
+        self.covariance = self._at_first()
+
+    def _at_first(self) -> NDArray[np.float64]:
+        settings = self._settings
+        return np.diag([settings.distance_share**2, settings.turn_share**2, settings.turn_per_metre**2])
+
+    def corrected(self, motion: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a small motion x, y, theta (3,) that odometry tells, without its systematic errors [m, rad]."""
+        along, turn = self.errors[0], self.errors[1] * motion[2] + self.errors[2] * motion[0]
+        half = 0.5 * turn
+        x, y = (1.0 + along) * motion[0], (1.0 + along) * motion[1]
+        cosine, sine = math.cos(half), math.sin(half)
+        return np.array([cosine * x - sine * y, sine * x + cosine * y, motion[2] + turn])
+
+    def uncertainty(self, distance: float, turn: float) -> NDArray[np.float64]:
+        """Return the covariance (3, 3) of a corrected motion over a distance (negative backwards) and a turn, at its end [m, rad]."""
+        lever = _lever(distance, turn)
+        return np.asarray(self._settings.noise(distance, turn) + lever @ self.covariance @ lever.T)
+
+    def learn(
+        self,
+        distance: float,
+        turn: float,
+        difference: NDArray[np.float64],
+        information: NDArray[np.float64],
+        prior: NDArray[np.float64],
+    ) -> None:
+        """Learn from a match.
+
+        Parameters
+        ----------
+        distance, turn : float
+            What odometry told since the last match [m, rad].
+        difference : (3,) float64
+            Where the match lies in the frame of where the robot was expected: x, y, theta [m, rad].
+        information : (3, 3) float64
+            What the points of the scan alone tell of that, in the same frame [1/m^2, 1/(m rad), 1/rad^2].
+        prior : (3, 3) float64
+            What was known before, which the match has in it too.
+        """
+        settings = self._settings
+        lever = _lever(distance, turn)
+        # The last match was no better than this one, and what is left of a motion is its noise.
+        share = np.linalg.inv(
+            np.eye(3) + information @ (settings.noise(distance, turn) + np.linalg.pinv(information + prior))
+        )
+        told = share @ information
+        seen = share @ (information + prior) @ difference
+        faded = 1.0 - (1.0 - settings.fading) ** (abs(distance) + abs(turn))
+        grown = (1.0 - faded) * self.covariance + faded * self._at_first()
+        before = np.linalg.inv(grown)
+        after = before + lever.T @ told @ lever
+        self.covariance = np.asarray(np.linalg.inv(0.5 * (after + after.T)), np.float64)
+        self.errors = self.errors + self.covariance @ (lever.T @ seen)
+        bound = settings.most_deviations * np.sqrt(np.diag(self._at_first()))
+        self.errors = np.clip(self.errors, -bound, bound)
+
+
+def _lever(distance: float, turn: float) -> NDArray[np.float64]:
+    """Return how the errors show at the end of a motion, (3, 3): in x, y [m] and heading [rad]."""
+    half = 0.5 * distance
+    return np.array([[distance, 0.0, 0.0], [0.0, half * turn, half * distance], [0.0, turn, distance]])

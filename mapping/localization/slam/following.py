@@ -1,0 +1,123 @@
+"""A recorded run followed by SLAM from its first scan to its last."""
+
+import math
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.files.laser_logs import LaserLog
+from lidarium.mapping.geometry.rigid import composed, relative
+from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.matching.settings import (
+    ClosureSettings,
+    CompassSettings,
+    GraphSettings,
+    MatchingSettings,
+    SlamSettings,
+    SubmapSettings,
+)
+from lidarium.mapping.localization.slam.localizer import Slam
+
+LOG_SETTINGS = SlamSettings(
+    matching=MatchingSettings(
+        distance_m=0.02,
+        angle=math.radians(1.0),
+        spacing_m=0.08,
+        points=250,
+        independent_share=1.0,
+        deviation=0.25,
+        surface_m=0.0,
+        unseen=0.5,
+    ),
+    submaps=SubmapSettings(resolution=0.05, path_m=8.0, behind_share=0.0),
+    closures=ClosureSettings(least_overlap=0.6, confirmed_beyond_m=0.4, doubts_one_map=False, agree_m=0.3),
+    graph=GraphSettings(deviation_m=0.01, deviation_per_metre=0.02, deviation_angle=math.radians(0.3)),
+    compass=CompassSettings(deviation_angle=math.radians(0.3), drift=0.2),
+)
+"""Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and
+time is plenty. Lasers of logs reach far, so that a local map of a shorter way holds enough, places are
+recognised by more of them, and few returns tell as much as many. Where scans are a metre apart much of each
+is new, and what is new must not outweigh what agrees; headings between them are less sure. Normals are told
+best by the nearest two returns. Walls that were built deviate more from each other than walls that were
+drawn, and scans that reach far let headings drift less; over the ways of logs robots err by more than walls
+are thick."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Followed:
+    """What came of a log.
+
+    Attributes
+    ----------
+    slam : Slam
+        The localizer at the end: its map, its graph, what it did.
+    poses : (scans, 3) float64
+        Where the robot was at each scan, as is believed at the end; the first is (0, 0, 0) [m, rad].
+    online : (scans, 3) float64
+        The same as was believed at that time.
+    scan_s : (scans,) float64
+        CPU time of each scan [s].
+    finish_s : float
+        CPU time after the last one [s].
+    """
+
+    slam: Slam
+    poses: NDArray[np.float64]
+    online: NDArray[np.float64]
+    scan_s: NDArray[np.float64]
+    finish_s: float
+
+
+def follow(
+    log: LaserLog,
+    settings: SlamSettings,
+    watch: Callable[[Iterable[int]], Iterable[int]] = iter,
+    clock: Callable[[], float] = time.process_time,
+) -> Followed:
+    """Run SLAM over a log.
+
+    Parameters
+    ----------
+    log : LaserLog
+        The log.
+    settings : SlamSettings
+        How; whether there is odometry and how fast the beams turn is told by the log.
+    watch : callable
+        Passes the scans' numbers on and may tell how many there were.
+    clock : callable
+        CPU time [s].
+    """
+    matching = replace(
+        settings.matching, beam_interval_s=log.beam_interval_s or settings.matching.beam_interval_s
+    )
+    slam = Slam(
+        replace(
+            settings, matching=matching, uses_odometry=settings.uses_odometry and log.odometry is not None
+        ),
+        log.geometry,
+    )
+    slam.reset(log.laser_pose, 0)
+    scans = len(log.stamps)
+    odometry = np.zeros((scans, 3)) if log.odometry is None else composed(log.odometry, log.laser_pose)
+    numbers, places = np.zeros(scans, np.int64), np.zeros((scans, 3))
+    online, scan_s = np.zeros((scans, 3)), np.zeros(scans)
+    for k in watch(range(scans)):
+        began = clock()
+        online[k] = slam.localize(Sensing(float(log.stamps[k]), odometry[k], log.ranges[k]))
+        scan_s[k] = clock() - began
+        numbers[k], places[k] = slam.place
+    began = clock()
+    slam.finish()
+    finish_s = clock() - began
+    laser = composed(slam.nodes[numbers], places)
+    return Followed(
+        slam, _of_robot(laser, log.laser_pose), _of_robot(online, log.laser_pose), scan_s, finish_s
+    )
+
+
+def _of_robot(laser: NDArray[np.float64], laser_pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the robot's poses where the laser's are known."""
+    return composed(laser, relative(laser_pose, np.zeros(3)))

@@ -1,0 +1,1 @@
+"""What describes an occupancy map: its corners, with a descriptor of each."""

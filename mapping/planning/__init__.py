@@ -1,0 +1,1 @@
+"""Paths on occupancy grids, from clearance to the targets of exploration."""

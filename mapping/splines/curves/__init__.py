@@ -1,0 +1,1 @@
+"""B-spline curves: their basis, their fit to points, lookup along them."""

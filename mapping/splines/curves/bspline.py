@@ -1,0 +1,316 @@
+"""Cubic B-spline curves in the plane: points, derivatives, length, nearest points, and where rays meet them.
+
+Knots here are four-fold at both ends, so that curves begin and end in control points, and run along the curve
+in metres.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.splines.curves.basis import ORDER, point_at
+
+_NEWTON_STEPS = 20
+_PIECES = 8
+"""Into so many pieces a span is cut where a curve is searched."""
+_FINE_PIECES = 32
+"""The same where its nearest point is searched: a curve may turn back on itself within a piece, and only one of its ways is found then."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spline:
+    """A cubic B-spline curve.
+
+    Attributes
+    ----------
+    knots : (n + 4,) float64
+        Not decreasing [m].
+    control_points : (n, 2) float64
+        At least 4 [m].
+    """
+
+    knots: NDArray[np.float64]
+    control_points: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        knots = np.ascontiguousarray(self.knots, np.float64)
+        control_points = np.ascontiguousarray(self.control_points, np.float64)
+        if control_points.ndim != 2 or control_points.shape[1] != 2 or len(control_points) < ORDER:
+            raise ValueError(
+                f"control points have shape {control_points.shape}; want (n, 2) with n >= {ORDER}"
+            )
+        if knots.shape != (len(control_points) + ORDER,):
+            raise ValueError(
+                f"knots have shape {knots.shape}; want {len(control_points) + ORDER}, {ORDER} more than control points"
+            )
+        if not _is_sound(knots, control_points):
+            raise ValueError("knots decrease or span nothing, or knots or control points are not finite")
+        object.__setattr__(self, "knots", knots)
+        object.__setattr__(self, "control_points", control_points)
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """First and last parameter [m]."""
+        return float(self.knots[ORDER - 1]), float(self.knots[len(self.control_points)])
+
+    def evaluate(self, parameters: ArrayLike) -> NDArray[np.float64]:
+        """Return the points at parameters (m,), shape (m, 2) [m].
+
+        Parameters beyond the ends give the ends.
+        """
+        return self._values(parameters, 0)
+
+    def derivative(self, parameters: ArrayLike, order: int = 1) -> NDArray[np.float64]:
+        """Return the first or second derivative at parameters (m,), shape (m, 2) [1, 1/m]."""
+        if order not in (1, 2):
+            raise ValueError(f"order of the derivative is {order}; want 1 or 2")
+        return self._values(parameters, order)
+
+    def tangents(self, parameters: ArrayLike) -> NDArray[np.float64]:
+        """Return unit vectors along the curve at parameters (m,), shape (m, 2)."""
+        along = self.derivative(parameters)
+        return np.asarray(along / np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None], np.float64)
+
+    def curvature(self, parameters: ArrayLike) -> NDArray[np.float64]:
+        """Return the signed curvature at parameters (m,), positive where the curve turns left [1/m]."""
+        first, second = self.derivative(parameters), self.derivative(parameters, 2)
+        speed = np.maximum(np.linalg.norm(first, axis=1), 1e-12)
+        return np.asarray((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3, np.float64)
+
+    def length(self) -> float:
+        """Return the length of the curve [m], by Gauss-Legendre quadrature of each span."""
+        return float(curve_length(self.knots, self.control_points))
+
+    def sample(self, spacing: float) -> NDArray[np.float64]:
+        """Return points evenly spaced in the parameter, both ends included, at most about ``spacing`` apart, shape (m, 2) [m]."""
+        return self.evaluate(self.sample_parameters(spacing))
+
+    def sample_parameters(self, spacing: float) -> NDArray[np.float64]:
+        """Return the parameters of `sample`, shape (m,) [m]."""
+        first, last = self.domain
+        gaps = max(math.ceil((last - first) / spacing), 2)
+        return np.asarray(first + np.arange(gaps + 1) * ((last - first) / gaps), np.float64)
+
+    def closest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return parameters (m,) of the nearest points of the curve to points (m, 2), and the distances (m,) [m]."""
+        places = np.ascontiguousarray(np.reshape(np.asarray(points, np.float64), (-1, 2)))
+        parameters, distances = np.empty(len(places)), np.empty(len(places))
+        _closest(self.knots, self.control_points, places, parameters, distances)
+        return parameters, distances
+
+    def ray(self, origin: ArrayLike, direction: float) -> float:
+        """Return the distance from a point (2,) along a direction [rad] at which a ray first meets the curve [m]; inf where it does not."""
+        x, y = (float(value) for value in np.asarray(origin, np.float64))
+        return float(_ray(self.knots, self.control_points, x, y, math.cos(direction), math.sin(direction)))
+
+    def _values(self, parameters: ArrayLike, order: int) -> NDArray[np.float64]:
+        wanted = np.atleast_1d(np.asarray(parameters, np.float64))
+        values = np.empty((len(wanted), 2))
+        _evaluate(self.knots, self.control_points, wanted, order, values)
+        return values
+
+
+_GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+@kernel
+def _is_sound(knots: Array, control_points: Array) -> bool:
+    """Return whether all numbers are finite, and knots do not decrease and span something."""
+    for k in range(1, knots.shape[0]):
+        if not knots[k] >= knots[k - 1]:
+            return False
+    for k in range(control_points.shape[0]):
+        if not (math.isfinite(control_points[k, 0]) and math.isfinite(control_points[k, 1])):
+            return False
+    return bool(
+        knots[ORDER - 1] < knots[control_points.shape[0]]
+        and math.isfinite(knots[0])
+        and math.isfinite(knots[-1])
+    )
+
+
+@kernel
+def _evaluate(knots: Array, control_points: Array, parameters: Array, order: int, points: Array) -> None:
+    values = np.empty(ORDER)
+    for k in range(parameters.shape[0]):
+        points[k, 0], points[k, 1] = point_at(knots, control_points, parameters[k], order, values)
+
+
+@kernel
+def curve_length(knots: Array, control_points: Array) -> float:
+    """Return the length of a curve [m]."""
+    values = np.empty(ORDER)
+    total = 0.0
+    for span in range(ORDER - 1, control_points.shape[0]):
+        half = (knots[span + 1] - knots[span]) / (2.0 * _PIECES)
+        if half > 0.0:
+            for i in range(_PIECES):
+                for k in range(len(_GAUSS_PLACES)):
+                    x, y = point_at(
+                        knots, control_points, knots[span] + half * (2 * i + 1 + _GAUSS_PLACES[k]), 1, values
+                    )
+                    total += half * _GAUSS_WEIGHTS[k] * math.sqrt(x * x + y * y)
+    return total
+
+
+@kernel
+def _closest(knots: Array, control_points: Array, points: Array, parameters: Array, distances: Array) -> None:
+    """Newton's method in each piece that may hold the nearest point: none is longer than its control points' differences allow."""
+    count = control_points.shape[0]
+    most = (count - ORDER + 1) * _FINE_PIECES
+    places, widths, reaches, used = np.empty(most + 1), np.empty(most), np.empty(most), 0
+    for span in range(ORDER - 1, count):
+        width = (knots[span + 1] - knots[span]) / _FINE_PIECES
+        if width > 0.0:
+            fastest = 0.0
+            for k in range(span - ORDER + 2, span + 1):
+                gap = math.hypot(
+                    control_points[k, 0] - control_points[k - 1, 0],
+                    control_points[k, 1] - control_points[k - 1, 1],
+                )
+                fastest = max(fastest, (ORDER - 1) * gap / (knots[k + ORDER - 1] - knots[k]))
+            for i in range(_FINE_PIECES):
+                places[used], widths[used], reaches[used] = (
+                    knots[span] + width * i,
+                    width,
+                    0.5 * fastest * width,
+                )
+                used += 1
+    places[used] = knots[count]
+    samples, values, apart = np.empty((used + 1, 2)), np.empty(ORDER), np.empty(used + 1)
+    for i in range(used + 1):
+        samples[i, 0], samples[i, 1] = point_at(knots, control_points, places[i], 0, values)
+    for k in range(points.shape[0]):
+        px, py = points[k, 0], points[k, 1]
+        for i in range(used + 1):
+            apart[i] = math.hypot(samples[i, 0] - px, samples[i, 1] - py)
+        nearest, chosen = apart.min(), places[apart.argmin()]
+        for i in range(used):
+            if min(apart[i], apart[i + 1]) - reaches[i] <= nearest:
+                middle = places[i] + 0.5 * widths[i]
+                parameter, squared = _descend(
+                    knots, control_points, px, py, places[i], middle, places[i + 1], values
+                )
+                if math.sqrt(squared) < nearest:
+                    nearest, chosen = math.sqrt(squared), parameter
+        parameters[k], distances[k] = chosen, nearest
+
+
+@kernel
+def _descend(
+    knots: Array,
+    control_points: Array,
+    px: float,
+    py: float,
+    low: float,
+    begin: float,
+    high: float,
+    values: Array,
+) -> tuple[float, float]:
+    """Return the parameter near a given one, between two others, at which the curve is nearest to a point, and the squared distance.
+
+    Newton's method; where a step leads farther away, as it does beside cusps, half of it is tried.
+    """
+    parameter = begin
+    x, y = point_at(knots, control_points, parameter, 0, values)
+    squared = (x - px) ** 2 + (y - py) ** 2
+    for _ in range(_NEWTON_STEPS):
+        x, y = point_at(knots, control_points, parameter, 0, values)
+        dx, dy = point_at(knots, control_points, parameter, 1, values)
+        ddx, ddy = point_at(knots, control_points, parameter, 2, values)
+        slope = (x - px) * dx + (y - py) * dy
+        bend = dx * dx + dy * dy + (x - px) * ddx + (y - py) * ddy
+        if bend <= 0.0:
+            bend = dx * dx + dy * dy
+        if bend == 0.0:
+            break
+        step = slope / bend
+        moved, reached, is_nearer = parameter, squared, False
+        while not is_nearer and abs(step) >= 1e-12:
+            moved = min(max(parameter - step, low), high)
+            x, y = point_at(knots, control_points, moved, 0, values)
+            reached = (x - px) ** 2 + (y - py) ** 2
+            is_nearer = reached < squared
+            step *= 0.5
+        if not is_nearer:
+            break
+        is_still = abs(moved - parameter) < 1e-10
+        parameter, squared = moved, reached
+        if is_still:
+            break
+    return parameter, squared
+
+
+@kernel
+def _ray(knots: Array, control_points: Array, x: float, y: float, cosine: float, sine: float) -> float:
+    """Spans whose control polygon lies on one side of the ray's line, or behind it, are passed over: a curve lies in its polygon's hull."""
+    values = np.empty(ORDER)
+    nearest = math.inf
+    for span in range(ORDER - 1, control_points.shape[0]):
+        if knots[span + 1] <= knots[span]:
+            continue
+        lowest, highest, farthest = math.inf, -math.inf, -math.inf
+        for r in range(ORDER):
+            offset_x = control_points[span - ORDER + 1 + r, 0] - x
+            offset_y = control_points[span - ORDER + 1 + r, 1] - y
+            aside = cosine * offset_y - sine * offset_x
+            lowest, highest = min(lowest, aside), max(highest, aside)
+            farthest = max(farthest, cosine * offset_x + sine * offset_y)
+        if lowest > 0.0 or highest < 0.0 or farthest < 0.0:
+            continue
+        step = (knots[span + 1] - knots[span]) / _PIECES
+        ahead_before, aside_before = 0.0, 0.0
+        for i in range(_PIECES + 1):
+            px, py = point_at(knots, control_points, knots[span] + i * step, 0, values)
+            ahead, aside = cosine * (px - x) + sine * (py - y), cosine * (py - y) - sine * (px - x)
+            if i > 0 and aside_before * aside <= 0.0 and max(ahead_before, ahead) >= 0.0:
+                met = _crossing(
+                    knots,
+                    control_points,
+                    knots[span] + (i - 1) * step,
+                    knots[span] + i * step,
+                    x,
+                    y,
+                    cosine,
+                    sine,
+                    values,
+                )
+                if 0.0 <= met < nearest:
+                    nearest = met
+            ahead_before, aside_before = ahead, aside
+    return nearest
+
+
+@kernel
+def _crossing(
+    knots: Array,
+    control_points: Array,
+    low: float,
+    high: float,
+    x: float,
+    y: float,
+    cosine: float,
+    sine: float,
+    values: Array,
+) -> float:
+    """Return how far ahead the curve crosses the ray's line between two parameters: Newton's method, halving where it would leave them."""
+    px, py = point_at(knots, control_points, low, 0, values)
+    aside_low = cosine * (py - y) - sine * (px - x)
+    parameter = (low + high) / 2.0
+    for _ in range(40):
+        px, py = point_at(knots, control_points, parameter, 0, values)
+        aside = cosine * (py - y) - sine * (px - x)
+        if abs(aside) < 1e-12 or high - low < 1e-13:
+            break
+        if aside_low * aside <= 0.0:
+            high = parameter
+        else:
+            low, aside_low = parameter, aside
+        dx, dy = point_at(knots, control_points, parameter, 1, values)
+        slope = cosine * dy - sine * dx
+        moved = parameter - aside / slope if slope != 0.0 else low
+        parameter = moved if low < moved < high else (low + high) / 2.0
+    return float(cosine * (px - x) + sine * (py - y))

@@ -1,0 +1,194 @@
+"""Without a goal the tree goes to the first frontier of the shortest tour past all."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lidarium.agents.srt.candidates import Candidate, CandidateSource
+from lidarium.agents.srt.choice import choose
+from lidarium.agents.srt.drive import Limits
+from lidarium.agents.srt.frontier_tour import first_on_tour
+from lidarium.agents.srt.memory import MapMemory, RegionMemory
+from lidarium.agents.srt.progress import Intent
+from lidarium.agents.srt.safe_region import DIRECTIONS, safe_region, seen_region
+from lidarium.agents.srt.senses import Senses
+from lidarium.agents.srt.settings import SrtSettings
+from lidarium.agents.srt.tree import Node, Tree
+from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.planning.tours import shortest_tour
+
+RADIUS, RESOLUTION = 0.2, 0.05
+LIMITS = Limits(speed=0.5, turn_rate=1.5, deceleration=0.5, radius=RADIUS)
+
+
+def costs_of(places):
+    """Return what ways from the origin and between places cost."""
+    return np.hypot(*places.T), np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+
+
+def length_of(tour, first, between):
+    return first[tour[0]] + sum(between[a, b] for a, b in itertools.pairwise(tour))
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 7))
+def test_a_tour_visits_all_places_and_is_hardly_longer_than_the_shortest(seed, count):
+    first, between = costs_of(np.random.default_rng(seed).uniform(-10.0, 10.0, (count, 2)))
+    tour = shortest_tour(first, between)
+    assert sorted(tour) == list(range(count))
+    shortest = min(length_of(each, first, between) for each in itertools.permutations(range(count)))
+    assert length_of(tour, first, between) <= 1.1 * shortest + 1e-9
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.integers(8, 20))
+def test_a_tour_is_never_longer_than_that_of_the_nearest_place_again_and_again(seed, count):
+    first, between = costs_of(np.random.default_rng(seed).uniform(-10.0, 10.0, (count, 2)))
+    nearest = [int(np.argmin(first))]
+    while len(nearest) < count:
+        nearest.append(min(set(range(count)) - set(nearest), key=lambda place: between[nearest[-1], place]))
+    assert (
+        length_of(shortest_tour(first, between), first, between) <= length_of(nearest, first, between) + 1e-9
+    )
+
+
+def test_what_lies_on_the_shorter_side_is_visited_first_though_another_place_is_nearer():
+    # Places lie on a line: what is left of the robot goes on to -6 m, so those on its right come first.
+    first, between = costs_of(np.array([[-1.0, 0.0], [1.1, 0.0], [1.6, 0.0], [-6.0, 0.0]]))
+    tour = shortest_tour(first, between).tolist()
+    assert (set(tour[:2]), tour[2:]) == ({1, 2}, [0, 3])
+
+
+def hall(openings):
+    """Return the map of a hall of 12 x 4 m whose walls were seen, but for stretches (x from, x to) of the upper one."""
+    log_odds = np.zeros((120, 320), np.int8)
+    log_odds[20:100, 20:260] = -40
+    log_odds[19], log_odds[:, 19], log_odds[:, 260], log_odds[100] = 40, 40, 40, 40
+    for low, high in openings:
+        log_odds[100, 20 + round(low / RESOLUTION) : 20 + round(high / RESOLUTION)] = 0
+    navigation = NavigationMap(log_odds, RESOLUTION)
+    navigation.changed((0, 120, 0, 320))
+    return MapMemory(navigation, RADIUS)
+
+
+def senses_at(x, y, theta=0.0):
+    """Return what a robot at a place of the hall [m] tells, its lower left corner at (1, 1)."""
+    return Senses(0.0, np.array([x + 1.0, y + 1.0, theta]), np.full(3, np.inf, np.float32), False, None, [])
+
+
+def x_of(found):
+    return float(found[1][0]) - 1.0
+
+
+def test_a_robot_begins_with_the_end_from_which_it_need_not_come_back():
+    memory = hall([(1.0, 2.0), (5.0, 6.0), (10.0, 11.0)])
+    found = first_on_tour(memory, senses_at(3.8, 2.0, math.pi / 2), LIMITS, 0.8, Intent(), ())
+    assert 1.0 <= x_of(found) <= 2.0
+    legs, focus = found
+    assert math.dist(legs[-1], focus) < RADIUS + 4.0 * RESOLUTION
+
+
+def test_what_it_went_for_is_left_only_for_a_gain():
+    memory = hall([(3.0, 4.0), (7.9, 8.9)])
+    there = senses_at(5.95, 2.0, math.pi / 2)
+    left, right = (
+        first_on_tour(memory, there, LIMITS, 0.8, on_the_way_to([x + 1.0, 5.0]), ()) for x in (3.5, 8.4)
+    )
+    assert x_of(left) < 5.0 < x_of(right)
+
+
+def on_the_way_to(*places):
+    """Return the intent of a robot that went for places one after the other."""
+    intent = Intent()
+    for place in places:
+        intent.go_for(np.array(place))
+    return intent
+
+
+def test_a_robot_that_came_back_to_what_it_had_left_holds_on_to_it():
+    """Two targets that each look better on the way to the other must not keep it between them."""
+    west, east = [4.0, 5.0], [9.9, 5.0]
+    assert [
+        on_the_way_to(*places).kept
+        for places in ([west], [west, east], [west, east, west], [west, east, west, east])
+    ] == [
+        1.0,
+        1.0,
+        2.0,
+        4.0,
+    ]
+    assert on_the_way_to(west, [4.2, 5.0], west).kept == 1.0
+    settled = on_the_way_to(west, east, west)
+    settled.settle()
+    assert (settled.kept, settled.latest.tolist()) == (1.0, west)
+    memory, there = hall([(2.5, 3.5), (7.9, 8.9)]), senses_at(7.0, 2.0, math.pi / 2)
+    assert x_of(first_on_tour(memory, there, LIMITS, 0.8, on_the_way_to(west), ())) > 5.0
+    assert (
+        x_of(first_on_tour(memory, there, LIMITS, 0.8, on_the_way_to(west, east, west, east, west), ())) < 5.0
+    )
+
+
+def test_a_long_frontier_makes_up_for_a_longer_way():
+    there = senses_at(6.0, 2.0, math.pi / 2)
+    assert x_of(first_on_tour(hall([(2.8, 3.8), (8.1, 9.1)]), there, LIMITS, 0.8, Intent(), ())) > 6.0
+    assert x_of(first_on_tour(hall([(0.8, 3.8), (8.1, 9.1)]), there, LIMITS, 0.8, Intent(), ())) < 6.0
+
+
+def test_what_a_teammate_goes_for_is_left_to_it_and_frontiers_near_by_cost_more():
+    memory, there = hall([(3.0, 4.0), (8.0, 9.0)]), senses_at(5.0, 2.0, math.pi / 2)
+    assert x_of(first_on_tour(memory, there, LIMITS, 0.8, Intent(), ())) < 5.0
+    assert x_of(first_on_tour(memory, there, LIMITS, 0.8, Intent(), [np.array([4.5, 5.0])])) > 5.0
+    both = [np.array([4.5, 5.0]), np.array([9.5, 5.0])]
+    assert first_on_tour(hall([(3.4, 4.2), (8.0, 9.0)]), there, LIMITS, 0.8, Intent(), both) is None
+
+
+@pytest.mark.parametrize("memory", [hall([]), hall([(3.0, 3.5)]), RegionMemory([])])
+def test_there_is_no_tour_without_frontiers_of_that_length(memory):
+    assert first_on_tour(memory, senses_at(5.0, 2.0), LIMITS, 0.8, Intent(), ()) is None
+
+
+def test_ways_between_frontiers_are_no_longer_than_past_the_robot():
+    frontiers = hall([(1.0, 2.0), (5.0, 6.0), (10.0, 11.0)]).frontiers(np.array([5.0, 3.0]), 0.8, 14)
+    assert len(frontiers.sizes) == 3
+    assert (np.diff(frontiers.costs) >= 0.0).all()
+    between = frontiers.between(np.arange(3))
+    assert (between <= frontiers.costs[:, None] + frontiers.costs[None] + 1e-9).all()
+    np.testing.assert_array_equal(between, between.T)
+    np.testing.assert_array_equal(frontiers.between(np.array([0, 2])), between[::2, ::2])
+    assert (
+        len(hall([(1.0, 2.0), (5.0, 6.0), (10.0, 11.0)]).frontiers(np.array([5.0, 3.0]), 0.8, 2).sizes) == 2
+    )
+
+
+def went_for(memory, goal, targets=()):
+    """Return the x that a robot at (4, 2) goes for, whose only node shows walls all round."""
+    srt, there = SrtSettings(), senses_at(4.0, 2.0, math.pi / 2)
+    there = replace(there, goal=None if goal is None else np.array(goal) + 1.0)
+    place, view = there.pose[:2], np.ones(DIRECTIONS)
+    safe = safe_region(place, view, 0.0, "radial", RADIUS, 4.0)
+    node = Node(0, "robot_0", there.pose, safe, seen_region(place, view, 4.0), [], None, view)
+    tree = Tree()
+    tree.add(node, None, set())
+    source = CandidateSource(srt, RADIUS, np.random.default_rng(0))
+    way = choose(node, tree, {0}, source, memory, srt, np.random.default_rng(0), there, targets, LIMITS)
+    return float(way[-1].candidate.focus[0]) - 1.0
+
+
+def test_towards_a_goal_a_robot_goes_to_the_frontier_from_which_least_is_left():
+    """The nearest one may lie on the wrong side."""
+    memory = hall([(2.5, 3.5), (6.0, 7.0), (10.5, 11.5)])
+    assert went_for(memory, None) < 4.0
+    assert 6.0 <= went_for(memory, (8.0, 10.0)) <= 7.0
+    assert went_for(memory, (11.0, 4.5)) > 10.0
+    assert went_for(memory, (0.0, 10.0)) < 4.0
+
+
+def test_towards_a_goal_what_a_teammate_goes_for_is_left_to_it():
+    memory = hall([(2.5, 3.5), (10.5, 11.5)])
+    mate = Candidate(0, np.array([12.0, 4.0]), None, np.array([12.0, 5.0]), is_frontier=True)
+    assert went_for(memory, (11.0, 8.0), [mate]) < 4.0

@@ -1,0 +1,179 @@
+"""The catalogue finds floors by name, seed and path, and its sets stay what they are."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from lidarium.envs.floors.catalogue.names import (
+    HASHED_FLOORS,
+    SETS,
+    about_floor,
+    describe_floor,
+    floor_names,
+    hash_of_floors,
+    load_floor,
+    set_floors,
+    set_sha256,
+)
+from lidarium.envs.floors.free_space import configuration_space
+from lidarium.envs.floors.measures import measure_building
+from lidarium.envs.floors.starts import check_starts
+from lidarium.envs.settings.robots import ROBOTS
+
+SCENES = (
+    "scene_loop",
+    "scene_corridor",
+    "scene_corner",
+    "scene_room",
+    "scene_loop_corridor",
+    "scene_room_corner",
+)
+
+TREE_WORLDS = (
+    "srt_corridor",
+    "srt_l_room",
+    "srt_lab",
+    "srt_t_junction",
+    "srt_cluttered",
+    "srt_cluttered_reachable",
+)
+TEAM_FLOORS = ("apartment", "clinic", *SCENES)
+
+
+def test_the_catalogue_holds_the_apartment_the_clinic_six_scenes_and_six_worlds_with_goals():
+    assert set(floor_names()) == {*TEAM_FLOORS, *TREE_WORLDS}
+    assert all(about_floor(name).endswith(".") for name in floor_names())
+
+
+@pytest.mark.parametrize("name", TEAM_FLOORS)
+def test_every_drawn_floor_for_teams_is_one_piece_for_the_largest_robot_with_three_starts(name):
+    floor = load_floor(name)
+    assert floor.name == name
+    assert floor.starts.shape == (3, 3)
+    assert floor.goal is None
+    for resolution in (0.05, 0.025):
+        for height in (0.5, 2.0):
+            raster = floor.raster(resolution, 0.0, height)
+            space = configuration_space(raster, 0.30)
+            assert cv2.connectedComponents(space.astype(np.uint8), connectivity=4)[0] - 1 == 1
+            for start in floor.starts:
+                check_starts(raster, 0.5, start[None])
+
+
+@pytest.mark.parametrize("name", TREE_WORLDS)
+def test_the_way_to_the_goal_is_free_for_a_pioneer_unless_the_goal_is_enclosed(name):
+    floor = load_floor(name)
+    radius = ROBOTS["pioneer"].radius
+    assert floor.starts.shape == (1, 3)
+    assert floor.starts[0, :2].tolist() == [0.0, 0.0]
+    assert all(math.isfinite(solid.z_high) for solid in floor.solids)
+    raster = floor.raster(0.01, 0.0, 0.3)
+    check_starts(raster, radius, floor.starts)
+    labels = cv2.connectedComponents(configuration_space(raster, radius).astype(np.uint8), connectivity=4)[1]
+    cells = ((np.array([floor.starts[0, :2], floor.goal]) - raster.origin) / raster.resolution).astype(int)
+    at_start, at_goal = labels[cells[:, 1], cells[:, 0]]
+    assert at_start != 0
+    assert at_goal != 0
+    assert (at_start == at_goal) == (name != "srt_cluttered")
+
+
+def test_the_two_cluttered_worlds_differ_by_the_lid_over_the_goal():
+    closed, opened = load_floor("srt_cluttered"), load_floor("srt_cluttered_reachable")
+    more = closed.raster(0.01, 0.3, 0.3).solid - opened.raster(0.01, 0.3, 0.3).solid
+    assert set(np.unique(more)) == {0, 1}
+    assert int(more.sum()) == 120 * 15
+
+
+def test_the_indoor_floors_are_as_large_as_they_say():
+    assert measure_building(load_floor("apartment")).area_m2 == pytest.approx(65.0, abs=2.0)
+    assert measure_building(load_floor("clinic")).area_m2 > 65.0
+    assert all(load_floor(name).bounds == (0.0, 0.0, 25.0, 25.0) for name in SCENES)
+
+
+def test_what_the_scenes_promise_is_measured():
+    loops = {name: measure_building(load_floor(name)).loops for name in SCENES}
+    assert loops["scene_loop"] == 1
+    assert loops["scene_loop_corridor"] >= 3
+    assert all(count >= 3 for name, count in loops.items() if name != "scene_loop")
+
+
+def test_generated_floors_are_found_by_kind_and_seed():
+    for kind in ("apartment", "office", "corridors"):
+        assert load_floor(f"{kind}:7").name == f"{kind}:7"
+    assert load_floor("building:7").name.endswith(":7")
+    assert load_floor("building:7") is load_floor("building:7")
+    assert load_floor("building:7").sha256 != load_floor("building:8").sha256
+
+
+def test_a_floor_is_returned_as_it_is():
+    floor = load_floor("scene_loop")
+    assert load_floor(floor) is floor
+
+
+def test_an_unknown_name_is_answered_with_the_nearest_one_and_the_list():
+    with pytest.raises(ValueError, match="did you mean 'apartment'") as caught:
+        load_floor("apartmant")
+    assert all(name in str(caught.value) for name in floor_names())
+    with pytest.raises(ValueError, match="no floor called"):
+        load_floor("")
+
+
+@pytest.mark.parametrize("seed", ["", "x", "-1", "1.5"])
+def test_a_seed_that_is_no_number_is_refused(seed):
+    with pytest.raises(ValueError, match="want a whole number"):
+        load_floor(f"building:{seed}")
+
+
+def test_a_set_is_refused_where_one_floor_is_wanted():
+    with pytest.raises(ValueError, match="set_floors"):
+        load_floor("set:train")
+
+
+def test_a_resolution_belongs_to_files_only():
+    with pytest.raises(ValueError, match="resolution"):
+        load_floor("apartment", resolution=0.05)
+
+
+def test_paths_go_to_the_importers(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        load_floor(str(tmp_path / "nothing.png"))
+    with pytest.raises(FileNotFoundError):
+        load_floor("nothing.yaml")
+
+
+def test_an_image_of_the_dungeons_is_loaded_by_its_path(shared_data):
+    image = next(iter(sorted(shared_data.rglob("*dungeon*/**/*.png"))), None)
+    if image is None:
+        pytest.skip("no dungeon image in the real data")
+    assert load_floor(image).cells is not None
+
+
+def test_sets_are_disjoint_and_of_the_promised_sizes():
+    specs = {name: set_floors(name) for name in SETS}
+    assert {name: len(floors) for name, floors in specs.items()} == {
+        "train": 10_000,
+        "validation": 200,
+        "test": 200,
+    }
+    assert len(set().union(*specs.values())) == 10_400
+    assert set_floors("set:test") == specs["test"]
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_floors_of_a_set_are_those_whose_hash_is_kept(name):
+    assert hash_of_floors(set_floors(name)[:HASHED_FLOORS]) == set_sha256(name)
+
+
+def test_an_unknown_set_is_answered_with_the_nearest_one():
+    with pytest.raises(ValueError, match="did you mean 'validation'"):
+        set_floors("validate")
+
+
+def test_a_description_holds_the_figures_of_a_floor():
+    described = describe_floor(load_floor("apartment"))
+    assert described["size_m"] == [11.8, 8.4]
+    assert described["rooms"] == 7
+    assert described["loops"] == 2
+    assert described["sha256"] == load_floor("apartment").sha256

@@ -1,0 +1,281 @@
+"""The scorer: masks against beliefs and against slow references, and who is credited with what."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.envs.floors.floor import Floor, Raster, Solid
+from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.scoring.coverage import count_bits, mark_seen, pack_bits, share_news, unpack_bits
+from lidarium.envs.scoring.scorer import THRESHOLDS, Scorer, reward_weights
+from lidarium.envs.settings.exploration import ExplorationSettings, RewardSettings
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.robots import ROBOTS
+from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic.motion import distance_bound
+from lidarium.envs.simulation.kinematic.ray_tables import RayTables
+from lidarium.envs.simulation.kinematic.world import KinematicWorld, counted_cells
+from lidarium.mapping.grids.occupancy import OccupancySettings
+from lidarium.mapping.kernels.compilation import kernel
+
+
+def tables_of(solid, resolution=0.025):
+    raster = Raster(solid.astype(np.uint8), (0.0, 0.0), resolution)
+    return FloorTables(raster, raster, RayTables(raster.solid), distance_bound(raster.solid))
+
+
+def hall(rows=160, columns=240):
+    solid = np.zeros((rows, columns), np.uint8)
+    solid[0], solid[-1], solid[:, 0], solid[:, -1] = 1, 1, 1, 1
+    return solid
+
+
+def team(robots, resolution=0.05, beams=181, noise=0.0, weights=None):
+    lidar, maps = Lidar(beams=beams, noise_floor=noise), OccupancySettings(resolution=resolution)
+    return KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, maps, reward_weights=weights)
+
+
+def starts_on(tables, count, generator, apart=0.6):
+    room = np.argwhere(tables.bound * tables.body.resolution > 0.22)
+    placed = []
+    while len(placed) < count:
+        row, column = room[generator.integers(len(room))]
+        x, y = np.array(tables.body.origin) + (np.array([column, row]) + 0.5) * tables.body.resolution
+        if all(math.dist((x, y), other[:2]) > apart for other in placed):
+            placed.append((x, y, generator.uniform(-math.pi, math.pi)))
+    return np.array(placed)
+
+
+@given(rows=st.integers(1, 9), columns=st.integers(1, 200), seed=st.integers(0, 99))
+@settings(max_examples=50)
+def test_packing_and_unpacking_bits_is_lossless(rows, columns, seed):
+    cells = np.random.default_rng(seed).random((rows, columns)) < 0.5
+    bits = pack_bits(cells)
+    assert bits.shape == (rows, -(-columns // 64))
+    assert np.array_equal(unpack_bits(bits, columns), cells)
+    assert np.bitwise_count(bits).sum() == cells.sum()
+
+
+@kernel
+def count_all(values, counts):
+    for k in range(values.shape[0]):
+        counts[k] = count_bits(values[k])
+
+
+def test_counting_bits_is_exact_for_all_kinds_of_words():
+    values = np.concatenate(
+        [
+            np.random.default_rng(0).integers(0, 2**64, 500, np.uint64),
+            np.array([0, 1, 2**63, 2**64 - 1], np.uint64),
+        ]
+    )
+    counts = np.zeros(len(values), np.int64)
+    count_all(values, counts)
+    assert np.array_equal(counts, np.bitwise_count(values))
+
+
+@pytest.mark.parametrize("resolution", [0.025, 0.05])
+@pytest.mark.parametrize("floor", ["apartment", "building:3"])
+def test_in_the_ideal_world_belief_and_mask_agree_to_the_cell(resolution, floor):
+    tables = floor_tables(load_floor(floor), 0.025, 0.3, 0.52)
+    generator = np.random.default_rng(2)
+    world = team(4, resolution)
+    world.place(0, tables, starts_on(tables, 4, generator), 3)
+    counted = unpack_bits(world.counted_masks[0], world.log_odds[0].shape[1])
+    for step in range(150):
+        world.step(generator.uniform(-0.2, 1.0, (4, 2)) * [0.77, 1.2], moves_bodies=step > 0)
+        if step % 30 == 0 or step == 149:
+            for row in range(4):
+                seen = unpack_bits(world.masks[row], counted.shape[1])
+                known = world.log_odds[row] != 0
+                assert np.array_equal(seen, known & counted)
+                assert not (world.log_odds[row][counted] > 0).any()
+                assert world.seen[row] == seen.sum()
+
+
+@pytest.mark.parametrize("robots", [1, 2, 5])
+def test_credits_are_equal_shares_of_what_is_new_to_the_team(robots):
+    tables = floor_tables(load_floor("building:3"), 0.025, 0.3, 0.52)
+    generator = np.random.default_rng(robots)
+    world = team(robots)
+    world.place(0, tables, starts_on(tables, robots, generator), 3)
+    columns = world.log_odds[0].shape[1]
+    before = np.zeros((robots, world.log_odds[0].shape[0], columns), bool)
+    for step in range(80):
+        world.step(generator.uniform(-0.2, 1.0, (robots, 2)) * [0.77, 1.2], moves_bodies=step > 0)
+        after = np.array([unpack_bits(mask, columns) for mask in world.masks])
+        new_to_team = after.any(axis=0) & ~before.any(axis=0)
+        sharers = (after & new_to_team).sum(axis=0)
+        expected = [(1.0 / sharers[mask & new_to_team]).sum() for mask in after]
+        assert np.allclose(world.gains, expected, atol=1e-9)
+        assert world.gains.sum() == pytest.approx(new_to_team.sum(), abs=1e-6)
+        assert world.team_seen[0] == after.any(axis=0).sum()
+        before = after
+
+
+@given(seed=st.integers(0, 2**32 - 1), robots=st.integers(1, 6))
+@settings(max_examples=60)
+def test_sharing_news_equals_a_slow_count_cell_by_cell(seed, robots):
+    generator = np.random.default_rng(seed)
+    rows, columns = 12, 192
+    counted = generator.random((rows, columns)) < 0.8
+    owns = [generator.random((rows, columns)) < 0.1 for _ in range(robots)]
+    owns = [own & counted for own in owns]
+    team_seen = np.any(owns, axis=0)
+    scans = [generator.random((rows, columns)) < 0.3 for _ in range(robots)]
+    packed = [pack_bits(own) for own in owns]
+    packed_team, packed_counted = pack_bits(team_seen), pack_bits(counted)
+    news = np.zeros((robots, 4), np.int64)
+    for k in range(robots):
+        new_own = mark_seen(
+            packed[k], packed_counted, pack_bits(scans[k]), (0, rows, 0, packed_team.shape[1]), 0, 0, news[k]
+        )
+        assert new_own == (scans[k] & counted & ~owns[k]).sum()
+    gains = np.zeros(robots)
+    total = share_news(np.array([own.ctypes.data for own in packed]), packed_team, news, 0, robots, gains)
+    fresh = [scan & counted & ~team_seen for scan in scans]
+    sharers = np.sum(fresh, axis=0)
+    assert np.allclose(gains, [(1.0 / sharers[mine]).sum() for mine in fresh])
+    assert total == (sharers > 0).sum()
+    assert np.array_equal(unpack_bits(packed_team, columns), team_seen | (sharers > 0))
+
+
+def test_a_window_that_hangs_over_the_masks_is_cut():
+    counted = np.ones((10, 64), bool)
+    own = np.zeros((10, 1), np.uint64)
+    bits = pack_bits(np.ones((20, 192), bool))
+    news = np.zeros(4, np.int64)
+    assert mark_seen(own, pack_bits(counted), bits, (0, 20, 0, bits.shape[1]), -5, -1, news) == 640
+    assert news.tolist() == [0, 10, 0, 1]
+    assert unpack_bits(own, 64).all()
+    assert mark_seen(own, pack_bits(counted), bits, (0, 20, 0, bits.shape[1]), -5, -1, news) == 0
+    assert news[0] >= news[1]
+
+
+def test_coverage_never_falls_and_reaches_one_where_all_is_seen():
+    world = team(1, beams=727)
+    world.place(0, tables_of(hall(80, 100)), np.array([[1.2, 1.0, 0.0]]), 1)
+    last = 0.0
+    for step in range(80):
+        world.step(np.array([[0.0, 1.5]]), moves_bodies=step > 0)
+        assert world.coverage(0) >= last
+        last = world.coverage(0)
+    assert last == 1.0
+
+
+def test_cells_behind_walls_and_in_sealed_rooms_never_count():
+    solid = hall()
+    solid[:, 120:124] = 1
+    tables = tables_of(solid)
+    world = team(1)
+    world.place(0, tables, np.array([[1.5, 2.0, 0.0]]), 1)
+    counted = unpack_bits(world.counted_masks[0], world.log_odds[0].shape[1])
+    assert not counted[:, 60:].any()
+    assert counted[2:78, 2:58].mean() > 0.99
+    for step in range(60):
+        world.step(np.array([[0.0, 2.0]]), moves_bodies=step > 0)
+    assert not unpack_bits(world.masks[0], counted.shape[1])[:, 60:].any()
+    assert world.team_seen[0] <= counted.sum()
+
+
+def test_the_cells_that_count_are_those_that_the_smallest_disc_sweeps():
+    solid = hall()
+    solid[60:100, 100:104] = 1
+    tables = tables_of(solid)
+    start = np.array([[1.5, 2.0, 0.0]])
+    world = team(1, 0.05)
+    world.place(0, tables, start, 1)
+    swept = swept_free_space(tables.body, 0.18, start)
+    expected = counted_cells(swept, 2)
+    counted = unpack_bits(world.counted_masks[0], world.log_odds[0].shape[1])
+    assert np.array_equal(counted[:, : expected.shape[1]], expected)
+    assert not counted[:, expected.shape[1] :].any()
+    # The corners of the hall are where a disc does not come.
+    assert not counted[1, 1]
+
+
+def test_a_coarse_cell_counts_only_where_all_its_fine_cells_do():
+    free = np.ones((7, 9), bool)
+    free[3, 4] = False
+    counted = counted_cells(free, 2)
+    assert counted.shape == (4, 5)
+    assert not counted[1, 2]
+    assert counted[0, 0]
+    assert not counted[3].any()
+    assert not counted[:, 4].any()
+
+
+def test_noise_changes_the_map_and_not_the_score():
+    generator = np.random.default_rng(8)
+    tables = floor_tables(load_floor("building:3"), 0.025, 0.3, 0.52)
+    starts = starts_on(tables, 2, generator)
+    exact, noisy = team(2), team(2, noise=0.03)
+    exact.place(0, tables, starts, 1)
+    noisy.place(0, tables, starts, 1)
+    for step in range(30):
+        commands = generator.uniform(-0.2, 1.0, (2, 2)) * [0.77, 1.2]
+        exact.step(commands, moves_bodies=step > 0)
+        noisy.step(commands, moves_bodies=step > 0)
+        assert np.array_equal(exact.gains, noisy.gains)
+        assert exact.team_seen[0] == noisy.team_seen[0]
+    assert not np.array_equal(exact.log_odds[0], noisy.log_odds[0])
+
+
+def scored(weights, robots=2):
+    options = ExplorationSettings(robots=robots, reward=weights)
+    world = team(robots, weights=reward_weights(options))
+    world.place(0, tables_of(hall()), np.array([[1.0, 2.0, 0.0], [3.0, 2.0, math.pi]])[:robots], 1)
+    scorer = Scorer(world, options)
+    world.step(np.zeros((robots, 2)), moves_bodies=False)
+    scorer.start()
+    return world, scorer
+
+
+def test_rewards_are_area_less_prices_and_sum_over_the_steps_since_they_were_taken():
+    weights = RewardSettings(area=2.0, time=0.5, contact=3.0, energy=0.25)
+    world, scorer = scored(weights)
+    assert scorer.take_rewards() == [0.0, 0.0]
+    expected = np.zeros(2)
+    for _ in range(30):
+        before = world.travelled.copy()
+        world.step(np.array([[0.5, 0.0], [0.6, 0.0]]))
+        scorer.advance()
+        expected += (
+            2.0 * 0.05**2 * world.gains - 0.5 * 0.1 - 3.0 * world.contacts - 0.25 * (world.travelled - before)
+        )
+    assert world.contacts.any()
+    assert np.allclose(scorer.take_rewards(), expected)
+    assert scorer.take_rewards() == [0.0, 0.0]
+
+
+def test_thresholds_are_timed_once_and_in_order():
+    world, scorer = scored(RewardSettings(), 1)
+    for _ in range(400):
+        world.step(np.array([[0.3, 0.8]]))
+        scorer.advance()
+    times = list(scorer.times.values())
+    assert list(scorer.times) == list(THRESHOLDS[: len(times)])
+    assert times == sorted(times)
+    assert len(times) >= 2
+    curve_times, coverages = zip(*scorer.curve, strict=True)
+    assert list(coverages) == sorted(coverages)
+    assert curve_times[0] == 0.0
+    for threshold, time in scorer.times.items():
+        assert min(t for t, c in scorer.curve if c >= threshold) == time
+    gaps = np.diff([time for time, _ in scorer.track])
+    assert np.allclose(gaps, 0.2)
+
+
+def test_body_and_laser_share_their_tables_unless_something_stands_at_one_height_only():
+    shelf = Solid(np.array([[2.0, 1.0], [2.2, 1.0], [2.2, 1.2], [2.0, 1.2]]), 0.6, 1.0)
+    floor = Floor("hall", (0.0, 0.0, 4.0, 3.0), (shelf,))
+    tables = FloorTables.of_floor(floor, 0.025, 0.3, 0.52)
+    assert tables.laser is tables.body
+    tables = FloorTables.of_floor(floor, 0.025, 0.7, 0.52)
+    assert tables.laser is not tables.body
+    assert tables.laser.solid.sum() > tables.body.solid.sum()

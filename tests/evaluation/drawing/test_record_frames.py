@@ -1,0 +1,71 @@
+"""Pictures and films of what a record shows, without its floor or version."""
+
+from dataclasses import replace
+
+import cv2
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+
+from lidarium.envs.drawing.frame_parts import EXPLORED, UNEXPLORED, team_colours
+from lidarium.evaluation.drawing.record_frames import TrackFrames, save_track_film, save_track_picture
+
+
+@pytest.fixture
+def foreign(apartment_record):
+    """A record of a version that is not known, on a floor that is not there."""
+    header = {
+        **apartment_record.header,
+        "version": "0.0.7",
+        "floor": "attic",
+        "floor_source": None,
+        "settings": {},
+    }
+    return replace(apartment_record, header=header)
+
+
+def share_of(frame, colour):
+    return float((frame == np.array(colour)).all(axis=2).mean())
+
+
+def test_frames_show_the_map_as_it_grows_and_the_robots(foreign):
+    frames = TrackFrames(foreign, 320)
+    first, last = frames.draw(0.0), frames.draw(60.0)
+    assert first.shape == last.shape
+    assert first.shape[0] % 2 == first.shape[1] % 2 == 0
+    assert share_of(first, EXPLORED) < share_of(last, EXPLORED)
+    assert share_of(first, UNEXPLORED) > share_of(last, UNEXPLORED)
+
+
+def test_a_robot_is_drawn_in_its_colour_where_it_is(foreign):
+    frames = TrackFrames(foreign, 640)
+    frame, view = frames.draw(30.0), frames.view
+    x, y = foreign.display.poses_at(30.0)[1, :2]
+    column, row = (
+        int((x - view.origin[0]) * view.scale) + 10,
+        frame.shape[0] - 10 - int((y - view.origin[1]) * view.scale),
+    )
+    around = frame[row - 12 : row + 12, column - 12 : column + 12]
+    assert share_of(around, team_colours(2)[1]) > 0.3
+
+
+def test_a_film_runs_at_its_speed(foreign, tmp_path):
+    save_track_film(tmp_path / "track.mp4", foreign, speed=40.0, size=128)
+    with imageio.get_reader(tmp_path / "track.mp4") as reader:
+        frames = reader.count_frames()
+    assert frames == pytest.approx(20.0 * foreign.display.times[-1] / 40.0 + 30, abs=2)
+    assert [path.name for path in tmp_path.iterdir()] == ["track.mp4"]
+
+
+def test_a_film_wants_a_speed(foreign, tmp_path):
+    with pytest.raises(ValueError, match="speed of the film is 0"):
+        save_track_film(tmp_path / "track.mp4", foreign, speed=0.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_picture_shows_the_end(foreign, tmp_path):
+    save_track_picture(tmp_path / "track.png", foreign)
+    picture = cv2.imread(str(tmp_path / "track.png"))[..., ::-1]
+    assert picture.shape[1] > 1000
+    assert 0.3 < share_of(picture, (255, 255, 255)) < 0.95
+    assert all(share_of(picture, colour) > 3e-4 for colour in team_colours(3))

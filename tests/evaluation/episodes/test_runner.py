@@ -1,0 +1,62 @@
+"""Running a policy through an episode, at every level of decision."""
+
+import numpy as np
+import pytest
+
+from lidarium.agents import Stop
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.settings.exploration import make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+
+
+class FirstFrontier:
+    """Takes the cheapest frontier on offer."""
+
+    level, shares_map = "frontier", True
+
+    def reset(self, team, seed):
+        self.team = team
+
+    def act(self, observations):
+        return {
+            agent: 0 if observation["action_mask"][0] else 16 for agent, observation in observations.items()
+        }
+
+
+class StopsAfter:
+    """Stands for some steps and stops, each robot with a reason of its own."""
+
+    level, shares_map = "velocity", True
+
+    def reset(self, team, seed):
+        self.team, self.steps = team, 0
+
+    def act(self, observations):
+        self.steps += 1
+        return {
+            agent: Stop(f"tired of {agent}") if self.steps > 3 else np.zeros(2, np.float32)
+            for agent in observations
+        }
+
+
+def test_a_policy_that_chooses_among_frontiers_explores_the_apartment():
+    env = ExplorationEnv("apartment", make_settings(robots=2, horizon_s=900.0))
+    episode = run_episode(FirstFrontier(), env, seed=0)
+    assert env.scorer.coverage >= 0.98
+    assert set(env.scorer.ended_because) == {"robot_0", "robot_1"}
+    assert env.world.collisions.sum() == 0
+    assert len(episode.decision_seconds) > 5
+
+
+def test_a_policys_stop_ends_its_robot_with_its_reason():
+    env = ExplorationEnv("apartment", make_settings(robots=2))
+    run_episode(StopsAfter(), env, seed=0)
+    assert env.scorer.ended_because == {"robot_0": "tired of robot_0", "robot_1": "tired of robot_1"}
+    assert env.scorer.time == pytest.approx(0.4)
+
+
+def test_an_unknown_level_is_refused_before_anything_runs():
+    policy = FirstFrontier()
+    policy.level = "thought"
+    with pytest.raises(ValueError, match="thought"):
+        run_episode(policy, ExplorationEnv("apartment", make_settings(robots=1)), seed=0)

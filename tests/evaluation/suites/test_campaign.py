@@ -1,0 +1,144 @@
+"""A campaign keeps what is finished, goes on where it stopped, and gives the same lines whoever does the work."""
+
+import json
+import shutil
+
+import pytest
+
+from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.evaluation.record import read_record, rerun
+from lidarium.evaluation.suites.campaign import Campaign, run_trial
+from lidarium.evaluation.suites.episodes_file import TIMINGS, read_episodes
+from lidarium.evaluation.suites.suite import Suite
+
+
+def suite(**changes):
+    settings = {"horizon_s": 6.0, "resolution": 0.05}
+    plan = {
+        "policies": ("nearest_frontier", "random_walk"),
+        "floors": ("apartment",),
+        "robots": (2,),
+        "seeds": (0, 1),
+    }
+    return Suite(**{**plan, "variants": {"default": settings}, **changes})
+
+
+def lasting(folder):
+    lines = read_episodes(folder / "episodes.jsonl")
+    return {
+        line["key"]: {name: value for name, value in line.items() if name not in TIMINGS} for line in lines
+    }
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A finished campaign of four episodes."""
+    folder = tmp_path_factory.mktemp("campaign")
+    campaign = Campaign(suite(), folder)
+    assert len(list(campaign.run())) == campaign.done == campaign.total == 4
+    return folder
+
+
+def test_a_folder_holds_the_suite_a_line_and_a_record_for_each_episode(folder):
+    assert json.loads((folder / "suite.json").read_text())["policies"] == ["nearest_frontier", "random_walk"]
+    lines = read_episodes(folder / "episodes.jsonl")
+    assert {line["key"] for line in lines} == {trial.key for trial in suite().trials()}
+    for line in lines:
+        record = read_record(folder / line["record"])
+        assert record.header["policy"] == line["policy"]
+        assert record.header["settings_sha256"] == line["settings_sha256"]
+
+
+def test_a_record_of_a_campaign_runs_again(folder):
+    line = read_episodes(folder / "episodes.jsonl")[0]
+    env = rerun(read_record(folder / line["record"]))
+    assert round(env.scorer.coverage, 9) == line["coverage_final"]
+
+
+def test_pairs_have_the_same_starts_and_seeds_other_ones(folder):
+    starts = {
+        (line["policy"], line["seed"]): line["starts"] for line in read_episodes(folder / "episodes.jsonl")
+    }
+    assert starts["nearest_frontier", 0] == starts["random_walk", 0] != starts["nearest_frontier", 1]
+
+
+def test_two_workers_leave_the_same_lines_as_one(folder, tmp_path):
+    campaign = Campaign(suite(), tmp_path, workers=2)
+    assert len(list(campaign.run())) == 4
+    assert lasting(tmp_path) == lasting(folder)
+
+
+def test_a_campaign_goes_on_where_it_stopped_and_takes_more(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "copy")
+    path = tmp_path / "copy" / "episodes.jsonl"
+    first = path.read_bytes().split(b"\n")[0]
+    path.write_bytes(first + b"\n" + first[:40])
+    with pytest.warns(UserWarning, match="cut off"):
+        assert len(list(Campaign(suite(), tmp_path / "copy").run())) == 3
+    assert lasting(tmp_path / "copy") == lasting(folder)
+    more = Campaign(suite(seeds=(1, 2), policies=("nearest_frontier",)), tmp_path / "copy")
+    assert len(list(more.run())) == 1
+    assert json.loads((tmp_path / "copy" / "suite.json").read_text())["seeds"] == [0, 1, 2]
+
+
+def test_what_a_killed_writer_left_is_cleared_away(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "copy")
+    (tmp_path / "copy" / "records" / ".half.npz.x7").mkdir()
+    assert list(Campaign(suite(), tmp_path / "copy").run()) == []
+    assert not list((tmp_path / "copy" / "records").glob(".*"))
+
+
+def test_other_settings_and_other_versions_are_refused(folder, tmp_path):
+    other = suite(variants={"default": {"horizon_s": 6.0, "resolution": 0.05, "noise": "datasheet"}})
+    with pytest.raises(ValueError, match=r"noise = its default.*noise = datasheet"):
+        list(Campaign(other, folder).run())
+    with pytest.raises(ValueError, match="ended by the rule None"):
+        list(Campaign(suite(stop={"decisions": 3}), folder).run())
+    shutil.copytree(folder, tmp_path / "copy")
+    path = tmp_path / "copy" / "episodes.jsonl"
+    path.write_text(path.read_text().replace('"version":"', '"version":"9.'))
+    with pytest.raises(ValueError, match=r"lidarium 9\..*this is"):
+        list(Campaign(suite(), tmp_path / "copy").run())
+
+
+def test_a_trial_that_fails_is_told_and_the_others_run(tmp_path):
+    free = tuple(tuple(float(number) for number in start) for start in load_floor("apartment").starts[:2])
+    solid = ((-9.0, -9.0, 0.0), (-8.0, -8.0, 0.0))
+    campaign = Campaign(
+        suite(policies=("nearest_frontier",), seeds=(0,), starts={"apartment": (free, solid)}), tmp_path
+    )
+    assert [line["starts"][0] for line in campaign.run()] == [[round(number, 6) for number in free[0]]]
+    assert [(trial.start, type(error)) for trial, error in campaign.failures] == [(1, ValueError)]
+    moved = suite(policies=("nearest_frontier",), seeds=(0,), starts={"apartment": (solid,)})
+    with pytest.raises(ValueError, match="other starts on 'apartment'"):
+        list(Campaign(moved, tmp_path).run())
+
+
+def test_a_rule_stops_an_episode_and_says_so():
+    shares = [{"figure": figure, "at_least": 0.1} for figure in ("c_free", "c_known", "c_valid", "c_own_min")]
+    for rule in (
+        *shares,
+        {"decisions": 2},
+        {"figure": "c_free", "above": 0.2},
+        {"figure": "remaining_cells", "at_most": 1e9},
+    ):
+        stopped = suite(stop=rule)
+        line = run_trial(stopped, next(stopped.trials()))
+        assert set(line["ended_because"].values()) == {"stop_rule"}
+        assert line["time_s"] < 6.0
+
+
+@pytest.mark.parametrize(
+    ("rule", "message"),
+    [
+        ({"figure": "beauty", "above": 0.5}, "'beauty'; want one of"),
+        ({"figure": "c_free"}, "with 0 bounds"),
+        ({"figure": "c_free", "above": 0.5, "at_most": 1.0}, "with 2 bounds"),
+        ({"decisions": 0}, "at least 1"),
+        ({}, "ends nothing"),
+        ({"when": 3}, "no 'when'"),
+    ],
+)
+def test_rules_that_are_not_clear_are_refused(rule, message):
+    with pytest.raises(ValueError, match=message):
+        suite(stop=rule)

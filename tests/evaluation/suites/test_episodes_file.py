@@ -1,0 +1,133 @@
+"""What has been written stays, whenever the writer dies; what is wrong is told."""
+
+import json
+import random
+import subprocess
+import sys
+import time
+
+import pytest
+
+from lidarium.evaluation.suites.episodes_file import EpisodesFile, read_episodes
+
+WRITER = """
+import sys
+from pathlib import Path
+from lidarium.evaluation.suites.episodes_file import EpisodesFile
+with EpisodesFile(Path(sys.argv[1])) as file:
+    known = {episode["key"] for episode in file.episodes}
+    print("ready", flush=True)
+    for number in range(10**6):
+        if str(number) not in known:
+            file.append({"key": str(number), "number": number, "text": "x" * (number * 37 % 5000)})
+"""
+
+
+def episode(number, **more):
+    return {"key": str(number), "number": number, **more}
+
+
+def test_what_is_appended_is_read(tmp_path):
+    path = tmp_path / "deep" / "episodes.jsonl"
+    assert read_episodes(path) == []
+    with EpisodesFile(path) as file:
+        file.append(episode(1))
+        assert read_episodes(path) == [episode(1)]
+        file.append(episode(2))
+    with EpisodesFile(path) as file:
+        assert file.episodes == [episode(1), episode(2)]
+
+
+def test_a_last_line_that_was_cut_off_is_dropped_with_a_warning(tmp_path):
+    path = tmp_path / "episodes.jsonl"
+    whole = json.dumps(episode(1)) + "\n"
+    path.write_text(whole + json.dumps(episode(2))[:-3])
+    with pytest.warns(UserWarning, match="line 2.*cut off"):
+        assert read_episodes(path) == [episode(1)]
+    with pytest.warns(UserWarning, match="cut off"), EpisodesFile(path) as file:
+        file.append(episode(3))
+    assert read_episodes(path) == [episode(1), episode(3)]
+
+
+def test_a_whole_last_line_without_its_end_is_kept(tmp_path):
+    path = tmp_path / "episodes.jsonl"
+    path.write_text(json.dumps(episode(1)))
+    with EpisodesFile(path) as file:
+        file.append(episode(2))
+    assert read_episodes(path) == [episode(1), episode(2)]
+
+
+@pytest.mark.parametrize("line", ["{", "[1]", '{"number": 1}', '{"key": 3}'])
+def test_a_bad_line_within_is_refused_and_left(tmp_path, line):
+    path = tmp_path / "episodes.jsonl"
+    content = f"{json.dumps(episode(1))}\n{line}\n{json.dumps(episode(2))}\n"
+    path.write_text(content)
+    for opened in (read_episodes, EpisodesFile):
+        with pytest.raises(ValueError, match="line 2"):
+            opened(path)
+    assert path.read_text() == content
+
+
+def test_the_same_episode_twice_counts_once_and_two_ends_of_it_are_refused(tmp_path):
+    path = tmp_path / "episodes.jsonl"
+    lines = [episode(1, steps_per_s=5.0), episode(2), episode(1, steps_per_s=7.0)]
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    with pytest.warns(UserWarning, match="line 3.*counted once"):
+        assert read_episodes(path) == lines[:2]
+    path.write_text(path.read_text() + json.dumps(episode(2, coverage=1.0)) + "\n")
+    with (
+        pytest.warns(UserWarning, match="counted once"),
+        pytest.raises(ValueError, match=r"line 4.*another end"),
+    ):
+        read_episodes(path)
+
+
+def test_there_is_one_writer_at_a_time(tmp_path):
+    path = tmp_path / "episodes.jsonl"
+    with EpisodesFile(path) as file:
+        with pytest.raises(ValueError, match="another process"):
+            EpisodesFile(path)
+        file.append(episode(1))
+    with EpisodesFile(path) as file:
+        assert len(file.episodes) == 1
+
+
+def test_a_full_disk_leaves_the_file_as_it_was(tmp_path, monkeypatch):
+    path = tmp_path / "episodes.jsonl"
+    with EpisodesFile(path) as file:
+        file.append(episode(1))
+        before = path.read_bytes()
+        with monkeypatch.context() as patched:
+            write = sys.modules["os"].write
+            patched.setattr("os.write", lambda handle, content: write(handle, content[:5]))
+            with pytest.raises(OSError, match=r"full.*goes on from there"):
+                file.append(episode(2))
+        assert path.read_bytes() == before
+        file.append(episode(3))
+    assert read_episodes(path) == [episode(1), episode(3)]
+
+
+@pytest.mark.parametrize("bad", [{}, {"key": 3}, {"key": "1", "number": float("nan")}])
+def test_what_is_no_episode_is_not_written(tmp_path, bad):
+    with (
+        EpisodesFile(tmp_path / "episodes.jsonl") as file,
+        pytest.raises(ValueError, match=r"key|Out of range"),
+    ):
+        file.append(bad)
+    assert (tmp_path / "episodes.jsonl").read_bytes() == b""
+
+
+@pytest.mark.filterwarnings("ignore:.*cut off")
+def test_a_writer_that_is_killed_at_any_moment_loses_and_doubles_nothing(tmp_path):
+    path, generator = tmp_path / "episodes.jsonl", random.Random(0)
+    for _ in range(50):
+        before = read_episodes(path)
+        process = subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE)
+        assert process.stdout.readline() == b"ready\n"
+        time.sleep(generator.uniform(0.0, 0.02))
+        process.kill()
+        process.communicate()
+        after = read_episodes(path)
+        assert after[: len(before)] == before
+        assert [line["number"] for line in after] == list(range(len(after)))
+    assert len(after) > 50

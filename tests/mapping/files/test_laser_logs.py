@@ -1,0 +1,273 @@
+import gzip
+import math
+
+import numpy as np
+import pytest
+
+from lidarium.mapping.files.carmen_logs import read_carmen_log
+from lidarium.mapping.files.laser_logs import LaserLog, read_npz_log, symmetric_scans, write_npz_log
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+
+
+def flaser(stamp, ranges, pose=(0.0, 0.0, 0.0), odometry=None, end="host 0"):
+    numbers = [len(ranges), *ranges, *pose, *(odometry or pose), stamp]
+    return f"FLASER {' '.join(map(str, numbers))} {end}\n"
+
+
+def odom(stamp, x=0.0, y=0.0, theta=0.0):
+    return f"ODOM {x} {y} {theta} 0 0 0 {stamp} host {stamp}\n"
+
+
+def robotlaser(stamp, ranges, laser=(0.1, 0.0, 0.0), robot=(0.0, 0.0, 0.0), max_range=8.0):
+    step = math.pi / (len(ranges) - 1)
+    head = f"ROBOTLASER1 0 {-math.pi / 2} {math.pi} {step} {max_range} 0.01 0 {len(ranges)} {' '.join(map(str, ranges))}"
+    return f"{head} 0 {' '.join(map(str, (*laser, *robot)))} 0 0 0.1 0.1 0 {stamp} host {stamp}\n"
+
+
+SCAN = [1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def read(tmp_path, *lines, name="run.log"):
+    path = tmp_path / name
+    content = "".join(lines).encode()
+    path.write_bytes(gzip.compress(content) if name.endswith(".gz") else content)
+    return read_carmen_log(path)
+
+
+@pytest.mark.parametrize("name", ["run.log", "run.clf", "run.log.gz"])
+def test_scans_odometry_and_stamps_are_read(tmp_path, name):
+    lines = [
+        "# a remark\n",
+        "PARAM robot_frontlaser_offset 0.25 nohost 0\n",
+        flaser(1.5, SCAN, odometry=(0, 0, 0)),
+        odom(2.0, 0.4),
+        flaser(2.5, SCAN, odometry=(1, 0, 0.5)),
+    ]
+    log = read(tmp_path, *lines, name=name)
+    assert log.stamps.tolist() == [1.5, 2.5]
+    assert log.odometry.tolist() == [[0, 0, 0], [1, 0, 0.5]]
+    assert log.laser_pose.tolist() == [0.25, 0.0, 0.0]
+    assert log.ranges[0].tolist() == [1.0, 2.0, 3.0, 4.0, math.inf]
+    assert log.geometry.field_of_view == pytest.approx(math.pi)
+    assert log.readings_stamps.tolist() == [2.0]
+    assert log.reading_of_scan.tolist() == [-1, 0]
+    assert log.corrected is None
+    assert not log.skipped
+
+
+def test_old_lines_end_after_the_stamp(tmp_path):
+    log = read(tmp_path, flaser(1.0, SCAN, end=""), flaser(2.0, SCAN, (1, 0, 0), end=""))
+    assert log.stamps.tolist() == [1.0, 2.0]
+
+
+def test_new_lines_say_themselves_how_the_laser_looks_and_where_it_is(tmp_path):
+    log = read(
+        tmp_path, robotlaser(1.0, [1.0, 8.0, 2.0]), robotlaser(2.0, [1.0, 8.0, 2.0], (1.1, 0, 0), (1, 0, 0))
+    )
+    assert log.geometry == ScanGeometry(beams=3, field_of_view=math.pi, range_min=0.0, range_max=8.0)
+    assert log.ranges[0].tolist() == [1.0, math.inf, 2.0]
+    assert log.laser_pose == pytest.approx([0.1, 0.0, 0.0])
+    assert log.odometry[1].tolist() == [1.0, 0.0, 0.0]
+
+
+def test_of_corrected_logs_odometry_is_the_sum_of_motions_and_never_the_correction(tmp_path):
+    lines = [
+        odom(1.0),
+        flaser(1.0, SCAN, (9, 9, 1)),
+        odom(0, 9, 9, 1),
+        odom(1.5, 9 + math.cos(1), 9 + math.sin(1), 1),
+        flaser(1.5, SCAN, (7, 7, 0)),
+        "NEFF 1\n",
+    ]
+    log = read(tmp_path, *lines)
+    assert log.odometry == pytest.approx(np.array([[0, 0, 0], [1, 0, 0]]), abs=1e-12)
+    assert log.corrected.tolist() == [[9, 9, 1], [7, 7, 0]]
+    assert log.readings_stamps.tolist() == [1.0, 1.5]
+    assert log.reading_of_scan.tolist() == [0, 1]
+
+
+def test_a_corrected_log_without_readings_between_has_no_odometry(tmp_path):
+    lines = []
+    for k in range(6):
+        lines += [flaser(k, SCAN, (k, 0, 0)), odom(0, k), "NEFF 1\n"]
+    log = read(tmp_path, *lines)
+    assert log.odometry is None
+    assert len(log.readings) == 0
+
+
+def test_odometry_that_stands_still_is_none(tmp_path):
+    assert read(tmp_path, *(flaser(k, SCAN) for k in range(4))).odometry is None
+
+
+def test_what_cannot_be_used_is_left_out_and_counted(tmp_path):
+    lines = [
+        flaser(1.0, SCAN),
+        flaser(2.0, SCAN, (1, 0, 0)),
+        "LASER_READING 3 1 2 3\n",
+        flaser(1.5, SCAN, (1, 0, 0)),
+        flaser(3.0, SCAN[:3], (1, 0, 0)),
+        "FLASER 5 1.0 2.0\n",
+        "FLASER five\n",
+        "ODOM 1 2\n",
+        "FLASER 2 1.0 nan 0 0 0 0 0 nan 4.0 host 4.0\n",
+        "\x00\x01\n",
+        flaser(4.0, SCAN, (2, 0, 0)),
+        flaser(5.0, SCAN, (3, 0, 0)),
+    ]
+    log = read(tmp_path, *lines)
+    assert log.stamps.tolist() == [1.0, 2.0, 4.0, 5.0]
+    assert log.skipped == {
+        "LASER_READING lines": 1,
+        "damaged FLASER lines": 3,
+        "damaged ODOM lines": 1,
+        "\x00\x01 lines": 1,
+        "scans that have not 5 beams as most": 1,
+        "scans back in time": 1,
+    }
+
+
+def test_a_clock_that_stands_still_is_replaced(tmp_path):
+    log = read(tmp_path, *(flaser(7.0, SCAN, (k, 0, 0)) for k in range(4)))
+    assert log.stamps.tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert any("numbered" in reason for reason in log.skipped)
+
+
+def test_of_a_log_that_is_cut_off_the_rest_is_used(tmp_path):
+    whole = gzip.compress(
+        "".join(
+            flaser(k, np.random.default_rng(k).random(60).round(3).tolist(), (k, 0, 0)) for k in range(200)
+        ).encode()
+    )
+    (tmp_path / "cut.log.gz").write_bytes(whole[: len(whole) // 2])
+    log = read_carmen_log(tmp_path / "cut.log.gz")
+    assert 20 < len(log.stamps) < 200
+    assert any("cut off" in reason for reason in log.skipped)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"ODOM 0 0 0 0 0 0 1 host 1\n", b"\x1f\x8b no gzip", b"FLASER 0 0 0 0 0 0 0 1 h 1\n"]
+)
+def test_a_log_without_scans_is_refused(tmp_path, content):
+    for name in ("run.log", "run.log.gz"):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ValueError, match="no scans"):
+            read_carmen_log(tmp_path / name)
+
+
+def test_files_that_are_not_there_are_named(tmp_path):
+    for reader in (read_carmen_log, read_npz_log):
+        with pytest.raises(FileNotFoundError, match=r"gone\.npz"):
+            reader(tmp_path / "gone.npz")
+        with pytest.raises(ValueError, match="is a folder"):
+            reader(tmp_path)
+
+
+def recording():
+    ranges = np.array([[1.0, math.inf, math.nan, 2.0], [1.5, 2.5, 3.5, math.inf]], np.float32)
+    geometry = ScanGeometry(beams=4, field_of_view=2.0, range_min=0.1, range_max=5.0)
+    readings = np.array([[0, 0, 0], [0.5, 0, 0], [1, 0, 0.1]], float)
+    return LaserLog(
+        stamps=np.array([0.0, 1.0]),
+        ranges=ranges,
+        geometry=geometry,
+        odometry=readings[[0, 2]],
+        laser_pose=np.array([0.1, 0.0, 0.5]),
+        beam_interval_s=1e-4,
+        corrected=np.ones((2, 3)),
+        readings_stamps=np.array([0.0, 0.5, 1.0]),
+        readings=readings,
+        reading_of_scan=np.array([0, 2]),
+    )
+
+
+def test_a_recording_is_read_as_it_was_written(tmp_path):
+    log = recording()
+    write_npz_log(tmp_path / "logs" / "run.npz", log)
+    back = read_npz_log(tmp_path / "logs" / "run.npz")
+    assert back.geometry.beams == 4
+    assert back.geometry.field_of_view == pytest.approx(2.0)
+    assert back.geometry.range_min == 0.1
+    for name in (
+        "stamps",
+        "ranges",
+        "odometry",
+        "laser_pose",
+        "corrected",
+        "readings_stamps",
+        "readings",
+        "reading_of_scan",
+    ):
+        np.testing.assert_array_equal(getattr(back, name), getattr(log, name), err_msg=name)
+    assert back.beam_interval_s == 1e-4
+    assert back.geometry.range_max == 5.0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "word"),
+    [
+        ("ranges", None, "no array ranges"),
+        ("ranges", np.zeros(3), "ranges have shape"),
+        ("stamp", np.zeros(5), "stamp has shape"),
+        ("stamp", np.full(2, np.nan), "no scan that can be used"),
+        ("pose_odom", np.zeros((3, 3)), "pose_odom has shape"),
+        ("pose_odom", np.array([["a"] * 3] * 2), "no numbers"),
+        ("angle_increment", -0.1, "want steps of more than 0"),
+        ("angle_min", np.nan, "angle_min"),
+        ("max_range", [1.0, 2.0], "max_range"),
+        ("odometry_of_scan", np.array([0, 9]), "odometry_of_scan"),
+    ],
+)
+def test_bad_arrays_are_named(tmp_path, key, value, word):
+    write_npz_log(tmp_path / "run.npz", recording())
+    with np.load(tmp_path / "run.npz") as archive:
+        arrays = dict(archive)
+    arrays.pop(key) if value is None else arrays.update({key: np.asarray(value)})
+    np.savez(tmp_path / "bad.npz", **arrays)
+    with pytest.raises(ValueError, match=word):
+        read_npz_log(tmp_path / "bad.npz")
+
+
+def test_what_is_no_npz_file_is_refused(tmp_path):
+    (tmp_path / "run.npz").write_bytes(b"PK\x03\x04 nothing")
+    with pytest.raises(ValueError, match="not an npz file"):
+        read_npz_log(tmp_path / "run.npz")
+
+
+def test_scans_that_look_to_one_side_gain_invalid_beams_on_the_other():
+    ranges = np.array([[1.0, 2.0, 3.0]], np.float32)
+    wide, geometry = symmetric_scans(ranges, -math.pi / 2, math.pi / 3, (0.0, 5.0))
+    np.testing.assert_array_equal(wide, [[1.0, 2.0, 3.0, np.nan]])
+    assert geometry.angles == pytest.approx([-math.pi / 2, -math.pi / 6, math.pi / 6, math.pi / 2])
+    wide, geometry = symmetric_scans(ranges, -math.pi / 6, math.pi / 3, (0.0, 5.0))
+    np.testing.assert_array_equal(wide, [[np.nan, 1.0, 2.0, 3.0]])
+
+
+def test_a_full_circle_is_turned_so_that_it_begins_behind():
+    ranges = np.arange(1.0, 5.0, dtype=np.float32)[None]
+    wide, geometry = symmetric_scans(ranges, 0.0, math.pi / 2, (0.0, 9.0))
+    assert geometry.is_full_circle
+    assert wide[0].tolist() == [3.0, 4.0, 1.0, 2.0]
+    assert geometry.angles[2] == pytest.approx(0.0)
+
+
+def test_a_shorter_laser_sees_that_the_way_is_free():
+    log = recording().limited(2.2, clears_without_return=True)
+    np.testing.assert_array_equal(
+        log.ranges, [[1.0, math.inf, math.nan, 2.0], [1.5, math.inf, math.inf, math.inf]]
+    )
+    assert log.geometry.range_max == 2.2
+    silent = recording().limited(9.0, clears_without_return=False)
+    np.testing.assert_array_equal(silent.ranges, [[1.0, math.nan, math.nan, 2.0], [1.5, 2.5, 3.5, math.nan]])
+
+
+def test_a_real_log_has_the_odometry_that_others_found_in_it(shared_data):
+    folder = shared_data / "laser_logs"
+    if not folder.is_dir():
+        pytest.skip(f"no logs at {folder}")
+    text, parsed = (
+        read_carmen_log(folder / "carmen" / "intel-corrected.log.gz"),
+        read_npz_log(folder / "npz" / "intel.npz"),
+    )
+    assert len(text.stamps) == 906
+    assert np.abs(text.odometry - parsed.odometry)[:, :2].max() < 1e-6
+    np.testing.assert_array_equal(text.ranges[0, :-1] < 9.0, parsed.ranges[0, :-1] < 9.0)

@@ -1,0 +1,283 @@
+"""The one decorator of kernels: exact, cached by all sources, and with views on arrays by their address."""
+
+import ast
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+
+from lidarium.mapping.kernels import cache_folders, compilation
+from lidarium.mapping.kernels.compilation import kernel, use_threads
+from lidarium.mapping.kernels.views import (
+    bytes_at,
+    int8_grid_at,
+    int32_table_at,
+    scratch_grid,
+    scratch_vector,
+    uint8_grid_at,
+    uint16_grid_at,
+    word_grid_at,
+)
+
+ROOT = Path(compilation.__file__).resolve().parents[2]
+SOURCES = {
+    path: path.read_text()
+    for folder in compilation.PACKAGE_FOLDERS
+    for path in sorted((ROOT / folder).rglob("*.py"))
+}
+
+
+@kernel
+def read_all(address, rows, columns):
+    as_bytes = bytes_at(address, rows * columns)
+    return (
+        as_bytes.sum(),
+        int8_grid_at(address, rows, columns).sum(),
+        uint8_grid_at(address, rows, columns)[rows - 1, columns - 1],
+    )
+
+
+@kernel
+def write_words(address, rows, columns):
+    grid = word_grid_at(address, rows, columns)
+    for row in range(rows):
+        grid[row, row % columns] = np.uint64(2**63)
+
+
+@kernel
+def sum_table(address, rows):
+    return int32_table_at(address, rows, 3).sum()
+
+
+@kernel
+def sum_grid(address, rows, columns):
+    return uint16_grid_at(address, rows, columns).sum()
+
+
+@kernel
+def odd_sums(values):
+    total = 0.0
+    for value in values:
+        total += value
+    return total, math.isnan(values[0] / values[0])
+
+
+@kernel(borrowing=True)
+def sum_by_scratch(values):
+    twice, rows = scratch_vector(values.shape[0], np.float64), scratch_grid(3, values.shape[0], np.int32)
+    for k in range(values.shape[0]):
+        twice[k], rows[1, k], rows[2, k] = 2.0 * values[k], 3, k
+    total = 0.0
+    for k in range(values.shape[0]):
+        total += twice[k] * rows[1, k] + rows[2, k]
+    return total
+
+
+@kernel
+def sum_often(values, times):
+    total = 0.0
+    for k in range(times):
+        total += sum_by_scratch(values[k % 2 :])
+    return total
+
+
+@kernel(parallel=True)
+def doubled(values):
+    return values * 2.0
+
+
+def test_grids_are_viewed_where_they_lie():
+    grid = np.arange(-6, 6, dtype=np.int8).reshape(3, 4)
+    total, signed, last = read_all(grid.ctypes.data, 3, 4)
+    assert total == grid.view(np.uint8).sum()
+    assert signed == grid.sum()
+    assert last == 5
+    words = np.zeros((3, 2), np.uint64)
+    write_words(words.ctypes.data, 3, 2)
+    assert np.flatnonzero(words).tolist() == [0, 3, 4]
+    table = np.arange(12, dtype=np.int32).reshape(4, 3)
+    assert sum_table(table.ctypes.data, 4) == 66
+    grid = np.arange(65_530, 65_536, dtype=np.uint16).reshape(2, 3)
+    assert sum_grid(grid.ctypes.data, 2, 3) == int(grid.sum())
+
+
+def test_parallel_kernels_run_on_as_many_threads_as_wanted():
+    before = numba.get_num_threads()
+    use_threads(1)
+    assert numba.get_num_threads() == 1
+    use_threads(before)
+    assert numba.get_num_threads() == before
+
+
+def test_arithmetic_is_exact_and_in_order():
+    values = np.array([1e16, 1.0, -1e16, 1.0, 0.1, 0.2])
+    total, is_nan = odd_sums(values)
+    expected = 0.0
+    for value in values:
+        expected += value
+    assert total == expected
+    assert not is_nan
+    assert odd_sums(np.array([np.nan]))[1]
+
+
+def test_parallel_kernels_compute_the_same():
+    assert np.array_equal(doubled(np.arange(100.0)), 2.0 * np.arange(100.0))
+
+
+def test_the_cache_key_changes_with_any_kernel_source_and_only_then(tmp_path, monkeypatch):
+    for folder in compilation.PACKAGE_FOLDERS:
+        (tmp_path / folder).mkdir()
+    source = tmp_path / "mapping" / "one.py"
+    source.write_text("@kernel\ndef f(x): return x\n")
+    (tmp_path / "envs" / "plain.py").write_text("x = 1\n")
+    monkeypatch.setattr(
+        compilation, "_source_folders", lambda: [tmp_path / folder for folder in compilation.PACKAGE_FOLDERS]
+    )
+    first = compilation._sources_hash()
+    (tmp_path / "envs" / "plain.py").write_text("x = 2\n")
+    assert compilation._sources_hash() == first
+    source.write_text("@kernel\ndef f(x): return x + 1\n")
+    assert compilation._sources_hash() != first
+
+
+def test_a_start_tells_a_first_one_from_later_ones_by_the_cache(tmp_path, monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(compilation, "_FOLDER", tmp_path)
+    assert compilation.is_cache_empty()
+    (tmp_path / "parallel" / "mapping").mkdir(parents=True)
+    (tmp_path / "parallel" / "mapping" / "one.nbi").touch()
+    assert not compilation.is_cache_empty()
+    monkeypatch.setattr(compilation, "_FOLDER", None)
+    assert not compilation.is_cache_empty()
+
+
+def test_every_file_whose_constants_or_kernels_a_kernel_uses_is_in_the_cache_key():
+    """Numba bakes globals into compiled code: a constant of a file without kernels could change unseen."""
+    with_kernels = {path for path, text in SOURCES.items() if "@kernel" in text}
+    assert len(with_kernels) > 5
+    for path in with_kernels:
+        tree = ast.parse(SOURCES[path])
+        imported = {
+            alias.asname or alias.name: ROOT
+            / (node.module.removeprefix("lidarium.").replace(".", "/") + ".py")
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("lidarium.")
+            for alias in node.names
+        }
+        decorated = [
+            node
+            for node in ast.walk(tree)
+            if isinstance(node, ast.FunctionDef)
+            and any("kernel" in ast.unparse(decorator) for decorator in node.decorator_list)
+        ]
+        used = {
+            name.id
+            for function in decorated
+            for part in function.body
+            for name in ast.walk(part)
+            if isinstance(name, ast.Name)
+        }
+        for name in used & imported.keys():
+            assert imported[name] in with_kernels, (
+                f"{path.name} uses {name} of {imported[name].name} in a kernel"
+            )
+
+
+def test_kernels_are_made_by_the_one_decorator_only():
+    for path, text in SOURCES.items():
+        if path.name != "compilation.py":
+            assert "njit" not in text, path
+            assert "@numba" not in text, path
+            assert "fastmath" not in text, path
+
+
+def test_the_first_writable_folder_is_taken_and_none_where_there_is_none(monkeypatch):
+    monkeypatch.setattr(
+        cache_folders, "is_writable", lambda folder: "tmp" in str(folder) or "lidarium-kernels" in str(folder)
+    )
+    folder = compilation._cache_folder()
+    assert folder is not None
+    assert folder.name == compilation._sources_hash()
+    monkeypatch.setattr(cache_folders, "is_writable", lambda folder: False)
+    assert compilation._cache_folder() is None
+
+
+def test_a_cache_folder_that_the_user_chose_is_used(tmp_path):
+    script = tmp_path / "one_kernel.py"
+    script.write_text(
+        "from lidarium.mapping.kernels import compilation\n"
+        "@compilation.kernel\n"
+        "def one_more(x):\n"
+        "    return x + 1\n"
+        "print(one_more(1), compilation._CHOSEN_BY_USER)\n"
+    )
+    chosen = tmp_path / "cache"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(chosen)}
+    result = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
+    )
+    assert result.stdout.split() == ["2", "True"]
+    assert list(chosen.rglob("*.nbi"))
+
+
+def test_the_serial_and_the_parallel_form_of_a_function_keep_their_code_apart(tmp_path):
+    script = tmp_path / "two_forms.py"
+    script.write_text(
+        "import numba, numpy as np\n"
+        "from lidarium.mapping.kernels import compilation\n"
+        "def count(values):\n"
+        "    for k in numba.prange(values.size):\n"
+        "        values[k] += 1\n"
+        "serial, parallel = compilation.kernel(count), compilation.kernel(parallel=True)(count)\n"
+        "values = np.zeros(64, np.int64)\n"
+        "serial(values)\n"
+        "parallel(values)\n"
+        "print(values.sum(), sum(serial.stats.cache_hits.values()), sum(parallel.stats.cache_hits.values()))\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    # The parallel form finds nothing that the serial one has left, and the next program finds both.
+    for hits in ("0", "1"):
+        result = subprocess.run(
+            [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
+        )
+        assert result.stdout.split() == ["128", hits, hits]
+
+
+def test_kernels_are_compiled_anew_where_nothing_can_be_written(tmp_path):
+    script = tmp_path / "one_kernel.py"
+    script.write_text(
+        "import tempfile\n"
+        "def refuse(*args, **kwargs):\n"
+        "    raise PermissionError('read-only')\n"
+        "tempfile.TemporaryFile = refuse\n"
+        "from lidarium.mapping.kernels import compilation\n"
+        "@compilation.kernel\n"
+        "def one_more(x):\n"
+        "    return x + 1\n"
+        "print(one_more(1), compilation._CAN_CACHE)\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    result = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
+    )
+    assert result.stdout.split() == ["2", "False"]
+
+
+def test_scratch_is_there_while_a_kernel_runs_and_gone_when_it_returns():
+    values = np.arange(1000.0)
+    whole, rest = 6.0 * values.sum() + 499500.0, 6.0 * values.sum() + 498501.0
+    assert sum_by_scratch(values) == whole
+    # All together are larger than any stack.
+    assert sum_often(values, 10_000) == 5_000 * (whole + rest)
+
+
+def test_kernels_that_borrow_arrays_leave_their_count_as_it_was():
+    values = np.arange(100.0)
+    before = sys.getrefcount(values)
+    sum_often(values, 100)
+    sum_by_scratch(values)
+    assert sys.getrefcount(values) == before

@@ -1,0 +1,136 @@
+import itertools
+import math
+
+import numpy as np
+import pytest
+import scipy.optimize
+
+from lidarium.mapping.geometry.rigid import composed, relative
+from lidarium.mapping.localization.graph.node_graph import NodeGraph
+from lidarium.mapping.localization.graph.pose_graph import Edges, optimised, residuals
+from lidarium.mapping.localization.matching.settings import GraphSettings
+
+SIDE = 10
+
+
+def square():
+    """True poses along a square, back to the start."""
+    poses = [np.zeros(3)]
+    for k in range(4 * SIDE):
+        turn = math.pi / 2 if k % SIDE == SIDE - 1 else 0.0
+        poses.append(composed(poses[-1], np.array([1.0, 0.0, turn])))
+    return np.array(poses)
+
+
+def edges_of(pairs, measured, robust):
+    information = np.array([np.diag([1e4, 1e4, 1e5]) for _ in pairs])
+    a, b = np.array(pairs).T
+    return Edges(a, b, np.array(measured), information, np.array(robust))
+
+
+def drifted(truth, wrong=(0.0, 0.0, 0.01)):
+    """Motions that all turn a little too far, and the poses that they lead to."""
+    motions = [relative(a, b) + np.array(wrong) for a, b in itertools.pairwise(truth)]
+    poses = [np.zeros(3)]
+    for motion in motions:
+        poses.append(composed(poses[-1], motion))
+    return motions, np.array(poses)
+
+
+def test_a_closure_takes_out_most_of_the_drift():
+    truth = square()
+    motions, poses = drifted(truth)
+    pairs = [(k, k + 1) for k in range(len(motions))]
+    edges = edges_of(
+        [*pairs, (0, len(motions))],
+        [*motions, relative(truth[0], truth[-1])],
+        [False] * len(motions) + [True],
+    )
+    corrected, covariance = optimised(poses, edges, 5.0, 20, 1)
+    assert np.abs(poses - truth)[:, :2].max() > 1.0
+    assert np.abs(corrected - truth)[:, :2].max() < 0.15
+    assert corrected[0].tolist() == [0.0, 0.0, 0.0]
+    assert (np.linalg.eigvalsh(covariance) > 0.0).all()
+
+
+def test_a_false_closure_does_not_bend_what_others_hold():
+    truth = square()
+    motions = [relative(a, b) for a, b in itertools.pairwise(truth)]
+    pairs = [(k, k + 1) for k in range(len(motions))]
+    good = [(0, 40), (1, 39), (2, 38)]
+    measured = [*motions, *(relative(truth[a], truth[b]) for a, b in good), np.array([3.0, 0.0, 0.0])]
+    edges = edges_of([*pairs, *good, (5, 25)], measured, [False] * len(motions) + [True] * 4)
+    corrected, _ = optimised(truth, edges, 2.0, 20, 4)
+    assert np.abs(corrected - truth)[:, :2].max() < 0.05
+
+
+def test_poses_that_agree_stay():
+    truth = square()
+    motions = [relative(a, b) for a, b in itertools.pairwise(truth)]
+    corrected, covariance = optimised(
+        truth, edges_of([(k, k + 1) for k in range(len(motions))], motions, [False] * len(motions)), 2.0, 5, 0
+    )
+    assert np.allclose(relative(truth, corrected), 0.0, atol=1e-9)
+    # Along a chain variances add up, and headings lever the rest.
+    assert covariance[2, 2] == pytest.approx(len(motions) / 1e5, rel=1e-3)
+
+
+def test_one_pose_is_known():
+    poses, covariance = optimised(np.ones((1, 3)), edges_of([(0, 0)], [np.zeros(3)], [False]), 1.0, 3, 0)
+    assert poses.tolist() == [[1.0, 1.0, 1.0]]
+    assert not covariance.any()
+
+
+def test_residuals_turn_the_short_way():
+    poses = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])
+    rest = residuals(poses, edges_of([(0, 1)], [np.array([0.0, 0.0, 2 * math.pi - 6.0 - 0.1])], [False]))
+    assert rest[0, 2] == pytest.approx(0.1)
+
+
+def test_the_optimum_is_that_of_dense_least_squares():
+    truth, generator = square(), np.random.default_rng(3)
+    pairs = [(k, k + 1) for k in range(len(truth) - 1)] + [(0, 40), (3, 38), (38, 3), (10, 31), (15, 26)]
+    measured = [relative(truth[a], truth[b]) + generator.normal(scale=[0.02, 0.02, 0.01]) for a, b in pairs]
+    edges = edges_of(pairs, measured, [False] * len(pairs))
+    corners = generator.normal(size=(len(pairs), 3, 3))
+    edges = edges._replace(information=edges.information + 1e3 * corners @ corners.swapaxes(1, 2))
+    roots = np.linalg.cholesky(edges.information).swapaxes(1, 2)
+
+    def weighted(free):
+        poses = np.vstack([truth[:1], free.reshape(-1, 3)])
+        return (roots @ residuals(poses, edges)[:, :, None]).ravel()
+
+    oracle = scipy.optimize.least_squares(weighted, truth[1:].ravel(), xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    poses = truth
+    for _ in range(5):
+        poses, covariance = optimised(poses, edges, 2.0, 20, 0)
+    assert np.abs(relative(poses[1:], oracle.x.reshape(-1, 3))).max() < 1e-6
+    assert np.allclose(covariance, np.linalg.inv(oracle.jac.T @ oracle.jac)[-3:, -3:], rtol=1e-4)
+
+
+def test_all_but_the_first_node_move_together_to_where_the_first_map_begins():
+    graph = NodeGraph(GraphSettings(), None, np.array([1.0, 2.0, 0.5]))
+    covariance = np.diag([0.01, 0.01, 0.001]) ** 2
+    for motion in np.random.default_rng(0).normal(0.0, 0.5, (6, 3)):
+        graph.add(motion, covariance)
+    before, since = graph.nodes.copy(), np.array([0.02, -0.01, 0.03])
+    graph.begin_at(since)
+    assert (graph.nodes[0] == before[0]).all()
+    assert graph.nodes[1] == pytest.approx(composed(before[0], since))
+    assert relative(graph.nodes[1], graph.nodes[2:]) == pytest.approx(relative(before[1], before[2:]))
+    moved = graph.nodes.copy()
+    graph.settle(0)
+    assert graph.nodes == pytest.approx(moved, abs=1e-9)
+
+
+def test_how_well_a_node_is_known_from_another_is_what_the_motions_between_leave_open():
+    generator = np.random.default_rng(1)
+    motions, deviations = generator.normal(0.0, 0.5, (8, 3)), np.array([0.02, 0.01, 0.02])
+    graph = NodeGraph(GraphSettings(), None, np.array([1.0, 2.0, 0.5]))
+    for motion in motions:
+        graph.add(motion, np.diag(deviations**2))
+    ends = np.zeros((20000, 3))
+    for motion in motions[3:]:
+        ends = composed(ends, motion + generator.normal(0.0, 1.0, ends.shape) * deviations)
+    assert graph.covariance_since(3) == pytest.approx(np.cov(ends.T), abs=0.03 * np.cov(ends.T).max())
+    assert (graph.covariance_since(8) == 0.0).all()

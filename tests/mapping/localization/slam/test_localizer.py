@@ -1,0 +1,322 @@
+import copy
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from driven_rooms import GEOMETRY, RING_ROUND, TWINS_VISITED, cast, driven, odd_room, ring, twins
+
+from lidarium.mapping.geometry.rigid import composed, relative
+from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.dead_reckoning.odometry import Odometry
+from lidarium.mapping.localization.matching.settings import (
+    ClosureSettings,
+    GraphSettings,
+    MatchingSettings,
+    OdometryUncertainty,
+    SlamSettings,
+)
+from lidarium.mapping.localization.registry import LOCALIZERS, make_localizer
+from lidarium.mapping.localization.slam.localizer import Slam
+
+EAGER = SlamSettings(graph=GraphSettings(waiting=5))
+"""Corrects the past also where closures contradict it by little."""
+
+ROOM_ROUND = [(1.0, 1.0), (4.5, 1.0), (4.5, 2.4), (1.5, 2.4), (1.0, 1.0)]
+
+
+def follow(slam, sensings):
+    """Return the poses told at each time, and for each the node and the place relative to it."""
+    told, places = [], []
+    for sensing in sensings:
+        told.append(slam.localize(sensing))
+        places.append(slam.place)
+    return np.array(told), places
+
+
+def final(slam, places):
+    return composed(slam.nodes[[node for node, _ in places]], np.stack([pose for _, pose in places]))
+
+
+def errors(poses, truth):
+    return np.hypot(*(poses - truth)[:, :2].T)
+
+
+@pytest.fixture(scope="module")
+def ring_run():
+    return driven(ring(), RING_ROUND, drift=(-0.05, -0.05))
+
+
+@pytest.fixture(scope="module")
+def ring_followed(ring_run):
+    slam = Slam(SlamSettings(), GEOMETRY)
+    told, places = follow(slam, ring_run.sensings)
+    return slam, told, places
+
+
+def test_a_loop_is_closed(ring_run, ring_followed):
+    slam, told, places = ring_followed
+    odometry = np.array([sensing.odometry for sensing in ring_run.sensings])
+    assert errors(odometry, ring_run.truth).max() > 5.0
+    assert errors(told, ring_run.truth).max() < 0.3
+    assert slam.counts.closures > 5
+    finished = copy.deepcopy(slam)
+    finished.finish()
+    assert errors(final(finished, places), ring_run.truth).max() < 0.1
+
+
+def test_a_correction_is_told_once_with_all_scans_at_their_new_poses(ring_run):
+    slam = Slam(EAGER, GEOMETRY)
+    corrections = []
+    for sensing in ring_run.sensings:
+        slam.localize(sensing)
+        correction = slam.take_correction()
+        if correction is not None:
+            corrections.append(correction)
+            assert slam.take_correction() is None
+    assert len(corrections) == slam.counts.corrections > 0
+    last = slam.key_scans
+    assert last.poses.shape == (len(last.ranges), 3)
+    assert last.ranges.shape[1] == GEOMETRY.beams
+
+
+def test_closures_act_a_second_after_they_are_found(ring_run):
+    first = {}
+    for delay in (1.0, 3.0):
+        slam = Slam(replace(SlamSettings(), closures=ClosureSettings(delay_s=delay)), GEOMETRY)
+        for sensing in ring_run.sensings:
+            slam.localize(sensing)
+            if slam.counts.closures:
+                first[delay] = sensing.time_s
+                break
+    assert first[3.0] - first[1.0] == pytest.approx(2.0, abs=0.21)
+
+
+def test_two_rooms_that_look_alike_are_not_taken_for_one():
+    run = driven(twins(), TWINS_VISITED, drift=(0.03, 0.02))
+    slam = Slam(SlamSettings(), GEOMETRY)
+    _, places = follow(slam, run.sensings)
+    slam.finish()
+    poses = final(slam, places)
+    assert errors(poses, run.truth).max() < 0.5
+    first, second = (
+        np.argmin(np.hypot(*(run.truth[:, :2] - np.array(room)).T)) for room in ((1.6, 2.2), (7.6, 2.2))
+    )
+    assert abs(np.hypot(*(poses[second] - poses[first])[:2]) - 6.0) < 0.4
+
+
+def test_the_same_run_gives_the_same_poses_to_the_bit(ring_run, ring_followed):
+    _, told, _ = ring_followed
+    again = Slam(SlamSettings(), GEOMETRY)
+    poses, _ = follow(again, ring_run.sensings[:300])
+    assert (poses == told[:300]).all()
+    again.reset(np.zeros(3), 1)
+    assert (follow(again, ring_run.sensings[:100])[0] == told[:100]).all()
+
+
+@pytest.mark.parametrize("twin_of", [copy.deepcopy, lambda slam: pickle.loads(pickle.dumps(slam))])
+def test_a_copy_goes_on_by_itself(ring_run, ring_followed, twin_of):
+    _, told, _ = ring_followed
+    slam = Slam(SlamSettings(), GEOMETRY)
+    follow(slam, ring_run.sensings[:150])
+    twin = twin_of(slam)
+    assert (follow(twin, ring_run.sensings[150:300])[0] == told[150:300]).all()
+    assert (follow(slam, ring_run.sensings[150:300])[0] == told[150:300]).all()
+
+
+def test_walls_keep_headings_from_drifting():
+    errors_of = {}
+    for uses_walls in (True, False):
+        found = []
+        for seed in range(2):
+            run = driven(ring(), RING_ROUND, seed, noise=0.05, drift=(-0.05, -0.05))
+            slam = Slam(SlamSettings(uses_walls=uses_walls, closures=ClosureSettings(delay_s=1e6)), GEOMETRY)
+            told, _ = follow(slam, run.sensings)
+            found.append(relative(run.truth, told)[:, 2])
+        errors_of[uses_walls] = np.degrees(np.sqrt(np.mean(np.square(found))))
+    assert errors_of[True] < 0.5
+    assert errors_of[True] < 0.6 * errors_of[False]
+
+
+def test_the_first_scan_is_laid_on_the_map_that_it_began():
+    turned = {}
+    for start_path_m in (7.0, 1e6):
+        found = []
+        for seed in range(16):
+            run = driven(ring(), [(0.9, 0.9), (5.0, 0.9), (2.0, 0.9), (6.0, 0.9)], seed, noise=0.02)
+            slam = Slam(
+                SlamSettings(uses_walls=False, graph=GraphSettings(start_path_m=start_path_m)), GEOMETRY
+            )
+            told, _ = follow(slam, run.sensings)
+            found.append(np.mean(relative(run.truth, told)[len(told) // 2 :, 2]))
+            assert (slam.key_scans.poses[0] == 0.0).all()
+        turned[start_path_m] = np.sqrt(np.mean(np.square(found)))
+    assert turned[7.0] < 0.75 * turned[1e6]
+
+
+def test_the_frame_is_that_of_the_first_pose():
+    run = driven(odd_room(), ROOM_ROUND)
+    start = np.array([3.0, -2.0, 2.0])
+    slam = Slam(SlamSettings(), GEOMETRY)
+    slam.reset(start, 0)
+    told, _ = follow(slam, run.sensings)
+    assert (told[0] == start).all()
+    assert errors(relative(np.broadcast_to(start, told.shape), told), run.truth).max() < 0.1
+
+
+def test_the_map_holds_the_walls():
+    run = driven(odd_room(), ROOM_ROUND)
+    slam = Slam(SlamSettings(), GEOMETRY)
+    follow(slam, run.sensings)
+    grid = slam.map
+    rows, columns = np.nonzero(grid.levels() == 0)
+    places = np.stack([columns + 0.5, rows + 0.5], axis=1) * grid.settings.resolution + np.array(grid.origin)
+    places += np.array(ROOM_ROUND[0])
+    walls = odd_room()
+    along = walls[:, 2:] - walls[:, :2]
+    share = np.clip(((places[:, None] - walls[None, :, :2]) * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
+    gaps = np.linalg.norm(places[:, None] - walls[None, :, :2] - share[..., None] * along, axis=-1).min(
+        axis=1
+    )
+    assert len(places) > 300
+    assert (gaps < 0.1).mean() > 0.95
+
+
+def test_covariance_grows_with_the_way_and_shrinks_with_closures(ring_run):
+    slam = Slam(EAGER, GEOMETRY)
+    variances = []
+    for sensing in ring_run.sensings:
+        slam.localize(sensing)
+        variances.append(np.trace(slam.covariance[:2, :2]))
+        assert (np.linalg.eigvalsh(slam.covariance) >= -1e-12).all()
+    # The first local map lies where the first scan was taken, as well as any scan lies on a map.
+    assert variances[0] == pytest.approx(2.0 * GraphSettings().deviation_m ** 2)
+    assert variances[-1] < 0.5 * max(variances)
+
+
+def test_motion_without_odometry_is_followed():
+    run = driven(odd_room(), ROOM_ROUND)
+    blind = [replace(sensing, odometry=np.zeros(3)) for sensing in run.sensings]
+    slam = Slam(SlamSettings(uses_odometry=False), GEOMETRY)
+    told, _ = follow(slam, blind)
+    assert errors(told, run.truth).max() < 0.1
+
+
+def test_wheels_that_tell_back_for_forth_are_not_believed():
+    run = driven(odd_room(), ROOM_ROUND)
+    odometry, wrong = np.zeros(3), []
+    for k, sensing in enumerate(run.sensings):
+        if k:
+            motion = relative(run.truth[k - 1], run.truth[k])
+            odometry = composed(odometry, motion * np.array([-1.0 if 20 <= k < 40 else 1.0, 1.0, 1.0]))
+        wrong.append(replace(sensing, odometry=odometry))
+    slam = Slam(SlamSettings(), GEOMETRY)
+    told, _ = follow(slam, wrong)
+    assert errors(told, run.truth)[-1] < 0.15
+
+
+def sensing(ranges, k, x=0.0):
+    return Sensing(0.1 * k, np.array([x, 0.0, 0.0]), np.asarray(ranges, np.float32))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 2.0, 0.0, -1.0, 1e9])
+def test_scans_that_say_nothing_leave_the_pose_to_odometry(value):
+    slam = Slam(SlamSettings(), GEOMETRY)
+    told, _ = follow(slam, [sensing(np.full(GEOMETRY.beams, value), k, 0.02 * k) for k in range(40)])
+    assert np.isfinite(told).all()
+    assert np.isfinite(slam.covariance).all()
+    if not 0.0 < value < 5.0:
+        assert told[-1] == pytest.approx([0.78, 0.0, 0.0])
+
+
+def test_odometry_that_is_no_number_is_no_motion():
+    slam = Slam(SlamSettings(), GEOMETRY)
+    scan = cast(odd_room(), np.array([2.0, 2.0, 0.0]))
+    slam.localize(sensing(scan, 0))
+    assert np.isfinite(slam.localize(Sensing(0.1, np.full(3, np.nan), scan))).all()
+    assert np.isfinite(slam.localize(sensing(scan, 2, 0.2))).all()
+
+
+def test_a_kidnapped_robot_goes_on_in_a_new_local_map():
+    before, after = driven(odd_room(), ROOM_ROUND[:3]), driven(ring(), RING_ROUND[:3])
+    moved = [
+        replace(s, time_s=s.time_s + 100.0, odometry=composed(before.sensings[-1].odometry, s.odometry))
+        for s in after.sensings
+    ]
+    slam = Slam(SlamSettings(), GEOMETRY)
+    told, _ = follow(slam, [*before.sensings, *moved])
+    assert slam.counts.restarts >= 1
+    assert np.isfinite(told).all()
+    # Near the end it follows the new place by its walls again.
+    end, true = told[-30:], after.truth[-30:]
+    assert np.abs(relative(end[0], end[-1]) - relative(true[0], true[-1])).max() < 0.1
+    assert slam.covariance[0, 0] > 1.0
+
+
+def test_a_scan_of_another_length_is_refused():
+    with pytest.raises(ValueError, match=r"shape \(3,\); want \(241,\)"):
+        Slam(SlamSettings(), GEOMETRY).localize(sensing([1.0, 1.0, 1.0], 0))
+
+
+def test_scans_are_matched_after_enough_motion_only():
+    scan = cast(odd_room(), np.array([2.0, 2.0, 0.0]))
+    slam = Slam(SlamSettings(matching=MatchingSettings(distance_m=0.1)), GEOMETRY)
+    follow(slam, [sensing(scan, k, 0.001 * k) for k in range(50)])
+    assert slam.counts.matches == 0
+
+
+def test_dead_reckoning_adds_motions_to_the_start():
+    odometry = Odometry(OdometryUncertainty())
+    odometry.reset(np.array([1.0, 2.0, math.pi / 2]), 0)
+    ranges = np.zeros(0, np.float32)
+    assert odometry.localize(Sensing(0.0, np.array([5.0, 5.0, 0.0]), ranges)).tolist() == [
+        1.0,
+        2.0,
+        math.pi / 2,
+    ]
+    assert not odometry.covariance.any()
+    assert odometry.localize(Sensing(1.0, np.array([6.0, 5.0, 0.0]), ranges)) == pytest.approx(
+        [1.0, 3.0, math.pi / 2]
+    )
+    small = odometry.covariance
+    assert odometry.localize(Sensing(2.0, np.full(3, np.nan), ranges)) == pytest.approx(
+        [1.0, 3.0, math.pi / 2]
+    )
+    odometry.localize(Sensing(3.0, np.array([7.0, 5.0, 0.0]), ranges))
+    assert np.trace(odometry.covariance) > np.trace(small) > 0.0
+    assert odometry.take_correction() is None
+
+
+@pytest.mark.parametrize("name", LOCALIZERS)
+def test_localizers_are_made_by_name(name):
+    made = make_localizer(name, GEOMETRY)
+    made.reset(np.array([1.0, 0.0, 0.0]), 0)
+    pose = made.localize(sensing(np.full(GEOMETRY.beams, 1.0), 0))
+    # Only particles are spread about the pose that they are told.
+    assert (
+        pose.tolist() == [1.0, 0.0, 0.0]
+        if name != "splines"
+        else pose == pytest.approx([1.0, 0.0, 0.0], abs=0.005)
+    )
+    assert made.covariance.shape == (3, 3)
+    assert made.take_correction() is None
+
+
+def test_names_without_localizer_are_refused():
+    with pytest.raises(ValueError, match="unknown localizer 'gps'; known are odometry, slam"):
+        make_localizer("gps", GEOMETRY)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "value"),
+    [
+        (MatchingSettings, "distance_m", -1.0),
+        (MatchingSettings, "points", 0),
+        (ClosureSettings, "delay_s", math.nan),
+        (OdometryUncertainty, "turn_share", 0.0),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(kind, name, value):
+    with pytest.raises(ValueError, match=name):
+        kind(**{name: value})
