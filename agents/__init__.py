@@ -1,15 +1,17 @@
 """Policies: they only decide."""
 
-from lidarium.agents import catalogue as catalogue
-from lidarium.agents.policy import (
-    GivenUp,
-    PerRobot,
-    Policy,
-    Stop,
-    Team,
-    make_policy,
-    policy_names,
-    register_policy,
-)
+from lidarium.agents.catalogue import make_policy, policy_names, register_policy
+from lidarium.agents.policy import PerRobot, Policy, Stop, Team
+from lidarium.agents.report import GivenUp, PolicyReport
 
-__all__ = ["GivenUp", "PerRobot", "Policy", "Stop", "Team", "make_policy", "policy_names", "register_policy"]
+__all__ = [
+    "GivenUp",
+    "PerRobot",
+    "Policy",
+    "PolicyReport",
+    "Stop",
+    "Team",
+    "make_policy",
+    "policy_names",
+    "register_policy",
+]

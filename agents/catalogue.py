@@ -1,54 +1,93 @@
-"""The policies that come with the package.
+"""The policies by name."""
 
-A new one is a file beside this one and a line here.
-"""
+from collections.abc import Callable
+from typing import Any
 
-from functools import partial
+from lidarium.agents.policy import Policy
+from lidarium.registry import Registry
 
-from lidarium.agents.frontier import ExploreLite, NearestFrontier, UtilityFrontier
-from lidarium.agents.policy import register_policy
-from lidarium.agents.random_walk import RandomWalk
-from lidarium.agents.srt.policy import SensorBasedRandomTree
-from lidarium.agents.supervisor.policy import independent, oracle_starts, supervised
+POLICIES: Registry[Callable[..., Policy]] = Registry("policy")
+"""What makes a policy, by name; keyword arguments are its settings. A module is imported when first needed."""
 
-register_policy(
-    "random_walk", RandomWalk, "drives straight on and turns by a random angle where something is near"
+_FRONTIER = "lidarium.agents.frontier"
+POLICIES.register(
+    "random_walk",
+    "lidarium.agents.random_walk:RandomWalk",
+    "drives straight on and turns by a random angle where something is near",
 )
-register_policy(
+POLICIES.register(
     "nearest_frontier",
-    NearestFrontier,
+    f"{_FRONTIER}:NearestFrontier",
     "each robot drives to its nearest frontier of the team's map (Yamauchi)",
 )
-register_policy(
+POLICIES.register(
     "nearest_frontier_own_map",
-    partial(NearestFrontier, shares_map=False),
+    f"{_FRONTIER}:nearest_frontier_own_map",
     "each robot drives to the nearest frontier of its own map",
 )
-register_policy(
-    "utility_frontier", UtilityFrontier, "the team shares frontiers out by utility less cost (Burgard)"
+POLICIES.register(
+    "utility_frontier",
+    f"{_FRONTIER}:UtilityFrontier",
+    "the team shares frontiers out by utility less cost (Burgard)",
 )
-register_policy(
+POLICIES.register(
     "explore_lite",
-    ExploreLite,
+    f"{_FRONTIER}:ExploreLite",
     "least cost of distance less size of the frontier, both in metres (explore_lite)",
 )
-register_policy(
+POLICIES.register(
     "srt",
-    SensorBasedRandomTree,
+    "lidarium.agents.srt.policy:SensorBasedRandomTree",
     "grows a tree of safe regions towards openings and the goal (sensor-based random tree)",
 )
-register_policy(
+POLICIES.register(
     "supervised",
-    supervised,
+    "lidarium.agents.supervisor.policy:supervised",
     "robots explore alone; a station merges their maps, and redirects and stops them by a tree of rules",
 )
-register_policy(
+POLICIES.register(
     "independent",
-    independent,
+    "lidarium.agents.supervisor.policy:independent",
     "each robot explores the whole floor alone; a bound for teams that merge their maps",
 )
-register_policy(
+POLICIES.register(
     "oracle_starts",
-    oracle_starts,
-    "supervised robots that are told how they stand to each other; a bound for teams that merge",
+    "lidarium.agents.supervisor.policy:oracle_starts",
+    "supervised robots that are given how they stand to each other; a bound for teams that merge",
 )
+
+
+def register_policy(name: str, make: Callable[..., Policy] | str, summary: str) -> None:
+    """Register a policy by name.
+
+    Parameters
+    ----------
+    name : str
+        What users call it.
+    make : callable or str
+        Returns a new policy; keyword arguments are its settings. Also ``"module:attribute"``.
+    summary : str
+        One line that says what it does.
+
+    Raises
+    ------
+    ValueError
+        Where the name is taken.
+    """
+    POLICIES.register(name, make, summary)
+
+
+def policy_names() -> dict[str, str]:
+    """Return the names of all policies with their summaries."""
+    return dict(sorted(POLICIES.summaries.items()))
+
+
+def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
+    """Return a new policy by name.
+
+    Raises
+    ------
+    ValueError
+        Where the name is unknown; the message suggests the nearest one.
+    """
+    return POLICIES[name](**settings)

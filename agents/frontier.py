@@ -6,7 +6,7 @@ frontier in reach stays idle and gives way; all stop together when none has work
 """
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.frontier_reach import Choice, Reach, reach_of
-from lidarium.agents.policy import Action, GivenUp, Stop, Team
+from lidarium.agents.policy import Action, Policy, Stop, Team
+from lidarium.agents.report import GivenUp
 from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.navigation import NavigationMap
@@ -50,7 +51,7 @@ class _Work:
     failed_at: Cell | None = None
 
 
-class FrontierExplorer(ABC):
+class FrontierExplorer(Policy):
     """What the frontier explorers share; a subclass chooses.
 
     Parameters
@@ -308,6 +309,11 @@ class ExploreLite(FrontierExplorer):
         ranked = long_enough if np.isfinite(long_enough).any() else costs
         best = int(np.argmin(ranked))
         return reach.choices[best] if math.isfinite(ranked[best]) else None
+
+
+def nearest_frontier_own_map() -> NearestFrontier:
+    """Return explorers that each drive to the nearest frontier of their own map."""
+    return NearestFrontier(shares_map=False)
 
 
 class UtilityFrontier(FrontierExplorer):

@@ -1,16 +1,14 @@
-"""What a policy is: it sees observations and beliefs, and decides.
+"""What a policy is: it sees observations and beliefs, and decides."""
 
-And the register of those that come with the package.
-"""
-
-import difflib
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.report import GivenUp, PolicyReport
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.radio.messages import DriveState, OperatingState, Order, Target
@@ -91,8 +89,8 @@ class Team(Protocol):
         ...
 
 
-class Policy(Protocol):
-    """Drives a team: one object for all of its robots.
+class Policy(ABC):
+    """Drives a team: one object for all of its robots; a policy is a subclass.
 
     Attributes
     ----------
@@ -102,99 +100,57 @@ class Policy(Protocol):
         decision period).
     shares_map : bool
         Whether the robots plan on the team's map, where it reaches them, or on their own.
+    observes : tuple of str
+        What it reads of observations, of ``settings.observe``; a run checks it before the first step.
     """
 
     level: str
-    shares_map: bool
+    shares_map: bool = True
+    observes: tuple[str, ...] = ()
 
+    @abstractmethod
     def reset(self, team: Team, seed: int) -> None:
-        """Begin an episode."""
-        ...
+        """Start an episode."""
 
+    @abstractmethod
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Decide for every agent in ``observations``."""
-        ...
+
+    @property
+    def given_up(self) -> Sequence[GivenUp]:
+        """What robots have left unexplored so far; nothing unless a policy overrides it."""
+        return ()
+
+    def report(self) -> PolicyReport:
+        """Return what there is to report of the episode."""
+        return PolicyReport(self.given_up)
 
 
-@dataclass(frozen=True, slots=True)
-class GivenUp:
-    """Something that a robot left unexplored, and why.
-
-    Attributes
-    ----------
-    agent : str
-        Who gave it up.
-    x, y : float
-        Where, in that robot's map frame [m].
-    size_m : float
-        How long the frontier is [m].
-    reason : str
-        ``unseen`` (nothing new is seen from as near as the body comes), ``hidden`` (behind something
-        occupied), ``narrow`` or ``blocked`` (no way for the body), ``no_progress`` (the way is there, but the
-        robot does not get on).
-    """
-
-    agent: str
-    x: float
-    y: float
-    size_m: float
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class PolicyEntry:
-    """A registered policy: how to make it, and what it is in one line."""
-
-    make: Callable[..., Policy]
-    summary: str
-
-
-_POLICIES: dict[str, PolicyEntry] = {}
-
-
-def register_policy(name: str, make: Callable[..., Policy], summary: str) -> None:
-    """Register a policy by name.
+def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
+    """Check that robots observe what a policy reads.
 
     Parameters
     ----------
+    policy : Policy
+        The policy.
     name : str
-        What users call it.
-    make : callable
-        Returns a new policy; keyword arguments are its settings.
-    summary : str
-        One line that says what it does.
+        What messages call it.
+    observe : sequence of str
+        ``settings.observe`` of the environment.
 
     Raises
     ------
     ValueError
-        Where the name is taken.
+        Where something is missing; the message says how to add it.
     """
-    if name in _POLICIES:
-        raise ValueError(f"policy {name!r} is registered already")
-    _POLICIES[name] = PolicyEntry(make, summary)
+    missing = [each for each in policy.observes if each not in observe]
+    if missing:
+        raise ValueError(
+            f"{name} needs {', '.join(missing)}, which the robots do not observe; add to settings.observe"
+        )
 
 
-def policy_names() -> dict[str, str]:
-    """Return the names of all policies with their summaries."""
-    return {name: entry.summary for name, entry in sorted(_POLICIES.items())}
-
-
-def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
-    """Return a new policy by name.
-
-    Raises
-    ------
-    ValueError
-        Where the name is unknown; the message suggests the nearest one.
-    """
-    if name not in _POLICIES:
-        near = difflib.get_close_matches(name, _POLICIES, n=1, cutoff=0.3)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"unknown policy {name!r}{hint} (known: {', '.join(sorted(_POLICIES))})")
-    return _POLICIES[name].make(**settings)
-
-
-class PerRobot:
+class PerRobot(Policy):
     """A decentralised policy: one instance for each robot, which sees its own robot only.
 
     Parameters
@@ -206,13 +162,13 @@ class PerRobot:
     def __init__(self, factory: Callable[[], Policy]) -> None:
         self._factory = factory
         probe = factory()
-        self.level, self.shares_map = probe.level, probe.shares_map
+        self.level, self.shares_map, self.observes = probe.level, probe.shares_map, probe.observes
         self._policies: dict[str, Policy] = {}
 
     @property
     def given_up(self) -> list[GivenUp]:
         """What the robots' instances left unexplored, robot by robot."""
-        return [entry for policy in self._policies.values() for entry in getattr(policy, "given_up", [])]
+        return [entry for policy in self._policies.values() for entry in policy.given_up]
 
     def reset(self, team: Team, seed: int) -> None:
         """Begin an episode with a new instance for each robot, each with a seed of its own."""

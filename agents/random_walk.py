@@ -5,17 +5,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lidarium.agents.policy import Action, Team
+from lidarium.agents.policy import Action, Policy, Team
 from lidarium.envs.exploration import Observation
 
 NEAR = 0.35
 """A robot turns when something ahead is nearer than its radius and this [m]."""
 
-NEEDED = ("scan", "pose", "bumper")
-"""What a robot must observe."""
 
-
-class RandomWalk:
+class RandomWalk(Policy):
     """Drives straight on and turns by a random angle where something is near.
 
     Parameters
@@ -25,7 +22,7 @@ class RandomWalk:
     """
 
     level = "velocity"
-    shares_map = True
+    observes = ("scan", "pose", "bumper")
 
     def __init__(self, speed: float = 0.43) -> None:
         if not 0.0 < speed <= 1.0:
@@ -45,20 +42,7 @@ class RandomWalk:
         self._headings = dict.fromkeys(team.agents)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Drive on, or turn towards the heading that was drawn.
-
-        Raises
-        ------
-        ValueError
-            Where the observations lack what the walk looks at.
-        """
-        missing = [
-            name for name in NEEDED if any(name not in observation for observation in observations.values())
-        ]
-        if missing:
-            raise ValueError(
-                f"a random walk needs {', '.join(missing)}, which the robots do not observe; add to settings.observe"
-            )
+        """Drive on, or turn towards the heading that was drawn."""
         return {agent: self._decide(agent, observation) for agent, observation in observations.items()}
 
     def _decide(self, agent: str, observation: Observation) -> Action:

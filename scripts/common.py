@@ -69,6 +69,10 @@ class TeamCommand(Command):
     map_resolution: float = 0.025
     """side of a cell of the maps, a whole multiple of 0.025 [m]"""
 
+    set: tuple[str, ...] = ()
+    """any other settings as NAME=VALUE, such as reward.time=0.02 or localizer.particles=400; `lidarium show
+    settings` lists them"""
+
     @property
     def team_options(self) -> dict[str, Any]:
         """What the options say of a team, as ``make_settings`` takes it.
@@ -90,6 +94,7 @@ class TeamCommand(Command):
             **starts,
             **pauses,
             "resolution": self.map_resolution,
+            **({"assigned": self.set} if self.set else {}),
         }
 
 

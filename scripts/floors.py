@@ -182,7 +182,7 @@ def prepare_floors(command: Prepare) -> Answer:
     """
     from lidarium.envs.floors.catalogue.names import set_floors
     from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE, SIZE_VARIABLE, floor_store
-    from lidarium.envs.settings.exploration import make_settings
+    from lidarium.envs.settings.making import make_settings
     from lidarium.mapping.kernels.cache_folders import is_writable
 
     _check_out(command)

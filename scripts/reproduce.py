@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
@@ -25,8 +25,8 @@ class Reproduce(Command):
     What has been run before is not run again.
     """
 
-    name: Positional[Literal["leaderboard", "merging", "srt", "supervisor"]]
-    """which page"""
+    name: Positional[str]
+    """which study; `lidarium show studies` lists them"""
     data: Path | None = None
     """folder of real floors; without it generated floors alone"""
     every: int = 1
@@ -49,7 +49,7 @@ def execute(command: Reproduce) -> Answer:
     ValueError, FileNotFoundError, OSError
         Where the input or ``--out`` is no good; what was finished before is kept.
     """
-    from lidarium.benchmarks.studies import EXPERIMENTS
+    from lidarium.benchmarks.studies import STUDIES
     from lidarium.evaluation.episodes.output import check_writable, write_text
     from lidarium.evaluation.suites.campaign import Campaign
 
@@ -60,24 +60,22 @@ def execute(command: Reproduce) -> Answer:
     every = _every(command)
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
-    experiment = EXPERIMENTS[command.name]
+    study = STUDIES[command.name]
     folder = command.runs / command.name
     workers = command.workers or len(os.sched_getaffinity(0))
     campaigns = {
         name: Campaign(suite, folder / name, workers, command.records)
-        for name, suite in experiment.suites(command.data, every).items()
+        for name, suite in study.suites(command.data, every).items()
     }
     for name, campaign in campaigns.items():
         if not _ran(campaign, name, command.json):
             return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
-    if experiment.work is not None and not _worked(
-        experiment.work(folder, command.data, every, workers), command.json
-    ):
+    if study.work is not None and not _worked(study.work(folder, command.data, every, workers), command.json):
         return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
-    if experiment.pictures is not None:
-        experiment.pictures(folder, out)
+    if study.pictures is not None:
+        study.pictures(folder, out)
     page = out / f"{command.name}.md"
-    write_text(page, experiment.page(folder, _command_line(command)))
+    write_text(page, study.page(folder, _command_line(command)))
     failures = [(trial, error) for campaign in campaigns.values() for trial, error in campaign.failures]
     for trial, error in failures:
         tell(f"{trial.key}: {type(error).__name__}: {error}")

@@ -125,7 +125,7 @@ def _completed(command: Run) -> Run:
 
 
 def _settings(command: Run) -> "ExplorationSettings":
-    from lidarium.envs.settings.exploration import make_settings
+    from lidarium.envs.settings.making import make_settings
     from lidarium.envs.settings.reset_options import FloorChoice
 
     stop = command.stop_coverage
@@ -232,7 +232,7 @@ def _write(
     """
     from lidarium.evaluation.drawing.run_picture import save_run_picture
     from lidarium.evaluation.episodes.output import write_json, write_text
-    from lidarium.evaluation.episodes.supervision import decision_lines, is_supervised
+    from lidarium.evaluation.episodes.supervision import decision_lines
     from lidarium.evaluation.truth.beliefs import team_log_odds
     from lidarium.mapping.files.map_files import write_ros_map
     from lidarium.mapping.grids.occupancy import three_levels
@@ -245,10 +245,11 @@ def _write(
     log_odds, (x, y) = team_log_odds(episode.env)
     write_ros_map(folder, "map", three_levels(log_odds), (x, y, 0.0), command.map_resolution)
     save_run_picture(folder / "run.png", episode, command.chosen_policy)
-    if is_supervised(episode.policy):
-        write_text(folder / "decisions.jsonl", decision_lines(episode.policy))
+    report = episode.policy.report()
+    if report.supervision is not None:
+        write_text(folder / "decisions.jsonl", decision_lines(report))
     asked_for = [
-        *(["decisions.jsonl"] if is_supervised(episode.policy) else []),
+        *(["decisions.jsonl"] if report.supervision is not None else []),
         *(["episode.npz"] if recorder is not None else []),
         *(["run.mp4"] if command.video else []),
     ]

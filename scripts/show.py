@@ -22,6 +22,8 @@ class Show(Command):
             "localizers",
             "radios",
             "batteries",
+            "formats",
+            "studies",
             "settings",
             "supervisor",
         ]
@@ -31,13 +33,17 @@ class Show(Command):
 
 def execute(command: Show) -> Answer:
     """List what there is of a kind."""
-    from lidarium.evaluation.episodes.output import check_writable, write_json
+    from lidarium.evaluation.episodes.output import check_writable, write_json, write_text
 
     if command.out is not None:
         check_writable(command.out)
     result, text = _LISTS[command.what]()
     if command.out is not None:
         write_json(command.out / f"{command.what}.json", result)
+        if command.what == "settings":
+            from lidarium.envs.settings.table import markdown_table
+
+            write_text(command.out / "settings.md", markdown_table())
         if command.what == "supervisor":
             from lidarium.evaluation.drawing.tree_picture import save_tree_picture
 
@@ -66,7 +72,7 @@ def _robots() -> tuple[dict[str, Any], str]:
 def _lidars() -> tuple[dict[str, Any], str]:
     import math
 
-    from lidarium.envs.settings.exploration import LIDARS, NOISE
+    from lidarium.envs.settings.lidar import LIDARS, NOISE
 
     header = ("lidar", "beams", "view [deg]", "from [m]", "to [m]", "height [m]")
     rows = [
@@ -94,25 +100,32 @@ def _lidars() -> tuple[dict[str, Any], str]:
 
 def _settings() -> tuple[dict[str, Any], str]:
     from lidarium.envs.settings.exploration import ExplorationSettings
+    from lidarium.envs.settings.table import settings_table
 
-    values = asdict(ExplorationSettings())
-    rows = []
-    for name, value in values.items():
-        entries = (
-            {f"{name}.{part}": part_value for part, part_value in value.items()}
-            if isinstance(value, dict)
-            else {name: value}
-        )
-        rows += [
-            (entry, "none" if part_value is None else str(part_value))
-            for entry, part_value in entries.items()
-        ]
-    return {"settings": values}, "\n".join(f"{entry:<32}{value}" for entry, value in rows)
+    rows = [
+        (row.name, "none" if row.default is None else row.default, row.summary) for row in settings_table()
+    ]
+    text = "\n".join(f"{name:<36}{default!s:<24} {summary}" for name, default, summary in rows)
+    return {"settings": asdict(ExplorationSettings())}, text
+
+
+def _formats() -> tuple[dict[str, Any], str]:
+    from lidarium.envs.floors.importers import FORMATS
+
+    rows = [(name, " ".join(FORMATS[name].suffixes), summary) for name, summary in FORMATS.summaries.items()]
+    return {"formats": FORMATS.summaries}, table(rows, ("format", "files", "what it is"), indent="")
+
+
+def _studies() -> tuple[dict[str, Any], str]:
+    from lidarium.benchmarks.studies import STUDIES
+
+    return {"studies": STUDIES.summaries}, table(STUDIES.summaries.items(), indent="")
 
 
 def _realism() -> tuple[dict[str, Any], str]:
-    from lidarium.envs.settings.exploration import REALISM, make_settings
     from lidarium.envs.settings.faults import KINDS
+    from lidarium.envs.settings.making import make_settings
+    from lidarium.envs.settings.realism import REALISM
 
     header = ("realism", "noise", "odometry", "localization", "radio", "faults [1/h]")
     rows, values = [], {}
@@ -153,7 +166,7 @@ def _batteries() -> tuple[dict[str, Any], str]:
 def _localizers() -> tuple[dict[str, Any], str]:
     from lidarium.mapping.localization.registry import LOCALIZERS
 
-    lines = {"truth": "the true pose", **{name: entry.description for name, entry in LOCALIZERS.items()}}
+    lines = {"truth": "the true pose", **LOCALIZERS.summaries}
     return {"localizers": lines}, table(lines.items(), indent="")
 
 
@@ -187,6 +200,8 @@ _LISTS = {
     "localizers": _localizers,
     "radios": _radios,
     "batteries": _batteries,
+    "formats": _formats,
+    "studies": _studies,
     "settings": _settings,
     "supervisor": _supervisor,
 }

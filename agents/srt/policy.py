@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.policy import Action, Stop, Team
+from lidarium.agents.policy import Action, Policy, Stop, Team
 from lidarium.agents.srt.explorer import Explorer
 from lidarium.agents.srt.senses import NEWS_S, memory_of, senses_of
 from lidarium.agents.srt.settings import make_srt_settings
@@ -14,7 +14,7 @@ from lidarium.agents.srt.tree import Tree
 from lidarium.envs.exploration import Observation
 
 
-class SensorBasedRandomTree:
+class SensorBasedRandomTree(Policy):
     """Grows a tree of places with the safe regions seen from them, towards the goal where there is one.
 
     Each robot drives by its own scans. Robots that know each other's starts and are in contact share one
@@ -35,10 +35,10 @@ class SensorBasedRandomTree:
     """
 
     level = "velocity"
+    observes = ("scan",)
 
     def __init__(self, mode: str = "default", **settings: Any) -> None:  # noqa: ANN401
         self.settings = make_srt_settings(mode, **settings)
-        self.shares_map = True
         self.tree = Tree()
         self._explorers: dict[str, Explorer] = {}
 
@@ -55,17 +55,7 @@ class SensorBasedRandomTree:
             )
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
-        """Drive every robot for a step.
-
-        Raises
-        ------
-        ValueError
-            Where the observations lack the scan.
-        """
-        if any("scan" not in observation for observation in observations.values()):
-            raise ValueError(
-                "a sensor-based random tree needs scan, which the robots do not observe; add it to settings.observe"
-            )
+        """Drive every robot for a step."""
         actions: dict[str, Action] = {}
         for agent, observation in observations.items():
             explorer, belief = self._explorers[agent], self._team.belief(agent)

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from lidarium.agents.supervisor.tree import RobotInputs
-from lidarium.mapping.geometry.rigid import Transform
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,35 +98,6 @@ class StationEvent:
             "agents": list(self.agents),
             "words": self.words,
         }
-
-
-@dataclass(frozen=True, slots=True)
-class Join:
-    """How the map frames of two robots lie, as the station found.
-
-    Attributes
-    ----------
-    time_s : float
-        When [s].
-    a, b : str
-        The robots.
-    found : Transform
-        Of b's map frame in that of a.
-    at : (x, y)
-        Where errors are taken, the middle of what both maps know, in b's frame [m].
-    is_used : bool
-        Whether decisions were built on it; otherwise it waited to be confirmed.
-    is_direct : bool
-        Whether these two maps were laid on each other; otherwise those of others lie between them.
-    """
-
-    time_s: float
-    a: str
-    b: str
-    found: Transform
-    at: tuple[float, float]
-    is_used: bool
-    is_direct: bool = True
 
 
 def _inputs(inputs: RobotInputs) -> dict[str, Any]:

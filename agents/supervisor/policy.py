@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.frontier import NearestFrontier
-from lidarium.agents.policy import Action, GivenUp, PerRobot, Policy, Stop, Team
-from lidarium.agents.supervisor.log import Decision, Join, StationEvent
+from lidarium.agents.policy import Action, PerRobot, Policy, Stop, Team
+from lidarium.agents.report import GivenOrder, GivenUp, Join, LogEntry, PolicyReport, Supervision
+from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
@@ -47,7 +48,7 @@ class _Errand:
     is_taken: bool = False
 
 
-class Supervised:
+class Supervised(Policy):
     """A supervisor over a policy: robots explore by that policy, the station merges their maps, and the tree redirects and stops them.
 
     Robots that are joined are told what the others know, so the policy explores on the merged map where it
@@ -89,7 +90,7 @@ class Supervised:
                 f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other"
             )
         self.policy, self.settings = policy, settings or SupervisorSettings(**options)
-        self.level, self.shares_map = policy.level, True
+        self.level, self.observes = policy.level, policy.observes
         self.has_begun = False
         self.tick_seconds: list[float] = []
         self.merge_seconds: list[float] = []
@@ -110,9 +111,37 @@ class Supervised:
         return self._supervisor.station.joins if self.has_begun else []
 
     @property
-    def given_up(self) -> list[GivenUp]:
+    def given_up(self) -> Sequence[GivenUp]:
         """What the robots left unexplored."""
-        return list(getattr(self.policy, "given_up", []))
+        return self.policy.given_up
+
+    def report(self) -> PolicyReport:
+        """Return what was left unexplored, with all that the station did."""
+        if not self.has_begun:
+            return PolicyReport()
+        log: list[LogEntry] = sorted([*self.events, *self.decisions], key=lambda entry: entry.time_s)
+        orders = [
+            GivenOrder(each.time_s, each.agent, OrderKind(each.order), each.place, each.goal)
+            for each in self.decisions
+            if each.order is not None
+        ]
+        return PolicyReport(
+            self.given_up,
+            Supervision(self.joins, orders, log, self._figures(), self.tick_seconds, self.merge_seconds),
+        )
+
+    def _figures(self) -> dict[str, Any]:
+        """Return how much was decided, and of what kind."""
+        orders = [decision.order for decision in self.decisions]
+        rules = sorted({decision.rule for decision in self.decisions})
+        return {
+            "decisions": len(orders),
+            "redirections": orders.count(OrderKind.GO_TO.value),
+            "stops": orders.count(OrderKind.STOP.value),
+            "by_rule": {str(rule): sum(each.rule == rule for each in self.decisions) for rule in rules},
+            "joined": sum(event.event == "joined" for event in self.events),
+            "dropped": sum(event.event == "dropped" for event in self.events),
+        }
 
     def reset(self, team: Team, seed: int) -> None:
         """Begin an episode."""

@@ -7,7 +7,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.supervisor.log import Join, StationEvent
+from lidarium.agents.report import Join
+from lidarium.agents.supervisor.log import StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
 from lidarium.envs.radio.messages import OperatingState

@@ -10,7 +10,8 @@ from lidarium.benchmarks.speed.scenes.floors import BenchFloor
 from lidarium.benchmarks.speed.scenes.teams import DrivenTeam
 from lidarium.envs.observations import ObservationWriter
 from lidarium.envs.scoring.coverage import mark_seen
-from lidarium.envs.settings.exploration import ExplorationSettings, make_settings
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kinematic.motion import move_robots
 from lidarium.envs.simulation.kinematic.ray_casting import cast_scan
 from lidarium.envs.simulation.kinematic.stages import _window_corner

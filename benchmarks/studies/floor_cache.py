@@ -57,7 +57,7 @@ def reset_over(phase: str, process: int, floors: list[str], log: Path) -> None:
     """
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.envs.floors.catalogue.names import load_floor
-    from lidarium.envs.settings.exploration import make_settings
+    from lidarium.envs.settings.making import make_settings
     from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
 
     settings = make_settings(robots=ROBOTS, lidar=LIDAR)
@@ -88,7 +88,7 @@ def reset_over(phase: str, process: int, floors: list[str], log: Path) -> None:
 def hold(phase: str, process: int, floors: list[str], log: Path) -> None:
     """Load the tables of some floors and hold them, as that many episodes would."""
     from lidarium.envs.floors.catalogue.names import load_floor
-    from lidarium.envs.settings.exploration import make_settings
+    from lidarium.envs.settings.making import make_settings
     from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
 
     settings = make_settings(robots=ROBOTS, lidar=LIDAR)

@@ -61,7 +61,7 @@ def explore(kind: str, floor: str, robots: int, policy: str) -> dict[str, object
     """Run one episode without a horizon; what the run says, or why it could not start."""
     import lidarium
     from lidarium.envs.exploration import ExplorationEnv
-    from lidarium.envs.settings.exploration import make_settings
+    from lidarium.envs.settings.making import make_settings
     from lidarium.evaluation.episodes.runner import run_episode
 
     row: dict[str, object] = {"kind": kind, "floor": name_of(floor), "robots": robots, "policy": policy}

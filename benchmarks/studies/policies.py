@@ -18,7 +18,7 @@ from lidarium.agents import make_policy
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import floor_names, load_floor
 from lidarium.envs.floors.starts import draw_starts
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
 from lidarium.evaluation.episodes.runner import run_episode
 

@@ -22,12 +22,12 @@ import lidarium
 from lidarium.benchmarks.speed.harness.report import about, heading
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scoring.coverage import unpack_bits
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.output import write_text
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.metrics.maps import occupied_iou
 from lidarium.evaluation.metrics.poses import absolute_error, best_transform
 from lidarium.evaluation.truth.beliefs import team_log_odds
@@ -76,7 +76,7 @@ class TimedLocalizer:
         return correction
 
 
-class Watch:
+class Watch(Watcher):
     """Watches localizers: how long each scan takes them, and where wheels alone would have taken the robots to be.
 
     Attributes

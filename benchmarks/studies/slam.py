@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from lidarium.agents import make_policy
 from lidarium.benchmarks.speed.harness.report import about, heading
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.output import check_writable, write_text
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.metrics.poses import absolute_error, best_transform, moved, relative_error
 from lidarium.evaluation.metrics.relations import RelationErrors, log_relation_errors, read_relations
 from lidarium.mapping.files.carmen_logs import read_carmen_log
@@ -129,7 +129,7 @@ class Robot:
 
 
 @dataclass(slots=True)
-class _Recorder:
+class _Recorder(Watcher):
     """Keeps what a robot's laser saw, and from where."""
 
     scans: list[NDArray[np.float32]] = field(default_factory=list)

@@ -29,11 +29,11 @@ from lidarium.benchmarks.studies.srt.map_figures import MapFigures, map_figures
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.drawing.spline_picture import save_spline_picture
 from lidarium.evaluation.episodes.output import write_text
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
@@ -58,7 +58,7 @@ POLICY, RASTER, RESOLUTION, TIME_STEP = "nearest_frontier", 0.01, 0.05, 0.1
 
 
 @dataclass(slots=True)
-class Drive:
+class Drive(Watcher):
     """What a robot measured on its way, and the truth."""
 
     ranges: list[NDArray[np.float32]]

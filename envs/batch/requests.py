@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.settings.exploration import ExplorationSettings, make_settings
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.reset_options import ResetOptions, read_options
 from lidarium.mapping.kernels.compilation import available_threads
 

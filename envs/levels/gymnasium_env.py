@@ -11,7 +11,7 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.radio.messages import Order
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 
 AGENT = "robot_0"
 

@@ -50,7 +50,9 @@ class Software:
         if self._localizes:
             for robot in range(robots):
                 row = episode * robots + robot
-                localizer = make_localizer(self._settings.localization, self._settings.lidar)
+                localizer = make_localizer(
+                    self._settings.localization, self._settings.lidar, self._settings.localizer
+                )
                 draws = np.random.default_rng([seed, LOCALIZER_STREAM, robot])
                 localizer.reset(world.believed[row].copy(), int(draws.integers(2**63)))
                 self._perception.localizers[row] = localizer

@@ -10,6 +10,8 @@ by its data sheet), the rest for driving at 0.33 m/s.
 import math
 from dataclasses import dataclass
 
+from lidarium.registry import Registry
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Battery:
@@ -50,5 +52,8 @@ class Battery:
         return self.capacity_j is not None
 
 
-BATTERIES: dict[str, Battery] = {"none": Battery(), "kobuki": Battery(capacity_j=2.4 * 3600.0 * 14.8)}
-"""Batteries by name: without a limit, and that of a Kobuki."""
+BATTERIES: Registry[Battery] = Registry("battery")
+"""Batteries by name."""
+
+BATTERIES.register("none", Battery(), "no limit")
+BATTERIES.register("kobuki", Battery(capacity_j=2.4 * 3600.0 * 14.8), "that of a Kobuki, 128 kJ")

@@ -1,20 +1,21 @@
 """Every knob of the exploration environments, with its unit and default."""
 
-import difflib
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, is_dataclass
 from numbers import Integral
-from typing import Any
+from typing import Any, get_type_hints
 
 from lidarium.envs.settings.battery import BATTERIES, Battery
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
-from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.lidar import LIDARS, Lidar
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.radio import RADIO, RadioSettings
+from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS, Robot
 from lidarium.mapping.grids.occupancy import OccupancySettings
-from lidarium.mapping.localization.registry import localizer_names
+from lidarium.mapping.localization.registry import LOCALIZERS
+from lidarium.registry import REGISTRIES, unknown
 
 MAX_ROBOTS = 64
 MAX_MAP_CELLS = 4096
@@ -27,76 +28,13 @@ OBSERVABLES = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
 A goal is observed wherever the floor has one.
 """
 
-NOISE: dict[str, tuple[float, float]] = {"none": (0.0, 0.0), "datasheet": (0.01, 0.01), "thesis": (0.03, 0.0)}
-"""Names of the range noise: floor [m] and share of the range of its standard deviation."""
+TRUE_POSE = "truth"
+"""The localization that is none: the robot is given its true pose."""
 
-LIDARS: dict[str, Lidar] = {
-    "urg": Lidar(),
-    "lidar_360_6m": Lidar(beams=180, field_of_view=2.0 * math.pi, range_max=6.0),
-    "lidar_360_20m": Lidar(beams=720, field_of_view=2.0 * math.pi, range_min=0.1, range_max=20.0),
-}
-"""Lasers by name: the URG-04LX-UG01 as simulated in the theses, and two that look all around."""
-
-KERNEL_LOCALIZATIONS = ("truth", "odometry")
+KERNEL_LOCALIZATIONS = (TRUE_POSE, "odometry")
 """Who can say where a robot is within the kernels of a step: the truth, or the wheels alone."""
 
 BACKENDS = ("kinematic",)
-
-
-REALISM: dict[str, dict[str, Any]] = {
-    "ideal": {
-        "noise": "none",
-        "odometry": "ideal",
-        "localization": "truth",
-        "radio": "all",
-        "faults": NO_FAULTS,
-    },
-    "lab": {
-        "noise": "datasheet",
-        "odometry": "typical",
-        "localization": "slam",
-        "radio": "all",
-        "faults": NO_FAULTS,
-    },
-    "field": {
-        "noise": "datasheet",
-        "odometry": "poor",
-        "localization": "slam",
-        "radio": RadioSettings(kind="signal", shadowing=4.0, loss=0.05, latency_s=0.2),
-        "faults": FaultSettings(laser_dropout=6.0, blind_sector=6.0, stuck_wheel=2.0, dead_radio=1.0),
-    },
-}
-"""How real the world is, by name: what each preset stands for."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RewardSettings:
-    """What a robot earns and pays.
-
-    Attributes
-    ----------
-    area : float
-        Per square metre of F that the team had not sensed, shared among the robots that sense it first
-        [1/m2].
-    time : float
-        Price of a second [1/s].
-    contact : float
-        Price of a step in contact [1].
-    energy : float
-        Price of a metre driven [1/m].
-    """
-
-    area: float = 1.0
-    time: float = 0.01
-    contact: float = 0.1
-    energy: float = 0.01
-
-    def __post_init__(self) -> None:
-        for name in ("area", "time", "contact", "energy"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(
-                    f"weight {name} of the reward is {getattr(self, name)}; want a finite number"
-                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +59,9 @@ class ExplorationSettings:
         Whether reports tell where robots with unknown starts truly started, as a bound for what merging maps
         can reach.
     localization : str
-        Who says where the robot is: ``truth``, ``odometry`` or one of ``localizer_names``.
+        Who says where the robot is: ``truth`` or the name of a localizer.
+    localizer : object or None
+        Own settings of that localizer, of its class ``Settings``; None for its defaults.
     odometry : OdometrySettings
         How well wheels tell the way.
     radio : RadioSettings
@@ -169,7 +109,8 @@ class ExplorationSettings:
     reward: RewardSettings = field(default_factory=RewardSettings)
     known_starts: bool = True
     reveals_starts: bool = False
-    localization: str = "truth"
+    localization: str = TRUE_POSE
+    localizer: Any = None
     odometry: OdometrySettings = ODOMETRY["ideal"]
     radio: RadioSettings = RADIO["all"]
     faults: FaultSettings = NO_FAULTS
@@ -203,7 +144,7 @@ class ExplorationSettings:
         for name, wanted in PARTS.items():
             if not isinstance(getattr(self, name), wanted):
                 raise ValueError(
-                    f"{name} is {getattr(self, name)!r}; want {wanted.__name__}{' or its name' if name in _NAMES else ''}"
+                    f"{name} is {getattr(self, name)!r}; want {wanted.__name__}{' or its name' if name in REGISTRIES else ''}"
                 )
         if not 1 <= self.robots <= MAX_ROBOTS:
             raise ValueError(f"robots is {self.robots}; a team has 1 to {MAX_ROBOTS}")
@@ -247,6 +188,17 @@ class ExplorationSettings:
         if self.threads < 1:
             raise ValueError(f"threads is {self.threads}; want at least 1")
 
+    def _check_localizer(self) -> None:
+        if self.localization not in LOCALIZERS:
+            raise ValueError(
+                f"localizer is given, but localization is {self.localization!r}, which has no settings"
+            )
+        wanted = LOCALIZERS[self.localization].Settings
+        if not isinstance(self.localizer, wanted):
+            raise ValueError(
+                f"localizer is {self.localizer!r}; want {wanted.__name__} for localization {self.localization!r}"
+            )
+
     @property
     def is_ideal(self) -> bool:
         """Whether sensors, poses, radio and robots are perfect."""
@@ -275,30 +227,46 @@ class ExplorationSettings:
 
 
 PARTS: dict[str, type] = {
-    "robot": Robot,
-    "lidar": Lidar,
-    "occupancy": OccupancySettings,
-    "reward": RewardSettings,
-    "odometry": OdometrySettings,
-    "radio": RadioSettings,
-    "faults": FaultSettings,
-    "battery": Battery,
+    name: kind
+    for name, kind in get_type_hints(ExplorationSettings).items()
+    if isinstance(kind, type) and is_dataclass(kind)
 }
 """Settings that are made of others."""
-
-_NAMES: dict[str, dict[str, Any]] = {
-    "robot": ROBOTS,
-    "lidar": LIDARS,
-    "odometry": ODOMETRY,
-    "radio": RADIO,
-    "battery": BATTERIES,
-}
-"""Those of them that have names."""
 
 
 def localizations() -> tuple[str, ...]:
     """Return the names of all who can say where a robot is."""
-    return ("truth", *localizer_names())
+    return (TRUE_POSE, *LOCALIZERS)
+
+
+def localizer_settings(localization: str, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Return the own settings of a localizer.
+
+    Raises
+    ------
+    ValueError
+        Where the localization has no settings, or not these.
+    """
+    if localization not in LOCALIZERS:
+        raise ValueError(
+            f"localization {localization!r} has no settings; choose one of {', '.join(LOCALIZERS)}"
+        )
+    try:
+        return with_parts(LOCALIZERS[localization].Settings, values)
+    except TypeError as error:
+        raise ValueError(f"settings of localizer {localization!r} cannot be used: {error}") from error
+
+
+def with_parts(kind: type, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Make a dataclass from values; those of parts that are dataclasses may be mappings."""
+    hints = get_type_hints(kind)
+    made = {
+        name: with_parts(hints[name], value)
+        if isinstance(value, Mapping) and is_dataclass(hints.get(name))
+        else value
+        for name, value in values.items()
+    }
+    return kind(**made)
 
 
 def _observed(names: Iterable[str]) -> tuple[str, ...]:
@@ -309,9 +277,7 @@ def _observed(names: Iterable[str]) -> tuple[str, ...]:
     names = tuple(names)
     for name in names:
         if name not in OBSERVABLES:
-            near = difflib.get_close_matches(str(name), OBSERVABLES, n=1, cutoff=0.3)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ValueError(f"observe has the unknown name {name!r}{hint} (known: {', '.join(OBSERVABLES)})")
+            raise ValueError(f"observe has an {unknown('name', name, OBSERVABLES)}")
         if names.count(name) > 1:
             raise ValueError(f"observe is {names}; want {name!r} once")
     if not names:
@@ -335,62 +301,3 @@ def _scales(scales: Iterable[int]) -> tuple[int, ...]:
     if not scales:
         raise ValueError(f"egocentric_scales is empty ({scales}); {wanted}")
     return tuple(int(scale) for scale in scales)
-
-
-def make_settings(settings: ExplorationSettings | None = None, **options: Any) -> ExplorationSettings:  # noqa: ANN401
-    """Fill settings from the short options of ``lidarium.parallel_env``.
-
-    Parameters
-    ----------
-    settings : ExplorationSettings or None
-        Where to start from; the defaults where None.
-    **options
-        Any attribute of ``ExplorationSettings``; ``robot``, ``lidar``, ``odometry``, ``radio`` and
-        ``battery`` also by name, ``noise`` (none, datasheet or thesis) for the laser's noise, ``resolution``
-        for the maps' cell [m], ``max_cycles`` (steps) in place of ``horizon_s``; ``realism`` (ideal, lab or
-        field) for all of noise, odometry, localization, radio and faults that is not given itself.
-
-    Returns
-    -------
-    ExplorationSettings
-        The settings.
-
-    Raises
-    ------
-    ValueError, TypeError
-        Where an option has a bad value or is unknown.
-    """
-    base = settings or ExplorationSettings()
-    realism = options.pop("realism", None)
-    if realism is not None:
-        options = {**_named("realism", realism, REALISM), **options}
-    for name, table in _NAMES.items():
-        if isinstance(options.get(name), str):
-            options[name] = _named(name, options[name], table)
-    lidar = options.pop("lidar", base.lidar)
-    noise = options.pop("noise", None)
-    if noise is not None:
-        noise_floor, noise_share = _named("noise", noise, NOISE)
-        lidar = replace(lidar, noise_floor=noise_floor, noise_share=noise_share)
-    options["lidar"] = lidar
-    resolution = options.pop("resolution", None)
-    if resolution is not None:
-        options["occupancy"] = replace(options.get("occupancy", base.occupancy), resolution=resolution)
-    max_cycles = options.pop("max_cycles", None)
-    if max_cycles is not None:
-        if max_cycles < 1:
-            raise ValueError(f"max_cycles is {max_cycles}; want at least 1 step")
-        options["horizon_s"] = max_cycles * options.get("time_step", base.time_step)
-    known = ExplorationSettings.__dataclass_fields__
-    for name in options:
-        if name not in known:
-            raise TypeError(
-                f"unknown option {name!r}; known are {', '.join(sorted([*known, 'noise', 'realism', 'resolution', 'max_cycles']))}"
-            )
-    return replace(base, **options)
-
-
-def _named(kind: str, name: str, table: dict[str, Any]) -> Any:  # noqa: ANN401
-    if name not in table:
-        raise ValueError(f"unknown {kind} {name!r}; known are {', '.join(table)}")
-    return table[name]

@@ -1,8 +1,10 @@
-"""The settings of a planar laser range finder."""
+"""Planar laser range finders, with the noise of their ranges."""
 
+import math
 from dataclasses import dataclass
 
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.registry import Registry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,3 +36,26 @@ class Lidar(ScanGeometry):
     def is_noisy(self) -> bool:
         """Whether ranges carry noise."""
         return self.noise_floor > 0.0 or self.noise_share > 0.0
+
+
+LIDARS: Registry[Lidar] = Registry("lidar")
+"""Lasers by name."""
+
+LIDARS.register("urg", Lidar(), "URG-04LX-UG01 as simulated in the theses: 240 degrees, 4 m")
+LIDARS.register(
+    "lidar_360_6m",
+    Lidar(beams=180, field_of_view=2.0 * math.pi, range_max=6.0),
+    "180 beams all around, 6 m",
+)
+LIDARS.register(
+    "lidar_360_20m",
+    Lidar(beams=720, field_of_view=2.0 * math.pi, range_min=0.1, range_max=20.0),
+    "720 beams all around, 20 m",
+)
+
+NOISE: Registry[tuple[float, float]] = Registry("noise")
+"""Range noise by name: floor [m] and share of the range of its standard deviation."""
+
+NOISE.register("none", (0.0, 0.0), "exact ranges")
+NOISE.register("datasheet", (0.01, 0.01), "0.01 m or 1 % of the range, the larger, as in the data sheet")
+NOISE.register("thesis", (0.03, 0.0), "0.03 m, as in the theses")

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.checks import check_from_zero
+from lidarium.registry import Registry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,9 +75,13 @@ class OdometrySettings:
         )
 
 
-ODOMETRY: dict[str, OdometrySettings] = {
-    "ideal": OdometrySettings(),
-    "good": OdometrySettings(
+ODOMETRY: Registry[OdometrySettings] = Registry("odometry")
+"""Odometry by name."""
+
+ODOMETRY.register("ideal", OdometrySettings(), "wheels measure exactly, drives follow commands exactly")
+ODOMETRY.register(
+    "good",
+    OdometrySettings(
         distance_bias=0.01,
         turn_bias=0.01,
         drift=0.002,
@@ -88,7 +93,11 @@ ODOMETRY: dict[str, OdometrySettings] = {
         speed_noise=0.02,
         turn_rate_noise=0.02,
     ),
-    "typical": OdometrySettings(
+    "1 % bias, whole ticks, little noise",
+)
+ODOMETRY.register(
+    "typical",
+    OdometrySettings(
         distance_bias=0.05,
         turn_bias=0.05,
         drift=0.01,
@@ -100,7 +109,11 @@ ODOMETRY: dict[str, OdometrySettings] = {
         speed_noise=0.03,
         turn_rate_noise=0.03,
     ),
-    "poor": OdometrySettings(
+    "5 % bias, whole ticks, some noise",
+)
+ODOMETRY.register(
+    "poor",
+    OdometrySettings(
         distance_bias=0.1,
         turn_bias=0.1,
         drift=0.03,
@@ -112,5 +125,5 @@ ODOMETRY: dict[str, OdometrySettings] = {
         speed_noise=0.05,
         turn_rate_noise=0.05,
     ),
-}
-"""Odometry by name."""
+    "10 % bias, whole ticks, much noise",
+)

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 from lidarium.mapping.geometry.checks import check_from_zero, check_positive
+from lidarium.registry import Registry
 
 RADIO_KINDS = ("all", "none", "range", "line_of_sight", "signal")
 """How robots reach each other."""
@@ -77,5 +78,15 @@ class RadioSettings:
         return self.kind == "all" and self.loss == 0.0 and self.latency_s == 0.0
 
 
-RADIO: dict[str, RadioSettings] = {kind: RadioSettings(kind=kind) for kind in RADIO_KINDS}
-"""Radios by name."""
+RADIO: Registry[RadioSettings] = Registry("radio")
+"""Radios by name: one for each kind."""
+
+RADIO.register("all", RadioSettings(kind="all"), "every message reaches everybody")
+RADIO.register("none", RadioSettings(kind="none"), "nothing reaches anybody")
+RADIO.register("range", RadioSettings(kind="range"), "reaches within a distance")
+RADIO.register(
+    "line_of_sight", RadioSettings(kind="line_of_sight"), "reaches within a distance, not through walls"
+)
+RADIO.register(
+    "signal", RadioSettings(kind="signal"), "reaches as far as the signal does, weaker through walls"
+)

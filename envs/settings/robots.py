@@ -11,6 +11,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.registry import Registry
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:
@@ -82,9 +84,13 @@ class Robot:
         )
 
 
-ROBOTS: dict[str, Robot] = {
-    "kobuki": Robot(),
-    "pioneer": Robot(
+ROBOTS: Registry[Robot] = Registry("robot")
+"""Robots by name."""
+
+ROBOTS.register("kobuki", Robot(), "Yujin Kobuki, 0.35 m across, 0.77 m/s at most")
+ROBOTS.register(
+    "pioneer",
+    Robot(
         radius=0.267,
         height=0.24,
         cruise_speed=0.5,
@@ -97,7 +103,11 @@ ROBOTS: dict[str, Robot] = {
         length=0.455,
         width=0.381,
     ),
-    "service": Robot(
+    "Adept MobileRobots Pioneer P3-DX, 1.2 m/s at most",
+)
+ROBOTS.register(
+    "service",
+    Robot(
         radius=0.30,
         height=1.2,
         cruise_speed=0.5,
@@ -110,7 +120,11 @@ ROBOTS: dict[str, Robot] = {
         length=0.6,
         width=0.6,
     ),
-    "point": Robot(
+    "a tall service robot, 0.6 m across, 1.0 m/s at most",
+)
+ROBOTS.register(
+    "point",
+    Robot(
         radius=0.01,
         height=0.5,
         cruise_speed=1.0,
@@ -123,4 +137,5 @@ ROBOTS: dict[str, Robot] = {
         length=0.02,
         width=0.02,
     ),
-}
+    "almost a point that follows commands at once; for tests and bounds",
+)

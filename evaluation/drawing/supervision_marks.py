@@ -1,6 +1,6 @@
 """Marks of a supervisor's decisions on pictures, with those on films."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import cv2
 import numpy as np
@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from lidarium.agents.policy import Policy
-from lidarium.agents.supervisor.log import Decision
-from lidarium.agents.supervisor.policy import Supervised
+from lidarium.agents.report import GivenOrder
 from lidarium.envs.drawing.frame_parts import SHIFT, Frame, View, team_colours
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.radio.messages import OrderKind
@@ -25,11 +24,12 @@ _JOIN_COLOUR = "#0f766e"
 
 def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Line2D]:
     """Draw where robots were joined, redirected and stopped by rules on a map of the floor; return the entries of the legend."""
-    if not (isinstance(policy, Supervised) and policy.has_begun):
+    station = policy.report().supervision
+    if station is None:
         return []
     colours = dict(zip(env.possible_agents, hex_colours(env.settings.robots), strict=True))
     drawn: dict[str, Line2D] = {}
-    for agent, start, end in _redirections(env, policy.decisions):
+    for agent, start, end in _redirections(env, station.orders):
         axes.annotate(
             "",
             end,
@@ -38,15 +38,15 @@ def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Li
             zorder=5,
         )
         drawn["redirected"] = Line2D([], [], color=INK, linestyle=":", label="redirected")
-    for decision in policy.decisions:
-        if decision.order == OrderKind.STOP.value:
-            x, y = in_floor_frame(env, decision.agent, *decision.place)
+    for order in station.orders:
+        if order.kind is OrderKind.STOP:
+            x, y = in_floor_frame(env, order.agent, *order.place)
             axes.plot(
                 [x],
                 [y],
                 marker="s",
                 markersize=6,
-                color=colours[decision.agent],
+                color=colours[order.agent],
                 markeredgecolor="white",
                 linewidth=0,
                 zorder=9,
@@ -54,7 +54,7 @@ def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Li
             drawn["stopped"] = Line2D(
                 [], [], marker="s", markersize=6, color=INK, linewidth=0, label="stopped by the supervisor"
             )
-    for join in policy.joins:
+    for join in station.joins:
         if join.is_used:
             x, y = in_floor_frame(env, join.b, *join.at)
             axes.plot(
@@ -73,21 +73,23 @@ def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Li
     return list(drawn.values())
 
 
-def recent_supervision(policy: Policy) -> DrawOver | None:
-    """Return what draws on frames of a film where robots have been sent lately, and that maps were joined; None without a supervisor."""
-    if not isinstance(policy, Supervised):
-        return None
+def recent_supervision(policy: Policy) -> DrawOver:
+    """Return what draws a station's latest orders and joins on frames of a film.
+
+    It draws nothing where a policy has no station.
+    """
 
     def draw(env: ExplorationEnv, frame: Frame, view: View) -> None:
-        if not policy.has_begun:
+        station = policy.report().supervision
+        if station is None:
             return
         since = env.scorer.time - SHOWN_S
         colours = dict(zip(env.possible_agents, team_colours(env.settings.robots), strict=True))
-        for agent, start, end in _redirections(env, [one for one in policy.decisions if one.time_s >= since]):
+        for agent, start, end in _redirections(env, [one for one in station.orders if one.time_s >= since]):
             first, last = ((int(x), int(y)) for x, y in view.pixels(np.array([start, end])))
             cv2.line(frame, first, last, colours[agent], 2, cv2.LINE_AA, SHIFT)
             cv2.circle(frame, last, round(8 * (1 << SHIFT)), colours[agent], 2, cv2.LINE_AA, SHIFT)
-        joined = [f"{join.a} + {join.b}" for join in policy.joins if join.is_used and join.time_s >= since]
+        joined = [f"{join.a} + {join.b}" for join in station.joins if join.is_used and join.time_s >= since]
         for line, words in enumerate(joined):
             cv2.putText(
                 frame,
@@ -104,13 +106,13 @@ def recent_supervision(policy: Policy) -> DrawOver | None:
 
 
 def _redirections(
-    env: ExplorationEnv, decisions: list[Decision]
+    env: ExplorationEnv, orders: Iterable[GivenOrder]
 ) -> Iterator[tuple[str, tuple[float, float], tuple[float, float]]]:
     """Yield who was redirected from where to where, in the floor's frame [m]."""
-    for decision in decisions:
-        if decision.goal is not None:
+    for order in orders:
+        if order.goal is not None:
             yield (
-                decision.agent,
-                in_floor_frame(env, decision.agent, *decision.place),
-                in_floor_frame(env, decision.agent, *decision.goal),
+                order.agent,
+                in_floor_frame(env, order.agent, *order.place),
+                in_floor_frame(env, order.agent, *order.goal),
             )

@@ -14,6 +14,7 @@ from lidarium.envs.drawing.frame_parts import Frame, View
 from lidarium.envs.drawing.rendering import draw_frame
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.episodes.output import whole_file
+from lidarium.evaluation.episodes.watching import Watcher
 
 DrawOver = Callable[[ExplorationEnv, Frame, View], None]
 
@@ -23,7 +24,7 @@ LAST_FRAME_S = 1.5
 """How long a film holds its last picture [s]."""
 
 
-class Film:
+class Film(Watcher):
     """Takes frames of an environment at equal simulated time; a ``Watcher``.
 
     Parameters
@@ -49,9 +50,6 @@ class Film:
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
         """Take a frame where it is time for one."""
         self._take(env)
-
-    def outcome(self, env: ExplorationEnv) -> None:
-        """Take nothing: endings do not change the picture."""
 
     def _take(self, env: ExplorationEnv) -> None:
         if env.scorer.time + 1e-9 >= self._next_s:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
+from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.metrics import overlap
 from lidarium.evaluation.truth.footprints import Footprints
 from lidarium.evaluation.truth.map_tally import COUNTED, KNOWABLE, VALID, MapTally
@@ -76,10 +77,8 @@ class Curves:
     seen_twice: NDArray[np.int64]
 
 
-class History:
+class History(Watcher):
     """What metrics over time need, of the episode that runs or ran last.
-
-    A ``Watcher``.
 
     Attributes
     ----------

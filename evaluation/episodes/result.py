@@ -8,16 +8,18 @@ from typing import Any
 import numpy as np
 
 import lidarium
-from lidarium.agents.policy import GivenUp
+from lidarium.agents.report import GivenUp
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scoring.coverage import unpack_bits
 from lidarium.envs.scoring.scorer import THRESHOLDS
-from lidarium.envs.settings.exploration import REALISM, ExplorationSettings, make_settings
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
+from lidarium.envs.settings.realism import REALISM
 from lidarium.evaluation import metrics
 from lidarium.evaluation.episodes.events import in_floor_frame, operating_events
 from lidarium.evaluation.episodes.history import WHOLE, History
 from lidarium.evaluation.episodes.runner import Episode
-from lidarium.evaluation.episodes.supervision import supervision_figures, tick_percentiles
+from lidarium.evaluation.episodes.supervision import tick_percentiles
 from lidarium.evaluation.metrics.merges import Trajectories, merge_figures
 from lidarium.evaluation.truth.beliefs import free_as_held, maps_on_floor
 from lidarium.evaluation.truth.true_map import left_by_failed, truth_of
@@ -51,7 +53,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         raise ValueError("the episode was interrupted before it began, there is no result")
     if history is not None and not history.has_begun:
         history = None
-    steps = max(int(world.steps[0]), 0)
+    steps, report = max(int(world.steps[0]), 0), episode.policy.report()
     collisions = int(world.collisions.sum())
     return {
         "floor": env.floor.name,
@@ -85,9 +87,9 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
             settings.occupancy.resolution,
             None if history is None else _trajectories(env, history),
         ),
-        "supervisor": supervision_figures(episode.policy),
+        "supervisor": None if report.supervision is None else report.supervision.figures,
         "decision_ms": metrics.decision_percentiles(episode.decision_seconds),
-        "tick_ms": tick_percentiles(episode.policy),
+        "tick_ms": tick_percentiles(report),
         "peak_mb": _rounded(metrics.peak_megabytes(), 1),
         "steps_per_s": round(steps / episode.wall_seconds, 3) if episode.wall_seconds > 0.0 else None,
         "version": lidarium.__version__,
@@ -234,8 +236,15 @@ def realism_of(settings: ExplorationSettings) -> str:
 
 
 def settings_sha256(settings: ExplorationSettings) -> str:
-    """Return a hash of all settings that can change a result: of their JSON with sorted keys, without ``threads``."""
-    values = {name: value for name, value in asdict(settings).items() if name != "threads"}
+    """Return a hash of all settings that can change a result.
+
+    It is of their JSON with sorted keys, without ``threads``, and without ``localizer`` where it is None, which
+    older records do not have.
+    """
+    values = asdict(settings)
+    del values["threads"]
+    if values["localizer"] is None:
+        del values["localizer"]
     return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.policy import GivenUp, Policy, Stop
+from lidarium.agents.policy import Policy, Stop, check_observed
+from lidarium.agents.report import GivenUp
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.gymnasium_env import at_level
@@ -47,8 +48,8 @@ class Episode:
     is_interrupted : bool
         Whether the user broke it off.
     merges : list of MergeEvent
-        Which robots were joined, where maps are merged: by the environment, or by a policy that has
-        ``joins``.
+        Which robots were joined, where maps are merged: by the environment, or by a policy with a
+        station.
     """
 
     env: ExplorationEnv
@@ -151,6 +152,7 @@ def run_episode(
     Episode
         What it left.
     """
+    check_observed(policy, type(policy).__name__, env.settings.observe)
     level = at_level(env, policy.level, policy.shares_map)
     driver = level.waypoints if isinstance(level, FrontierExploration) else level
     world = level if merging is None else MergedMaps(level, merging)
@@ -170,7 +172,7 @@ def run_episode(
                 observations = {agent: observations[agent] for agent in env.agents}
                 if isinstance(env, WatchedExploration):
                     orders = driver.driver.orders() if isinstance(driver, WaypointExploration) else None
-                    env.decided(orders, getattr(policy, "given_up", ()))
+                    env.decided(orders, policy.given_up)
                 if on_decision is not None:
                     on_decision(env)
         except KeyboardInterrupt:
@@ -179,7 +181,7 @@ def run_episode(
             episode.is_interrupted = True
         episode.is_interrupted |= interrupt is not None and interrupt.is_asked and bool(env.agents)
     episode.wall_seconds = time.perf_counter() - began
-    episode.given_up = list(getattr(policy, "given_up", []))
+    episode.given_up = list(policy.given_up)
     episode.merges = world.events if isinstance(world, MergedMaps) else merges_of(policy, env)
     if isinstance(env, WatchedExploration):
         for merge in episode.merges:
@@ -188,11 +190,9 @@ def run_episode(
 
 
 def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
-    """Return the joins that a policy's decisions were built on beside the truth.
-
-    None where it has no ``joins``.
-    """
-    used = [join for join in getattr(policy, "joins", []) if join.is_used]
+    """Return the joins that a policy's decisions were built on, beside the truth."""
+    station = policy.report().supervision
+    used = [] if station is None else [join for join in station.joins if join.is_used]
     if not used:
         return []
     truth = true_frames(env)

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.policy import GivenUp
+from lidarium.agents.report import GivenUp
 from lidarium.envs.episode_start import Beginning
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.floors.floor import Floor
@@ -15,24 +15,23 @@ from lidarium.envs.radio.messages import Orders
 from lidarium.envs.settings.exploration import ExplorationSettings
 
 
-class Watcher(Protocol):
-    """Who looks on. Looking changes nothing: a watched episode is the same to the bit as one that is not."""
+class Watcher:
+    """Watches an episode; a watched episode is the same to the bit as one that is not.
+
+    Every method does nothing: a watcher is a subclass that overrides those that it needs.
+    """
 
     def begin(self, env: ExplorationEnv) -> None:
-        """Look at an episode after its reset, when the scan at the start is taken."""
+        """Observe an episode after its reset, when the scan at the start is taken."""
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
-        """Look at the world after a time step that was driven at ``commands`` (robots, 2) [m/s, rad/s]."""
+        """Observe the world after a time step driven at ``commands`` (robots, 2) [m/s, rad/s]."""
 
     def outcome(self, env: ExplorationEnv) -> None:
-        """Look after rewards and endings have been told, when ended agents have left."""
-
-
-class DecisionWatcher(Watcher, Protocol):
-    """Who looks on at decisions as well; a watcher with this method is shown them."""
+        """Observe the episode after rewards and endings, when ended agents have left."""
 
     def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
-        """Look back at a decision that has been carried out.
+        """Observe a decision that has been carried out.
 
         Parameters
         ----------
@@ -42,6 +41,21 @@ class DecisionWatcher(Watcher, Protocol):
             Where the robots were sent; None at the level of velocities.
         given_up : sequence of GivenUp
             All that the policy leaves unexplored by now.
+        """
+
+    def note(self, kind: str, time_s: float, agent: str | None, **details: Any) -> None:  # noqa: ANN401
+        """Take note of an event, such as a message or a merge.
+
+        Parameters
+        ----------
+        kind : str
+            What happened.
+        time_s : float
+            When [s].
+        agent : str or None
+            To whom.
+        **details
+            Whatever else is known.
         """
 
 
@@ -91,18 +105,11 @@ class WatchedExploration(ExplorationEnv):
         return told
 
     def decided(self, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
-        """Show a decision that has been carried out to the watchers that look at them.
-
-        See ``DecisionWatcher``.
-        """
+        """Show the watchers a decision that has been carried out."""
         for watcher in self.watchers:
-            look = getattr(watcher, "decision", None)
-            if look is not None:
-                look(self, orders, given_up)
+            watcher.decision(self, orders, given_up)
 
     def tell(self, event: dict[str, Any]) -> None:
-        """Tell an event, such as a merge, to the watchers that take notes: ``kind``, ``time_s``, ``agent`` and whatever else is known."""
+        """Show the watchers an event, such as a merge: ``kind``, ``time_s``, ``agent``, further details."""
         for watcher in self.watchers:
-            note = getattr(watcher, "note", None)
-            if note is not None:
-                note(**event)
+            watcher.note(**event)

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lidarium
-from lidarium.agents.policy import GivenUp
+from lidarium.agents.report import GivenUp
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.radio.messages import Orders
 from lidarium.evaluation.episodes.events import operating_events, place_of
 from lidarium.evaluation.episodes.result import settings_sha256
+from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.record.display import DisplayTrack
 from lidarium.evaluation.record.episode_record import FORMAT, EpisodeRecord
 from lidarium.evaluation.record.map_sampler import MapSampler
@@ -26,8 +27,8 @@ MAP_PERIOD_S = 2.0
 """Time between samples of the team's map [s]."""
 
 
-class Recorder:
-    """Records an episode; a ``Watcher`` that also looks at decisions.
+class Recorder(Watcher):
+    """Records an episode.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ class Recorder:
         self._decided_at = int(env.world.steps[0])
         if orders is not None:
             self._note_targets(env, orders, time_s)
-        if given_up and given_up != self._last_given_up:
+        if given_up and list(given_up) != self._last_given_up:
             self._note_given_up(env, given_up, time_s)
 
     def note(self, kind: str, time_s: float, agent: str | None, **details: Any) -> None:  # noqa: ANN401

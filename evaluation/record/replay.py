@@ -12,7 +12,8 @@ from lidarium.envs.episode_start import Beginning
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.settings.exploration import PARTS, ExplorationSettings
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
 from lidarium.evaluation.episodes.result import settings_sha256
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
@@ -109,9 +110,8 @@ def settings_of(header: dict[str, Any]) -> ExplorationSettings:
         Where they are not whole, or not those that were hashed.
     """
     try:
-        parts = {name: kind(**header["settings"][name]) for name, kind in PARTS.items()}
-        settings = ExplorationSettings(**{**header["settings"], **parts})
-    except (KeyError, TypeError) as error:
+        settings = make_settings(**header["settings"])
+    except TypeError as error:
         raise ValueError(
             f"the settings of the record are not those of lidarium {lidarium.__version__}: {error}"
         ) from error

@@ -3,36 +3,20 @@
 import hashlib
 import json
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from lidarium.agents import Policy, make_policy
 from lidarium.envs.floors.catalogue.names import is_generated, load_floor, set_floors
-from lidarium.envs.settings.battery import Battery
-from lidarium.envs.settings.exploration import ExplorationSettings, RewardSettings, make_settings
-from lidarium.envs.settings.faults import FaultSettings
-from lidarium.envs.settings.lidar import Lidar
-from lidarium.envs.settings.radio import RadioSettings
-from lidarium.envs.settings.robots import Robot
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.stop_rules import stop_rule_of
-from lidarium.mapping.grids.occupancy import OccupancySettings
 
 Starts = tuple[tuple[float, float, float], ...]
 
 DEFAULT_VARIANT = "default"
-
-_PARTS: dict[str, Callable[..., Any]] = {
-    "robot": Robot,
-    "lidar": Lidar,
-    "occupancy": OccupancySettings,
-    "reward": RewardSettings,
-    "battery": Battery,
-    "radio": RadioSettings,
-    "faults": FaultSettings,
-}
-"""Settings that are tables of their own, where they are not named."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -174,9 +158,6 @@ class Suite:
             if name in options:
                 raise ValueError(f"variant {variant!r} sets {name}, which is fixed by {why}; leave it out")
         try:
-            for name, kind in _PARTS.items():
-                if isinstance(options.get(name), Mapping):
-                    options[name] = kind(**options[name])
             return make_settings(robots=robots, **options)
         except (ValueError, TypeError) as error:
             raise ValueError(f"variant {variant!r} with {robots} robots cannot be used: {error}") from error

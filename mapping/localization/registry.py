@@ -1,77 +1,68 @@
 """The localizers by name."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any, Protocol
 
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
+from lidarium.registry import Registry
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """A localizer that can be chosen by name.
+class LocalizerClass(Protocol):
+    """What is registered: a class of localizers.
 
     Attributes
     ----------
-    description : str
-        What it does, in a line.
-    make : callable
-        Makes one from the geometry of the laser's scans.
+    Settings : type
+        The dataclass of its own settings; its defaults are those of the localizer.
     """
 
-    description: str
-    make: Callable[[ScanGeometry], Localizer]
+    Settings: type[Any]
+
+    def __call__(self, settings: Any, geometry: ScanGeometry) -> Localizer:  # noqa: ANN401
+        """Make a localizer from its settings, for a laser at the centre of the robot."""
+        ...
 
 
-def _odometry(geometry: ScanGeometry) -> Localizer:
-    from lidarium.mapping.localization.dead_reckoning.odometry import Odometry
+LOCALIZERS: Registry[LocalizerClass] = Registry("localizer")
+"""The localizers by name; the module of each is imported when it is first made."""
 
-    return Odometry()
-
-
-def _slam(geometry: ScanGeometry) -> Localizer:
-    from lidarium.mapping.localization.matching.settings import SlamSettings
-    from lidarium.mapping.localization.slam.localizer import Slam
-
-    return Slam(SlamSettings(), geometry)
-
-
-def _splines(geometry: ScanGeometry) -> Localizer:
-    from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
-
-    return SplineFilter(geometry=geometry)
-
-
-def _splines_ekf(geometry: ScanGeometry) -> Localizer:
-    from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
-
-    return SplineEkf(geometry=geometry)
-
-
-LOCALIZERS: dict[str, Entry] = {
-    "odometry": Entry("dead reckoning from the start by the wheels", _odometry),
-    "slam": Entry("scans matched with local maps, places recognised, the past corrected", _slam),
-    "splines": Entry("a particle filter on walls kept as B-splines and their features", _splines),
-    "splines_ekf": Entry(
-        "an extended Kalman filter on the features of walls kept as B-splines", _splines_ekf
-    ),
-}
-"""The localizers by name; the modules of each are imported when it is first made."""
+_PACKAGE = "lidarium.mapping.localization"
+LOCALIZERS.register(
+    "odometry", f"{_PACKAGE}.dead_reckoning.odometry:Odometry", "dead reckoning from the start by the wheels"
+)
+LOCALIZERS.register(
+    "slam",
+    f"{_PACKAGE}.slam.localizer:Slam",
+    "scans matched with local maps, places recognised, the past corrected",
+)
+LOCALIZERS.register(
+    "splines",
+    f"{_PACKAGE}.on_splines.spline_filter:SplineFilter",
+    "a particle filter on walls kept as B-splines and their features",
+)
+LOCALIZERS.register(
+    "splines_ekf",
+    f"{_PACKAGE}.on_splines.spline_ekf:SplineEkf",
+    "an extended Kalman filter on the features of walls kept as B-splines",
+)
 
 
-def localizer_names() -> tuple[str, ...]:
-    """Return the names of all localizers."""
-    return tuple(LOCALIZERS)
-
-
-def make_localizer(name: str, geometry: ScanGeometry) -> Localizer:
+def make_localizer(name: str, geometry: ScanGeometry, settings: Any = None) -> Localizer:  # noqa: ANN401
     """Make a localizer by name, for a laser at the centre of the robot.
+
+    Parameters
+    ----------
+    name : str
+        Its name in ``LOCALIZERS``.
+    geometry : ScanGeometry
+        The laser.
+    settings : object or None
+        Its own settings, of the class ``Settings`` of the localizer; its defaults where None.
 
     Raises
     ------
     ValueError
         Where the name is unknown.
     """
-    if name not in LOCALIZERS:
-        raise ValueError(f"unknown localizer {name!r}; known are {', '.join(LOCALIZERS)}")
-    return LOCALIZERS[name].make(geometry)
+    localizer = LOCALIZERS[name]
+    return localizer(localizer.Settings() if settings is None else settings, geometry)

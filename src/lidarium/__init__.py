@@ -82,7 +82,7 @@ def parallel_env(
     """
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.envs.levels.gymnasium_env import at_level
-    from lidarium.envs.settings.exploration import make_settings
+    from lidarium.envs.settings.making import make_settings
 
     return at_level(
         ExplorationEnv(floor, make_settings(settings, **options), render_mode, image_resolution), level

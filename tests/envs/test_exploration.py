@@ -8,7 +8,8 @@ import pytest
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster, Solid
-from lidarium.envs.settings.exploration import ExplorationSettings, make_settings
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kinematic.arrays import ENDED
 
 STAY = np.zeros(2, np.float32)

@@ -7,7 +7,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode

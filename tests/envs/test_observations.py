@@ -14,7 +14,8 @@ from lidarium.agents.random_walk import RandomWalk
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, observation_space
-from lidarium.envs.settings.exploration import OBSERVABLES, make_settings
+from lidarium.envs.settings.exploration import OBSERVABLES
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.grids.map_crops import crop_turned
 

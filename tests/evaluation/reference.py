@@ -10,6 +10,8 @@ import math
 
 import numpy as np
 
+from lidarium.evaluation.episodes.watching import Watcher
+
 GRAZING = 8.0
 MATE_MARGIN = 1.5
 JUST_INSIDE = 1.0 + 1.2e-7
@@ -17,7 +19,7 @@ HIT, MISS, LEAST, MOST = 17, 8, -40, 70
 ENDED = 4
 
 
-class Notes:
+class Notes(Watcher):
     """What a step leaves: poses, scans as told, and who still senses. A watcher."""
 
     def begin(self, env):

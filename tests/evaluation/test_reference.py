@@ -8,8 +8,8 @@ import pytest
 import lidarium
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.settings.exploration import make_settings
 from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode

@@ -14,7 +14,7 @@ from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, straight_floor, turned_floor
 from lidarium.benchmarks.speed.scenes.teams import LIDAR
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 
 ROBOTS = 3
 ALLOWED = 1.4

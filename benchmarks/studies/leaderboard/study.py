@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import lidarium
+from lidarium.benchmarks.studies.study import Study
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
 
@@ -183,3 +184,6 @@ def _difference(policy: str, group: Mapping[str, Any]) -> str:
 
 def _estimate(values: Mapping[str, Any], key: str) -> str:
     return f"{values[key]['median']['estimate']:.0f}"
+
+
+STUDY = Study(page, suites)

@@ -30,6 +30,7 @@ from lidarium.benchmarks.studies.merging.features import (
 from lidarium.benchmarks.studies.merging.figures import Tried
 from lidarium.benchmarks.studies.merging.pictures import draw_pairs
 from lidarium.benchmarks.studies.merging.trials import METHODS, read_outcomes, try_pairs
+from lidarium.benchmarks.studies.study import Study
 from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.suites.workers import shared_out
 
@@ -188,3 +189,6 @@ def _kept_floors(path: Path) -> list[BankFloor]:
     return [
         BankFloor(**{**one, "path": None if one["path"] is None else Path(one["path"])}) for one in entries
     ]
+
+
+STUDY = Study(page, work=work, pictures=pictures)

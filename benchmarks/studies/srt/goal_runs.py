@@ -11,9 +11,9 @@ from lidarium.agents.srt.policy import SensorBasedRandomTree
 from lidarium.benchmarks.studies.srt.map_figures import MapFigures, map_figures
 from lidarium.benchmarks.studies.srt.shortest_path import shortest_path
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import Episode, run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
 
@@ -62,8 +62,8 @@ class GoalRun:
         return f"{self.mode} | {self.world} | {self.seed}"
 
 
-class Way:
-    """What a robot measured and believed on its way, and the truth; a ``Watcher``."""
+class Way(Watcher):
+    """What a robot measured and believed on its way, and the truth."""
 
     def __init__(self) -> None:
         self.ranges: list[NDArray[np.float32]] = []

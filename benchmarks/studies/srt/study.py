@@ -11,6 +11,7 @@ from lidarium.benchmarks.studies.srt import tables
 from lidarium.benchmarks.studies.srt.ablations import FollowedWay, measure_variants
 from lidarium.benchmarks.studies.srt.goal_runs import MODES, WORLDS, GoalRun, measure_goal_run
 from lidarium.benchmarks.studies.srt.pictures import draw_coverage, draw_world
+from lidarium.benchmarks.studies.study import Study
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile, read_episodes
 from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
 from lidarium.evaluation.suites.workers import shared_out
@@ -143,3 +144,6 @@ def pictures(folder: Path, out: Path) -> None:
     draw_coverage(out / "srt_coverage.png", read_episodes(folder / GOALS_FILE))
     for world in WORLDS:
         draw_world(out / f"srt_world_{world.removeprefix('srt_')}.png", world, PICTURE_SEED)
+
+
+STUDY = Study(page, suites, work, pictures)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import lidarium
+from lidarium.benchmarks.studies.study import Study
 from lidarium.benchmarks.studies.supervisor import tables
 from lidarium.benchmarks.studies.supervisor.figures import (
     Row,
@@ -211,7 +212,7 @@ def _log_of(suite: Suite, trial: Trial) -> list[str]:
     episode = run_episode(
         suite.make_policy(trial.policy), env, trial.seed, None if starts is None else {"starts": starts}
     )
-    return decision_lines(episode.policy).splitlines()
+    return decision_lines(episode.policy.report()).splitlines()
 
 
 def _wrong_section(rows: Sequence[Row]) -> list[str]:
@@ -320,3 +321,6 @@ def _about_extensions() -> str:
         f"Three robots, {FEWEST_SEEDS} seeds on each of two floors; runs are not ended at 99 %, since what robots do then counts, too. "
         f"`energy budget` turns back at {MARGIN:g} times what the way home costs. `all together` is every one at once, with `utility`."
     )
+
+
+STUDY = Study(page, suites, work=work)

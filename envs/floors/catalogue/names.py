@@ -92,7 +92,7 @@ def is_file_name(spec: str | Path) -> bool:
     """Return whether a floor is named by a path to a file."""
     if isinstance(spec, Path):
         return True
-    suffixes = tuple(suffix for known in FORMATS for suffix in known.suffixes)
+    suffixes = tuple(suffix for known in FORMATS.values() for suffix in known.suffixes)
     return (
         "/" in spec
         or "\\" in spec

@@ -1,4 +1,4 @@
-"""Importers of floors: one file per format, and one line each in the registry below."""
+"""Importers of floors, one module per format."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from pathlib import Path
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import amrl, arrays, houseexpo, images, kth, lifull, ros_map
 from lidarium.mapping.files.map_files import check_file
+from lidarium.registry import Registry
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,8 +16,6 @@ class Format:
 
     Attributes
     ----------
-    name : str
-        What it is called.
     suffixes : tuple of str
         How the names of its files end.
     matches : callable
@@ -25,7 +24,6 @@ class Format:
         Reads the file; gets the path and the resolution asked for, or None.
     """
 
-    name: str
     suffixes: tuple[str, ...]
     matches: Callable[[Path], bool]
     load: Callable[[Path, float | None], Floor]
@@ -35,17 +33,23 @@ def _always(path: Path) -> bool:
     return True
 
 
-# The first that matches reads the file.
-FORMATS = (
-    Format("ROS map", (".yaml", ".yml"), _always, ros_map.load),
-    Format("HouseExpo", (".json", ".json.gz"), _always, houseexpo.load),
-    Format("KTH floor plan", (".xml", ".xml.gz"), _always, kth.load),
-    Format("AMRL vector map", (".txt", ".txt.gz"), amrl.matches, amrl.load),
-    Format("LIFULL vector annotation", (".txt", ".txt.gz"), _always, lifull.load),
-    Format("numpy array", (".npy", ".npz"), _always, arrays.load),
-    Format("dungeon", images.SUFFIXES, images.is_dungeon, images.load_dungeon),
-    Format("image", images.SUFFIXES, _always, images.load_image),
+FORMATS: Registry[Format] = Registry("floor format")
+"""Formats of floors by name; the first that matches reads a file."""
+
+FORMATS.register(
+    "ros_map", Format((".yaml", ".yml"), _always, ros_map.load), "ROS map: a picture with its yaml"
 )
+FORMATS.register(
+    "houseexpo", Format((".json", ".json.gz"), _always, houseexpo.load), "HouseExpo, a plan as JSON"
+)
+FORMATS.register("kth", Format((".xml", ".xml.gz"), _always, kth.load), "KTH floor plan as XML")
+FORMATS.register("amrl", Format((".txt", ".txt.gz"), amrl.matches, amrl.load), "AMRL vector map")
+FORMATS.register("lifull", Format((".txt", ".txt.gz"), _always, lifull.load), "LIFULL vector annotation")
+FORMATS.register("array", Format((".npy", ".npz"), _always, arrays.load), "numpy array")
+FORMATS.register(
+    "dungeon", Format(images.SUFFIXES, images.is_dungeon, images.load_dungeon), "picture of a dungeon"
+)
+FORMATS.register("image", Format(images.SUFFIXES, _always, images.load_image), "plain picture")
 
 
 def load_file(path: Path, resolution: float | None = None) -> Floor:
@@ -78,8 +82,8 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     if resolution is not None and not 0.0 < resolution < float("inf"):
         raise ValueError(f"resolution is {resolution} m; want a positive number of metres per pixel")
     lower = path.name.lower()
-    for known in FORMATS:
+    for known in FORMATS.values():
         if lower.endswith(known.suffixes) and known.matches(path):
             return known.load(path, resolution)
-    suffixes = sorted({suffix for known in FORMATS for suffix in known.suffixes})
+    suffixes = sorted({suffix for known in FORMATS.values() for suffix in known.suffixes})
     raise ValueError(f"{path} is of no known floor format; want a file that ends in {', '.join(suffixes)}")

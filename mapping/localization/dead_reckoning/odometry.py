@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import composed, relative
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.matching.settings import OdometryUncertainty
 
@@ -17,7 +18,11 @@ class Odometry:
         By how much odometry may err.
     """
 
-    def __init__(self, settings: OdometryUncertainty | None = None) -> None:
+    Settings = OdometryUncertainty
+
+    def __init__(
+        self, settings: OdometryUncertainty | None = None, geometry: ScanGeometry | None = None
+    ) -> None:
         self._settings = settings or OdometryUncertainty()
         self.reset(np.zeros(3), 0)
 

@@ -71,6 +71,8 @@ class SplineEkf(SplineTracker):
         Covariance of the pose and the landmarks [m, rad].
     """
 
+    Settings = SplineEkfSettings
+
     def __init__(
         self, settings: SplineEkfSettings | None = None, geometry: ScanGeometry | None = None
     ) -> None:

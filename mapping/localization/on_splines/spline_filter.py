@@ -105,6 +105,8 @@ class SplineFilter(SplineTracker):
         How often particles were drawn anew by their weights.
     """
 
+    Settings = SplineFilterSettings
+
     def __init__(
         self, settings: SplineFilterSettings | None = None, geometry: ScanGeometry | None = None
     ) -> None:

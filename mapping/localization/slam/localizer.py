@@ -56,6 +56,8 @@ class Slam:
         What was done so far.
     """
 
+    Settings = SlamSettings
+
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
         self._settings, self._geometry = settings, geometry
         self._unit_vectors = geometry.unit_vectors

@@ -53,7 +53,7 @@ def test_two_robots_are_joined_rightly_redirected_and_stopped_when_the_floor_is_
     assert figures["supervisor"]["decisions"] == len(policy.decisions)
     assert figures["supervisor"]["redirections"] >= 1
     assert figures["supervisor"]["joined"] >= 1
-    log = decision_lines(policy)
+    log = decision_lines(policy.report())
     assert log.count("\n") == len(policy.decisions) + len(policy.events)
 
 

@@ -16,8 +16,8 @@ from lidarium.envs.batch.vector_env import ExplorationVectorEnv
 from lidarium.envs.floors.catalogue import names as catalogue
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.settings.exploration import make_settings
 from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.grids.scan_geometry import MOST_BEAMS
 from lidarium.mapping.kernels.compilation import available_threads
 

@@ -9,7 +9,7 @@ import lidarium
 from lidarium.envs.drawing.rendering import EXPLORED, PALETTE, FrameWindow, classify, draw_frame, team_colours
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 
 
 def small_floor(width=4.0, height=3.0):

@@ -10,7 +10,7 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.radio.messages import DriveState, Target
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 
 HALL = Floor("hall", (0.0, 0.0, 6.0, 4.0), starts=np.array([[1.0, 2.0, 0.0], [1.0, 3.0, 0.0]]), goal=None)
 

@@ -19,7 +19,7 @@ from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
 from lidarium.envs.onboard.navigation import FLAGS
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import Orders, Target
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kinematic.arrays import ENDED
 from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic.world import KinematicWorld

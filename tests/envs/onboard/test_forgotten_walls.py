@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed, swept
 
 RESOLUTION = 0.05

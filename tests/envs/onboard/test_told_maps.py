@@ -6,7 +6,7 @@ import pytest
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.radio.messages import DriveState, Target
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.frontiers import FRONTIER, IGNORED
 

@@ -12,8 +12,9 @@ from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.scoring.coverage import count_bits, mark_seen, pack_bits, share_news, unpack_bits
 from lidarium.envs.scoring.scorer import THRESHOLDS, Scorer, reward_weights
-from lidarium.envs.settings.exploration import ExplorationSettings, RewardSettings
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
 from lidarium.envs.simulation.kinematic.floor_tables import FloorTables

@@ -8,15 +8,11 @@ from dataclasses import FrozenInstanceError, asdict, fields, replace
 import numpy as np
 import pytest
 
-from lidarium.envs.settings.exploration import (
-    LIDARS,
-    NOISE,
-    ExplorationSettings,
-    RewardSettings,
-    make_settings,
-)
-from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.lidar import LIDARS, NOISE, Lidar
+from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.reset_options import FloorChoice, read_options
+from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.mapping.grids.occupancy import OccupancySettings
 

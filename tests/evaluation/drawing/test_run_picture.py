@@ -6,7 +6,7 @@ import pytest
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.drawing.run_picture import frontiers_left, save_floor_picture, save_run_picture
 from lidarium.evaluation.drawing.video import film
 from lidarium.evaluation.episodes.runner import run_episode

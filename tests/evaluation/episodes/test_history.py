@@ -7,16 +7,16 @@ import lidarium
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster
 from lidarium.envs.scoring.coverage import unpack_bits
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation import metrics
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.truth.beliefs import free_as_held, maps_on_floor
 from lidarium.evaluation.truth.true_map import truth_of
 
 
-class Whole:
+class Whole(Watcher):
     """Works out the figures from whole maps and masks at every period. A watcher."""
 
     def begin(self, env):

@@ -5,7 +5,8 @@ import pytest
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import ExplorationSettings, make_settings
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.events import in_floor_frame
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import realism_of, result_of, settings_sha256

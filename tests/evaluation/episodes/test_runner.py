@@ -5,7 +5,7 @@ import pytest
 
 from lidarium.agents import Stop
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 
 

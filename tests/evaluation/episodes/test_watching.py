@@ -4,14 +4,14 @@ import numpy as np
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 
 SETTINGS = make_settings(robots=2, horizon_s=12.0)
 
 
-class Log:
+class Log(Watcher):
     """Notes what it is shown."""
 
     def __init__(self):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 import lidarium
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder

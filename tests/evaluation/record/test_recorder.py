@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record import Recorder
 from lidarium.evaluation.truth.beliefs import team_log_odds
 from lidarium.mapping.grids.occupancy import three_levels
 
 
-class MapLog:
+class MapLog(Watcher):
     """Keeps the true team map and poses at some steps."""
 
     def __init__(self):

@@ -8,7 +8,7 @@ import pytest
 from lidarium.agents import Stop
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder, read_record, rerun, write_record
 from lidarium.evaluation.record.replay import drive_again, find_floor, is_same

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import lidarium
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.history import History
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lidarium.mapping.kernels.views import LINE
 from lidarium.mapping.kernels.huge_pages import LARGE_PAGE, LARGEST_PIECE, PIECE, Pages
+from lidarium.mapping.kernels.views import LINE
 
 
 def test_arrays_of_pages_are_blank_apart_and_begin_on_lines():

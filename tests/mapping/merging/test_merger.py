@@ -7,7 +7,7 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, 
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.settings.exploration import make_settings
+from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.files.map_files import FREE, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform

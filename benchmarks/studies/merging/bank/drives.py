@@ -10,10 +10,11 @@ from lidarium.agents import make_policy
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.starts import draw_starts
-from lidarium.envs.settings.exploration import ExplorationSettings, make_settings
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
 from lidarium.evaluation.episodes.runner import run_episode
-from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN, OccupancyGrid
 
@@ -71,8 +72,8 @@ class Snapshot:
     coverage: float
 
 
-class MapMaker:
-    """Draws the scans of a watched robot into a map of its own; a ``Watcher``."""
+class MapMaker(Watcher):
+    """Draws the scans of a watched robot into a map of its own."""
 
     def __init__(self, error: PoseError, seed: int, shares: tuple[float, ...] = SNAPSHOTS) -> None:
         self.snapshots: list[Snapshot] = []

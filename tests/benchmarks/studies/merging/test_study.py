@@ -2,7 +2,7 @@ from functools import partial
 
 import pytest
 
-from lidarium.benchmarks.studies import EXPERIMENTS
+from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.merging import features, trials
 from lidarium.benchmarks.studies.merging import study as merging
 from lidarium.benchmarks.studies.merging.bank import bank, drives
@@ -33,14 +33,14 @@ def small_bank(monkeypatch):
 
 
 def test_the_page_has_all_experiments_and_what_is_done_is_not_done_again(small_bank, tmp_path, monkeypatch):
-    experiment = EXPERIMENTS["merging"]
-    assert experiment.suites(None, 1) == {}
-    done = list(experiment.work(tmp_path, None, 1, 1))
+    study = STUDIES["merging"]
+    assert study.suites(None, 1) == {}
+    done = list(study.work(tmp_path, None, 1, 1))
     assert ("drives", 9, 9) in done
     assert done[-1] == ("other experiments", 5, 5)
-    again = list(experiment.work(tmp_path, None, 1, 1))
+    again = list(study.work(tmp_path, None, 1, 1))
     assert all(what.startswith("pairs") for what, *_ in again)
-    page = experiment.page(tmp_path, "lidarium reproduce merging")
+    page = study.page(tmp_path, "lidarium reproduce merging")
     for heading in (
         "The bank",
         "Beside the thesis's bank",
@@ -51,8 +51,8 @@ def test_the_page_has_all_experiments_and_what_is_done_is_not_done_again(small_b
     ):
         assert f"## {heading}" in page
     assert "nan" not in page.split("## Detectors")[1]
-    experiment.pictures(tmp_path, tmp_path / "out")
+    study.pictures(tmp_path, tmp_path / "out")
     assert (tmp_path / "out" / "merging_pairs.png").stat().st_size > 1000
     monkeypatch.setattr(merging, "bank_floors", lambda data, every: FLOORS[:2])
     with pytest.raises(ValueError, match="a bank of other floors"):
-        next(experiment.work(tmp_path, None, 1, 1))
+        next(study.work(tmp_path, None, 1, 1))

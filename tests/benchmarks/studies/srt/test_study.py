@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.studies import EXPERIMENTS
+from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.srt import study as srt
 from lidarium.benchmarks.studies.srt import tables
 from lidarium.benchmarks.studies.srt.ablations import VARIANTS
@@ -82,14 +82,14 @@ def test_a_floor_on_which_a_run_did_not_get_there_is_told():
 
 
 def test_a_share_asks_for_fewer_floors_and_starts():
-    whole, part = (EXPERIMENTS["srt"].suites(None, every)[srt.EXPLORATION] for every in (1, 4))
+    whole, part = (STUDIES["srt"].suites(None, every)[srt.EXPLORATION] for every in (1, 4))
     assert len(whole.floors) == 16
     assert len(part.floors) == 4
     assert set(part.seeds) < set(whole.seeds)
 
 
 def test_what_is_measured_had_no_part_in_the_tuning():
-    floors = EXPERIMENTS["srt"].suites(None, 1)[srt.EXPLORATION].floors
+    floors = STUDIES["srt"].suites(None, 1)[srt.EXPLORATION].floors
     assert min(srt.SEEDS) > 102
     assert min(srt.STARTS) >= 100
     assert set(floors) - set(srt.SCENES) == set(set_floors("validation:10"))

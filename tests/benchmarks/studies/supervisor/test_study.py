@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.studies import EXPERIMENTS
+from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.supervisor import study as supervisor
 from lidarium.benchmarks.studies.supervisor import suites as plan
 from lidarium.benchmarks.studies.supervisor.goals import Goal
@@ -64,15 +64,15 @@ def tiny(monkeypatch):
 
 
 def test_a_tiny_share_runs_from_end_to_end_and_is_not_run_again(tiny, tmp_path):
-    experiment = EXPERIMENTS["supervisor"]
-    for name, suite in experiment.suites(None, 10).items():
+    study = STUDIES["supervisor"]
+    for name, suite in study.suites(None, 10).items():
         campaign = Campaign(suite, tmp_path / name, records=False)
         assert len(list(campaign.run())) == campaign.total > 0
         assert not campaign.failures
-    steps = list(experiment.work(tmp_path, None, 10, 1))
+    steps = list(study.work(tmp_path, None, 10, 1))
     assert steps == [step for step in steps if step[0] in ("runs in which a robot fails", "logs")]
-    assert list(experiment.work(tmp_path, None, 10, 1)) == steps
-    page = experiment.page(tmp_path, "lidarium reproduce supervisor --share 0.1")
+    assert list(study.work(tmp_path, None, 10, 1)) == steps
+    page = study.page(tmp_path, "lidarium reproduce supervisor --share 0.1")
     for heading in (
         "What was to be reached",
         "Test 1",
@@ -155,13 +155,13 @@ def test_runs_that_left_something_are_listed_beside_those_of_the_other_policies(
 
 
 def test_the_page_is_of_what_was_asked_for_though_the_folder_holds_more(tiny, tmp_path):
-    experiment = EXPERIMENTS["supervisor"]
+    study = STUDIES["supervisor"]
     for every in (5, 10):
-        for name, suite in experiment.suites(None, every).items():
+        for name, suite in study.suites(None, every).items():
             list(Campaign(suite, tmp_path / name, records=False).run())
-    asked = sum(1 for suite in experiment.suites(None, 10).values() for _ in suite.trials())
-    assert not any(step[0] != "logs" for step in experiment.work(tmp_path, None, 10, 1))
-    assert f"; {asked} runs," in experiment.page(tmp_path, "lidarium reproduce supervisor --every 10")
+    asked = sum(1 for suite in study.suites(None, 10).values() for _ in suite.trials())
+    assert not any(step[0] != "logs" for step in study.work(tmp_path, None, 10, 1))
+    assert f"; {asked} runs," in study.page(tmp_path, "lidarium reproduce supervisor --every 10")
 
 
 def test_a_robot_dies_at_half_of_what_its_own_team_took():

@@ -1,0 +1,142 @@
+"""What a policy reports of an episode."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from lidarium.envs.radio.messages import OrderKind
+from lidarium.mapping.geometry.rigid import Transform
+
+
+@dataclass(frozen=True, slots=True)
+class GivenUp:
+    """Something that a robot left unexplored, and why.
+
+    Attributes
+    ----------
+    agent : str
+        Who gave it up.
+    x, y : float
+        Where, in that robot's map frame [m].
+    size_m : float
+        How long the frontier is [m].
+    reason : str
+        ``unseen`` (nothing new is seen from as near as the body comes), ``hidden`` (behind something occupied),
+        ``narrow`` or ``blocked`` (no path for the body), ``no_progress`` (there is a path, but the robot does
+        not advance).
+    """
+
+    agent: str
+    x: float
+    y: float
+    size_m: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Join:
+    """The transform between the map frames of two robots, as a station found it.
+
+    Attributes
+    ----------
+    time_s : float
+        When [s].
+    a, b : str
+        The robots.
+    found : Transform
+        Of b's map frame in that of a.
+    at : (x, y)
+        Where errors are taken, the middle of what both maps know, in b's frame [m].
+    is_used : bool
+        Whether decisions were built on it; otherwise it waited to be confirmed.
+    is_direct : bool
+        Whether these two maps were aligned; otherwise those of others lie between them.
+    """
+
+    time_s: float
+    a: str
+    b: str
+    found: Transform
+    at: tuple[float, float]
+    is_used: bool
+    is_direct: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class GivenOrder:
+    """An order that a station gave a robot.
+
+    Attributes
+    ----------
+    time_s : float
+        When [s].
+    agent : str
+        The robot.
+    kind : OrderKind
+        What it is to do.
+    place : (float, float)
+        Where it was, in its own map frame [m].
+    goal : (float, float) or None
+        Where it is sent, in its own map frame [m].
+    """
+
+    time_s: float
+    agent: str
+    kind: OrderKind
+    place: tuple[float, float]
+    goal: tuple[float, float] | None = None
+
+
+class LogEntry(Protocol):
+    """An entry of a station's log."""
+
+    @property
+    def time_s(self) -> float:
+        """When [s]."""
+        ...
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what JSON can hold of it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Supervision:
+    """What a station did in an episode.
+
+    Attributes
+    ----------
+    joins : sequence of Join
+        How the frames of robots lie, as it found.
+    orders : sequence of GivenOrder
+        The orders that it gave.
+    log : sequence of LogEntry
+        All that it decided and all that happened to it, by time.
+    figures : mapping
+        The entry ``supervisor`` of ``result.json``.
+    tick_seconds, merge_seconds : sequence of float
+        Wall time of each decision and of each merge between decisions [s].
+    """
+
+    joins: Sequence[Join] = ()
+    orders: Sequence[GivenOrder] = ()
+    log: Sequence[LogEntry] = ()
+    figures: Mapping[str, Any] | None = None
+    tick_seconds: Sequence[float] = ()
+    merge_seconds: Sequence[float] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyReport:
+    """What a policy reports of an episode, at its end or at any time of it.
+
+    Attributes
+    ----------
+    given_up : sequence of GivenUp
+        What was left unexplored, with reasons.
+    supervision : Supervision or None
+        What its station did; None without a station.
+    """
+
+    given_up: Sequence[GivenUp] = ()
+    supervision: Supervision | None = None

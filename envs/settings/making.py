@@ -1,0 +1,129 @@
+"""Settings made from short options, tables of files, assignments of the command line."""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+from lidarium.envs.settings.exploration import PARTS, ExplorationSettings, localizer_settings
+from lidarium.envs.settings.lidar import NOISE
+from lidarium.envs.settings.realism import REALISM
+from lidarium.registry import REGISTRIES, registry, unknown
+
+SHORT_OPTIONS = ("assigned", "max_cycles", "noise", "realism", "resolution")
+"""Options of ``make_settings`` that are no attributes of the settings."""
+
+
+def make_settings(settings: ExplorationSettings | None = None, **options: Any) -> ExplorationSettings:  # noqa: ANN401
+    """Fill settings from the short options of ``lidarium.parallel_env``.
+
+    Parameters
+    ----------
+    settings : ExplorationSettings or None
+        Where to start from; the defaults where None.
+    **options
+        Any attribute of ``ExplorationSettings``; a part such as ``robot`` or ``reward`` also as a mapping of its
+        values, and ``robot``, ``lidar``, ``odometry``, ``radio`` and ``battery`` by name. ``noise`` (none,
+        datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps)
+        in place of ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise, odometry, localization,
+        radio and faults that is not given itself; ``assigned`` for single values, as ``assign`` takes them, set
+        last.
+
+    Returns
+    -------
+    ExplorationSettings
+        The settings.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Where an option has a bad value or is unknown.
+    """
+    base = settings or ExplorationSettings()
+    assigned = options.pop("assigned", ())
+    realism = options.pop("realism", None)
+    if realism is not None:
+        options = {**REALISM[realism], **options}
+    options = {name: _part(name, value) for name, value in options.items()}
+    lidar = options.pop("lidar", base.lidar)
+    noise = options.pop("noise", None)
+    if noise is not None:
+        noise_floor, noise_share = NOISE[noise]
+        lidar = replace(lidar, noise_floor=noise_floor, noise_share=noise_share)
+    options["lidar"] = lidar
+    resolution = options.pop("resolution", None)
+    if resolution is not None:
+        options["occupancy"] = replace(options.get("occupancy", base.occupancy), resolution=resolution)
+    max_cycles = options.pop("max_cycles", None)
+    if max_cycles is not None:
+        if max_cycles < 1:
+            raise ValueError(f"max_cycles is {max_cycles}; want at least 1 step")
+        options["horizon_s"] = max_cycles * options.get("time_step", base.time_step)
+    known = ExplorationSettings.__dataclass_fields__
+    for name in options:
+        if name not in known:
+            raise TypeError(unknown("option", name, sorted((*known, *SHORT_OPTIONS))))
+    if isinstance(options.get("localizer"), Mapping):
+        chosen = options.get("localization", base.localization)
+        options["localizer"] = localizer_settings(chosen, options["localizer"])
+    return assign(replace(base, **options), assigned)
+
+
+def _part(name: str, value: Any) -> Any:  # noqa: ANN401
+    """Return the value of an option, where it is a part by its name or by its values."""
+    if name in PARTS and isinstance(value, Mapping):
+        return PARTS[name](**value)
+    if name in PARTS and name in REGISTRIES and isinstance(value, str):
+        return registry(name)[value]
+    return value
+
+
+def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> ExplorationSettings:
+    """Return settings with single values set.
+
+    Parameters
+    ----------
+    settings : ExplorationSettings
+        Where to start from.
+    assignments : iterable of str
+        ``name=value`` each: a name as ``lidarium show settings`` lists it, such as ``reward.time``, a value as
+        in TOML, ``none`` for None; text needs no quotes.
+
+    Raises
+    ------
+    ValueError
+        Where an assignment has no ``=``, names no setting, or has a bad value.
+    """
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        if not equals:
+            raise ValueError(f"{assignment!r} sets nothing; want NAME=VALUE, such as reward.time=0.02")
+        path = name.strip().split(".")
+        if path[0] == "localizer" and settings.localizer is None:
+            settings = replace(settings, localizer=localizer_settings(settings.localization, {}))
+        settings = _replaced(settings, path, _value(text.strip()), name.strip())
+    return settings
+
+
+def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa: ANN401
+    """Return a part with the value at the end of a path replaced."""
+    known = [each.name for each in fields(part)] if is_dataclass(part) else []
+    if path[0] not in known:
+        raise ValueError(f"{name!r} is no setting: {unknown('setting', path[0], known)}")
+    if len(path) > 1:
+        value = _replaced(getattr(part, path[0]), path[1:], value, name)
+    elif isinstance(part, ExplorationSettings):
+        return make_settings(part, **{path[0]: value})
+    try:
+        return replace(part, **{path[0]: value})
+    except TypeError as error:
+        raise ValueError(f"{name} cannot be {value!r}: {error}") from error
+
+
+def _value(text: str) -> Any:  # noqa: ANN401
+    if text.lower() == "none":
+        return None
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text

@@ -1,0 +1,83 @@
+"""The table of all settings, made from their declarations."""
+
+import inspect
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+from lidarium.envs.settings.exploration import ExplorationSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A setting.
+
+    Attributes
+    ----------
+    name : str
+        Its name, with those of its parts: ``reward.time``.
+    kind : str
+        Its type as its class documents it.
+    default : object
+        Its default.
+    summary : str
+        What it is, with its unit.
+    """
+
+    name: str
+    kind: str
+    default: Any
+    summary: str
+
+
+def settings_table(settings: Any = None, prefix: str = "") -> Iterator[Setting]:  # noqa: ANN401
+    """Yield every setting in the order of its declaration; those of a part follow under its name.
+
+    Parameters
+    ----------
+    settings : dataclass instance or None
+        Whose fields; the defaults of ``ExplorationSettings`` where None.
+    prefix : str
+        What precedes the names.
+    """
+    settings = ExplorationSettings() if settings is None else settings
+    documented = documented_attributes(type(settings))
+    for each in fields(settings):
+        value = getattr(settings, each.name)
+        if is_dataclass(value):
+            yield from settings_table(value, f"{prefix}{each.name}.")
+        else:
+            kind, summary = documented[each.name]
+            yield Setting(f"{prefix}{each.name}", kind, value, summary)
+
+
+def documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
+    """Return what the docstrings of a class and its bases say of each attribute: its type, what it is."""
+    found: dict[str, tuple[str, str]] = {}
+    for each in reversed(kind.__mro__):
+        text = inspect.cleandoc(each.__doc__ or "")
+        section = re.search(
+            r"^Attributes\n-+\n(.*?)(?=^\w[^\n]*\n-{3,}\n|\Z)", text, re.DOTALL | re.MULTILINE
+        )
+        entries = re.finditer(
+            r"^(\S[^\n]*) : ([^\n]*)\n((?:[ ]+[^\n]*\n?|\n)*)", section[1] if section else "", re.MULTILINE
+        )
+        for entry in entries:
+            for name in entry[1].split(", "):
+                found[name] = (entry[2], " ".join(entry[3].split()))
+    return found
+
+
+def markdown_table() -> str:
+    """Return the table of all settings as Markdown."""
+    rows = [
+        f"| `{row.name}` | {row.kind} | `{_shown(row.default)}` | {row.summary} |" for row in settings_table()
+    ]
+    return "\n".join(["| setting | type | default | what it is |", "|---|---|---|---|", *rows]) + "\n"
+
+
+def _shown(value: Any) -> str:  # noqa: ANN401
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return str(value)

@@ -1,0 +1,135 @@
+"""Registries: what can be chosen by name, each with a summary.
+
+A registry is a mapping from names to items. An item may be registered as ``"module:attribute"``; its module
+is imported when the item is first asked for, so a name costs nothing until it is used.
+"""
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import import_module
+from typing import Any, Generic, TypeVar, cast
+
+T = TypeVar("T")
+
+REGISTRIES: dict[str, str] = {
+    "policy": "lidarium.agents.catalogue:POLICIES",
+    "robot": "lidarium.envs.settings.robots:ROBOTS",
+    "lidar": "lidarium.envs.settings.lidar:LIDARS",
+    "noise": "lidarium.envs.settings.lidar:NOISE",
+    "odometry": "lidarium.envs.settings.odometry:ODOMETRY",
+    "radio": "lidarium.envs.settings.radio:RADIOS",
+    "battery": "lidarium.envs.settings.battery:BATTERIES",
+    "realism": "lidarium.envs.settings.realism:REALISM",
+    "localizer": "lidarium.mapping.localization.registry:LOCALIZERS",
+    "floor_format": "lidarium.envs.floors.importers:FORMATS",
+    "study": "lidarium.benchmarks.studies:STUDIES",
+}
+"""All registries by kind, and where each is."""
+
+
+class Registry(Mapping[str, T], Generic[T]):
+    """Items of one kind by name.
+
+    Parameters
+    ----------
+    kind : str
+        What the items are, for messages: ``policy``.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self._items: dict[str, T | str] = {}
+        self._summaries: dict[str, str] = {}
+
+    def register(self, name: str, item: T | str, summary: str) -> None:
+        """Add an item.
+
+        Parameters
+        ----------
+        name : str
+            What users call it.
+        item : T or str
+            The item, or ``"module:attribute"`` that is imported when it is first asked for.
+        summary : str
+            One line that says what it is.
+
+        Raises
+        ------
+        ValueError
+            Where the name is taken.
+        """
+        if name in self._items:
+            raise ValueError(f"{self.kind} {name!r} is registered already; choose another name")
+        self._items[name] = item
+        self._summaries[name] = summary
+
+    def unregister(self, name: str) -> None:
+        """Remove an item; its name is free again.
+
+        Raises
+        ------
+        ValueError
+            Where the name is unknown.
+        """
+        self._check(name)
+        del self._items[name], self._summaries[name]
+
+    def __getitem__(self, name: str) -> T:
+        """Return an item.
+
+        Raises
+        ------
+        UnknownNameError
+            Where the name is unknown; the message suggests the nearest one.
+        """
+        self._check(name)
+        item = self._items[name]
+        if isinstance(item, str):
+            module, _, attribute = item.partition(":")
+            item = cast(T, getattr(import_module(module), attribute))
+            self._items[name] = item
+        return item
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    @property
+    def summaries(self) -> dict[str, str]:
+        """What each name stands for, in one line."""
+        return dict(self._summaries)
+
+    def _check(self, name: str) -> None:
+        if name not in self._items:
+            raise UnknownNameError(unknown(self.kind, name, self._items))
+
+
+class UnknownNameError(KeyError, ValueError):
+    """A name that a registry does not have."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def unknown(kind: str, name: object, known: Iterable[str]) -> str:
+    """Return the message for an unknown name: the nearest known one, and all of them."""
+    names = list(known)
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.3)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"unknown {kind} {name!r}{hint} (known: {', '.join(names) or 'none'})"
+
+
+def registry(kind: str) -> Registry[Any]:
+    """Return the registry of a kind, such as ``policy`` or ``robot``.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such kind.
+    """
+    if kind not in REGISTRIES:
+        raise ValueError(unknown("registry", kind, REGISTRIES))
+    module, _, attribute = REGISTRIES[kind].partition(":")
+    return cast("Registry[Any]", getattr(import_module(module), attribute))
