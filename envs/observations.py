@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping
 from itertools import starmap
 from operator import itemgetter
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numba
 import numpy as np
@@ -13,19 +13,29 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.exploration import OBSERVABLES, ExplorationSettings
-from lidarium.envs.simulation.kinematic.arrays import grid_of, table_of, vector_of, world_at
+from lidarium.envs.simulation.kinematic.arrays import (
+    MAP,
+    MAP_COLUMNS,
+    MAP_ROWS,
+    TOUCHED,
+    TOUCHED_ROWS,
+    world_at,
+)
 from lidarium.envs.simulation.kinematic.stages import RANGE_GAP
 from lidarium.envs.simulation.kinematic.world import ROWS_FOR_THREADS, KinematicWorld
 from lidarium.mapping.grids.map_crops import crop_levels, crop_turned
 from lidarium.mapping.grids.pooled_maps import forget_touched, pool_touched, touched_words
 from lidarium.mapping.kernels.compilation import Array, kernel, use_threads
-from lidarium.mapping.kernels.views import grid_at, int8_grid_at, word_grid_at
+from lidarium.mapping.kernels.views import arrays_at, grid_at, int8_grid_at, table_of, word_grid_at
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
 
 KEYS = (*OBSERVABLES, "goal")
 """All that is ever observed, in the order in which the kernel takes the arrays."""
+
+SCAN, POSE, VELOCITY, BUMPER, LEVELS, EGOCENTRIC_LEVELS, GOAL = range(len(KEYS))
+"""Places of the arrays of ``KEYS``."""
 
 Arrays = tuple[Array, ...]
 """Arrays that go to the kernel together.
@@ -70,22 +80,55 @@ def action_space() -> spaces.Box:
     return spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 
+class Sources(NamedTuple):
+    """What observations are written from.
+
+    Attributes
+    ----------
+    world : (arrays, 3) int64
+        The table of the world's arrays.
+    offsets, goals : (rows, 2) float64
+        Origin of each robot's map frame, and its goal, in the frame of its believed pose [m].
+    pools : (rows, scales * 3) int64
+        Address, rows and columns of each robot's pooled maps.
+    limits : (4,) float64
+        Resolution of the maps [m], and what ranges [m], speeds [m/s] and turn rates [rad/s] are clipped to.
+    scales : (scales,) int64
+        Scales of the pooled maps [cells].
+    """
+
+    world: Annotated[Array, np.int64, 2]
+    offsets: Annotated[Array, np.float64, 2]
+    goals: Annotated[Array, np.float64, 2]
+    pools: Annotated[Array, np.int64, 2]
+    limits: Annotated[Array, np.float64, 1]
+    scales: Annotated[Array, np.int64, 1]
+
+
+RESOLUTION, LONGEST_RANGE, TOP_SPEED, TOP_TURN_RATE = range(4)
+"""Places in ``Sources.limits``."""
+
+
 @kernel(borrowing=True)
 def write_row(row: int, sources: Array, observed: Arrays) -> None:
     """Write a row of the arrays of ``KEYS``.
 
     Those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``.
     """
-    world, offsets, goals = (
-        world_at(grid_of(sources, 0, np.int64)),
-        grid_of(sources, 1, np.float64),
-        grid_of(sources, 2, np.float64),
+    told = arrays_at(sources, Sources)
+    world, offsets, goals, limits, scales = (
+        world_at(told.world),
+        told.offsets,
+        told.goals,
+        told.limits,
+        told.scales,
     )
-    numbers, scales = vector_of(sources, 4, np.float64), vector_of(sources, 5, np.int64)
     ranges, believed, velocities, bumpers = world.ranges, world.believed, world.measured, world.bumpers
     beliefs, origins = world.maps, world.origins
-    scans, poses, motions, presses, maps, egocentric_maps, observed_goals = observed
-    resolution, range_max, max_speed, max_turn_rate = numbers[0], numbers[1], numbers[2], numbers[3]
+    scans, poses, motions, presses = observed[SCAN], observed[POSE], observed[VELOCITY], observed[BUMPER]
+    maps, egocentric_maps, observed_goals = observed[LEVELS], observed[EGOCENTRIC_LEVELS], observed[GOAL]
+    resolution, range_max = limits[RESOLUTION], limits[LONGEST_RANGE]
+    max_speed, max_turn_rate = limits[TOP_SPEED], limits[TOP_TURN_RATE]
     farthest = np.float32(FARTHEST)
     if scans.size > 0:
         no_return, longest = np.float32(range_max), np.float32(range_max - RANGE_GAP)
@@ -117,12 +160,16 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
             (believed[row, 0] - origins[row, 0]) / resolution,
             (believed[row, 1] - origins[row, 1]) / resolution,
         )
-        log_odds = int8_grid_at(beliefs[row, 0], beliefs[row, 1], beliefs[row, 2])
+        log_odds = int8_grid_at(beliefs[row, MAP], beliefs[row, MAP_ROWS], beliefs[row, MAP_COLUMNS])
         if maps.size > 0:
             crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
         if egocentric_maps.size > 0:
-            touched = word_grid_at(beliefs[row, 3], beliefs[row, 4], touched_words(beliefs[row, 2]))
-            pools = grid_at(sources[3, 0] + row * sources[3, 2] * 8, scales.shape[0], 3, np.int64)
+            touched = word_grid_at(
+                beliefs[row, TOUCHED], beliefs[row, TOUCHED_ROWS], touched_words(beliefs[row, MAP_COLUMNS])
+            )
+            pools = grid_at(
+                told.pools.ctypes.data + row * told.pools.shape[1] * 8, scales.shape[0], 3, np.int64
+            )
             for k in range(scales.shape[0]):
                 if scales[k] > 1:
                     pool_touched(

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.simulation.kinematic.arrays import MAP, MAP_COLUMNS, MAP_ROWS
 from lidarium.mapping.grids.cell_blocks import BLOCK, positive_cells, sum_blocks
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import (
@@ -236,10 +237,12 @@ def _sum_block(beliefs: Array, place: int, total: Array, nothing: Array) -> np.u
     target = total.ctypes.data + place
     before = positive_cells(target)
     sum_blocks(
-        beliefs[0, 0] + place, beliefs[1, 0] + place if beliefs.shape[0] > 1 else nothing.ctypes.data, target
+        beliefs[0, MAP] + place,
+        beliefs[1, MAP] + place if beliefs.shape[0] > 1 else nothing.ctypes.data,
+        target,
     )
     for k in range(2, beliefs.shape[0]):
-        sum_blocks(target, beliefs[k, 0] + place, target)
+        sum_blocks(target, beliefs[k, MAP] + place, target)
     changed: np.uint64 = before ^ positive_cells(target)
     return changed
 
@@ -247,9 +250,9 @@ def _sum_block(beliefs: Array, place: int, total: Array, nothing: Array) -> np.u
 @kernel(inline=True)
 def _sum_cell(beliefs: Array, place: int, total: Array) -> bool:
     """Sum a cell of the maps; tell whether it became occupied or ceased to be."""
-    value = int(int8_at(beliefs[0, 0] + place, 1)[0])
+    value = int(int8_at(beliefs[0, MAP] + place, 1)[0])
     for k in range(1, beliefs.shape[0]):
-        value = min(max(value + int(int8_at(beliefs[k, 0] + place, 1)[0]), -127), 127)
+        value = min(max(value + int(int8_at(beliefs[k, MAP] + place, 1)[0]), -127), 127)
     cell = total.reshape(-1)
     was_occupied, cell[place] = cell[place] > 0, np.int8(value)
     return bool(was_occupied != (value > 0))
@@ -318,4 +321,9 @@ def refresh_team(maps: TeamMaps, episode: int) -> None:
         if maps.shared[episode, LOG_ODDS] != 0:
             sum_team(maps, episode, window)
         extend_window(maps.known[row], window)
-        window[0], window[1], window[2], window[3] = maps.beliefs[row, 1], 0, maps.beliefs[row, 2], 0
+        window[0], window[1], window[2], window[3] = (
+            maps.beliefs[row, MAP_ROWS],
+            0,
+            maps.beliefs[row, MAP_COLUMNS],
+            0,
+        )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.faults import KINDS, MOST_DRAWN, Fault, FaultSettings
+from lidarium.envs.simulation.odometry import RADIUS
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 NO_FAULT, LASER_DROPOUT, BLIND_SECTOR, STUCK_WHEEL, KIDNAPPING, DEAD_ROBOT, DEAD_RADIO = range(7)
@@ -152,7 +153,7 @@ def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) ->
             continue
         is_free = True
         for other in range(poses.shape[0]):
-            reach = bodies[robot, 0] + bodies[other, 0]
+            reach = bodies[robot, RADIUS] + bodies[other, RADIUS]
             gap_x, gap_y = faults[k + 3] - poses[other, 0], faults[k + 4] - poses[other, 1]
             is_free = is_free and (other == robot or gap_x * gap_x + gap_y * gap_y > reach * reach)
         if is_free:

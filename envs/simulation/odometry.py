@@ -23,10 +23,19 @@ ENCODER_STREAM, DRIVE_STREAM = 0x6F646F6D, 0x64726976
 DISTANCE_SCALE, TURN_SCALE, DRIFT, LEFT_TRAVEL, RIGHT_TRAVEL, LEFT_TICKS, RIGHT_TICKS = range(7)
 """Places in a robot's row of wheel numbers: its biases, the travel that its wheels feign [m], and the ticks read of it."""
 
-WHEEL_NUMBERS = 7
+(
+    RADIUS,
+    MAX_SPEED,
+    MAX_TURN_RATE,
+    MAX_ACCELERATION,
+    MAX_TURN_ACCELERATION,
+    HEIGHT,
+    WHEEL_BASE,
+    TICKS_PER_METRE,
+) = range(8)
+"""Columns of bodies, as ``Robot.numbers`` has them."""
 
-WHEEL_BASE, TICKS_PER_METRE = 6, 7
-"""Places in ``Robot.numbers``."""
+WHEEL_NUMBERS = 7
 
 
 @kernel(inline=True)

@@ -5,19 +5,25 @@ array where it lies: nothing is concatenated or copied, a floor is shared by all
 grows alone. The Python side that fills such a table keeps its arrays alive.
 """
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple, get_args, get_type_hints
 
+import numba
 import numpy as np
 from numba import types
 from numba.extending import intrinsic
 from numba.np import arrayobj
+from numpy.typing import NDArray
 
-from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.compilation import Array, kernel
 
 _numba_arrays: Any = arrayobj
 
 LINE = 64
 """A line of the caches [bytes]."""
+
+ENTRY = 3
+"""Numbers of an entry of a table of arrays: address, rows, columns (1 for a vector)."""
 
 
 def _fill_view(context: Any, builder: Any, kind: Any, address: Any, shape: list[Any]) -> Any:  # noqa: ANN401
@@ -70,8 +76,38 @@ def _room_for(typing_context: Any, count: Any, kind: Any) -> Any:  # noqa: ANN40
     return types.intp(types.intp, kind), generate
 
 
+def _forms_of(named: type) -> list[Any]:
+    """Return the array types that a class of arrays declares, in the order of its fields."""
+    hints = get_type_hints(named, include_extras=True)
+    forms = []
+    for name in named._fields:  # type: ignore[attr-defined]
+        _, dtype, dimensions = get_args(hints[name])
+        forms.append(types.Array(numba.from_dtype(np.dtype(dtype)), dimensions, "C"))
+    return forms
+
+
+def _arrays_of(typing_context: Any, table: Any, kind: Any) -> Any:  # noqa: ANN401
+    """View all arrays of a table as the fields of a class of arrays inside a kernel."""
+    forms = _forms_of(kind.instance_class)
+    named = types.NamedTuple(forms, kind.instance_class)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        entries = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        views = []
+        for place, form in enumerate(forms):
+            address, *shape = (
+                builder.load(builder.gep(entries, [context.get_constant(types.intp, ENTRY * place + number)]))
+                for number in range(1 + form.ndim)
+            )
+            views.append(_fill_view(context, builder, form, address, shape))
+        return context.make_tuple(builder, named, views)
+
+    return named(table, kind), generate
+
+
 _vector_view: Any = intrinsic(_vector_of)
 _grid_view: Any = intrinsic(_grid_of)
+_named_views: Any = intrinsic(_arrays_of)
 _room: Any = intrinsic(_room_for)
 
 
@@ -143,3 +179,25 @@ def word_grid_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
 def int32_table_at(address: int, rows: int, columns: int) -> Any:  # noqa: ANN401
     """View a (rows, columns) int32 table at an address inside a kernel."""
     return _grid_view(address, rows, columns, np.int32)
+
+
+def table_of(arrays: Iterable[NDArray[Any]]) -> NDArray[np.int64]:
+    """Return the table of arrays, shape (arrays, ENTRY); the caller keeps them alive."""
+    return np.array(
+        [(array.ctypes.data, array.shape[0], array.size // max(array.shape[0], 1)) for array in arrays],
+        np.int64,
+    )
+
+
+@kernel(spliced=True)
+def arrays_at(table: Array, kind: type[NamedTuple]) -> Any:  # noqa: ANN401
+    """View all arrays of a table inside a kernel.
+
+    Parameters
+    ----------
+    table : (arrays, ENTRY) int64
+        What ``table_of`` returned, in the order of the fields of ``kind``.
+    kind : NamedTuple class
+        Its fields are annotated ``Annotated[Array, dtype, dimensions]``.
+    """
+    return _named_views(table, kind)

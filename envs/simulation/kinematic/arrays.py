@@ -4,19 +4,40 @@ A kernel views the arrays where they lie. Arrays handed over as arguments would 
 every use, by all threads in the same places of memory; views are not.
 """
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import grid_at, vector_at
+from lidarium.mapping.kernels.views import arrays_at
 
 TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME, DEAD_RECKONING, SOME_MATES = 1, 2, 4, 8, 16, 32
 """Flags of a row: the localizer knows the true pose; teammates' poses are known; the robot has ended (its
 body stands there, its sensors are off); it believes in the frame of its own start; its localizer reckons from
 its odometry alone; the poses of those teammates are known that the radio told of."""
+
+(
+    SQUARES,
+    FLOOR_ROWS,
+    FLOOR_COLUMNS,
+    FACE_TABLE,
+    FACE_COUNT,
+    FACE_STARTS,
+    FACE_START_COUNT,
+    TILE_COLUMNS,
+    BOUND,
+    BODY_SOLID,
+) = range(10)
+"""Columns of ``floors``: addresses and sizes, as ``FloorTables.row`` has them."""
+
+FRAME_X, FRAME_Y, FRAME_RESOLUTION = range(3)
+"""Columns of ``frames``."""
+
+MAP, MAP_ROWS, MAP_COLUMNS, TOUCHED, TOUCHED_ROWS = range(5)
+"""Columns of ``maps``."""
+
+OWN_MASK, TEAM_MASK, COUNTED_MASK, MASK_ROWS, MASK_WORDS = range(5)
+"""Columns of ``masks``."""
 
 
 class WorldArrays(NamedTuple):
@@ -81,110 +102,49 @@ class WorldArrays(NamedTuple):
         poses.
     """
 
-    bodies: Array
-    sensor: Array
-    unit_vectors: Array
-    noise_table: Array
-    increments: Array
-    floors: Array
-    frames: Array
-    seeds: Array
-    steps: Array
-    team_seen: Array
-    moves: Array
-    flags: Array
-    poses: Array
-    velocities: Array
-    starts: Array
-    believed: Array
-    ranges: Array
-    maps: Array
-    origins: Array
-    windows: Array
-    masks: Array
-    boxes: Array
-    seen: Array
-    gains: Array
-    bumpers: Array
-    contacts: Array
-    travelled: Array
-    collisions: Array
-    reward_weights: Array
-    rewarded: Array
-    rewards: Array
-    odometry_model: Array
-    wheels: Array
-    odometry: Array
-    measured: Array
-    faults: Array
-    failed: Array
-    driven: Array
-    contact: Array
-    heard: Array
-
-
-def table_of(arrays: Iterable[NDArray[Any]]) -> NDArray[np.int64]:
-    """Return where arrays lie: address, rows and columns (1 for a vector) of each, shape (arrays, 3). The caller keeps them alive."""
-    return np.array(
-        [(array.ctypes.data, array.shape[0], array.size // max(array.shape[0], 1)) for array in arrays],
-        np.int64,
-    )
-
-
-@kernel(spliced=True)
-def vector_of(table: Array, place: int, kind: type[np.generic]) -> Array:
-    """View the vector that has a place in a table, inside a kernel."""
-    return vector_at(table[place, 0], table[place, 1], kind)  # type: ignore[no-any-return]
-
-
-@kernel(spliced=True)
-def grid_of(table: Array, place: int, kind: type[np.generic]) -> Array:
-    """View the grid that has a place in a table, inside a kernel."""
-    return grid_at(table[place, 0], table[place, 1], table[place, 2], kind)  # type: ignore[no-any-return]
+    bodies: Annotated[Array, np.float64, 2]
+    sensor: Annotated[Array, np.float64, 1]
+    unit_vectors: Annotated[Array, np.float64, 2]
+    noise_table: Annotated[Array, np.float32, 1]
+    increments: Annotated[Array, np.int64, 1]
+    floors: Annotated[Array, np.int64, 2]
+    frames: Annotated[Array, np.float64, 2]
+    seeds: Annotated[Array, np.uint64, 1]
+    steps: Annotated[Array, np.int64, 1]
+    team_seen: Annotated[Array, np.int64, 1]
+    moves: Annotated[Array, np.uint8, 1]
+    flags: Annotated[Array, np.int64, 1]
+    poses: Annotated[Array, np.float64, 2]
+    velocities: Annotated[Array, np.float64, 2]
+    starts: Annotated[Array, np.float64, 2]
+    believed: Annotated[Array, np.float64, 2]
+    ranges: Annotated[Array, np.float32, 2]
+    maps: Annotated[Array, np.int64, 2]
+    origins: Annotated[Array, np.float64, 2]
+    windows: Annotated[Array, np.int64, 2]
+    masks: Annotated[Array, np.int64, 2]
+    boxes: Annotated[Array, np.int64, 2]
+    seen: Annotated[Array, np.int64, 1]
+    gains: Annotated[Array, np.float64, 1]
+    bumpers: Annotated[Array, np.int8, 2]
+    contacts: Annotated[Array, np.uint8, 1]
+    travelled: Annotated[Array, np.float64, 1]
+    collisions: Annotated[Array, np.int64, 1]
+    reward_weights: Annotated[Array, np.float64, 1]
+    rewarded: Annotated[Array, np.float64, 1]
+    rewards: Annotated[Array, np.float64, 1]
+    odometry_model: Annotated[Array, np.float64, 1]
+    wheels: Annotated[Array, np.float64, 2]
+    odometry: Annotated[Array, np.float64, 2]
+    measured: Annotated[Array, np.float64, 2]
+    faults: Annotated[Array, np.float64, 2]
+    failed: Annotated[Array, np.uint8, 1]
+    driven: Annotated[Array, np.float64, 2]
+    contact: Annotated[Array, np.uint8, 2]
+    heard: Annotated[Array, np.float64, 2]
 
 
 @kernel(spliced=True)
 def world_at(table: Array) -> WorldArrays:
     """View the arrays of a table inside a kernel."""
-    return WorldArrays(
-        grid_of(table, 0, np.float64),
-        vector_of(table, 1, np.float64),
-        grid_of(table, 2, np.float64),
-        vector_of(table, 3, np.float32),
-        vector_of(table, 4, np.int64),
-        grid_of(table, 5, np.int64),
-        grid_of(table, 6, np.float64),
-        vector_of(table, 7, np.uint64),
-        vector_of(table, 8, np.int64),
-        vector_of(table, 9, np.int64),
-        vector_of(table, 10, np.uint8),
-        vector_of(table, 11, np.int64),
-        grid_of(table, 12, np.float64),
-        grid_of(table, 13, np.float64),
-        grid_of(table, 14, np.float64),
-        grid_of(table, 15, np.float64),
-        grid_of(table, 16, np.float32),
-        grid_of(table, 17, np.int64),
-        grid_of(table, 18, np.float64),
-        grid_of(table, 19, np.int64),
-        grid_of(table, 20, np.int64),
-        grid_of(table, 21, np.int64),
-        vector_of(table, 22, np.int64),
-        vector_of(table, 23, np.float64),
-        grid_of(table, 24, np.int8),
-        vector_of(table, 25, np.uint8),
-        vector_of(table, 26, np.float64),
-        vector_of(table, 27, np.int64),
-        vector_of(table, 28, np.float64),
-        vector_of(table, 29, np.float64),
-        vector_of(table, 30, np.float64),
-        vector_of(table, 31, np.float64),
-        grid_of(table, 32, np.float64),
-        grid_of(table, 33, np.float64),
-        grid_of(table, 34, np.float64),
-        grid_of(table, 35, np.float64),
-        vector_of(table, 36, np.uint8),
-        grid_of(table, 37, np.float64),
-        grid_of(table, 38, np.uint8),
-        grid_of(table, 39, np.float64),
-    )
+    return arrays_at(table, WorldArrays)  # type: ignore[no-any-return]

@@ -11,6 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from lidarium.envs.simulation.kinematic.arrays import FRAME_RESOLUTION, FRAME_X, FRAME_Y
+from lidarium.envs.simulation.odometry import (
+    MAX_ACCELERATION,
+    MAX_SPEED,
+    MAX_TURN_ACCELERATION,
+    MAX_TURN_RATE,
+    RADIUS,
+)
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import uint8_grid_at, vector_at
 
@@ -104,7 +112,7 @@ def _deepest_robot(poses: Array, bodies: Array, robot: int, x: float, y: float) 
         if other == robot:
             continue
         gap_x, gap_y = x - poses[other, 0], y - poses[other, 1]
-        reach = bodies[robot, 0] + bodies[other, 0]
+        reach = bodies[robot, RADIUS] + bodies[other, RADIUS]
         squared = gap_x * gap_x + gap_y * gap_y
         if squared >= (reach - depth) ** 2:
             continue
@@ -120,15 +128,15 @@ def _free_of_contact(
     bound: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, margin: float
 ) -> bool:
     """Whether nothing is within ``margin`` [m] of the disc at x, y, by bounds alone."""
-    resolution = frame[2]
-    radius = bodies[robot, 0] + margin
-    column, row = int((x - frame[0]) / resolution), int((y - frame[1]) / resolution)
+    resolution = frame[FRAME_RESOLUTION]
+    radius = bodies[robot, RADIUS] + margin
+    column, row = int((x - frame[FRAME_X]) / resolution), int((y - frame[FRAME_Y]) / resolution)
     if row < 0 or row >= bound.shape[0] or column < 0 or column >= bound.shape[1]:
         return False
     if bound[row, column] * resolution <= radius:
         return False
     for other in range(poses.shape[0]):
-        reach = radius + bodies[other, 0]
+        reach = radius + bodies[other, RADIUS]
         if other != robot and (x - poses[other, 0]) ** 2 + (y - poses[other, 1]) ** 2 <= reach * reach:
             return False
     return True
@@ -151,11 +159,11 @@ def _push_out(
     Returns x, y [m], whether it touched, and whether it is free now; presses the bumpers on the sides of
     contact.
     """
-    resolution = frame[2]
-    radius = bodies[robot, 0]
+    resolution = frame[FRAME_RESOLUTION]
+    radius = bodies[robot, RADIUS]
     touched = False
     for _ in range(8):
-        cell_x, cell_y = (x - frame[0]) / resolution, (y - frame[1]) / resolution
+        cell_x, cell_y = (x - frame[FRAME_X]) / resolution, (y - frame[FRAME_Y]) / resolution
         depth, normal_x, normal_y = deepest_wall(solid, cell_x, cell_y, radius / resolution)
         depth *= resolution
         robot_depth, robot_x, robot_y = _deepest_robot(poses, bodies, robot, x, y)
@@ -256,9 +264,9 @@ def move_robots(
             velocities[robot, 0] = velocities[robot, 1] = 0.0
             continue
         body = bodies[robot]
-        wanted_speed = min(max(commands[robot, 0], -body[1]), body[1])
-        wanted_turn = min(max(commands[robot, 1], -body[2]), body[2])
-        gain, turn_gain = body[3] * duration, body[4] * duration
+        wanted_speed = min(max(commands[robot, 0], -body[MAX_SPEED]), body[MAX_SPEED])
+        wanted_turn = min(max(commands[robot, 1], -body[MAX_TURN_RATE]), body[MAX_TURN_RATE])
+        gain, turn_gain = body[MAX_ACCELERATION] * duration, body[MAX_TURN_ACCELERATION] * duration
         speed = velocities[robot, 0] + min(max(wanted_speed - velocities[robot, 0], -gain), gain)
         turn_rate = velocities[robot, 1] + min(max(wanted_turn - velocities[robot, 1], -turn_gain), turn_gain)
         x, y, heading = poses[robot, 0], poses[robot, 1], poses[robot, 2]
@@ -267,7 +275,7 @@ def move_robots(
         if length == 0.0 or _free_of_contact(bound, frame, poses, bodies, robot, x, y, length):
             x, y, heading = _along_arc(x, y, heading, speed, turn_rate, duration)
         else:
-            pieces = int(math.ceil(length / (PIECE * frame[2])))
+            pieces = int(math.ceil(length / (PIECE * frame[FRAME_RESOLUTION])))
             for _ in range(pieces):
                 next_x, next_y, next_heading = _along_arc(x, y, heading, speed, turn_rate, duration / pieces)
                 next_x, next_y, touched, is_free = _push_out(

@@ -14,6 +14,16 @@ import math
 
 import numpy as np
 
+from lidarium.envs.simulation.kinematic.arrays import (
+    FACE_COUNT,
+    FACE_START_COUNT,
+    FACE_STARTS,
+    FACE_TABLE,
+    FLOOR_COLUMNS,
+    FLOOR_ROWS,
+    SQUARES,
+    TILE_COLUMNS,
+)
 from lidarium.envs.simulation.kinematic.face_casting import cast_by_faces
 from lidarium.envs.simulation.kinematic.ray_tables import TILE
 from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
@@ -209,8 +219,8 @@ def cast_scan(
     ranges : (beams,) float64
         Result [cells]; ``reach`` where nothing is met.
     """
-    rows, columns, tile_columns = tables[1], tables[2], tables[7]
-    starts = int32_table_at(tables[5], 1, tables[6])[0]
+    rows, columns, tile_columns = tables[FLOOR_ROWS], tables[FLOOR_COLUMNS], tables[TILE_COLUMNS]
+    starts = int32_table_at(tables[FACE_STARTS], 1, tables[FACE_START_COUNT])[0]
     window = (
         max(int(y - reach) // TILE, 0),
         min(int(y + reach), rows - 1) // TILE,
@@ -223,7 +233,7 @@ def cast_scan(
         last = (tile_row * tile_columns + window[3]) * 4 + 4
         in_reach += starts[last] - starts[first]
     if in_reach <= FACES + FACES_PER_BEAM * ranges.shape[0]:
-        faces = int32_table_at(tables[3], tables[4], 3)
+        faces = int32_table_at(tables[FACE_TABLE], tables[FACE_COUNT], 3)
         cast_by_faces(
             faces,
             starts,
@@ -238,7 +248,7 @@ def cast_scan(
             ranges,
         )
     else:
-        squares = bytes_at(tables[0], 4 * rows * columns)
+        squares = bytes_at(tables[SQUARES], 4 * rows * columns)
         _cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges)
 
 

@@ -16,14 +16,27 @@ import numpy as np
 from lidarium.envs.scoring.coverage import mark_seen
 from lidarium.envs.simulation.faults import blind_beams
 from lidarium.envs.simulation.kinematic.arrays import (
+    COUNTED_MASK,
+    FRAME_RESOLUTION,
+    FRAME_X,
+    FRAME_Y,
     KNOWN_MATES,
+    MAP,
+    MAP_COLUMNS,
+    MAP_ROWS,
+    MASK_ROWS,
+    MASK_WORDS,
     OWN_FRAME,
+    OWN_MASK,
     SOME_MATES,
+    TOUCHED,
+    TOUCHED_ROWS,
     TRUE_POSE,
     WorldArrays,
 )
 from lidarium.envs.simulation.kinematic.ray_casting import cast_scan, cut_by_disc
 from lidarium.envs.simulation.noise import fill_gaussian, stream_key
+from lidarium.envs.simulation.odometry import HEIGHT, RADIUS
 from lidarium.mapping.grids.noisy_returns import settle_returns
 from lidarium.mapping.grids.occupancy import integrate_scan
 from lidarium.mapping.grids.pooled_maps import touched_words
@@ -80,23 +93,23 @@ def _measure(
     """Take the scan of one robot without noise: ``ranges`` [m], inf for no return, and ``lengths`` of the beams [map cells]."""
     robot, episode = row - first, first // robots
     sensor, frame, poses = world.sensor, world.frames[episode], world.poses
-    resolution = frame[2]
+    resolution = frame[FRAME_RESOLUTION]
     reach = sensor[RANGE_MAX] / resolution
     x, y, heading = (
-        (poses[row, 0] - frame[0]) / resolution,
-        (poses[row, 1] - frame[1]) / resolution,
+        (poses[row, 0] - frame[FRAME_X]) / resolution,
+        (poses[row, 1] - frame[FRAME_Y]) / resolution,
         poses[row, 2],
     )
     angle_first, increment = sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
     beam_directions(heading, world.unit_vectors, directions)
     cast_scan(world.floors[episode], x, y, heading, angle_first, increment, directions, reach, lengths)
     for other in range(robots):
-        if other != robot and world.bodies[other, 5] > sensor[LASER_HEIGHT]:
+        if other != robot and world.bodies[other, HEIGHT] > sensor[LASER_HEIGHT]:
             other_x, other_y = (
-                (poses[first + other, 0] - frame[0]) / resolution,
-                (poses[first + other, 1] - frame[1]) / resolution,
+                (poses[first + other, 0] - frame[FRAME_X]) / resolution,
+                (poses[first + other, 1] - frame[FRAME_Y]) / resolution,
             )
-            radius = world.bodies[other, 0] / resolution
+            radius = world.bodies[other, RADIUS] / resolution
             cut_by_disc(
                 x, y, heading, angle_first, increment, directions, other_x, other_y, radius, reach, lengths
             )
@@ -159,7 +172,7 @@ def _seen_area(
     """
     sensor, frame = world.sensor, world.frames[first // robots]
     scale = 1.0 / sensor[MAP_RESOLUTION]
-    x, y = (world.poses[row, 0] - frame[0]) * scale, (world.poses[row, 1] - frame[1]) * scale
+    x, y = (world.poses[row, 0] - frame[FRAME_X]) * scale, (world.poses[row, 1] - frame[FRAME_Y]) * scale
     row_offset, column_offset = _window_corner(x, y, sensor[RANGE_MAX] * scale)
     local_x, local_y = x - column_offset, y - row_offset
     scan_ends(lengths, directions, local_x, local_y, ends)
@@ -183,7 +196,10 @@ def _score(
         world, row, first, robots, scratch.lengths, scratch.directions, scratch.ends, bits
     )
     masks = world.masks[row]
-    own, counted = word_grid_at(masks[0], masks[3], masks[4]), word_grid_at(masks[2], masks[3], masks[4])
+    own, counted = (
+        word_grid_at(masks[OWN_MASK], masks[MASK_ROWS], masks[MASK_WORDS]),
+        word_grid_at(masks[COUNTED_MASK], masks[MASK_ROWS], masks[MASK_WORDS]),
+    )
     world.seen[row] += mark_seen(own, counted, bits, box, row_offset, word_offset, world.boxes[row])
     return box
 
@@ -242,7 +258,7 @@ def _filter_mates(
         mate_x = believed[other, 0] if knows_all else world.heard[row, 3 * mate]
         mate_y = believed[other, 1] if knows_all else world.heard[row, 3 * mate + 1]
         gap_x, gap_y = (mate_x - believed[row, 0]) * scale, (mate_y - believed[row, 1]) * scale
-        radius = world.bodies[other - first, 0] * scale + MATE_MARGIN
+        radius = world.bodies[other - first, RADIUS] * scale + MATE_MARGIN
         if gap_x * gap_x + gap_y * gap_y > (reach + radius) ** 2:
             continue
         begin, count = beams_towards(
@@ -296,14 +312,14 @@ def _update_map(
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
     x, y = (believed[0] - origin[0]) * scale, (believed[1] - origin[1]) * scale
-    if not (0.0 <= x < belief[2] and 0.0 <= y < belief[1]):
+    if not (0.0 <= x < belief[MAP_COLUMNS] and 0.0 <= y < belief[MAP_ROWS]):
         # Whoever takes himself to be beyond his map is lost.
         world.failed[row] = 1
         return
     is_hit = scratch_vector(beams, np.bool_)
     for beam in range(beams):
         is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
-    log_odds = int8_grid_at(belief[0], belief[1], belief[2])
+    log_odds = int8_grid_at(belief[MAP], belief[MAP_ROWS], belief[MAP_COLUMNS])
     row_offset, column_offset = _window_corner(x, y, reach)
     local_x, local_y = x - column_offset, y - row_offset
     if not is_filled:
@@ -326,7 +342,7 @@ def _update_map(
         )
     if world.flags[row] & (KNOWN_MATES | SOME_MATES):
         _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
-    touched = word_grid_at(belief[3], belief[4], touched_words(belief[2]))
+    touched = word_grid_at(belief[TOUCHED], belief[TOUCHED_ROWS], touched_words(belief[MAP_COLUMNS]))
     integrate_scan(
         log_odds,
         bits,
@@ -342,9 +358,9 @@ def _update_map(
     # A hit may lie one cell beyond the seen area.
     window = world.windows[row]
     window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
-    window[1] = min(max(window[1], box[1] + row_offset + 1), belief[1])
+    window[1] = min(max(window[1], box[1] + row_offset + 1), belief[MAP_ROWS])
     window[2] = max(min(window[2], 64 * box[2] + column_offset - 1), 0)
-    window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[2])
+    window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[MAP_COLUMNS])
 
 
 @kernel(spliced=True)

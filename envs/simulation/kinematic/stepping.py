@@ -12,11 +12,19 @@ import numba
 from lidarium.envs.scoring.coverage import add_rewards, share_news
 from lidarium.envs.simulation.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
 from lidarium.envs.simulation.kinematic.arrays import (
+    BODY_SOLID,
+    BOUND,
     DEAD_RECKONING,
     ENDED,
+    FLOOR_COLUMNS,
+    FLOOR_ROWS,
     KNOWN_MATES,
+    MASK_ROWS,
+    MASK_WORDS,
     OWN_FRAME,
+    OWN_MASK,
     SOME_MATES,
+    TEAM_MASK,
     TRUE_POSE,
     WorldArrays,
     world_at,
@@ -96,10 +104,10 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
             commands = world.driven
         table = world.floors[episode]
         move_robots(
-            table[8],
-            table[9],
-            table[1],
-            table[2],
+            table[BOUND],
+            table[BODY_SOLID],
+            table[FLOOR_ROWS],
+            table[FLOOR_COLUMNS],
             world.frames[episode],
             world.bodies,
             world.moves[first:last],
@@ -141,8 +149,12 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
 def _share(world: WorldArrays, episode: int, robots: int) -> None:
     """Credit the episode's robots with what they saw first, reward them, and count the step."""
     first, last = episode * robots, (episode + 1) * robots
-    team = word_grid_at(world.masks[first, 1], world.masks[first, 3], world.masks[first, 4])
-    world.team_seen[episode] += share_news(world.masks[:, 0], team, world.boxes, first, robots, world.gains)
+    team = word_grid_at(
+        world.masks[first, TEAM_MASK], world.masks[first, MASK_ROWS], world.masks[first, MASK_WORDS]
+    )
+    world.team_seen[episode] += share_news(
+        world.masks[:, OWN_MASK], team, world.boxes, first, robots, world.gains
+    )
     world.steps[episode] += 1
     add_rewards(
         world.gains[first:last],

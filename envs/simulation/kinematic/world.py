@@ -28,7 +28,6 @@ from lidarium.envs.simulation.kinematic.arrays import (
     SOME_MATES,
     TRUE_POSE,
     WorldArrays,
-    table_of,
 )
 from lidarium.envs.simulation.kinematic.belief_maps import blank, map_around_start, map_with_margin, wipe
 from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
@@ -45,6 +44,7 @@ from lidarium.mapping.grids.occupancy import WORD, OccupancySettings
 from lidarium.mapping.grids.pooled_maps import untouched
 from lidarium.mapping.kernels.compilation import use_threads
 from lidarium.mapping.kernels.huge_pages import Pages
+from lidarium.mapping.kernels.views import table_of
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""

@@ -1,0 +1,257 @@
+"""Hashes of whole episodes: a change that is to keep the behaviour keeps it to the bit.
+
+``golden_episodes.json`` holds the hashes. Where a change of behaviour is wanted, write them anew with
+``python tests/test_golden_episodes.py --write [CASE ...]``, all or some of them, and say so in CHANGELOG.md.
+"""
+
+import json
+import platform
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+import scipy
+from episode_ledger import Ledger
+from hashed_episodes import (
+    Case,
+    command,
+    drawn_floor,
+    faults,
+    learner_rows,
+    made_rows,
+    part,
+    policy,
+    rows,
+    solo,
+    team,
+    turns,
+)
+
+GOLDEN = Path(__file__).with_name("golden_episodes.json")
+
+THREADS = min(2, numba.config.NUMBA_NUM_THREADS)
+ALL_SEEN = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
+WEAK = part("RadioSettings", kind="signal", power=-28.0, shadowing=4.0, loss=0.2, latency_s=0.3)
+REAL = {"localization": "slam", "odometry": "typical", "noise": "datasheet", "known_starts": False}
+
+CASES: dict[str, Case] = {
+    # Levels of decision, floors, bodies, lasers, sizes of teams.
+    "velocity": team("apartment", 300, robots=3),
+    "velocity_one_robot": team("building:5", 300, robots=1, noise="thesis", observe=ALL_SEEN),
+    "velocity_nine_robots": team(
+        "scene_loop", 50, robots=9, noise="datasheet", threads=THREADS, lidar="lidar_360_6m"
+    ),
+    "velocity_unknown_starts": team(
+        "clinic",
+        300,
+        robots=2,
+        known_starts=False,
+        noise="datasheet",
+        observe=ALL_SEEN,
+        egocentric_scales=(1, 4, 16),
+    ),
+    "velocity_drawn_floor": team(drawn_floor, 300, robots=2, resolution=0.1),
+    "velocity_set": team("set:train", 300, robots=2, max_cycles=100),
+    "velocity_pioneer": team("office:3", 200, robots=2, robot="pioneer", lidar="lidar_360_20m"),
+    "velocity_service": team("corridors:2", 200, robots=2, robot="service", raster_resolution=0.05),
+    "velocity_point": team("srt_lab", 200, robots=1, robot="point", time_step=0.05),
+    "contact_ends": team("apartment:4", 300, robots=3, stop_on_contact=True),
+    "goal": team("srt_l_room", 300, robots=1, goal_radius=4.5),
+    "covered": team("scene_room", 30, "frontier", robots=3, stop_coverage=0.6),
+    "waypoint": team("apartment", 60, "waypoint", robots=3),
+    "waypoint_unknown_starts": team(
+        "building:5", 40, "waypoint", robots=2, known_starts=False, noise="datasheet"
+    ),
+    "waypoint_orders": team("clinic", 30, "waypoint", ordered=True, robots=2),
+    "frontier": team("apartment", 60, "frontier", robots=3, stop_coverage=0.99),
+    "frontier_one_robot": team("building:17", 50, "frontier", robots=1, observe=ALL_SEEN),
+    "frontier_ends": team("srt_corridor", 60, "frontier", robots=2),
+    "frontier_five_robots": team("office:3", 12, "frontier", robots=5, noise="thesis", resolution=0.025),
+    # Who says where a robot is, how well wheels tell.
+    "odometry_ideal": team("apartment", 200, robots=2, localization="odometry"),
+    "odometry_good": team("apartment", 200, robots=2, localization="odometry", odometry="good"),
+    "odometry_typical": team("clinic", 40, "frontier", robots=2, localization="odometry", odometry="typical"),
+    "odometry_poor": team(
+        "clinic", 200, robots=2, localization="odometry", odometry="poor", known_starts=False
+    ),
+    "slam_ideal": team("apartment", 200, solves=True, robots=2, localization="slam"),
+    "slam_typical": team("apartment", 14, "frontier", solves=True, robots=2, **REAL),
+    "splines_ideal": team("srt_l_room", 100, solves=True, robots=1, localization="splines"),
+    "splines_typical": team("clinic", 100, solves=True, robots=2, **{**REAL, "localization": "splines"}),
+    "splines_ekf_ideal": team("srt_l_room", 150, solves=True, robots=1, localization="splines_ekf"),
+    "splines_ekf_typical": team(
+        "clinic", 80, solves=True, robots=2, **{**REAL, "localization": "splines_ekf"}
+    ),
+    # Radios, faults, energy, pauses, all of it.
+    "radio_none": team("apartment", 30, "frontier", robots=3, radio="none"),
+    "radio_range": team(
+        "apartment", 40, "frontier", robots=3, radio=part("RadioSettings", kind="range", reach=4.0)
+    ),
+    "radio_line_of_sight": team("clinic", 40, "frontier", robots=3, radio="line_of_sight"),
+    "radio_signal": team("clinic", 40, "frontier", robots=3, radio="signal"),
+    "radio_weak": team("office:3", 40, "frontier", robots=4, radio=WEAK),
+    "radio_weak_orders": team("clinic", 30, "waypoint", ordered=True, robots=2, radio=WEAK),
+    "faults": team("apartment", 250, robots=3, faults=faults, localization="odometry", odometry="good"),
+    "faults_frontier": team("apartment", 40, "frontier", robots=3, faults=faults, radio="line_of_sight"),
+    "battery": team("clinic", 40, "frontier", robots=2, battery=part("Battery", capacity_j=250.0)),
+    "battery_kobuki": team("clinic", 150, robots=2, battery="kobuki"),
+    "pauses": team("scene_corner", 30, "waypoint", ordered=True, robots=3, pauses_when_blocked=True),
+    "lab": team("clinic", 150, solves=True, robots=2, realism="lab"),
+    "field": team("apartment", 10, "frontier", solves=True, robots=3, realism="field"),
+    # Merged maps.
+    "merged_velocity": team("scene_room", 150, merged=False, robots=2, known_starts=False),
+    "merged_frontier": team(
+        "apartment", 30, "frontier", merged=False, robots=3, known_starts=False, noise="datasheet"
+    ),
+    "merged_told": team(
+        "clinic", 30, "waypoint", merged=True, robots=3, known_starts=False, radio="line_of_sight"
+    ),
+    # One robot by Gymnasium, turns by PettingZoo, rows.
+    "solo_velocity": solo("Exploration", "velocity", 200, floor="building:3", max_cycles=180),
+    "solo_waypoint": solo("WaypointExploration", "waypoint", 30, floor="srt_t_junction"),
+    "solo_frontier": solo("FrontierExploration", "frontier", 40, floor="scene_loop_corridor"),
+    "turns": turns("clinic", 300, robots=2, max_cycles=100),
+    "rows_velocity": rows("set:train", 200, robots=2, max_cycles=90, observe=ALL_SEEN, threads=THREADS),
+    "rows_waypoint": rows("apartment", 30, "waypoint", robots=2, noise="datasheet", copy=False),
+    "rows_frontier": rows(
+        "building:5", 30, "frontier", robots=3, threads=THREADS, max_cycles=400, known_starts=False
+    ),
+    "rows_faults": rows("clinic", 20, "frontier", robots=3, threads=1, faults=faults, radio="range"),
+    "rows_field": rows("clinic", 6, "frontier", solves=True, threads=1, robots=2, realism="field"),
+    "rows_registered": rows("clinic", 20, "waypoint", made_rows),
+    "rows_learner": learner_rows("building:5", 120, robots=2, max_cycles=50),
+    # Policies.
+    "random_walk": policy("random_walk", "apartment", 300, robots=3),
+    "nearest_frontier": policy("nearest_frontier", "apartment", 1000, robots=3, stop_coverage=0.99),
+    "nearest_frontier_each": policy(
+        "nearest_frontier", "clinic", 300, each=True, robots=2, radio="range", noise="datasheet"
+    ),
+    "nearest_frontier_own_map": policy("nearest_frontier_own_map", "clinic", 1200, robots=2),
+    "nearest_frontier_merged": policy(
+        "nearest_frontier", "apartment", 400, merged=True, robots=2, known_starts=False
+    ),
+    "utility_frontier": policy("utility_frontier", "building:17", 1000, robots=3),
+    "explore_lite": policy("explore_lite", "office:3", 1000, robots=2, noise="thesis"),
+    "srt": policy("srt", "srt_l_room", 300, robots=1, solves=True),
+    "srt_explores": policy("srt", "clinic", 300, robots=1, solves=True, stop_coverage=0.9),
+    "srt_team": policy("srt", "apartment", 200, robots=2, solves=True, radio="line_of_sight"),
+    "srt_thesis": policy("srt", "srt_lab", 300, setup={"mode": "thesis"}, robots=1, solves=True),
+    "supervised": policy("supervised", "apartment", 800, robots=3, solves=True, known_starts=False),
+    "supervised_slam": policy("supervised", "clinic", 250, robots=2, solves=True, faults=faults, **REAL),
+    "supervised_extended": policy(
+        "supervised",
+        "apartment",
+        450,
+        robots=3,
+        solves=True,
+        known_starts=False,
+        radio="signal",
+        setup={"assignment": "hungarian", "avoids_rendezvous": True, "returns_home": True},
+    ),
+    "independent": policy("independent", "clinic", 1500, robots=2, solves=True, known_starts=False),
+    "oracle_starts": policy(
+        "oracle_starts", "clinic", 900, robots=3, solves=True, known_starts=False, reveals_starts=True
+    ),
+    # Whole runs by the command line.
+    "run": command("--robots 2 --horizon-s 11 --map-resolution 0.05", solves=True),
+    "run_ideal": command("--policy nearest_frontier --floor clinic --horizon-s 60 --map-resolution 0.05"),
+    "run_goal": command(
+        "--floor srt_t_junction --robots 1 --policy nearest_frontier --horizon-s 40 --map-resolution 0.05"
+    ),
+}
+"""All episodes. Floats of BLAS, LAPACK or FFT are in those that ``solves``, for one kind of processor."""
+
+
+def processor() -> str:
+    """Return the kind of processor, as far as it tells which code libraries choose."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().split("\n\n")[0].splitlines()
+    except OSError:
+        return platform.processor()
+    told = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
+    flags = [flag for flag in ("fma", "avx2", "avx512f") if flag in told.get("flags", "").split()]
+    return " ".join([told.get("model name", ""), told.get("cpu family", ""), told.get("model", ""), *flags])
+
+
+def made_with() -> dict[str, str]:
+    """Return what hashes of floats depend on."""
+    versions = {module.__name__: ".".join(module.__version__.split(".")[:2]) for module in (np, numba, scipy)}
+    return {**versions, "machine": platform.machine(), "processor": processor()}
+
+
+def run(name: str, known: dict[str, list[str]] | None) -> Ledger:
+    """Run a case."""
+    ledger = Ledger(CASES[name].block, known)
+    CASES[name].run(ledger)
+    return ledger
+
+
+def difference(kept: dict[str, Any], found: dict[str, Any]) -> list[str]:
+    """Return in words how an episode differs from the one that was kept."""
+    said = [f"{found['steps']} steps in place of {kept['steps']}"] if found["steps"] != kept["steps"] else []
+    for part_name, row in kept["parts"].items():
+        whole, *marks = row.split()
+        new_whole, *new_marks = found["parts"].get(part_name, "none").split()
+        if whole != new_whole:
+            block = next(
+                (n for n, pair in enumerate(zip(marks, new_marks, strict=False)) if pair[0] != pair[1]),
+                len(marks),
+            )
+            first = block * kept["block"]
+            where = (
+                f"steps {first} to {first + kept['block']}"
+                if block < len(marks)
+                else f"what comes after step {first}"
+            )
+            said.append(f"{part_name} differ, first in {where}")
+    return said
+
+
+@pytest.fixture(scope="module")
+def golden() -> dict[str, Any]:
+    """What is kept; skipped where libraries are others than those it was made with."""
+    kept: dict[str, Any] = json.loads(GOLDEN.read_text())
+    ours = made_with()
+    for name in ("numpy", "numba", "scipy", "machine"):
+        if kept["made_with"][name] != ours[name]:
+            pytest.skip(f"hashes were made with {name} {kept['made_with'][name]}, this is {ours[name]}")
+    return kept
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_an_episode_is_the_same_to_the_bit(name, golden):
+    made_on = golden["made_with"]["processor"]
+    if CASES[name].solves and made_on != processor():
+        pytest.skip(f"has solutions of BLAS in it, and was made on {made_on}, this is {processor()}")
+    said = difference(golden["cases"][name], run(name, golden["keys"]).summary())
+    hint = "" if made_on == processor() else f" (hashes were made on {made_on}, this is {processor()})"
+    assert not said, f"{name}: {'; '.join(said)}{hint}"
+
+
+def write(names: list[str]) -> None:
+    """Write hashes of all cases, or of some, and tell how long each took."""
+    kept: dict[str, Any] = json.loads(GOLDEN.read_text()) if names else {"keys": {}, "cases": {}}
+    keys = {part_name: set(known) for part_name, known in kept["keys"].items()}
+    for name in names or CASES:
+        began = time.perf_counter()
+        ledger = run(name, kept["keys"] if names else None)
+        for part_name, met in ledger.met.items():
+            keys[part_name] = keys.get(part_name, set()) | met
+        kept["cases"][name] = ledger.summary()
+        print(f"{name:28} {ledger.steps:5} steps {time.perf_counter() - began:6.2f} s", flush=True)
+    kept = {
+        "made_with": made_with(),
+        "keys": {part_name: sorted(met) for part_name, met in keys.items()},
+        "cases": {name: kept["cases"][name] for name in CASES if name in kept["cases"]},
+    }
+    GOLDEN.write_text(json.dumps(kept, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] != ["--write"]:
+        sys.exit("usage: python tests/test_golden_episodes.py --write [CASE ...]")
+    write(sys.argv[2:])
