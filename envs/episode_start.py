@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.starts import check_goal, check_starts, draw_starts
-from lidarium.envs.scoring.scorer import reward_weights
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
-from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.backends import BACKENDS
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,23 +77,9 @@ def begin(
     return Beginning(floor, tables, starts, seed, goal)
 
 
-def make_world(settings: ExplorationSettings, episodes: int = 1) -> KinematicWorld:
-    """Return the world of so many episodes."""
-    return KinematicWorld(
-        [settings.robot] * settings.robots,
-        settings.lidar,
-        settings.occupancy,
-        settings.time_step,
-        episodes,
-        settings.threads,
-        settings.egocentric_scales,
-        reward_weights(settings),
-        settings.localization,
-        settings.odometry,
-        settings.faults,
-        settings.horizon_s,
-        settings.radio.is_ideal,
-    )
+def make_simulation(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
+    """Return the simulation of so many episodes, by the backend of the settings."""
+    return BACKENDS[settings.backend](settings, episodes)
 
 
 def map_frames(beginning: Beginning, settings: ExplorationSettings) -> NDArray[np.float64]:

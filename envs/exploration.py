@@ -11,17 +11,17 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_world, map_frames
+from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
+from lidarium.envs.outcome.scorer import Scorer, is_near
 from lidarium.envs.radio.messages import Order
-from lidarium.envs.scoring.scorer import Scorer, is_near
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, read_options
-from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.station.reports import Station
 from lidarium.mapping.kernels.compilation import Array, kernel
 
@@ -105,26 +105,31 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             agent: action_space() for agent in self.possible_agents
         }
         self._rows = {agent: row for row, agent in enumerate(self.possible_agents)}
-        self.world = make_world(self.settings)
+        self.simulation = make_simulation(self.settings)
+        self.world, self.beliefs, self.score = (
+            self.simulation.world,
+            self.simulation.beliefs,
+            self.simulation.score,
+        )
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
         self._horizon = self.settings.horizon_steps
         self._generator: np.random.Generator | None = None
         self._offsets = np.zeros((self.settings.robots, 2))
         self._goals = np.full((self.settings.robots, 2), np.nan)
         self._writer = ObservationWriter(
-            self.world, self.settings, self._offsets, self._goals if self.has_goal else None
+            self.simulation, self.settings, self._offsets, self._goals if self.has_goal else None
         )
         self._commands = np.zeros((self.settings.robots, 2))
         self._window: Any = None
         self.floor: Floor | None = None
         self.goal: tuple[float, float] | None = None
         self.seed: int | None = None
-        self.scorer = Scorer(self.world, self.settings)
-        self.perception = Perception(self.world, self.settings, self._offsets)
+        self.scorer = Scorer(self.world, self.score, self.settings)
+        self.perception = Perception(self.simulation, self.settings, self._offsets)
         self._software = Software(self.perception, self.settings)
         # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a
         # tenth of a step.
-        self._step = self._software.step if self._software.is_staged else self.world.step
+        self._step = self._software.step if self._software.is_staged else self.simulation.step
         self._may_fail, self._is_battery_limited = self.settings.may_fail, self.settings.battery.is_limited
         self._meters = self.perception.meters = Meters(self.world, self.settings)
         self.station = Station(self.perception, self._meters)
@@ -164,7 +169,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         Returns what ``reset`` returns.
         """
         self.seed, self.floor, self.goal = beginning.seed, beginning.floor, beginning.goal
-        self.world.place(0, beginning.tables, beginning.starts, beginning.seed, self.settings.known_starts)
+        self.simulation.place(
+            0, beginning.tables, beginning.starts, beginning.seed, self.settings.known_starts
+        )
         self._offsets[:] = map_frames(beginning, self.settings)
         self._goals[:] = goal_of_robots(beginning, self.settings)
         self._commands[:] = 0.0
@@ -271,6 +278,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         rewards = {agent: rewards_of_rows[rows[agent]] for agent in live}
         endings, is_truncated = self._endings(live)
         infos = self._infos(live)
+        for agent in live:
+            infos[agent]["reward_terms"] = self.scorer.terms[rows[agent]]
         terminations, truncations = dict.fromkeys(live, False), dict.fromkeys(live, is_truncated)
         if endings or is_truncated:
             for agent in live:
@@ -391,7 +400,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self._rows,
             self.scorer.coverage,
             self.world.poses.copy(),
-            self.world.seen.tolist(),
+            self.score.seen.tolist(),
         )
         states, orders = self.operating.states, self.operating.orders
         infos: dict[str, dict[str, Any]] = {}

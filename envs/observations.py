@@ -13,7 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.exploration import OBSERVABLES, ExplorationSettings
-from lidarium.envs.simulation.kinematic.arrays import (
+from lidarium.envs.simulation.kernels.arrays import (
     MAP,
     MAP_COLUMNS,
     MAP_ROWS,
@@ -21,8 +21,8 @@ from lidarium.envs.simulation.kinematic.arrays import (
     TOUCHED_ROWS,
     world_at,
 )
-from lidarium.envs.simulation.kinematic.stages import RANGE_GAP
-from lidarium.envs.simulation.kinematic.world import ROWS_FOR_THREADS, KinematicWorld
+from lidarium.envs.simulation.kernels.stages import RANGE_GAP
+from lidarium.envs.simulation.simulation import ROWS_FOR_THREADS, Simulation
 from lidarium.mapping.grids.map_crops import crop_levels, crop_turned
 from lidarium.mapping.grids.pooled_maps import forget_touched, pool_touched, touched_words
 from lidarium.mapping.kernels.compilation import Array, kernel, use_threads
@@ -124,7 +124,7 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
         told.scales,
     )
     ranges, believed, velocities, bumpers = world.ranges, world.believed, world.measured, world.bumpers
-    beliefs, origins = world.maps, world.origins
+    beliefs, origins = world.belief_rows, world.origins
     scans, poses, motions, presses = observed[SCAN], observed[POSE], observed[VELOCITY], observed[BUMPER]
     maps, egocentric_maps, observed_goals = observed[LEVELS], observed[EGOCENTRIC_LEVELS], observed[GOAL]
     resolution, range_max = limits[RESOLUTION], limits[LONGEST_RANGE]
@@ -198,8 +198,8 @@ class ObservationWriter:
 
     Parameters
     ----------
-    world : KinematicWorld
-        Where the robots are.
+    simulation : Simulation
+        Of the robots.
     settings : ExplorationSettings
         What is observed; sizes, limits and threads.
     offsets : (rows, 2) float64
@@ -222,21 +222,21 @@ class ObservationWriter:
 
     def __init__(
         self,
-        world: KinematicWorld,
+        simulation: Simulation,
         settings: ExplorationSettings,
         offsets: NDArray[np.float64],
         goals: NDArray[np.float64] | None = None,
     ) -> None:
         self.keys = observed_keys(settings, goals is not None)
-        self.rows = len(world.believed)
+        self.rows = len(simulation.beliefs.believed)
         for name, array in (("offsets", offsets), ("goals", offsets if goals is None else goals)):
             if array.shape != (self.rows, 2) or array.dtype != np.float64 or not array.flags.c_contiguous:
                 raise ValueError(
                     f"{name} are {array.dtype} {array.shape}; want float64 {(self.rows, 2)}, contiguous"
                 )
-        if "egocentric_map" in self.keys and world.scales != settings.egocentric_scales:
+        if "egocentric_map" in self.keys and simulation.beliefs.scales != settings.egocentric_scales:
             raise ValueError(
-                f"the world pools its maps at scales {world.scales}; want those of the settings, {settings.egocentric_scales}"
+                f"the world pools its maps at scales {simulation.beliefs.scales}; want those of the settings, {settings.egocentric_scales}"
             )
         kinds = {name: ((self.rows, *box.shape), box.dtype) for name, box in _boxes(settings).items()}
         self._kinds = [kinds[name] for name in self.keys]
@@ -250,11 +250,11 @@ class ObservationWriter:
             float(np.float32(limit))
             for limit in (settings.lidar.range_max, robot.max_speed, robot.max_turn_rate)
         ]
-        self._world = world
+        self._simulation = simulation
         self._told = (
             offsets,
             offsets if goals is None else goals,
-            world.pool_rows,
+            simulation.beliefs.pool_rows,
             np.array([settings.occupancy.resolution, *limits]),
             np.array(settings.egocentric_scales, np.int64),
         )
@@ -310,7 +310,7 @@ class ObservationWriter:
 
     def _table(self) -> NDArray[np.int64]:
         """Return where the world's table, offsets, goals, pooled maps, limits and scales lie."""
-        self._sources = table_of((self._world.table, *self._told))
+        self._sources = table_of((self._simulation.table, *self._told))
         return self._sources
 
     def __getstate__(self) -> dict[str, Any]:

@@ -235,7 +235,7 @@ def _prepared(spec: str, resolution: float, laser_height: float, body_height: fl
     """Keep a floor and its tables; False where they were there."""
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.floors.catalogue.store import floor_store
-    from lidarium.envs.simulation.kinematic.floor_cache import prepare_tables
+    from lidarium.envs.simulation.kernels.floor_cache import prepare_tables
 
     return prepare_tables(floor_store(), load_floor(spec), resolution, laser_height, body_height)
 

@@ -134,7 +134,7 @@ def _run_again(command: Replay, record: "EpisodeRecord") -> Answer:
 
 def _figures(env: "ExplorationEnv") -> dict[str, Any]:
     """Return the main figures of an episode, as ``result.json`` has them."""
-    from lidarium.envs.scoring.scorer import THRESHOLDS
+    from lidarium.envs.outcome.scorer import THRESHOLDS
     from lidarium.evaluation.episodes.result import map_figures
     from lidarium.evaluation.metrics import overlap
 
@@ -145,7 +145,7 @@ def _figures(env: "ExplorationEnv") -> dict[str, Any]:
         "time_s": round(scorer.time, 6),
         **{name: None if time is None else round(time, 6) for name, time in times.items()},
         "path_m": [round(float(length), 9) for length in world.travelled],
-        "overlap": round(overlap(world.masks), 9),
+        "overlap": round(overlap(env.score.masks), 9),
         "collisions": int(world.collisions.sum()),
         "ended_because": {agent: scorer.ended_because.get(agent) for agent in env.possible_agents},
         **map_figures(env),

@@ -258,17 +258,17 @@ def _write(
 
 def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]) -> str:
     env = episode.env
-    area = float(env.world.counted[0]) * env.settings.occupancy.resolution**2
+    area = float(env.score.counted[0]) * env.settings.occupancy.resolution**2
     thresholds = [
         f"{share} % at {result[f't{share}_s']:.1f} s"
         for share in (85, 90, 95, 99)
         if result[f"t{share}_s"] is not None
     ]
-    counted = max(int(env.world.counted[0]), 1)
+    counted = max(int(env.score.counted[0]), 1)
     ended = [
         (agent, reason or "still at work", f"{length:.1f} m", f"{100.0 * seen / counted:.1f} %")
         for (agent, reason), length, seen in zip(
-            result["ended_because"].items(), result["path_m"], env.world.seen, strict=True
+            result["ended_because"].items(), result["path_m"], env.score.seen, strict=True
         )
     ]
     facts = [

@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from lidarium.agents import policy as policies
+from lidarium.agents.catalogue import POLICIES
 from lidarium.scripts.main import Choice
 
 TUTORIALS = Path(__file__).parents[1] / "docs" / "tutorials"
@@ -19,9 +19,11 @@ def code_of(name):
     )
 
 
-def test_the_policy_of_the_tutorial_explores_the_apartment(monkeypatch, capsys):
-    monkeypatch.setattr(policies, "_POLICIES", dict(policies._POLICIES))
-    exec(compile(code_of("add_a_policy.md"), "add_a_policy.md", "exec"), {})
+def test_the_policy_of_the_tutorial_explores_the_apartment(capsys):
+    try:
+        exec(compile(code_of("add_a_policy.md"), "add_a_policy.md", "exec"), {})
+    finally:
+        POLICIES.unregister("keep_apart")
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == ["keep_apart", "nearest_frontier"]
     assert all("0.99" in line for line in lines)

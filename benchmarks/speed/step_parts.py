@@ -12,10 +12,10 @@ from lidarium.envs.observations import ObservationWriter
 from lidarium.envs.scoring.coverage import mark_seen
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.simulation.kinematic.motion import move_robots
-from lidarium.envs.simulation.kinematic.ray_casting import cast_scan
-from lidarium.envs.simulation.kinematic.stages import _window_corner
-from lidarium.envs.simulation.noise import GAUSSIAN_TABLE, fill_gaussian
+from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, fill_gaussian
+from lidarium.envs.simulation.kernels.motion import move_robots
+from lidarium.envs.simulation.kernels.ray_casting import cast_scan
+from lidarium.envs.simulation.kernels.stages import _window_corner
 from lidarium.mapping.grids.occupancy import integrate_scan
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import beam_directions
@@ -138,15 +138,19 @@ class StepParts:
         team = DrivenTeam(floor, ROBOTS, scales=ExplorationSettings().egocentric_scales)
         for _ in range(WARM_STEPS):
             team.step()
-        world, lidar = team.world, team.world.lidar
+        simulation, lidar = team.simulation, team.simulation.lidar
         beams, reach = lidar.beams, lidar.range_max / floor.resolution
-        poses, velocities, commands = world.poses.copy(), world.velocities.copy(), team.commands
+        poses, velocities, commands = (
+            simulation.world.poses.copy(),
+            simulation.world.velocities.copy(),
+            team.commands,
+        )
         places = poses / [floor.resolution, floor.resolution, 1.0]
         corners = np.array([_window_corner(x, y, reach) for x, y in places[:, :2]])
         inside = places[:, :2] - corners[:, ::-1]
         directions, lengths = np.empty((ROBOTS, 4, beams)), np.empty((ROBOTS, beams))
-        noisy = np.minimum(world.ranges.astype(np.float64) / floor.resolution, reach)
-        is_hit = np.isfinite(world.ranges)
+        noisy = np.minimum(simulation.ranges.astype(np.float64) / floor.resolution, reach)
+        is_hit = np.isfinite(simulation.ranges)
         clean_bits, noisy_bits, hit_bits = (
             np.zeros((ROBOTS, window_rows(reach), window_words(reach)), np.uint64) for _ in range(3)
         )
@@ -158,7 +162,7 @@ class StepParts:
             np.zeros(ROBOTS, np.uint8),
             np.zeros(ROBOTS, np.int64),
         )
-        floor_row = world._floor_rows[0]
+        floor_row = simulation.floor_rows[0]
 
         def move() -> None:
             moved[:], speeds[:] = poses, velocities
@@ -167,13 +171,13 @@ class StepParts:
                 floor_row[9],
                 floor_row[1],
                 floor_row[2],
-                world._frames[0],
-                world.bodies,
-                world.moves,
+                simulation.frames[0],
+                simulation.world.bodies,
+                simulation.world.moves,
                 moved,
                 speeds,
                 commands,
-                world.time_step,
+                simulation.time_step,
                 bumpers,
                 contacts,
                 np.zeros(ROBOTS),
@@ -181,8 +185,8 @@ class StepParts:
             )
 
         def step() -> None:
-            world.poses[:], world.velocities[:] = poses, velocities
-            world.step(commands)
+            simulation.world.poses[:], simulation.world.velocities[:] = poses, velocities
+            simulation.step(commands)
 
         increment = lidar.angle_increment
         self.parts: dict[str, Callable[[], object]] = {
@@ -195,25 +199,25 @@ class StepParts:
             "area seen by the true beams": partial(
                 _fill, lengths, directions, inside, increment, clean_ends, clean_bits, clean_boxes
             ),
-            "scorer": partial(_score, world._mask_rows, clean_bits, clean_boxes, corners, news),
+            "scorer": partial(_score, simulation.score.mask_rows, clean_bits, clean_boxes, corners, news),
             "area seen through noise": partial(
                 _fill, noisy, directions, inside, increment, noisy_ends, noisy_bits, noisy_boxes
             ),
             "map update": partial(
                 _map,
-                world.belief_rows,
+                simulation.beliefs.belief_rows,
                 noisy_bits,
                 noisy_boxes,
                 noisy_ends,
                 is_hit,
                 corners,
-                world._increments,
+                simulation.beliefs.increments,
                 hit_bits,
             ),
         }
         self.whole: Callable[[], object] = step
         settings = make_settings(robots=ROBOTS, lidar=lidar, resolution=floor.resolution, observe=OBSERVED)
-        writer = ObservationWriter(world, settings, np.zeros((ROBOTS, 2)))
+        writer = ObservationWriter(simulation, settings, np.zeros((ROBOTS, 2)))
         self.observation: Callable[[], object] = partial(writer.write, writer.buffers())
         for part in self.parts.values():
             part()

@@ -58,7 +58,7 @@ def reset_over(phase: str, process: int, floors: list[str], log: Path) -> None:
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.settings.making import make_settings
-    from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+    from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 
     settings = make_settings(robots=ROBOTS, lidar=LIDAR)
     env = ExplorationEnv("apartment", settings)
@@ -89,7 +89,7 @@ def hold(phase: str, process: int, floors: list[str], log: Path) -> None:
     """Load the tables of some floors and hold them, as that many episodes would."""
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.settings.making import make_settings
-    from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+    from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 
     settings = make_settings(robots=ROBOTS, lidar=LIDAR)
     heights = settings.raster_resolution, settings.lidar.height, settings.robot.height

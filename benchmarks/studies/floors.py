@@ -74,7 +74,7 @@ def explore(kind: str, floor: str, robots: int, policy: str) -> dict[str, object
     scorer, world = env.scorer, env.world
     return {
         **row,
-        "area_m2": round(float(world.counted[0]) * 0.025**2, 1),
+        "area_m2": round(float(env.score.counted[0]) * 0.025**2, 1),
         "coverage": round(scorer.coverage, 5),
         "time_s": round(scorer.time, 1),
         "path_m": round(float(world.travelled.sum()), 1),

@@ -19,7 +19,7 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import floor_names, load_floor
 from lidarium.envs.floors.starts import draw_starts
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.evaluation.episodes.runner import run_episode
 
 POLICIES = ("random_walk", "nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite")

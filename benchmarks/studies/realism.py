@@ -99,23 +99,23 @@ class Watch(Watcher):
         localizers[:] = [
             None if localizer is None else TimedLocalizer(localizer, self.seconds) for localizer in localizers
         ]
-        render = env.world.render_anew
+        render = env.simulation.render_anew
 
         def render_timed(row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
             began = time.perf_counter()
             render(row, poses, ranges)
             self.seconds[-1] = (self.seconds[-1][0] + time.perf_counter() - began, True)
 
-        env.world.render_anew = render_timed  # type: ignore[method-assign]
+        env.simulation.render_anew = render_timed  # type: ignore[method-assign]
 
     def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
         """Note how far dead reckoning is off, and where robots are and believe to be."""
         world = env.world
         cosine, sine = np.cos(world.starts[:, 2]), np.sin(world.starts[:, 2])
-        x, y = world.odometry[:, 0], world.odometry[:, 1]
+        x, y = env.simulation.odometry[:, 0], env.simulation.odometry[:, 1]
         reckoned = world.starts[:, :2] + np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
         self.wheels.append(np.hypot(*(reckoned - world.poses[:, :2]).T))
-        self.believed.append(world.believed.copy())
+        self.believed.append(env.beliefs.believed.copy())
         self.true.append(world.poses.copy())
 
     def outcome(self, env: ExplorationEnv) -> None:
@@ -132,7 +132,7 @@ def episode(floor: str, robots: int, seed: int, horizon_s: float) -> dict[str, A
     )
     believed, true = np.array(watch.believed), np.array(watch.true)
     aligned = [absolute_error(believed[:, robot], true[:, robot]) for robot in range(robots)]
-    last = np.hypot(*(env.world.believed - env.world.poses)[:, :2].T)
+    last = np.hypot(*(env.beliefs.believed - env.world.poses)[:, :2].T)
     return {
         "floor": result["floor"],
         "spec": floor,
@@ -175,7 +175,7 @@ def aligned_iou(env: ExplorationEnv, believed: NDArray[np.float64], true: NDArra
     is_inside = ((cells >= 0) & (cells < log_odds.shape[::-1])).all(axis=-1)
     laid = np.zeros(log_odds.shape, np.bool_)
     laid[is_inside] = log_odds[cells[is_inside, 1], cells[is_inside, 0]] > 0
-    return occupied_iou(laid, truth.occupied, unpack_bits(env.world.team_masks[0], log_odds.shape[1]))
+    return occupied_iou(laid, truth.occupied, unpack_bits(env.score.team_masks[0], log_odds.shape[1]))
 
 
 def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:

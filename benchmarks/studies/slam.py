@@ -139,7 +139,7 @@ class _Recorder(Watcher):
         self.step(env, np.zeros((1, 2)))
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
-        self.scans.append(env.world.ranges[0].copy())
+        self.scans.append(env.simulation.ranges[0].copy())
         self.poses.append(env.world.poses[0].copy())
 
     def outcome(self, env: ExplorationEnv) -> None:

@@ -70,7 +70,7 @@ class Drive(Watcher):
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
         """Note a time step."""
-        self.ranges.append(env.world.ranges[0].copy())
+        self.ranges.append(env.simulation.ranges[0].copy())
         self.poses.append(env.world.poses[0].copy())
 
     def outcome(self, env: ExplorationEnv) -> None:

@@ -11,7 +11,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lidarium.envs.batch.endings import HORIZON, REASONS, endings
 from lidarium.envs.batch.levels import make_level
 from lidarium.envs.batch.running import (
     DECIDES,
@@ -25,15 +24,18 @@ from lidarium.envs.batch.running import (
     run_parallel,
     run_serial,
 )
-from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_world, map_frames
+from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, observation_space
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
+from lidarium.envs.outcome.endings import HORIZON, REASONS, endings
+from lidarium.envs.outcome.reward_terms import ExtraTerms
 from lidarium.envs.radio.messages import OperatingState
+from lidarium.envs.scoring.rewards import TERMS
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
-from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.station.operating import state_after
 from lidarium.mapping.kernels.work_queue import new_turns
 
@@ -116,13 +118,15 @@ class EpisodeBatch:
                 f"want None and False: many episodes at once have no batteries and nobody to end a pause; or use lidarium.parallel_env"
             )
         self._choice = FloorChoice(floor, image_resolution)
-        self.world = make_world(settings, self.episodes)
+        self.simulation = make_simulation(settings, self.episodes)
+        self.world, self.score = self.simulation.world, self.simulation.score
+        self._extra = ExtraTerms(settings.reward.more)
         self._offsets, self._goals = np.zeros((self.rows, 2)), np.full((self.rows, 2), np.nan)
-        self.perception = Perception(self.world, settings, self._offsets)
+        self.perception = Perception(self.simulation, settings, self._offsets)
         self._software = Software(self.perception, settings)
         self.level = make_level(level, self.perception, settings)
         self._writer = ObservationWriter(
-            self.world, settings, self._offsets, self._goals if self._choice.has_goal else None
+            self.simulation, settings, self._offsets, self._goals if self._choice.has_goal else None
         )
         known = observation_space(settings, self._choice.has_goal).spaces
         self.observation_space = spaces.Dict({**known, **self.level.boxes})
@@ -144,7 +148,7 @@ class EpisodeBatch:
             settings.stop_on_contact,
         )
         self._tally = Tally(
-            self.world.counted,
+            self.score.counted,
             np.full((self.episodes, 2), np.nan),
             np.array(bounds, np.float64),
             self.live,
@@ -163,7 +167,7 @@ class EpisodeBatch:
     @property
     def rewards(self) -> NDArray[np.float64]:
         """What each row has earned in the last step, (rows,)."""
-        return self.world.rewards
+        return self.score.rewards
 
     @property
     def is_over(self) -> NDArray[np.bool_]:
@@ -232,13 +236,17 @@ class EpisodeBatch:
             seen = acted.copy()
             seen.reshape(self.episodes, robots)[beginning] = True
         self._turn_buffers(seen, is_same_step)
-        self.world.rewards[:] = 0.0
+        self.score.rewards[:], self.score.reward_terms[:] = 0.0, 0.0
         self.run_kernel(modes, self._commands, seen)
+        earned = {} if self._extra.is_empty else self._extra.earned(self.world)
+        for amounts in earned.values():
+            self.score.rewards += amounts
         if not is_plain:
-            self.world.rewards[~acted] = 0.0
+            self.score.rewards[~acted], self.score.reward_terms[~acted] = 0.0, 0.0
+            earned = {name: np.where(acted, amounts, 0.0) for name, amounts in earned.items()}
         self.acted = acted
         self.reasons = endings(
-            self.world, self.settings, self._tally.goals if self._has_goals else None, acted, stopping
+            self.simulation, self.settings, self._tally.goals if self._has_goals else None, acted, stopping
         )
         self.has_endings = bool(self.reasons.any())
         if self.has_endings:
@@ -247,7 +255,8 @@ class EpisodeBatch:
             self.live[ended] = False
             self.world.moves[ended] = 0
             self.world.flags[ended] |= ENDED
-        self._tell(seen)
+        terms = dict(zip(TERMS, self.score.reward_terms.T.copy(), strict=True))
+        self._tell(seen, {**terms, **earned})
 
     def run_kernel(
         self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]
@@ -268,13 +277,13 @@ class EpisodeBatch:
         if self._software.is_staged:
             self._run_staged(modes.copy(), commands, seen)
             return
-        threads = self.world.threads
-        self.world.use_threads()
+        threads = self.simulation.threads
+        self.simulation.use_threads()
         # To and fro: the maps of the episodes that ran last are in the caches yet.
         self._orders.reverse()
         run = run_parallel if threads > 1 else run_serial
         run(
-            self.world.table,
+            self.simulation.table,
             self.robots,
             modes,
             commands,
@@ -304,13 +313,13 @@ class EpisodeBatch:
             follow_some(
                 runs & decides,
                 self.robots,
-                self.world.table,
+                self.simulation.table,
                 self.level.drives,
                 self.level.following,
                 commands,
             )
             self._software.step(commands, runs=runs)
-            note_ends(modes, self.robots, self.world.table, self.level.drives, self._tally)
+            note_ends(modes, self.robots, self.simulation.table, self.level.drives, self._tally)
             left[runs] -= 1
             modes[left == 0] = WAITS
         self._writer.write(self.observations, seen)
@@ -339,12 +348,13 @@ class EpisodeBatch:
     def _place(self, episode: int, start: Beginning) -> None:
         """Put the robots of an episode where they begin."""
         rows = slice(episode * self.robots, (episode + 1) * self.robots)
-        self.world.place(episode, start.tables, start.starts, start.seed, self.settings.known_starts)
+        self.simulation.place(episode, start.tables, start.starts, start.seed, self.settings.known_starts)
         self.floors[episode] = start.floor
         self._offsets[rows] = map_frames(start, self.settings)
         self._goals[rows] = goal_of_robots(start, self.settings)
         self._tally.goals[episode] = np.nan if start.goal is None else start.goal
         self._commands[rows], self.live[rows] = 0.0, True
+        self._extra.start(self.world, episode)
         self.perception.start(start.goal, episode)
         self._software.start(episode, start.seed)
         self.level.start(episode)
@@ -374,16 +384,17 @@ class EpisodeBatch:
             for name, array in self.observations.items():
                 array[~seen] = before[name][~seen]
 
-    def _tell(self, seen: NDArray[np.bool_]) -> None:
-        """Put together what the step tells beside the observations."""
+    def _tell(self, seen: NDArray[np.bool_], terms: dict[str, NDArray[np.float64]]) -> None:
+        """Put together the infos of the step: the truth, states, terms of the reward, endings."""
         everyone = self.everyone
         truth = {
             "pose": self.world.poses.copy(),
-            "coverage": np.repeat(self.world.coverages(), self.robots),
-            "seen_cells": self.world.seen.copy(),
+            "coverage": np.repeat(self.score.coverages(), self.robots),
+            "seen_cells": self.score.seen.copy(),
         }
         # Nobody gives orders here: states follow from the endings alone.
         self.infos = {"truth": truth, "_truth": everyone, "order": self._no_orders, "_order": everyone}
+        self.infos["reward_terms"], self.infos["_reward_terms"] = terms, everyone
         if self.has_endings:
             ended = self.reasons != 0
             names = np.full(self.rows, None, object)

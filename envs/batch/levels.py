@@ -7,7 +7,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lidarium.envs.batch.endings import FRONTIER_UNREACHABLE, NO_FRONTIER
 from lidarium.envs.batch.running import DECIDES, STEPS
 from lidarium.envs.driving.drives import DRIVE_STATES, Drives, Following, no_drives
 from lidarium.envs.driving.path_following import FORESIGHT_TIMES
@@ -17,6 +16,7 @@ from lidarium.envs.levels.frontier_offers import CANDIDATES, REASONS, FrontierOf
 from lidarium.envs.levels.frontiers import frontier_boxes
 from lidarium.envs.observations import action_space
 from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.outcome.endings import FRONTIER_UNREACHABLE, NO_FRONTIER
 from lidarium.envs.radio.messages import Orders
 from lidarium.envs.settings.exploration import ExplorationSettings
 
@@ -165,7 +165,7 @@ class WaypointLevel:
         shares = check_actions(actions, commands.shape, live, "two finite numbers within [-1, 1]").astype(
             np.float64
         )
-        places = self._perception.world.believed[:, :2] - self._perception.offsets
+        places = self._perception.beliefs.believed[:, :2] - self._perception.offsets
         targets = places + np.clip(shares, -1.0, 1.0) * self._half_side
         self.carry_out(Orders(live, targets, np.full(len(live), np.nan)), live, modes)
 

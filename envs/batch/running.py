@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from lidarium.envs.driving.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
 from lidarium.envs.observations import Arrays, write_row
-from lidarium.envs.scoring.scorer import is_near
-from lidarium.envs.simulation.kinematic.arrays import WorldArrays, world_at
-from lidarium.envs.simulation.kinematic.stepping import step_episode
+from lidarium.envs.outcome.scorer import is_near
+from lidarium.envs.simulation.kernels.arrays import WorldArrays, world_at
+from lidarium.envs.simulation.kernels.stepping import step_episode
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.work_queue import take_turn
 

@@ -27,9 +27,9 @@ from lidarium.envs.drawing.frame_parts import (
     view_around,
     with_header,
 )
+from lidarium.envs.outcome.scorer import TRACK_PERIOD_S
 from lidarium.envs.scoring.coverage import unpack_bits
-from lidarium.envs.scoring.scorer import TRACK_PERIOD_S
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
 if TYPE_CHECKING:
     from lidarium.envs.exploration import ExplorationEnv
@@ -103,7 +103,7 @@ def _draw_floor(env: "ExplorationEnv", tables: FloorTables, view: View) -> Frame
     solid = _shrunk(raster.solid[view.rows, view.columns], view.block)
     seen, counted = (
         _shrunk(_on_raster(mask, raster.solid.shape, multiple)[view.rows, view.columns], view.block)
-        for mask in (env.world.team_masks[0], env.world.counted_masks[0])
+        for mask in (env.score.team_masks[0], env.score.counted_masks[0])
     )
     picture = PALETTE[classify(solid, seen, counted, raster.resolution * view.block)]
     return enlarged(picture, view)
@@ -163,7 +163,7 @@ def _draw_fans(frame: Frame, env: "ExplorationEnv", view: View, colours: list[Co
         x, y, theta = world.poses[robot]
         # No return is drawn to the greatest range, an invalid beam not at all.
         lengths = np.clip(
-            np.nan_to_num(world.ranges[robot].astype(np.float64), nan=0.0, posinf=lidar.range_max),
+            np.nan_to_num(env.simulation.ranges[robot].astype(np.float64), nan=0.0, posinf=lidar.range_max),
             0.0,
             lidar.range_max,
         )

@@ -30,7 +30,7 @@ from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import DriveState, Orders, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.mapping.kernels.work_queue import new_turns
 from lidarium.mapping.planning.clearance import limit_of
 from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, cells_of, discs_of, passage_of
@@ -110,8 +110,8 @@ class TeamDriver:
             np.full(settings.robots, robot.radius),
             limits,
             perception.knows_mates,
-            perception.world.contact,
-            perception.world.heard,
+            perception.beliefs.contact,
+            perception.beliefs.heard,
             np.ones(settings.robots, np.uint8),
             FORESIGHT_TIMES,
         )
@@ -122,7 +122,7 @@ class TeamDriver:
         """Begin an episode: no robot has a target."""
         rows, drives = self._team(episode), self.drives
         self._perception.memory.fit(
-            max(grid.size for grid in self._perception.world.log_odds[rows]), self._passage.slots
+            max(grid.size for grid in self._perception.beliefs.log_odds[rows]), self._passage.slots
         )
         drives.is_ordered[rows], drives.passing[rows], drives.has_path[rows] = False, -1, False
         drives.states[rows], drives.stood[rows], drives.counts[rows], drives.backing[rows] = IDLE, 0, 0, 0
@@ -209,9 +209,14 @@ class TeamDriver:
 
     def commands(self) -> NDArray[np.float64]:
         """Return speed and turn rate of all robots for the next step, shape (rows, 2) [m/s, rad/s]."""
-        world = self._perception.world
+        simulation = self._perception.simulation
         follow_teams(
-            self.drives, self.following, world.believed, world.measured, world.ranges, self._commands
+            self.drives,
+            self.following,
+            simulation.beliefs.believed,
+            simulation.measured,
+            simulation.ranges,
+            self._commands,
         )
         return self._commands
 
@@ -235,7 +240,7 @@ class TeamDriver:
         """Return the rows of a robot's teammates, of those that it knows where they are."""
         first, contact = (
             row // self._settings.robots * self._settings.robots,
-            self._perception.world.contact[row],
+            self._perception.beliefs.contact[row],
         )
         knows_all = self._perception.knows_mates
         return [
@@ -260,8 +265,8 @@ class TeamDriver:
         return Planning(
             settings.robots,
             perception.knows_mates,
-            world.contact,
-            world.heard,
+            perception.beliefs.contact,
+            perception.beliefs.heard,
             settings.robot.radius,
             resolution,
             self._footprint.radius + 2 * resolution,
@@ -270,8 +275,8 @@ class TeamDriver:
             records,
             sharing,
             perception.memory.table,
-            world.believed,
-            world.origins,
+            perception.beliefs.believed,
+            perception.beliefs.origins,
             perception.offsets,
             (world.flags & ENDED != 0) | self.held,
         )
@@ -282,12 +287,12 @@ class TeamDriver:
         return self.planning(np.array([row]))
 
     def _origin(self, row: int) -> tuple[float, float]:
-        origin = self._perception.world.origins[row]
+        origin = self._perception.beliefs.origins[row]
         return float(origin[0]), float(origin[1])
 
     def _cell(self, row: int) -> Cell:
         place = cells_of(
-            self._perception.world.believed[row, :2], self._origin(row), self._settings.occupancy.resolution
+            self._perception.beliefs.believed[row, :2], self._origin(row), self._settings.occupancy.resolution
         )
         return int(place[0]), int(place[1])
 
@@ -312,7 +317,7 @@ class TeamDriver:
 
     def _remaining(self, row: int) -> NDArray[np.float64]:
         place, count = int(self.drives.places[row]), int(self.drives.counts[row])
-        here = self._perception.world.believed[row : row + 1, :2]
+        here = self._perception.beliefs.believed[row : row + 1, :2]
         return np.concatenate([here, self.drives.paths[row, place:count]]) if count else here.copy()
 
     def _end_refuge(self, row: int) -> None:
@@ -355,7 +360,7 @@ class TeamDriver:
 
     def _settle(self, row: int, live: list[int]) -> None:
         """Resolve that a teammate stands in a robot's way: drive round it, or one of the two gives way."""
-        drives, here = self.drives, self._perception.world.believed[row, :2]
+        drives, here = self.drives, self._perception.beliefs.believed[row, :2]
         reach = self._settings.robot.radius + NEAR + self._settings.robot.radius
         near = [
             other
@@ -410,7 +415,7 @@ class TeamDriver:
         )
         if cell is None or not self._drive_to(row, cell, others):
             return False
-        drives.passing[row], drives.stations[row] = to, world.believed[row, :2]
+        drives.passing[row], drives.stations[row] = to, self._perception.beliefs.believed[row, :2]
         drives.since[row] = world.steps[row // self._settings.robots]
         drives.stood[to], drives.states[to] = 0, DRIVING
         return True

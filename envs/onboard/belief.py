@@ -63,7 +63,7 @@ class Belief:
     @property
     def velocity(self) -> NDArray[np.float64]:
         """Speed and turn rate as odometry tells [m/s, rad/s], shape (2,)."""
-        return np.array(self._perception.world.measured[self._row])
+        return np.array(self._perception.simulation.measured[self._row])
 
     @property
     def spread(self) -> NDArray[np.float64]:

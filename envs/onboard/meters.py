@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.kinematic.arrays import ENDED
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.backend import World
+from lidarium.envs.simulation.kernels.arrays import ENDED
 
 
 class Meters:
@@ -18,7 +18,7 @@ class Meters:
 
     Parameters
     ----------
-    world : KinematicWorld
+    world : World
         Whose robots; of one episode.
     settings : ExplorationSettings
         Their wheels and batteries.
@@ -31,7 +31,7 @@ class Meters:
         Energy used since the beginning [J]; 0 where batteries have no limit.
     """
 
-    def __init__(self, world: KinematicWorld, settings: ExplorationSettings) -> None:
+    def __init__(self, world: World, settings: ExplorationSettings) -> None:
         self._world, self._battery, self._time_step = world, settings.battery, settings.time_step
         self._reckons_way, self._reckons_energy = not settings.odometry.is_ideal, settings.battery.is_limited
         self.is_active = self._reckons_way or self._reckons_energy
@@ -53,7 +53,7 @@ class Meters:
             return
         self._taken_in = step
         if self._reckons_way:
-            self._way += np.abs(self._world.measured[:, 0]) * self._time_step
+            self._way += np.abs(self._world.sensors["velocity"][:, 0]) * self._time_step
         if self._reckons_energy:
             self._use_energy()
 

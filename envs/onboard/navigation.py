@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.simulation.kinematic.arrays import MAP, MAP_COLUMNS, MAP_ROWS
+from lidarium.envs.simulation.kernels.arrays import MAP, MAP_COLUMNS, MAP_ROWS
 from lidarium.mapping.grids.cell_blocks import BLOCK, positive_cells, sum_blocks
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import (

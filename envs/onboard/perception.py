@@ -29,8 +29,8 @@ from lidarium.envs.onboard.navigation import (
 )
 from lidarium.envs.radio.exchange import NEVER, Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.kinematic.arrays import ENDED
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.kernels.compilation import use_threads
 from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
 from lidarium.mapping.merging.fusion import FusedMap, lay_over
@@ -45,7 +45,7 @@ class Perception:
 
     Parameters
     ----------
-    world : KinematicWorld
+    simulation : Simulation
         Whose maps and believed poses they are; row = episode * robots + robot.
     settings : ExplorationSettings
         The team of every episode.
@@ -69,10 +69,11 @@ class Perception:
     """
 
     def __init__(
-        self, world: KinematicWorld, settings: ExplorationSettings, offsets: NDArray[np.float64]
+        self, simulation: Simulation, settings: ExplorationSettings, offsets: NDArray[np.float64]
     ) -> None:
-        self.world, self.settings, self.offsets = world, settings, offsets
-        self._robots, self._episodes = settings.robots, world.episodes
+        self.simulation, self.settings, self.offsets = simulation, settings, offsets
+        self.world, self.beliefs = simulation.world, simulation.beliefs
+        self._robots, self._episodes = settings.robots, simulation.episodes
         rows = self._robots * self._episodes
         self._own: list[NavigationMap | None] = [None] * rows
         self._shared: list[NavigationMap | None] = [None] * self._episodes
@@ -92,7 +93,7 @@ class Perception:
         self.exchanges = (
             []
             if settings.radio.is_ideal
-            else [Exchange(world, settings, episode) for episode in range(self._episodes)]
+            else [Exchange(simulation, settings, episode) for episode in range(self._episodes)]
         )
         self.localizers: list[Localizer | None] = [None] * rows
         self.meters: Meters | None = None
@@ -117,7 +118,7 @@ class Perception:
         self._adds_up = self.hears or any(told is not None for told in self._told)
         self._own_records[first:last], self._shared_records[episode] = 0, 0
         self._known[first:last] = [
-            (rows, 0, columns, 0) for rows, columns in self.world.belief_rows[first:last, 1:3]
+            (rows, 0, columns, 0) for rows, columns in self.beliefs.belief_rows[first:last, 1:3]
         ]
         self._goals[episode], self._fresh_at[episode] = goal, -2
 
@@ -138,8 +139,8 @@ class Perception:
             self._robots,
             self._own_records,
             self._shared_records,
-            world.belief_rows,
-            world.windows,
+            self.beliefs.belief_rows,
+            self.beliefs.windows,
             self._known,
             world.steps,
             self._fresh_at,
@@ -167,7 +168,7 @@ class Perception:
         self._refresh(self.episode_of(row))
         navigation = self._own[row]
         if navigation is None:
-            navigation = NavigationMap(self.world.log_odds[row], self.settings.occupancy.resolution)
+            navigation = NavigationMap(self.beliefs.log_odds[row], self.settings.occupancy.resolution)
             navigation.keep_record_in(self._own_records[row])
             maps = self._maps
             refresh_map(navigation.record, maps.limit, maps.stamp, self._known[row])
@@ -178,7 +179,7 @@ class Perception:
         """Return the first and last rows and columns, exclusive, that hold all that a robot's own map knows."""
         self.own_map(row)
         low_row, high_row, low_column, high_column = (int(value) for value in self._known[row])
-        rows, columns = self.world.log_odds[row].shape
+        rows, columns = self.beliefs.log_odds[row].shape
         low_row, low_column = max(low_row, 0), max(low_column, 0)
         return (
             low_row,
@@ -203,7 +204,7 @@ class Perception:
         navigation = self._shared[episode]
         if navigation is None:
             first = episode * self._robots
-            log_odds = np.zeros(self.world.log_odds[first].shape, np.int8)
+            log_odds = np.zeros(self.beliefs.log_odds[first].shape, np.int8)
             navigation = NavigationMap(log_odds, self.settings.occupancy.resolution)
             navigation.keep_record_in(self._shared_records[episode])
             for row in range(first, first + self._robots):
@@ -241,7 +242,7 @@ class Perception:
             )
         if others is None and self._told[row] is None:
             return
-        told = np.zeros(self.world.log_odds[row].shape, np.int8)
+        told = np.zeros(self.beliefs.log_odds[row].shape, np.int8)
         if others is not None:
             lay_over(told, others, self.origin_in_frame(row))
         before = self._told[row]
@@ -281,7 +282,7 @@ class Perception:
 
     def _forget(self, row: int, trail: NDArray[np.float64]) -> None:
         resolution, radius = self.settings.occupancy.resolution, float(self.world.bodies[:, 0].max())
-        origin, whole = np.array(self.origin_in_frame(row)), self.world.log_odds[row]
+        origin, whole = np.array(self.origin_in_frame(row)), self.beliefs.log_odds[row]
         reach = radius + MARGIN_M + resolution
         low = np.clip(
             np.floor((trail.min(axis=0) - reach - origin) / resolution).astype(np.int64), 0, whole.shape[::-1]
@@ -294,7 +295,7 @@ class Perception:
         (left, bottom), (right, top) = low.tolist(), high.tolist()
         part = whole[bottom:top, left:right]
         x, y = (origin + low * resolution).tolist()
-        self.world.forget(
+        self.beliefs.forget(
             row, passed(part.shape, (x, y), trail, radius, resolution) & (part > 0), (bottom, left)
         )
         self._fresh_at[self.episode_of(row)] = -2
@@ -304,11 +305,11 @@ class Perception:
         self._refresh(self.episode_of(row))
         navigation = self._heard[row]
         if navigation is None:
-            log_odds = np.zeros(self.world.log_odds[row].shape, np.int8)
+            log_odds = np.zeros(self.beliefs.log_odds[row].shape, np.int8)
             navigation = NavigationMap(log_odds, self.settings.occupancy.resolution)
             navigation.keep_record_in(self._heard_records[row])
             self._heard[row] = navigation
-            _, rows, columns = self.world.belief_rows[row, :3]
+            _, rows, columns = self.beliefs.belief_rows[row, :3]
             self._sum_heard(row, np.array([0, rows, 0, columns]))
             own = self._own[row]
             if not self.hears and own is not None and own.record[FLAGS] != 0:
@@ -327,8 +328,8 @@ class Perception:
             held = [] if told is None else [told.ctypes.data]
         beliefs = np.array(
             [
-                (address, *self.world.log_odds[row].shape)
-                for address in (self.world.belief_rows[row, 0], *held)
+                (address, *self.beliefs.log_odds[row].shape)
+                for address in (self.beliefs.belief_rows[row, 0], *held)
             ],
             np.int64,
         )
@@ -374,7 +375,7 @@ class Perception:
             refresh_team(self._maps, episode)
             return
         first = episode * self._robots
-        windows = self.world.windows[first : first + self._robots].copy()
+        windows = self.beliefs.windows[first : first + self._robots].copy()
         refresh_team(self._maps, episode)
         for robot, window in enumerate(windows):
             if self.hears:
@@ -388,12 +389,12 @@ class Perception:
 
     def pose_in_frame(self, of: int, to: int) -> NDArray[np.float64]:
         """Return the believed pose of a robot in the map frame of another (or its own), shape (3,)."""
-        x, y, theta = self.world.believed[of]
+        x, y, theta = self.beliefs.believed[of]
         return np.array([x - self.offsets[to, 0], y - self.offsets[to, 1], theta])
 
     def origin_in_frame(self, row: int) -> tuple[float, float]:
         """Return the lower left corner of a robot's map in its map frame [m]."""
-        x, y = self.world.origins[row] - self.offsets[row]
+        x, y = self.beliefs.origins[row] - self.offsets[row]
         return float(x), float(y)
 
     def spread(self, row: int) -> NDArray[np.float64]:
@@ -404,8 +405,8 @@ class Perception:
     def pose_known_to(self, row: int, other: int) -> NDArray[np.float64]:
         """Return the pose of a teammate as a robot knows it, in the frame of believed poses, shape (3,)."""
         if self.knows_mates:
-            return np.asarray(self.world.believed[other])
-        return np.asarray(self.world.heard[row].reshape(-1, 3)[other % self._robots])
+            return np.asarray(self.beliefs.believed[other])
+        return np.asarray(self.beliefs.heard[row].reshape(-1, 3)[other % self._robots])
 
     def teammates(self, row: int) -> dict[str, Teammate]:
         """Return what a robot knows of the others: with known starts and the ideal radio where they are now, else where they last said."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.exchange import CONTACT_S, NEVER
 from lidarium.envs.settings.exploration import KERNEL_LOCALIZATIONS, ExplorationSettings
-from lidarium.envs.simulation.kinematic.arrays import ENDED
-from lidarium.envs.simulation.kinematic.stepping import ranges_without_mates
+from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.envs.simulation.kernels.stepping import ranges_without_mates
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
 
@@ -39,14 +39,14 @@ class Software:
         self._perception, self._settings = perception, settings
         self._localizes = settings.localization not in KERNEL_LOCALIZATIONS
         self._beams = np.empty(settings.lidar.beams, np.float32)
-        self.is_staged = self._localizes or bool(perception.exchanges)
+        self.is_staged = self._localizes or bool(perception.exchanges) or not perception.simulation.is_fused
 
     def start(self, episode: int, seed: int) -> None:
         """Begin an episode, after its robots were placed.
 
         Whatever is drawn comes from ``seed``.
         """
-        world, robots = self._perception.world, self._settings.robots
+        robots = self._settings.robots
         if self._localizes:
             for robot in range(robots):
                 row = episode * robots + robot
@@ -54,7 +54,7 @@ class Software:
                     self._settings.localization, self._settings.lidar, self._settings.localizer
                 )
                 draws = np.random.default_rng([seed, LOCALIZER_STREAM, robot])
-                localizer.reset(world.believed[row].copy(), int(draws.integers(2**63)))
+                localizer.reset(self._perception.beliefs.believed[row].copy(), int(draws.integers(2**63)))
                 self._perception.localizers[row] = localizer
         if self._perception.exchanges:
             self._perception.exchanges[episode].start(seed)
@@ -66,35 +66,36 @@ class Software:
         moves_bodies: bool = True,
         runs: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Run a step of the world, as ``KinematicWorld.step``, and what belongs to it on board."""
-        world = self._perception.world
-        world.step(commands, moves_bodies=moves_bodies, perceives=not self._localizes, runs=runs)
+        """Run a step of the world, as ``Simulation.step``, and what belongs to it on board."""
+        simulation = self._perception.simulation
+        simulation.step(commands, moves_bodies=moves_bodies, perceives=not self._localizes, runs=runs)
         if not self.is_staged:
             return
-        episodes = range(world.episodes) if runs is None else np.flatnonzero(runs).tolist()
+        episodes = range(simulation.episodes) if runs is None else np.flatnonzero(runs).tolist()
         if self._localizes:
             for episode in episodes:
                 self._localize(episode)
-            world.perceive(runs)
+            simulation.perceive(runs)
         if self._perception.exchanges:
             for episode in episodes:
                 self._exchange(episode)
 
     def _localize(self, episode: int) -> None:
         """Let the robots of an episode find out where they are."""
-        world, robots = self._perception.world, self._settings.robots
+        simulation, robots = self._perception.simulation, self._settings.robots
+        world = simulation.world
         time_s = float(world.steps[episode]) * self._settings.time_step
         for row in range(episode * robots, (episode + 1) * robots):
             localizer = self._perception.localizers[row]
             if localizer is None or world.flags[row] & ENDED:
                 continue
-            ranges_without_mates(world.table, row, robots, self._beams)
-            world.believed[row] = localizer.localize(
-                Sensing(time_s, world.odometry[row].copy(), self._beams.copy())
+            ranges_without_mates(simulation.table, row, robots, self._beams)
+            simulation.beliefs.believed[row] = localizer.localize(
+                Sensing(time_s, simulation.odometry[row].copy(), self._beams.copy())
             )
             correction = localizer.take_correction()
             if correction is not None:
-                world.render_anew(row, correction.poses, correction.ranges)
+                simulation.render_anew(row, correction.poses, correction.ranges)
                 self._perception.forget_again(row)
 
     def _exchange(self, episode: int) -> None:
@@ -109,7 +110,7 @@ class Software:
             return
         rows = slice(episode * settings.robots, (episode + 1) * settings.robots)
         age = int(world.steps[episode]) - exchange.heard_at
-        world.contact[rows] = (exchange.heard_at != NEVER) & (
+        self._perception.beliefs.contact[rows] = (exchange.heard_at != NEVER) & (
             age * settings.time_step <= CONTACT_S + settings.radio.latency_s
         )
-        world.heard[rows] = exchange.heard.reshape(settings.robots, -1)
+        self._perception.beliefs.heard[rows] = exchange.heard.reshape(settings.robots, -1)

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from lidarium.envs.radio.messages import Status
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.faults import DEAD_RADIO, has_fault
-from lidarium.envs.simulation.kinematic.arrays import ENDED
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
-from lidarium.envs.simulation.radio import RADIO_STREAM, links, links_to
+from lidarium.envs.simulation.disturbances.faults import DEAD_RADIO, has_fault
+from lidarium.envs.simulation.disturbances.radio import RADIO_STREAM, links, links_to
+from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 BLOCK = 64
@@ -107,7 +107,7 @@ class Exchange:
 
     Parameters
     ----------
-    world : KinematicWorld
+    simulation : Simulation
         Whose robots talk.
     settings : ExplorationSettings
         The team and its radio.
@@ -146,8 +146,9 @@ class Exchange:
         others.
     """
 
-    def __init__(self, world: KinematicWorld, settings: ExplorationSettings, episode: int = 0) -> None:
-        self._world, self._settings, self._episode = world, settings, episode
+    def __init__(self, simulation: Simulation, settings: ExplorationSettings, episode: int = 0) -> None:
+        self._world, self._beliefs = simulation.world, simulation.beliefs
+        self._settings, self._episode = settings, episode
         robots = settings.robots
         self._first = episode * robots
         self._period = max(round(settings.radio.period_s / settings.time_step), 1)
@@ -164,7 +165,7 @@ class Exchange:
         """
         robots, maps = (
             self._settings.robots,
-            self._world.log_odds[self._first : self._first + self._settings.robots],
+            self._beliefs.log_odds[self._first : self._first + self._settings.robots],
         )
         self._generator = np.random.default_rng([seed, RADIO_STREAM])
         self._station_generator = np.random.default_rng([seed, RADIO_STREAM, STATION_STREAM])
@@ -192,7 +193,7 @@ class Exchange:
         return window
 
     def _forget_changes(self, robot: int) -> None:
-        rows, columns = self._world.log_odds[self._first + robot].shape
+        rows, columns = self._beliefs.log_odds[self._first + robot].shape
         self.windows[robot] = (rows, 0, columns, 0)
 
     def step(self) -> None:
@@ -270,7 +271,7 @@ class Exchange:
     def _tell_poses(self, step: int) -> None:
         for sender in np.flatnonzero(self.links.any(axis=1)).tolist():
             row = self._first + sender
-            pose, has_ended = self._world.believed[row].copy(), bool(self._world.flags[row] & ENDED)
+            pose, has_ended = self._beliefs.believed[row].copy(), bool(self._world.flags[row] & ENDED)
             # A pose is sent to all at once.
             self.bytes_sent[sender] += POSE_BYTES
             for receiver in np.flatnonzero(self.links[sender]).tolist():
@@ -350,7 +351,7 @@ class Exchange:
         """Return what a robot holds of another's map, blank at first."""
         if self.copies[receiver][source].size == 0:
             self.copies[receiver][source] = np.zeros(
-                self._world.log_odds[self._first + source].shape, np.int8
+                self._beliefs.log_odds[self._first + source].shape, np.int8
             )
         return self.copies[receiver][source]
 

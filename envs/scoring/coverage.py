@@ -1,6 +1,6 @@
-"""What counts as explored, and what a robot earns for it.
+"""What counts as explored.
 
-The scorer keeps a bit per robot and cell of the floor, at the resolution of the beliefs: the cells seen by
+The score keeps a bit per robot and cell of the floor, at the resolution of the beliefs: the cells seen by
 true beams from true poses, before noise. Of these only the cells of F count: those that the disc of the
 smallest robot sweeps over its configuration space, connected to the starts.
 """
@@ -152,28 +152,3 @@ def share_news(owns: Array, team: Array, news: Array, first: int, robots: int, g
                 total += count_bits(value)
                 team[row, word] |= value
     return total
-
-
-@kernel(borrowing=True)
-def add_rewards(
-    gains: Array, contacts: Array, travelled: Array, weights: Array, travelled_before: Array, rewards: Array
-) -> None:
-    """Add each robot's reward of a step: its share of the new cells less the prices of time, contact and energy.
-
-    Parameters
-    ----------
-    gains, contacts, travelled : (robots,) arrays
-        Cells credited in the step, whether the body touched anything, and length of the path [m].
-    weights : (4,) float64
-        What a new cell earns, and what a step, a contact and a metre cost.
-    travelled_before : (robots,) float64
-        Length of the path at the last reward [m]; updated.
-    rewards : (robots,) float64
-        Added to.
-    """
-    for robot in range(gains.shape[0]):
-        driven = travelled[robot] - travelled_before[robot]
-        travelled_before[robot] = travelled[robot]
-        rewards[robot] += (
-            weights[0] * gains[robot] - weights[1] - weights[2] * contacts[robot] - weights[3] * driven
-        )

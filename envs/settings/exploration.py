@@ -15,7 +15,7 @@ from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS, Robot
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.localization.registry import LOCALIZERS
-from lidarium.registry import REGISTRIES, unknown
+from lidarium.registry import REGISTRIES, registry, unknown
 
 MAX_ROBOTS = 64
 MAX_MAP_CELLS = 4096
@@ -33,8 +33,6 @@ TRUE_POSE = "truth"
 
 KERNEL_LOCALIZATIONS = (TRUE_POSE, "odometry")
 """Who can say where a robot is within the kernels of a step: the truth, or the wheels alone."""
-
-BACKENDS = ("kinematic",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,8 +152,8 @@ class ExplorationSettings:
             raise ValueError(
                 f"localization is {self.localization!r}; want one of {', '.join(localizations())}"
             )
-        if self.backend not in BACKENDS:
-            raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(BACKENDS)}")
+        if self.backend != "kinematic" and self.backend not in registry("backend"):
+            raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(registry('backend'))}")
         if not (math.isfinite(self.time_step) and self.time_step > 0.0):
             raise ValueError(f"time_step is {self.time_step} s; want more than 0")
         if self.horizon_s is not None and not 0.0 < self.horizon_s < math.inf:

@@ -1,1 +1,1 @@
-"""Bodies, lasers and noise, over arrays of episodes and robots."""
+"""The simulation of a team: a world of bodies with sensors, beliefs of robots, the score."""

@@ -1,43 +1,112 @@
-"""What a backend of the simulation is: it moves bodies and senses, for arrays over (episodes, robots).
+"""What a world is: it moves the bodies of robots and senses for them.
 
-Perception is not its business: it hands out what the sensors say, and the truth for the scorer.
+Maps are not its business, nor is the score: it has bodies, sensors, and the truth. Row = episode * robots + robot
+in all arrays over rows, which keep their place in memory for the life of a world.
 """
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
-@dataclass(frozen=True, slots=True)
-class Sensed:
-    """What one step brings, for ``rows`` = episodes x robots, row = episode * robots + robot.
+
+class World(Protocol):
+    """Bodies and sensors of all episodes.
 
     Attributes
     ----------
-    ranges : (rows, beams) float32
-        Ranges [m]; inf for no return, nan for an invalid beam.
-    odometry : (rows, 2) float64
-        Speed and turn rate as the wheels tell [m/s, rad/s].
-    bumper : (rows, 3) int8
-        Left, centre, right; 1 where pressed.
-    contacts : (rows,) uint8
-        Whether the body touched anything.
-    true_pose : (rows, 3) float64
-        x, y, theta in the floor's frame [m, rad].
+    robots, episodes : int
+        Size of a team, and number of episodes.
+    bodies : (robots, 8) float64
+        ``Robot.numbers`` of each robot of a team.
+    floors : list of FloorTables or None
+        The floor of each episode.
+    seeds, steps : (episodes,) uint64, (episodes,) int64
+        Where noise comes from, and the step that comes next; -1 before the scan at the start.
+    starts, poses, velocities : (rows, 3), (rows, 3), (rows, 2) float64
+        True poses at the start and now [m, rad], true speeds and turn rates [m/s, rad/s].
+    moves, flags, failed : (rows,) uint8, (rows,) int64, (rows,) uint8
+        Whether a robot drives; its flags (``kernels.arrays``); whether it is dead.
+    contacts, travelled, collisions : (rows,) uint8, float64, int64
+        Whether a body touched anything in the last step, length of its path [m], how often it came into contact.
+    faults : (rows, numbers) float64
+        Faults of each robot (``disturbances.faults``).
+    true_ranges : (rows, beams) float32
+        The last scans without noise [m]; inf for no return, nan for an invalid beam.
+    sensors : mapping of str to array over rows
+        What the sensors measured in the last step, by name: ``scan`` (rows, beams) float32 [m], ``odometry``
+        (rows, 3) float64 [m, rad], ``velocity`` (rows, 2) float64 [m/s, rad/s], ``bumper`` (rows, 3) int8.
     """
 
-    ranges: NDArray[np.float32]
-    odometry: NDArray[np.float64]
-    bumper: NDArray[np.int8]
+    robots: int
+    episodes: int
+    bodies: NDArray[np.float64]
+    floors: list[FloorTables | None]
+    seeds: NDArray[np.uint64]
+    steps: NDArray[np.int64]
+    starts: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    moves: NDArray[np.uint8]
+    flags: NDArray[np.int64]
+    failed: NDArray[np.uint8]
     contacts: NDArray[np.uint8]
-    true_pose: NDArray[np.float64]
+    travelled: NDArray[np.float64]
+    collisions: NDArray[np.int64]
+    faults: NDArray[np.float64]
+    true_ranges: NDArray[np.float32]
 
+    @property
+    def sensors(self) -> Mapping[str, NDArray[Any]]:
+        """What the sensors measured in the last step, by name."""
+        ...
 
-class Backend(Protocol):
-    """A world that moves robots and senses for them."""
+    def place(
+        self,
+        episode: int,
+        floor: FloorTables,
+        starts: NDArray[np.float64],
+        free: NDArray[np.bool_],
+        seed: int,
+    ) -> None:
+        """Start an episode with robots at rest.
 
-    def move_and_sense(self, commands: NDArray[np.float64], step: int) -> Sensed:
-        """Drive all robots for one time step by ``commands`` (rows, 2) [m/s, rad/s] and take their scans."""
+        Parameters
+        ----------
+        episode : int
+            Which.
+        floor : FloorTables
+            The floor.
+        starts : (robots, 3) float64
+            x, y, theta of each robot, headings in (-pi, pi] [m, rad].
+        free : (rows, columns) bool
+            Cells of the floor's raster that robots can reach.
+        seed : int
+            Where all draws come from.
+        """
+        ...
+
+    def move_and_sense(
+        self,
+        commands: NDArray[np.float64],
+        *,
+        moves_bodies: bool = True,
+        runs: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Drive the robots for one time step, then take their scans.
+
+        Robots that have ended stand and sense nothing. ``steps`` is left alone: the simulation counts.
+
+        Parameters
+        ----------
+        commands : (rows, 2) float64
+            Wanted speed and turn rate [m/s, rad/s].
+        moves_bodies : bool
+            False for the first scan of an episode, taken where the robots stand.
+        runs : (episodes,) bool or None
+            Which episodes take the step; all where None.
+        """
         ...

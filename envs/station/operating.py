@@ -185,7 +185,7 @@ class Operating:
         """Pause the robots that have touched something or are blocked, where they do so by themselves."""
         if not self._settings.pauses_when_blocked:
             return
-        pressed = np.asarray(self._perception.world.bumpers.any(axis=1))
+        pressed = np.asarray(self._perception.simulation.bumpers.any(axis=1))
         is_touching, self._pressed = pressed & ~self._pressed & (self._retreating == 0), pressed
         is_blocked = np.zeros_like(pressed) if self.driver is None else self.driver.drives.states == BLOCKED
         for row in np.flatnonzero(is_touching | is_blocked).tolist():

@@ -27,7 +27,7 @@ from lidarium.envs.drawing.frame_parts import (
     view_around,
     with_header,
 )
-from lidarium.envs.scoring.scorer import THRESHOLDS
+from lidarium.envs.outcome.scorer import THRESHOLDS
 from lidarium.evaluation.drawing.picture_parts import (
     INK,
     SOLID,

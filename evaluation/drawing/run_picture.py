@@ -70,7 +70,7 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
     _draw_legend(figure, *_draw_frontiers(floor_axes, episode), entries)
     draw_curve(curve_axes, scorer.curve, scorer.times, scorer.time)
     _list_robots(team_axes, episode)
-    area = float(env.world.counted[0]) * env.settings.occupancy.resolution**2
+    area = float(env.score.counted[0]) * env.settings.occupancy.resolution**2
     robots = "1 robot" if env.settings.robots == 1 else f"{env.settings.robots} robots"
     how = ", interrupted" if episode.is_interrupted else ""
     title = f"{env.floor.name}: {100 * scorer.coverage:.1f} % of {area:.0f} m² explored in {scorer.time:.1f} s{how}"
@@ -132,7 +132,7 @@ def frontiers_left(episode: Episode) -> tuple[NDArray[np.float64], NDArray[np.fl
         for points, group in ((cells, left), (ignored, given_up)):
             centres = centres_of(
                 points,
-                (float(env.world.origins[row, 0]), float(env.world.origins[row, 1])),
+                (float(env.beliefs.origins[row, 0]), float(env.beliefs.origins[row, 1])),
                 navigation.resolution,
             )
             group.append(centres if env.settings.known_starts else _moved(centres, env.world.starts[row]))
@@ -154,7 +154,7 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
     env = episode.env
     log_odds, origin = team_log_odds(env)
     solid = occupied_in_truth(env)
-    counted = unpack_bits(env.world.counted_masks[0], solid.shape[1])
+    counted = unpack_bits(env.score.counted_masks[0], solid.shape[1])
     rows, columns = np.flatnonzero(solid.any(axis=1))[-1] + 1, np.flatnonzero(solid.any(axis=0))[-1] + 1
     levels = without_specks(three_levels(log_odds))
     solid, counted, levels = solid[:rows, :columns], counted[:rows, :columns], levels[:rows, :columns]
@@ -231,11 +231,11 @@ def _draw_legend(figure: Figure, has_left: bool, has_given_up: bool, more: list[
 def _list_robots(axes: Axes, episode: Episode) -> None:
     """List each robot's ending, way and share of F, and below what was given up."""
     env, world = episode.env, episode.env.world
-    counted = max(int(world.counted[0]), 1)
+    counted = max(int(env.score.counted[0]), 1)
     endings = [env.scorer.ended_because.get(agent, "still at work") for agent in env.possible_agents]
     robots = [
         (reason, f"{way:.1f} m", f"{100.0 * seen / counted:.0f} %")
-        for reason, way, seen in zip(endings, world.travelled, world.seen, strict=True)
+        for reason, way, seen in zip(endings, world.travelled, env.score.seen, strict=True)
     ]
     reasons = Counter(entry.reason.replace("_", " ") for entry in episode.given_up)
     given_up = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common()) or "nothing"

@@ -112,7 +112,7 @@ class History(Watcher):
         self._counts: list[NDArray[np.int64]] = []
         self._lengths: list[NDArray[np.float64]] = []
         self._footprint_counts: list[tuple[int, int]] = []
-        self._believed: list[NDArray[np.float64]] = [env.world.believed.copy()]
+        self._believed: list[NDArray[np.float64]] = [env.beliefs.believed.copy()]
         self._note_thresholds(env)
         self._sample(env, is_decision=True)
 
@@ -121,7 +121,7 @@ class History(Watcher):
         self._tally.note_step(env)
         scorer = env.scorer
         if len(scorer.track) != len(self._believed):
-            self._believed.append(env.world.believed.copy())
+            self._believed.append(env.beliefs.believed.copy())
         if len(scorer.times) != self._thresholds:
             self._note_thresholds(env)
         self._left -= 1
@@ -160,7 +160,7 @@ class History(Watcher):
                 scorer.coverage,
                 decisions,
                 world.travelled.copy(),
-                overlap(world.masks),
+                overlap(env.score.masks),
                 known_shares,
             )
         )

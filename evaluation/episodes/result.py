@@ -10,8 +10,8 @@ import numpy as np
 import lidarium
 from lidarium.agents.report import GivenUp
 from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.outcome.scorer import THRESHOLDS
 from lidarium.envs.scoring.coverage import unpack_bits
-from lidarium.envs.scoring.scorer import THRESHOLDS
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.realism import REALISM
@@ -72,7 +72,7 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
         **_at_thresholds(history),
         "path_m": [round(float(length), 9) for length in world.travelled],
         "path_balance": round(metrics.path_balance(world.travelled), 9),
-        "overlap": round(metrics.overlap(world.masks), 9),
+        "overlap": round(metrics.overlap(env.score.masks), 9),
         **_overlaps(history),
         "collisions": collisions,
         "collisions_per_km": _rounded(metrics.collisions_per_km(collisions, world.travelled), 6),
@@ -195,7 +195,7 @@ def map_figures(env: ExplorationEnv) -> dict[str, Any]:
     known, believed, believed_free = (
         np.asarray(cells) for cells in ((maps != 0).any(axis=0), team > 0, team < 0)
     )
-    sensed = unpack_bits(env.world.team_masks[0], maps.shape[2])
+    sensed = unpack_bits(env.score.team_masks[0], maps.shape[2])
     own_least, own_mean = metrics.own_coverage(free_as_held(env, maps), truth.counted)
     return {
         "c_known_final": round(metrics.known_coverage(known, truth.knowable), 9),
@@ -221,7 +221,7 @@ def others_coverage(env: ExplorationEnv) -> float | None:
         return None
     seen = [
         unpack_bits(mask, left.shape[1])
-        for mask, failed in zip(env.world.masks, env.world.failed, strict=True)
+        for mask, failed in zip(env.score.masks, env.world.failed, strict=True)
         if not failed
     ]
     return metrics.free_coverage(np.any(seen, axis=0), left)
@@ -238,13 +238,15 @@ def realism_of(settings: ExplorationSettings) -> str:
 def settings_sha256(settings: ExplorationSettings) -> str:
     """Return a hash of all settings that can change a result.
 
-    It is of their JSON with sorted keys, without ``threads``, and without ``localizer`` where it is None, which
-    older records do not have.
+    It is of their JSON with sorted keys, without ``threads``, and without what older records do not have where
+    it is not used.
     """
     values = asdict(settings)
     del values["threads"]
     if values["localizer"] is None:
         del values["localizer"]
+    if not values["reward"]["more"]:
+        del values["reward"]["more"]
     return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 

@@ -12,7 +12,7 @@ _FIGURES: dict[str, Callable[[ExplorationEnv, History], float]] = {
     "c_known": lambda _, history: float(history.curves.c_known[-1]),
     "c_valid": lambda _, history: float(history.curves.c_valid[-1]),
     "c_own_min": lambda _, history: float(history.curves.c_own[-1].min()),
-    "remaining_cells": lambda env, _: float(env.world.counted[0] - env.world.team_seen[0]),
+    "remaining_cells": lambda env, _: float(env.score.counted[0] - env.score.team_seen[0]),
 }
 """What a rule may ask for, as docs/reference/metrics.md defines it.
 

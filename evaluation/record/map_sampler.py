@@ -40,9 +40,12 @@ class MapSampler:
         tables = world.floors[0]
         assert tables is not None
         self.origin: tuple[float, float] = tables.laser.origin
-        self.shape: tuple[int, int] = (world.counted_masks[0].shape[0], world.counted_masks[0].shape[1])
-        self._world, self._time_step, self._resolution = (
-            world,
+        self.shape: tuple[int, int] = (
+            env.score.counted_masks[0].shape[0],
+            env.score.counted_masks[0].shape[1],
+        )
+        self._env, self._time_step, self._resolution = (
+            env,
             settings.time_step,
             settings.occupancy.resolution,
         )
@@ -53,17 +56,17 @@ class MapSampler:
         self._reach = (
             settings.lidar.range_max + 0.5 * settings.robot.max_speed * period_s + 4 * self._resolution
         )
-        self._last = world.believed[:, :2].copy()
+        self._last = env.beliefs.believed[:, :2].copy()
         self._is_laid = not settings.known_starts
-        self._maps = world.belief_rows.copy()
+        self._maps = env.beliefs.belief_rows.copy()
         if settings.known_starts:
             for row in range(settings.robots):
                 first_row, first_column = cells_beyond(env, row)
                 self._maps[row, 0] += first_row * self._maps[row, 2] + first_column
-        self._renderings = world.renderings.copy()
+        self._renderings = env.beliefs.renderings.copy()
         self._lays = _lays_of(env, self.origin)
         self._before = (
-            [np.zeros(log_odds.shape, np.int8) for log_odds in world.log_odds] if self._is_laid else []
+            [np.zeros(log_odds.shape, np.int8) for log_odds in env.beliefs.log_odds] if self._is_laid else []
         )
         self._before_at = np.array([log_odds.ctypes.data for log_odds in self._before], np.int64)
         self._steps: list[int] = []
@@ -72,27 +75,29 @@ class MapSampler:
 
     def sample(self) -> None:
         """Take a sample; once in a step."""
-        world = self._world
+        world = self._env.world
         step = int(world.steps[0])
         if self._steps and step <= self._steps[-1]:
             return
         planes = (self._known, self._occupied, self._buffer)
-        is_new = not np.array_equal(self._renderings, world.renderings)
+        is_new = not np.array_equal(self._renderings, self._env.beliefs.renderings)
         reach = FAR if is_new else self._reach
-        self._renderings[:] = world.renderings
+        self._renderings[:] = self._env.beliefs.renderings
         if self._is_laid:
             count = note_laid_changes(
-                world.belief_rows,
+                self._env.beliefs.belief_rows,
                 self._before_at,
                 self._lays,
-                world.believed,
+                self._env.beliefs.believed,
                 self._last,
                 reach,
                 self._resolution,
                 *planes,
             )
         else:
-            count = note_changes(self._maps, world.believed, self._last, reach, self._frame, *planes)
+            count = note_changes(
+                self._maps, self._env.beliefs.believed, self._last, reach, self._frame, *planes
+            )
         self._steps.append(step)
         self._changes.append(self._buffer[:count].copy())
 
@@ -114,6 +119,6 @@ def _lays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.flo
     return np.array(
         [
             (*origin, x, y, math.cos(theta), math.sin(theta), *own_origin)
-            for (x, y, theta), own_origin in zip(world.starts, world.origins, strict=True)
+            for (x, y, theta), own_origin in zip(world.starts, env.beliefs.origins, strict=True)
         ]
     )

@@ -166,7 +166,7 @@ class Recorder(Watcher):
             "noise_seed": env.seed,
             "goal": None if env.goal is None else list(env.goal),
             "steps": len(commands),
-            "counted_cells": int(world.counted[0]),
+            "counted_cells": int(env.score.counted[0]),
             "map_origin": list(self._maps.origin),
             "map_resolution": settings.occupancy.resolution,
             "map_shape": list(self._maps.shape),

@@ -32,14 +32,15 @@ def state_sha256(env: ExplorationEnv) -> str:
     collisions and counts of seen cells; the scorer's masks and the robots' maps; and why each robot ended. It
     does not cover what is made of these: observations, plans, clearance.
     """
-    world = env.world
+    simulation = env.simulation
+    owners = (simulation, simulation.world, simulation.beliefs, simulation.score)
     digest = hashlib.sha256()
     for name in _ARRAYS:
-        _add(digest, name, getattr(world, name))
+        _add(digest, name, next(getattr(owner, name) for owner in owners if hasattr(owner, name)))
     for name in ("masks", "team_masks", "counted_masks"):
-        for mask in getattr(world, name):
+        for mask in getattr(env.score, name):
             _add(digest, name, mask)
-    for log_odds in world.log_odds:
+    for log_odds in env.beliefs.log_odds:
         _add_map(digest, log_odds)
     digest.update(json.dumps(env.scorer.ended_because, sort_keys=True).encode())
     return digest.hexdigest()

@@ -157,7 +157,7 @@ def drawn_starts(
     """
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.floors.starts import draw_starts
-    from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+    from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 
     loaded = load_floor(floor, image_resolution)
     if not len(loaded.starts):

@@ -18,16 +18,16 @@ def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
     tables, resolution = world.floors[0], settings.occupancy.resolution
     assert tables is not None
     if settings.known_starts:
-        return np.stack([on_floor(env, row, log_odds) for row, log_odds in enumerate(world.log_odds)])
+        return np.stack([on_floor(env, row, log_odds) for row, log_odds in enumerate(env.beliefs.log_odds)])
     origin = tables.laser.origin
-    rows, words = world.counted_masks[0].shape
+    rows, words = env.score.counted_masks[0].shape
     laid = np.zeros((settings.robots, rows, words * 64), np.int8)
     y, x = np.meshgrid(*((np.arange(size) + 0.5) * resolution for size in laid.shape[1:]), indexing="ij")
-    for row, log_odds in enumerate(world.log_odds):
+    for row, log_odds in enumerate(env.beliefs.log_odds):
         start_x, start_y, theta = world.starts[row]
         east, north = x + origin[0] - start_x, y + origin[1] - start_y
-        own_x = math.cos(theta) * east + math.sin(theta) * north - world.origins[row, 0]
-        own_y = math.cos(theta) * north - math.sin(theta) * east - world.origins[row, 1]
+        own_x = math.cos(theta) * east + math.sin(theta) * north - env.beliefs.origins[row, 0]
+        own_y = math.cos(theta) * north - math.sin(theta) * east - env.beliefs.origins[row, 1]
         columns, lines = (np.floor(own / resolution).astype(np.int64) for own in (own_x, own_y))
         is_inside = (
             (lines >= 0) & (lines < log_odds.shape[0]) & (columns >= 0) & (columns < log_odds.shape[1])
@@ -40,14 +40,14 @@ def cells_beyond(env: ExplorationEnv, row: int) -> tuple[int, int]:
     """Return by how many rows and columns the map of a robot that knows its start begins before the lattice of the scorer's masks."""
     tables, resolution = env.world.floors[0], env.settings.occupancy.resolution
     assert tables is not None
-    x, y = (corner - own for corner, own in zip(tables.laser.origin, env.world.origins[row], strict=True))
+    x, y = (corner - own for corner, own in zip(tables.laser.origin, env.beliefs.origins[row], strict=True))
     return round(float(y) / resolution), round(float(x) / resolution)
 
 
 def on_floor(env: ExplorationEnv, row: int, log_odds: NDArray[np.int8]) -> NDArray[np.int8]:
     """Return the part of the map of a robot that knows its start that lies on the lattice of the scorer's masks, (rows, columns)."""
     first_row, first_column = cells_beyond(env, row)
-    rows, words = env.world.counted_masks[0].shape
+    rows, words = env.score.counted_masks[0].shape
     return log_odds[first_row : first_row + rows, first_column : first_column + words * 64]
 
 

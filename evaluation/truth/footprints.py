@@ -4,8 +4,8 @@ import numpy as np
 
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scoring.coverage import count_bits
-from lidarium.envs.simulation.kinematic.arrays import ENDED, WorldArrays, world_at
-from lidarium.envs.simulation.kinematic.stages import MAP_RESOLUTION, RANGE_MAX, footprint
+from lidarium.envs.simulation.kernels.arrays import ENDED, WorldArrays, world_at
+from lidarium.envs.simulation.kernels.stages import MAP_RESOLUTION, RANGE_MAX, footprint
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at
@@ -96,5 +96,5 @@ class Footprints:
 
         (0, 0) where no two footprints can meet.
         """
-        once, twice = _count_footprints(env.world.table, 0, self._windows)
+        once, twice = _count_footprints(env.simulation.table, 0, self._windows)
         return int(once), int(twice)

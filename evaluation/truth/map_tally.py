@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scoring.coverage import count_bits, pack_bits
-from lidarium.envs.simulation.kinematic.arrays import OWN_FRAME, TRUE_POSE, WorldArrays, world_at
-from lidarium.envs.simulation.kinematic.stages import MAP_RESOLUTION, RANGE_MAX
+from lidarium.envs.simulation.kernels.arrays import OWN_FRAME, TRUE_POSE, WorldArrays, world_at
+from lidarium.envs.simulation.kernels.stages import MAP_RESOLUTION, RANGE_MAX
 from lidarium.evaluation.truth.beliefs import held_maps, shares_one_map
 from lidarium.evaluation.truth.true_map import Truth
 from lidarium.mapping.grids.cell_blocks import negative_cells, positive_cells
@@ -71,7 +71,7 @@ def _free_of_sum(
         cells ^= bit
         column, total = word * 64 + count_bits(bit - np.uint64(1)), 0
         for row in range(first, first + robots):
-            belief = world.maps[row]
+            belief = world.belief_rows[row]
             first_row, first_column = _cells_beyond(world, row, first // robots)
             total += int8_grid_at(belief[0], belief[1], belief[2])[line + first_row, column + first_column]
         if total < 0:
@@ -140,9 +140,9 @@ def _take_in_aligned(
     box: tuple[int, int, int, int],
 ) -> None:
     """Bring up to date what comes of a map on the floor's lattice, in a box of rows and words."""
-    own, columns = bits[robot], world.maps[first + robot, 2]
+    own, columns = bits[robot], world.belief_rows[first + robot, 2]
     first_row, first_column = _cells_beyond(world, first + robot, first // robots)
-    address = world.maps[first + robot, 0] + first_row * columns + first_column
+    address = world.belief_rows[first + robot, 0] + first_row * columns + first_column
     for i in range(box[0], box[1]):
         for j in range(box[2], box[3]):
             if truth[KNOWABLE, i, j] == np.uint64(0):
@@ -181,7 +181,7 @@ def _take_in_turned(
     """
     row = first + robot
     belief, start, origin, frame = (
-        world.maps[row],
+        world.belief_rows[row],
         world.starts[row],
         world.origins[row],
         world.frames[first // robots],
@@ -277,8 +277,8 @@ def _take_in(
         ways[robot] = world.travelled[row]
         for axis in range(3):
             poses[robot, axis] = world.poses[row, axis]
-        changes[robot, 0], changes[robot, 1] = world.maps[row, 1], 0
-        changes[robot, 2], changes[robot, 3] = world.maps[row, 2], 0
+        changes[robot, 0], changes[robot, 1] = world.belief_rows[row, 1], 0
+        changes[robot, 2], changes[robot, 3] = world.belief_rows[row, 2], 0
 
 
 @kernel
@@ -328,19 +328,19 @@ class MapTally:
         )
         self.counts = np.zeros((robots + 1, 3), np.int64)
         self._poses, self._ways = world.poses.copy(), world.travelled.copy()
-        self._changes = world.windows.copy()
-        map_rows, map_columns = (0, 0) if env.settings.known_starts else world.log_odds[0].shape
+        self._changes = env.beliefs.windows.copy()
+        map_rows, map_columns = (0, 0) if env.settings.known_starts else env.beliefs.log_odds[0].shape
         self._signs = np.zeros((robots, map_rows, map_columns // WORD, 2), np.uint64)
         self.shares = shares_one_map(env)
 
     def note_step(self, env: ExplorationEnv) -> None:
         """Note where maps have changed; wanted after every step."""
-        _note_changes(env.world.windows, self._changes)
+        _note_changes(env.beliefs.windows, self._changes)
 
     def take_in(self, env: ExplorationEnv) -> None:
         """Bring the counts up to date."""
         _take_in(
-            env.world.table,
+            env.simulation.table,
             0,
             self.shares,
             self._truth,

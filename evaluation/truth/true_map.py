@@ -13,7 +13,8 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.scoring.coverage import unpack_bits
-from lidarium.envs.simulation.kinematic.world import counted_cells
+from lidarium.envs.scoring.score import counted_cells
+from lidarium.envs.simulation.disturbances.odometry import RADIUS
 from lidarium.evaluation.metrics import surface
 from lidarium.evaluation.metrics.shares import Mask
 
@@ -45,9 +46,8 @@ class Truth:
 
 def truth_of(env: ExplorationEnv) -> Truth:
     """Return what is true of the floor of an episode, after its reset."""
-    world = env.world
     occupied = occupied_in_truth(env)
-    counted = unpack_bits(world.counted_masks[0], occupied.shape[1])
+    counted = unpack_bits(env.score.counted_masks[0], occupied.shape[1])
     free = _connected_free(env, occupied)
     return Truth(occupied, counted, free | surface(occupied, free), counted | surface(occupied, counted))
 
@@ -71,11 +71,11 @@ def left_by_failed(env: ExplorationEnv) -> Mask | None:
         )
         solid[near < env.settings.robot.radius - resolution] = 1
     swept = swept_free_space(
-        Raster(solid, body.origin, resolution), world.smallest_radius, world.poses[~failed]
+        Raster(solid, body.origin, resolution), float(world.bodies[:, RADIUS].min()), world.poses[~failed]
     )
     free = swept & (tables.laser.solid == 0)
     left = counted_cells(free, round(env.settings.occupancy.resolution / resolution))
-    counted = unpack_bits(world.counted_masks[0], left.shape[1])
+    counted = unpack_bits(env.score.counted_masks[0], left.shape[1])
     return np.asarray(left & counted)
 
 
@@ -85,7 +85,7 @@ def occupied_in_truth(env: ExplorationEnv) -> NDArray[np.bool_]:
     assert tables is not None
     raster = tables.laser
     multiple = round(env.settings.occupancy.resolution / raster.resolution)
-    rows, words = env.world.counted_masks[0].shape
+    rows, words = env.score.counted_masks[0].shape
     solid = np.zeros((rows * multiple, words * 64 * multiple), np.bool_)
     solid[: raster.solid.shape[0], : raster.solid.shape[1]] = raster.solid
     if multiple == 1:

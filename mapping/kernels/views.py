@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 _numba_arrays: Any = arrayobj
+_numba_types: Any = types
 
 LINE = 64
 """A line of the caches [bytes]."""
@@ -89,7 +90,7 @@ def _forms_of(named: type) -> list[Any]:
 def _arrays_of(typing_context: Any, table: Any, kind: Any) -> Any:  # noqa: ANN401
     """View all arrays of a table as the fields of a class of arrays inside a kernel."""
     forms = _forms_of(kind.instance_class)
-    named = types.NamedTuple(forms, kind.instance_class)
+    named: Any = _numba_types.NamedTuple(forms, kind.instance_class)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         entries = context.make_array(signature.args[0])(context, builder, arguments[0]).data

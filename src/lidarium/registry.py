@@ -17,12 +17,14 @@ REGISTRIES: dict[str, str] = {
     "lidar": "lidarium.envs.settings.lidar:LIDARS",
     "noise": "lidarium.envs.settings.lidar:NOISE",
     "odometry": "lidarium.envs.settings.odometry:ODOMETRY",
-    "radio": "lidarium.envs.settings.radio:RADIOS",
+    "radio": "lidarium.envs.settings.radio:RADIO",
     "battery": "lidarium.envs.settings.battery:BATTERIES",
     "realism": "lidarium.envs.settings.realism:REALISM",
     "localizer": "lidarium.mapping.localization.registry:LOCALIZERS",
     "floor_format": "lidarium.envs.floors.importers:FORMATS",
     "study": "lidarium.benchmarks.studies:STUDIES",
+    "reward_term": "lidarium.envs.outcome.reward_terms:REWARD_TERMS",
+    "backend": "lidarium.envs.simulation.backends:BACKENDS",
 }
 """All registries by kind, and where each is."""
 

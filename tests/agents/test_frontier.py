@@ -84,7 +84,7 @@ def test_unknown_starts_mean_that_each_robot_explores_alone(name):
 def test_with_the_own_map_each_robot_sees_it_all_itself():
     env = lidarium.parallel_env(TWO_ROOMS, robots=2, horizon_s=None, stop_coverage=None, map_cells=32)
     run_episode(lidarium.policy("nearest_frontier_own_map"), env, 1)
-    shares = env.world.seen / env.world.counted[0]
+    shares = env.score.seen / env.score.counted[0]
     assert (shares >= 0.98).all()
     shared = lidarium.parallel_env(TWO_ROOMS, robots=2, horizon_s=None, stop_coverage=None, map_cells=32)
     run_episode(lidarium.policy("nearest_frontier"), shared, 1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.agents import GivenUp, PerRobot, Stop, make_policy, policy_names, register_policy
+from lidarium.agents import GivenUp, PerRobot, Policy, Stop, make_policy, policy_names, register_policy
 from lidarium.envs.radio.messages import Target
 from lidarium.evaluation.episodes.runner import run_episode
 
@@ -53,7 +53,8 @@ def test_the_same_seed_gives_the_same_run(name):
     assert first.env.scorer.ended_because == second.env.scorer.ended_because
     assert first.given_up == second.given_up
     assert all(
-        np.array_equal(a, b) for a, b in zip(first.env.world.log_odds, second.env.world.log_odds, strict=True)
+        np.array_equal(a, b)
+        for a, b in zip(first.env.beliefs.log_odds, second.env.beliefs.log_odds, strict=True)
     )
 
 
@@ -102,11 +103,11 @@ def test_a_name_is_registered_once():
         register_policy("random_walk", object, "another")
 
 
-class Recorder:
+class Recorder(Policy):
     """A policy that notes what it is shown and stays where it is."""
 
     level = "waypoint"
-    shares_map = True
+    given_up = ()
 
     def __init__(self):
         self.calls, self.given_up = [], []

@@ -10,7 +10,7 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.simulation.kinematic.arrays import ENDED
+from lidarium.envs.simulation.kernels.arrays import ENDED
 
 STAY = np.zeros(2, np.float32)
 AHEAD = np.array([1.0, 0.0], np.float32)
@@ -396,7 +396,7 @@ def test_rewards_are_the_settings_weights():
     total = 0.0
     for _ in range(20):
         total += sum(step_all(free, np.array([0.3, 0.4], np.float32))[1].values())
-    area = (free.scorer.coverage - before) * free.world.counted[0] * 0.05**2
+    area = (free.scorer.coverage - before) * free.score.counted[0] * 0.05**2
     assert total == pytest.approx(area - 20 * 2 * 0.01 * 0.1 - 0.01 * free.world.travelled.sum(), abs=1e-9)
 
 

@@ -41,7 +41,10 @@ def driven(steps=15, floor="building:5", **options):
 
 def writer_of(env, offsets=None, goals=None, **options):
     return ObservationWriter(
-        env.world, make_settings(env.settings, **options), env._offsets if offsets is None else offsets, goals
+        env.simulation,
+        make_settings(env.settings, **options),
+        env._offsets if offsets is None else offsets,
+        goals,
     )
 
 
@@ -105,11 +108,11 @@ def pooled(log_odds, scale):
 def test_the_egocentric_map_is_turned_about_the_corner_nearest_to_where_the_robot_believes_to_be():
     env, observations = driven(observe=["egocentric_map"])
     for row, agent in enumerate(env.agents):
-        x, y = (env.world.believed[row, :2] - env.world.origins[row]) / env.settings.occupancy.resolution
+        x, y = (env.beliefs.believed[row, :2] - env.beliefs.origins[row]) / env.settings.occupancy.resolution
         expected = np.zeros((3, 16, 16), np.uint8)
-        pools = [env.world.log_odds[row], *(pooled(env.world.log_odds[row], scale) for scale in (2, 3))]
+        pools = [env.beliefs.log_odds[row], *(pooled(env.beliefs.log_odds[row], scale) for scale in (2, 3))]
         table = np.array([(pool.ctypes.data, *pool.shape) for pool in pools], np.int64)
-        crop_turned(table, x, y, env.world.believed[row, 2], np.array([1, 2, 3]), expected)
+        crop_turned(table, x, y, env.beliefs.believed[row, 2], np.array([1, 2, 3]), expected)
         assert np.array_equal(observations[agent]["egocentric_map"], expected)
         assert np.unique(expected).size > 1
 

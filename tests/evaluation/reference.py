@@ -34,7 +34,7 @@ class Notes(Watcher):
 
     def _note(self, env):
         self.poses.append(env.world.poses.copy())
-        self.ranges.append(env.world.ranges.astype(float))
+        self.ranges.append(env.simulation.ranges.astype(float))
         self.senses.append(env.world.flags & ENDED == 0)
 
 

@@ -67,10 +67,10 @@ class Twins:
                 self._whole.step(self._actions[k])
             between = time.perf_counter()
             for _ in range(_HOLD):
-                self._kernel.world.step(self._commands[k])
+                self._kernel.simulation.step(self._commands[k])
             whole, kernel = whole + between - began, kernel + time.perf_counter() - between
             steps += _HOLD
-        if not np.array_equal(self._whole.world.poses, self._kernel.world.poses):
+        if not np.array_equal(self._whole.simulation.world.poses, self._kernel.simulation.world.poses):
             raise RuntimeError(
                 "the two environments are not in the same state; their times cannot be compared"
             )

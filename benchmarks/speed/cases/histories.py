@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, team_poses
 from lidarium.benchmarks.speed.scenes.teams import LIDAR
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
 
@@ -67,34 +67,42 @@ class Histories:
     def __init__(self, drives: Drives, rows: int, resolution: float, maps: int | None = None) -> None:
         self._drives, self._rows = drives, rows
         robots = drives.robots
-        self.world = world = KinematicWorld(
+        self.simulation = simulation = KinematicSimulation.of_team(
             [ROBOTS["kobuki"]] * robots, LIDAR, OccupancySettings(resolution=resolution), 0.1, rows // robots
         )
-        for episode in range(world.episodes):
-            world.place(
+        for episode in range(simulation.episodes):
+            simulation.place(
                 episode, drives.tables, drives.starts[episode * robots : (episode + 1) * robots], seed=episode
             )
         if maps is not None:
-            world.belief_rows[:] = np.resize(world.belief_rows[:maps], world.belief_rows.shape)
-            world._mask_rows[:] = np.resize(world._mask_rows[:maps], world._mask_rows.shape)
+            simulation.beliefs.belief_rows[:] = np.resize(
+                simulation.beliefs.belief_rows[:maps], simulation.beliefs.belief_rows.shape
+            )
+            simulation.score.mask_rows[:] = np.resize(
+                simulation.score.mask_rows[:maps], simulation.score.mask_rows.shape
+            )
 
     @property
     def working_set(self) -> int:
         """Bytes of the maps and masks that the robots write to."""
-        world = self.world
-        maps = {int(row[0]): int(row[1] * row[2]) for row in world.belief_rows}
-        masks = {int(row[place]): int(row[3] * row[4] * 8) for row in world._mask_rows for place in (0, 1)}
+        simulation = self.simulation
+        maps = {int(row[0]): int(row[1] * row[2]) for row in simulation.beliefs.belief_rows}
+        masks = {
+            int(row[place]): int(row[3] * row[4] * 8)
+            for row in simulation.score.mask_rows
+            for place in (0, 1)
+        }
         return sum(maps.values()) + sum(masks.values())
 
     def run(self) -> float:
         """Run all drives once and return the seconds per agent step."""
-        world, drives, spent = self.world, self._drives, 0.0
+        simulation, drives, spent = self.simulation, self._drives, 0.0
         for first in range(0, len(drives.starts), self._rows):
             chosen = slice(first, first + self._rows)
-            world.poses[:], world.velocities[:] = drives.starts[chosen], 0.0
+            simulation.world.poses[:], simulation.world.velocities[:] = drives.starts[chosen], 0.0
             commands = drives.commands[chosen]
             began = time.perf_counter()
             for _ in range(drives.steps):
-                world.step(commands)
+                simulation.step(commands)
             spent += time.perf_counter() - began
         return spent / (len(drives.starts) * drives.steps)

@@ -30,10 +30,10 @@ def measure(effort: Effort) -> list[Line]:
     team = DrivenTeam(straight_floor(), ROBOTS)
     for _ in range(30):
         team.step()
-    world, floor = team.world, straight_floor()
-    lidar, settings = world.lidar, OccupancySettings(resolution=floor.resolution)
+    simulation, floor = team.simulation, straight_floor()
+    lidar, settings = simulation.lidar, OccupancySettings(resolution=floor.resolution)
     scans: list[tuple[float, float, NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]] = []
-    for pose, ranges in zip(world.poses, world.ranges.astype(np.float64), strict=True):
+    for pose, ranges in zip(simulation.world.poses, simulation.ranges.astype(np.float64), strict=True):
         cosine, sine = np.cos(pose[2]), np.sin(pose[2])
         directions = np.array([[cosine, -sine], [sine, cosine]]) @ lidar.unit_vectors
         lengths = np.minimum(ranges, RANGE_MAX) / floor.resolution
@@ -41,17 +41,19 @@ def measure(effort: Effort) -> list[Line]:
             (pose[0] / floor.resolution, pose[1] / floor.resolution, directions, lengths, np.isfinite(ranges))
         )
     for_polygons, for_rays = itertools.cycle(scans), itertools.cycle(scans)
-    for_grid = itertools.cycle(list(zip(world.poses.copy(), world.ranges.copy(), strict=True)))
+    for_grid = itertools.cycle(
+        list(zip(simulation.world.poses.copy(), simulation.ranges.copy(), strict=True))
+    )
     polygons = PolygonUpdate(floor.solid.shape, settings.increments)
     log_odds = np.zeros(floor.solid.shape, np.int8)
     grid = OccupancyGrid(
         settings, (0.0, 0.0, floor.solid.shape[1] * floor.resolution, floor.solid.shape[0] * floor.resolution)
     )
     update_by_rays(log_odds, *next(for_rays), settings.increments)
-    world.perceive()
+    simulation.perceive()
     seconds = interleaved(
         {
-            "ours": repeated(world.perceive, ROBOTS),
+            "ours": repeated(simulation.perceive, ROBOTS),
             "one by one": repeated(lambda: grid.integrate(*next(for_grid), lidar)),
             "polygons": repeated(lambda: polygons.update(*next(for_polygons))),
             "rays": repeated(lambda: update_by_rays(log_odds, *next(for_rays), settings.increments)),

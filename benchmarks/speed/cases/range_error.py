@@ -18,7 +18,7 @@ from lidarium.benchmarks.speed.harness.timing import Effort
 from lidarium.benchmarks.speed.peers.sphere_tracing import SphereTracer
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, free_poses
 from lidarium.benchmarks.speed.scenes.teams import BEAMS, LIDAR, RANGE_MAX
-from lidarium.envs.simulation.kinematic.ray_casting import cast_scans
+from lidarium.envs.simulation.kernels.ray_casting import cast_scans
 from lidarium.mapping.kernels.compilation import Array
 
 POSES = 12

@@ -14,7 +14,7 @@ from lidarium.benchmarks.speed.peers.f1tenth_scans import F1tenthScanner
 from lidarium.benchmarks.speed.peers.sphere_tracing import SphereTracer
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, free_poses, straight_floor, turned_floor
 from lidarium.benchmarks.speed.scenes.teams import BEAMS, LIDAR, RANGE_MAX
-from lidarium.envs.simulation.kinematic.ray_casting import cast_scans
+from lidarium.envs.simulation.kernels.ray_casting import cast_scans
 
 POSES = 32
 F1TENTH_RAYS = 10e6

@@ -86,20 +86,29 @@ class Deciders:
 
         Seconds per robot and step of both.
         """
-        world, bare = self._deciding.batch.world, self._bare.batch.world
+        simulation, bare = self._deciding.batch.simulation, self._bare.batch.simulation
         deciding, stepping, agent_steps = 0.0, 0.0, 0
         while agent_steps == 0 or deciding + stepping < 2.0 * seconds:
             actions = self._actions()
-            for name in ("poses", "velocities", "believed"):
-                getattr(bare, name)[:] = getattr(world, name)
-            poses, steps, travelled = world.poses.copy(), world.steps.copy(), world.travelled.copy()
+            bare.world.poses[:], bare.world.velocities[:] = (
+                simulation.world.poses,
+                simulation.world.velocities,
+            )
+            bare.beliefs.believed[:] = simulation.beliefs.believed
+            poses, steps, travelled = (
+                simulation.world.poses.copy(),
+                simulation.world.steps.copy(),
+                simulation.world.travelled.copy(),
+            )
             began = time.perf_counter()
             *_, infos = self._deciding.step(actions)
             deciding += time.perf_counter() - began
-            taken = world.steps - steps
+            taken = simulation.world.steps - steps
             duration = np.repeat(taken, ROBOTS) * self._time_step
-            turned = np.mod(world.poses[:, 2] - poses[:, 2] + math.pi, 2.0 * math.pi) - math.pi
-            commands = np.column_stack([(world.travelled - travelled) / duration, turned / duration])
+            turned = np.mod(simulation.world.poses[:, 2] - poses[:, 2] + math.pi, 2.0 * math.pi) - math.pi
+            commands = np.column_stack(
+                [(simulation.world.travelled - travelled) / duration, turned / duration]
+            )
             runs = [taken > step for step in range(int(taken.max()))]
             began = time.perf_counter()
             for running in runs:
@@ -111,8 +120,8 @@ class Deciders:
 
     def _actions(self) -> NDArray[np.float32]:
         """Give robots without a waypoint another one, and return all as shares of half the observed map's side."""
-        world = self._deciding.batch.world
-        places = world.believed[:, :2]
+        simulation = self._deciding.batch.simulation
+        places = simulation.beliefs.believed[:, :2]
         self._ages += 1
         for row in np.flatnonzero(self._is_idle | (self._ages > _LONGEST)):
             self._waypoints[row], self._ages[row] = self._drawn(int(row)), 0
@@ -124,20 +133,22 @@ class Deciders:
 
         Where it stands, if none of many draws is.
         """
-        world = self._deciding.batch.world
+        simulation = self._deciding.batch.simulation
         angles, distances = (
             self._generator.uniform(-math.pi, math.pi, _TRIALS),
             self._generator.uniform(NEAREST, FARTHEST, _TRIALS),
         )
-        places = world.believed[row, :2] + distances[:, None] * np.column_stack(
+        places = simulation.beliefs.believed[row, :2] + distances[:, None] * np.column_stack(
             [np.cos(angles), np.sin(angles)]
         )
-        cells = np.floor((places - world.origins[row]) / world.occupancy.resolution).astype(np.int64)
-        log_odds = world.log_odds[row]
+        cells = np.floor((places - simulation.beliefs.origins[row]) / simulation.occupancy.resolution).astype(
+            np.int64
+        )
+        log_odds = simulation.beliefs.log_odds[row]
         inside = (cells >= 0).all(axis=1) & (cells < log_odds.shape[::-1]).all(axis=1)
         levels = three_levels(log_odds[cells[inside, 1], cells[inside, 0]])
         free = places[inside][levels == _FREE]
-        return np.asarray(free[0] if len(free) else world.believed[row, :2])
+        return np.asarray(free[0] if len(free) else simulation.beliefs.believed[row, :2])
 
 
 def measure(effort: Effort) -> list[Line]:

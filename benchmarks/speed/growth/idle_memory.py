@@ -15,7 +15,7 @@ from lidarium.benchmarks.speed.harness.batches import OBSERVED, ROBOTS
 from lidarium.benchmarks.speed.scenes.floors import straight_floor
 from lidarium.benchmarks.speed.scenes.teams import LIDAR
 from lidarium.envs.batch.vector_env import ExplorationVectorEnv
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +44,18 @@ class IdleMemory:
     resident_bytes: float | None
 
 
-def own_bytes(world: KinematicWorld) -> float:
+def own_bytes(simulation: Simulation) -> float:
     """Return the size of the arrays that belong to a robot: the mean of those over rows, and of its map and mask."""
-    rows = world.robots * world.episodes
+    rows = simulation.robots * simulation.episodes
     over_rows = sum(
-        array.nbytes for array in vars(world).values() if isinstance(array, np.ndarray) and len(array) == rows
+        array.nbytes
+        for owner in (simulation.world, simulation.beliefs, simulation.score)
+        for array in vars(owner).values()
+        if isinstance(array, np.ndarray) and len(array) == rows
     )
-    grids = sum(array.nbytes for array in world.log_odds) + sum(array.nbytes for array in world.masks)
+    grids = sum(array.nbytes for array in simulation.beliefs.log_odds) + sum(
+        array.nbytes for array in simulation.score.masks
+    )
     return (over_rows + grids) / rows
 
 
@@ -115,11 +120,11 @@ def measure(few: int = 64, many: int = 1024) -> IdleMemory:
     second = standing(many)
     gc.collect()
     after = resident()
-    world = second.batch.world
+    simulation = second.batch.simulation
     growth = None if before is None or after is None else (after - before) / many
     # What does not grow with the robots, such as the floor's tables, drops out of the difference.
     everything = (array_bytes(second) - array_bytes(first)) / (many - few)
-    return IdleMemory(many, world.log_odds[0].nbytes, own_bytes(world), everything, growth)
+    return IdleMemory(many, simulation.beliefs.log_odds[0].nbytes, own_bytes(simulation), everything, growth)
 
 
 if __name__ == "__main__":

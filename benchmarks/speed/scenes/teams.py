@@ -1,4 +1,4 @@
-"""Our side of the comparisons: robots in the kinematic world, driven by drawn commands."""
+"""Our side of the comparisons: robots in the kinematic simulation, driven by drawn commands."""
 
 import math
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lidarium.benchmarks.speed.scenes.floors import BenchFloor, free_poses
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
 BEAMS, RANGE_MAX = 720, 5.6
@@ -49,16 +49,18 @@ class DrivenTeam:
         self.robots = robots
         self._floor, self._tables = floor, floor.tables()
         settings = OccupancySettings(resolution=floor.resolution)
-        self.world = KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, settings, scales=scales)
+        self.simulation = KinematicSimulation.of_team(
+            [ROBOTS["kobuki"]] * robots, lidar, settings, scales=scales
+        )
         self._count, self._starts = 0, 0
         self.start()
 
     def start(self) -> None:
         """Begin anew: blank maps, other places."""
         poses = free_poses(self._floor, self.robots, seed=self._starts)
-        self.world.place(0, self._tables, poses, seed=self._starts)
+        self.simulation.place(0, self._tables, poses, seed=self._starts)
         self._commands = drawn_commands(self.robots, self._starts)
-        self.world.step(self._commands[0], moves_bodies=False)
+        self.simulation.step(self._commands[0], moves_bodies=False)
         self._count = 0
         self._starts = (self._starts + 1) % 8
 
@@ -69,7 +71,7 @@ class DrivenTeam:
 
     def step(self) -> None:
         """Move, sense, score and map, for all robots."""
-        self.world.step(self.commands)
+        self.simulation.step(self.commands)
         self._count += 1
 
 

@@ -81,10 +81,10 @@ class Way(Watcher):
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
         """Note a time step."""
         world = env.world
-        self.ranges.append(world.ranges[0].copy())
+        self.ranges.append(env.simulation.ranges[0].copy())
         self.true.append(world.poses[0].copy())
-        self.believed.append(world.believed[0].copy())
-        self.odometry.append(world.odometry[0].copy())
+        self.believed.append(env.beliefs.believed[0].copy())
+        self.odometry.append(env.simulation.odometry[0].copy())
         self.coverage.append(env.scorer.coverage)
         updates = tracker_of(env).map.updates
         if updates > self._updates:

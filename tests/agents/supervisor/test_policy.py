@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.agents import Policy
 from lidarium.agents.random_walk import RandomWalk
 from lidarium.agents.supervisor.policy import Supervised, supervised
 from lidarium.agents.supervisor.settings import SupervisorSettings
@@ -16,7 +17,7 @@ from lidarium.evaluation.episodes.supervision import decision_lines
 from lidarium.evaluation.metrics.merges import transform_error
 
 
-class FirstFrontier:
+class FirstFrontier(Policy):
     """Takes the cheapest frontier on offer."""
 
     level, shares_map = "frontier", True

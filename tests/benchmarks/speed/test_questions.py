@@ -37,20 +37,22 @@ def test_the_kernel_alone_takes_the_steps_of_the_whole(few_episodes):
         kernel.step_kernel()
     assert np.array_equal(whole.poses, kernel.poses)
     assert (np.abs(whole.poses - began).max(axis=1) > 0.0).all()
-    assert np.array_equal(whole.env.batch.world.log_odds[5], kernel.env.batch.world.log_odds[5])
+    assert np.array_equal(
+        whole.env.batch.simulation.beliefs.log_odds[5], kernel.env.batch.simulation.beliefs.log_odds[5]
+    )
 
 
 def test_waypoints_are_free_cells_some_way_off(few_episodes):
     deciders = Deciders(1)
     deciders.start()
     assert min(deciders.run(0.0)) > 0.0
-    world = deciders._deciding.batch.world
+    beliefs = deciders._deciding.batch.simulation.beliefs
     for row in range(8):
         place = deciders._drawn(row)
-        distance = float(np.hypot(*(place - world.believed[row, :2])))
-        column, line = ((place - world.origins[row]) / 0.025).astype(int)
+        distance = float(np.hypot(*(place - beliefs.believed[row, :2])))
+        column, line = ((place - beliefs.origins[row]) / 0.025).astype(int)
         assert 0.5 <= distance <= 3.0
-        assert world.log_odds[row][line, column] < 0
+        assert beliefs.log_odds[row][line, column] < 0
 
 
 def test_the_profile_has_all_parts_and_they_make_up_the_whole(tmp_path):

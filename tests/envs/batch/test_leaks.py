@@ -51,4 +51,4 @@ def test_memory_does_not_grow_with_the_number_of_resets(level):
     # Fewer than one for every twenty resets.
     assert blocks < 50
     # Less than a map of the closet for each reset.
-    assert pages * 4096 < 1_000 * batch.batch.world.log_odds[0].nbytes
+    assert pages * 4096 < 1_000 * batch.batch.simulation.beliefs.log_odds[0].nbytes

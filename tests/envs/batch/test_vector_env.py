@@ -242,7 +242,7 @@ def test_floors_of_different_sizes_and_of_cells_of_different_sizes_are_in_one_ba
     image = dataclasses.replace(load_floor("apartment"), name="image", solids=(), cells=coarse)
     batch = lidarium.vector_env(4, **FEW)
     batch.reset(seed=0, options={"floor": [*names, image]})
-    shapes = {grid.shape for grid in batch.batch.world.log_odds}
+    shapes = {grid.shape for grid in batch.batch.simulation.beliefs.log_odds}
     assert len(shapes) == 4
     for _ in range(5):
         observations, *_ = batch.step(np.tile(AHEAD, (4, 1)))

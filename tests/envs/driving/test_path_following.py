@@ -1,4 +1,4 @@
-"""Path following and the safety stop, on hand-made paths in the world itself."""
+"""Path following and the safety stop, on hand-made paths in the simulation itself."""
 
 import itertools
 import math
@@ -20,10 +20,10 @@ from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.radio.messages import DriveState, Target
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic.motion import distance_bound
-from lidarium.envs.simulation.kinematic.ray_tables import RayTables
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.motion import distance_bound
+from lidarium.envs.simulation.kernels.ray_tables import RayTables
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
 
@@ -41,9 +41,11 @@ class Drive:
 
     def __init__(self, tables, starts, paths, heading=math.nan, knows_mates=True, margin=0.3):
         count = len(starts)
-        self.world = KinematicWorld([ROBOTS["kobuki"]] * count, Lidar(), OccupancySettings())
-        self.world.place(0, tables, np.array(starts, np.float64), 1)
-        self.world.step(np.zeros((count, 2)), moves_bodies=False)
+        self.simulation = KinematicSimulation.of_team(
+            [ROBOTS["kobuki"]] * count, Lidar(), OccupancySettings()
+        )
+        self.simulation.place(0, tables, np.array(starts, np.float64), 1)
+        self.simulation.step(np.zeros((count, 2)), moves_bodies=False)
         robot = ROBOTS["kobuki"]
         self.limits = np.array([robot.cruise_speed, 2.0, 0.8 * robot.max_acceleration, 0.1])
         self.paths, self.margins = np.zeros((count, MAX_POINTS, 2)), np.full((count, MAX_POINTS), margin)
@@ -57,14 +59,14 @@ class Drive:
         self.commands, self.track, self.speeds = np.zeros((count, 2)), [], []
 
     def step(self, steps=1):
-        world = self.world
+        simulation = self.simulation
         for _ in range(steps):
             follow_paths(
-                world.believed,
-                world.velocities,
-                world.ranges,
-                world.lidar.unit_vectors,
-                world.bodies[:, 0].copy(),
+                simulation.beliefs.believed,
+                simulation.world.velocities,
+                simulation.ranges,
+                simulation.lidar.unit_vectors,
+                simulation.world.bodies[:, 0].copy(),
                 self.limits,
                 self.paths,
                 self.margins,
@@ -77,13 +79,13 @@ class Drive:
                 self.knows_mates,
                 self.present,
                 FORESIGHT_TIMES,
-                world.contact,
-                world.heard,
+                simulation.beliefs.contact,
+                simulation.beliefs.heard,
                 self.commands,
             )
-            world.step(self.commands)
-            self.track.append(world.poses.copy())
-            self.speeds.append(world.velocities.copy())
+            simulation.step(self.commands)
+            self.track.append(simulation.world.poses.copy())
+            self.speeds.append(simulation.world.velocities.copy())
         return self
 
     def until_done(self, limit=600):
@@ -118,13 +120,13 @@ def test_a_path_is_followed_to_its_end_without_leaving_it(name, heading):
     path = PATHS[name]
     drive = Drive(hall(), [(*path[0], heading)], [path]).until_done()
     assert drive.states[0] == ARRIVED
-    assert math.dist(drive.world.poses[0, :2], path[-1]) <= 0.05
+    assert math.dist(drive.simulation.world.poses[0, :2], path[-1]) <= 0.05
     track = np.array(drive.track)[:, 0, :2]
     assert distance_to_path(track, path).max() < 0.13
-    assert drive.world.collisions[0] == 0
+    assert drive.simulation.world.collisions[0] == 0
     assert np.array(drive.speeds)[:, 0, 0].max() <= 0.33 + 1e-9
     length = np.hypot(*np.diff(np.array(path), axis=0).T).sum()
-    assert drive.world.travelled[0] < 1.1 * length + 0.1
+    assert drive.simulation.world.travelled[0] < 1.1 * length + 0.1
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.02])
@@ -138,14 +140,14 @@ def test_where_it_is_tight_the_path_is_kept_to_within_millimetres(margin):
 @pytest.mark.parametrize("heading", [0.0, 1.57, -3.0, 3.1])
 def test_at_the_end_the_robot_turns_to_the_wanted_heading(heading):
     drive = Drive(hall(), [(1.0, 1.0, 0.0)], [PATHS["straight"]], heading).until_done()
-    assert abs(math.remainder(drive.world.poses[0, 2] - heading, 2.0 * math.pi)) <= 0.15
+    assert abs(math.remainder(drive.simulation.world.poses[0, 2] - heading, 2.0 * math.pi)) <= 0.15
 
 
 def test_the_robot_stops_before_a_wall_that_its_path_crosses():
     drive = Drive(hall(boxes=[(0, 120, 200, 4)]), [(1.0, 1.0, 0.0)], [[(1.0, 1.0), (5.0, 1.0)]]).until_done()
     assert drive.states[0] == BLOCKED
-    assert drive.world.collisions[0] == 0
-    gap = 120 * 0.025 - 0.18 - drive.world.poses[0, 0]
+    assert drive.simulation.world.collisions[0] == 0
+    gap = 120 * 0.025 - 0.18 - drive.simulation.world.poses[0, 0]
     assert 0.0 < gap < 0.05
 
 
@@ -154,7 +156,7 @@ def test_the_robot_stops_before_a_post_in_any_part_of_its_swath(offset):
     row = round((2.0 + offset) / 0.025)
     drive = Drive(hall(boxes=[(row, 120, 1, 1)]), [(1.0, 2.0, 0.0)], [[(1.0, 2.0), (5.0, 2.0)]]).until_done()
     assert drive.states[0] == BLOCKED
-    assert drive.world.collisions[0] == 0
+    assert drive.simulation.world.collisions[0] == 0
 
 
 def test_the_robot_passes_a_post_just_beside_its_swath():
@@ -162,7 +164,7 @@ def test_the_robot_passes_a_post_just_beside_its_swath():
         hall(boxes=[(round(2.2 / 0.025), 120, 1, 1)]), [(1.0, 2.0, 0.0)], [[(1.0, 2.0), (5.0, 2.0)]]
     ).until_done()
     assert drive.states[0] == ARRIVED
-    assert drive.world.collisions[0] == 0
+    assert drive.simulation.world.collisions[0] == 0
 
 
 @pytest.mark.parametrize("knows_mates", [True, False])
@@ -170,15 +172,15 @@ def test_the_robot_stops_before_a_body_that_appears_on_its_way_and_goes_on_when_
     drive = Drive(
         hall(), [(1.0, 2.0, 0.0), (4.0, 4.0, 0.0)], [[(1.0, 2.0), (5.0, 2.0)], []], knows_mates=knows_mates
     ).step(25)
-    speed = float(drive.world.velocities[0, 0])
+    speed = float(drive.simulation.world.velocities[0, 0])
     assert speed == pytest.approx(0.33, abs=0.01)
     # As near as it can still stop: its braking way, a step, and the gap.
-    drive.world.poses[1, :2] = drive.world.poses[0, :2] + [0.36 + 0.2, 0.0]
+    drive.simulation.world.poses[1, :2] = drive.simulation.world.poses[0, :2] + [0.36 + 0.2, 0.0]
     drive.step(60)
-    assert drive.world.collisions.tolist() == [0, 0]
+    assert drive.simulation.world.collisions.tolist() == [0, 0]
     assert drive.states[0] == BLOCKED
-    assert drive.world.poses[1, 0] - drive.world.poses[0, 0] > 0.36
-    drive.world.poses[1, :2] = [4.0, 4.0]
+    assert drive.simulation.world.poses[1, 0] - drive.simulation.world.poses[0, 0] > 0.36
+    drive.simulation.world.poses[1, :2] = [4.0, 4.0]
     drive.step(250)
     assert drive.states[0] == ARRIVED
 
@@ -189,14 +191,14 @@ def test_two_whose_ways_cross_never_touch():
         drive = Drive(hall(), [(1.0 + late / 2, 2.5, 0.0), (*paths[1][0], math.pi / 2)], paths).until_done(
             1000
         )
-        assert drive.world.collisions.sum() == 0
+        assert drive.simulation.world.collisions.sum() == 0
         track = np.array(drive.track)
         assert np.hypot(*(track[:, 0, :2] - track[:, 1, :2]).T).min() > 0.36
 
 
 def test_robots_without_a_path_stand():
     drive = Drive(hall(), [(1.0, 2.0, 0.0)], [[]]).step(10)
-    assert np.array_equal(drive.world.poses[0], [1.0, 2.0, 0.0])
+    assert np.array_equal(drive.simulation.world.poses[0], [1.0, 2.0, 0.0])
     assert drive.states[0] == IDLE
 
 

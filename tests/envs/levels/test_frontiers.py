@@ -166,6 +166,6 @@ def test_on_their_own_maps_robots_explore_twice():
             ROOMS, make_settings(robots=2, stop_coverage=None, horizon_s=None, map_cells=64)
         )
         run(FrontierExploration(base, shares_map))
-        shares.append(float((base.world.seen / base.world.counted[0]).min()))
+        shares.append(float((base.score.seen / base.score.counted[0]).min()))
     assert shares[1] >= 0.97
     assert shares[0] <= shares[1]

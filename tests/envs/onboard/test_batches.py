@@ -1,4 +1,4 @@
-"""Many episodes in one world: each goes as it would alone, to the bit, however many threads drive it."""
+"""Many episodes in one simulation: each goes as it would alone, to the bit, however many threads drive it."""
 
 import copy
 import math
@@ -20,9 +20,9 @@ from lidarium.envs.onboard.navigation import FLAGS
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import Orders, Target
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.simulation.kinematic.arrays import ENDED
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 
 ROBOTS = 2
 
@@ -72,7 +72,7 @@ class Teams:
         )
         settings, self.episodes = self.settings, len(floors)
         self.rows = self.episodes * ROBOTS
-        self.world = KinematicWorld(
+        self.simulation = KinematicSimulation.of_team(
             [settings.robot] * ROBOTS,
             settings.lidar,
             settings.occupancy,
@@ -81,17 +81,17 @@ class Teams:
             settings.threads,
         )
         self.offsets = np.zeros((self.rows, 2))
-        self.perception = Perception(self.world, settings, self.offsets)
+        self.perception = Perception(self.simulation, settings, self.offsets)
         self.driver = TeamDriver(self.perception, settings)
         self.offers = FrontierOffers(self.perception, settings, self.driver)
         for episode, (floor, seed) in enumerate(zip(floors, seeds, strict=True)):
             tables = FloorTables.of_floor(
                 floor, settings.raster_resolution, settings.lidar.height, settings.robot.height
             )
-            self.world.place(episode, tables, floor.starts, seed, known_starts)
+            self.simulation.place(episode, tables, floor.starts, seed, known_starts)
             if known_starts:
                 self.offsets[episode * ROBOTS : (episode + 1) * ROBOTS] = floor.starts[:, :2]
-        self.world.step(np.zeros((self.rows, 2)), moves_bodies=False)
+        self.simulation.step(np.zeros((self.rows, 2)), moves_bodies=False)
         for episode in range(self.episodes):
             self.perception.start(None, episode)
             self.driver.start(episode)
@@ -107,7 +107,7 @@ class Teams:
         commands = []
         for _ in range(steps):
             commands.append(driver.commands().copy())
-            self.world.step(commands[-1])
+            self.simulation.step(commands[-1])
         states, commands = driver.states(), np.array(commands)
         return [
             (
@@ -117,7 +117,7 @@ class Teams:
                 drives.paths[row, : drives.counts[row]].tobytes(),
                 drives.room[row, : drives.counts[row]].tobytes(),
                 commands[:, row].tobytes(),
-                self.world.poses[row].tobytes(),
+                self.simulation.world.poses[row].tobytes(),
             )
             for row in range(self.rows)
         ]
@@ -191,7 +191,7 @@ def test_a_new_episode_beside_others_leaves_them_as_they_are():
     other.explored(3)
     old_map = one.perception.shared_map(0)
     tables = FloorTables.of_floor(HALL, 0.025, one.settings.lidar.height, one.settings.robot.height)
-    one.world.place(0, tables, HALL.starts, 9)
+    one.simulation.place(0, tables, HALL.starts, 9)
     one.perception.start(None, 0)
     one.driver.start(0)
     one.offers.start(0)
@@ -248,7 +248,7 @@ def test_a_robot_is_newly_done_when_it_waits_and_did_not_before():
 
 def test_robots_that_have_ended_are_not_planned_for():
     teams = Teams((HALL,), (1,))
-    teams.world.flags[0] |= ENDED
+    teams.simulation.world.flags[0] |= ENDED
     teams.driver.assign(teams.every, Orders.of([Target(1.0, 0.0)] * ROBOTS))
     teams.driver.prepare()
     assert teams.driver.drives.has_path.tolist() == [False, True]

@@ -71,14 +71,14 @@ def test_a_wall_that_is_one_is_drawn_again_when_it_is_seen_again(env):
 
 def test_a_map_that_is_rendered_anew_forgets_them_again_until_the_next_episode(env):
     perception, belief = env.perception, env.perception.belief("robot_0")
-    localizer, pose = perception.localizers[0], env.world.believed[0]
+    localizer, pose = perception.localizers[0], env.beliefs.believed[0]
     assert localizer is not None
-    scan, poses = env.world.ranges[0][None].copy(), pose[None].copy()
+    scan, poses = env.simulation.ranges[0][None].copy(), pose[None].copy()
     walls = np.argwhere(belief.map.log_odds > 0)
     middle = walls[len(walls) // 2]
     place = centres(belief, middle[None])[0]
     perception.forget_walls(0, place + np.array([(0.0, 0.0), (20.0, 0.0)]))
-    env.world.render_anew(0, poses, scan)
+    env.simulation.render_anew(0, poses, scan)
     perception.forget_again(0)
     assert belief.map.log_odds[tuple(middle)] == 0
     env.reset(seed=0)

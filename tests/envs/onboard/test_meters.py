@@ -96,7 +96,7 @@ def test_a_battery_changes_nothing_else():
     for env in (with_battery, without):
         drive(env, 30, (0.4, 0.2))
     assert np.array_equal(with_battery.world.poses, without.world.poses)
-    assert np.array_equal(with_battery.world.ranges, without.world.ranges)
+    assert np.array_equal(with_battery.simulation.ranges, without.simulation.ranges)
 
 
 def test_a_kobuki_lasts_as_long_as_its_guide_says():
@@ -117,7 +117,7 @@ def test_the_odometer_tells_what_wheels_tell_not_the_truth():
     env = hall(odometry="poor", localization="odometry")
     drive(env, 60)
     by_wheels = env.perception.meters.travelled_m(0)
-    assert by_wheels == pytest.approx(math.hypot(*env.world.odometry[0, :2]), rel=0.05)
+    assert by_wheels == pytest.approx(math.hypot(*env.simulation.odometry[0, :2]), rel=0.05)
     assert by_wheels != env.world.travelled[0]
     ideal = hall()
     drive(ideal, 60)

@@ -60,11 +60,11 @@ def test_maps_first_asked_for_late_are_the_same_as_those_asked_for_from_the_star
 
 def test_the_shared_map_is_the_sum_of_all_robots_log_odds_cut_to_a_byte():
     env = driven()
-    total = np.sum([log_odds.astype(int) for log_odds in env.world.log_odds], axis=0)
+    total = np.sum([log_odds.astype(int) for log_odds in env.beliefs.log_odds], axis=0)
     shared = env.perception.belief("robot_0").shared_map
     assert np.array_equal(shared.log_odds, np.clip(total, -127, 127))
     assert env.perception.belief("robot_2").shared_map is shared
-    assert (three_levels(shared.log_odds) == 255).sum() > (three_levels(env.world.log_odds[0]) == 255).sum()
+    assert (three_levels(shared.log_odds) == 255).sum() > (three_levels(env.beliefs.log_odds[0]) == 255).sum()
 
 
 def test_a_lone_robots_shared_map_is_its_own():
@@ -139,5 +139,5 @@ def test_a_new_episode_forgets_all_maps():
     env.reset(seed=3)
     new = env.perception.belief("robot_0").shared_map
     assert new is not old
-    total = np.sum([log_odds.astype(int) for log_odds in env.world.log_odds], axis=0)
+    total = np.sum([log_odds.astype(int) for log_odds in env.beliefs.log_odds], axis=0)
     assert np.array_equal(new.log_odds, np.clip(total, -127, 127))

@@ -60,7 +60,7 @@ def test_who_is_always_linked_knows_what_the_team_knew_at_the_last_exchange(monk
     env = started(radio=RadioSettings(kind="range"))
     wander(env, 20)
     # Step 20 is one of exchange: all maps are as of now.
-    total = np.clip(np.sum(np.stack(env.world.log_odds).astype(int), axis=0), -127, 127)
+    total = np.clip(np.sum(np.stack(env.beliefs.log_odds).astype(int), axis=0), -127, 127)
     for agent in env.possible_agents:
         assert np.array_equal(np.sign(env.perception.belief(agent).shared_map.log_odds), np.sign(total))
     mate = env.perception.belief("robot_0").teammates["robot_2"]
@@ -96,7 +96,7 @@ def test_news_travels_on_over_who_meets_later(monkeypatch):
 def test_what_is_sent_is_counted_by_blocks_that_changed(monkeypatch):
     set_links(monkeypatch, [[0, 1], [0, 0]])
     env = started(robots=2, radio=RadioSettings(kind="range"))
-    blocks = (env.world.log_odds[0].reshape(-1, 64) != 0).any(axis=1).sum()
+    blocks = (env.beliefs.log_odds[0].reshape(-1, 64) != 0).any(axis=1).sum()
     assert exchange_of(env).bytes_sent.tolist() == [POSE_BYTES + HEADER_BYTES + BLOCK_BYTES * blocks, 0]
     for _ in range(9):
         env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
@@ -108,7 +108,7 @@ def test_late_messages_come_late_and_whole(monkeypatch):
     env = started(robots=2, radio=RadioSettings(kind="range", latency_s=0.5))
     exchange = exchange_of(env)
     assert exchange.copied_at[1, 0] == NEVER
-    first = env.world.log_odds[0].copy()
+    first = env.beliefs.log_odds[0].copy()
     wander(env, 5)
     assert exchange.copied_at[1, 0] == 0
     assert np.array_equal(exchange.copies[1][0], first)

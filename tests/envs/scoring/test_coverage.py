@@ -10,17 +10,19 @@ from hypothesis import strategies as st
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.outcome.scorer import THRESHOLDS, Scorer
 from lidarium.envs.scoring.coverage import count_bits, mark_seen, pack_bits, share_news, unpack_bits
-from lidarium.envs.scoring.scorer import THRESHOLDS, Scorer, reward_weights
+from lidarium.envs.scoring.rewards import reward_weights
+from lidarium.envs.scoring.score import counted_cells
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic.motion import distance_bound
-from lidarium.envs.simulation.kinematic.ray_tables import RayTables
-from lidarium.envs.simulation.kinematic.world import KinematicWorld, counted_cells
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.motion import distance_bound
+from lidarium.envs.simulation.kernels.ray_tables import RayTables
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.kernels.compilation import kernel
 
@@ -38,7 +40,7 @@ def hall(rows=160, columns=240):
 
 def team(robots, resolution=0.05, beams=181, noise=0.0, weights=None):
     lidar, maps = Lidar(beams=beams, noise_floor=noise), OccupancySettings(resolution=resolution)
-    return KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, maps, reward_weights=weights)
+    return KinematicSimulation.of_team([ROBOTS["kobuki"]] * robots, lidar, maps, reward_weights=weights)
 
 
 def starts_on(tables, count, generator, apart=0.6):
@@ -85,37 +87,37 @@ def test_counting_bits_is_exact_for_all_kinds_of_words():
 def test_in_the_ideal_world_belief_and_mask_agree_to_the_cell(resolution, floor):
     tables = floor_tables(load_floor(floor), 0.025, 0.3, 0.52)
     generator = np.random.default_rng(2)
-    world = team(4, resolution)
-    world.place(0, tables, starts_on(tables, 4, generator), 3)
-    counted = unpack_bits(world.counted_masks[0], world.log_odds[0].shape[1])
+    simulation = team(4, resolution)
+    simulation.place(0, tables, starts_on(tables, 4, generator), 3)
+    counted = unpack_bits(simulation.score.counted_masks[0], simulation.beliefs.log_odds[0].shape[1])
     for step in range(150):
-        world.step(generator.uniform(-0.2, 1.0, (4, 2)) * [0.77, 1.2], moves_bodies=step > 0)
+        simulation.step(generator.uniform(-0.2, 1.0, (4, 2)) * [0.77, 1.2], moves_bodies=step > 0)
         if step % 30 == 0 or step == 149:
             for row in range(4):
-                seen = unpack_bits(world.masks[row], counted.shape[1])
-                known = world.log_odds[row] != 0
+                seen = unpack_bits(simulation.score.masks[row], counted.shape[1])
+                known = simulation.beliefs.log_odds[row] != 0
                 assert np.array_equal(seen, known & counted)
-                assert not (world.log_odds[row][counted] > 0).any()
-                assert world.seen[row] == seen.sum()
+                assert not (simulation.beliefs.log_odds[row][counted] > 0).any()
+                assert simulation.score.seen[row] == seen.sum()
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5])
 def test_credits_are_equal_shares_of_what_is_new_to_the_team(robots):
     tables = floor_tables(load_floor("building:3"), 0.025, 0.3, 0.52)
     generator = np.random.default_rng(robots)
-    world = team(robots)
-    world.place(0, tables, starts_on(tables, robots, generator), 3)
-    columns = world.log_odds[0].shape[1]
-    before = np.zeros((robots, world.log_odds[0].shape[0], columns), bool)
+    simulation = team(robots)
+    simulation.place(0, tables, starts_on(tables, robots, generator), 3)
+    columns = simulation.beliefs.log_odds[0].shape[1]
+    before = np.zeros((robots, simulation.beliefs.log_odds[0].shape[0], columns), bool)
     for step in range(80):
-        world.step(generator.uniform(-0.2, 1.0, (robots, 2)) * [0.77, 1.2], moves_bodies=step > 0)
-        after = np.array([unpack_bits(mask, columns) for mask in world.masks])
+        simulation.step(generator.uniform(-0.2, 1.0, (robots, 2)) * [0.77, 1.2], moves_bodies=step > 0)
+        after = np.array([unpack_bits(mask, columns) for mask in simulation.score.masks])
         new_to_team = after.any(axis=0) & ~before.any(axis=0)
         sharers = (after & new_to_team).sum(axis=0)
         expected = [(1.0 / sharers[mask & new_to_team]).sum() for mask in after]
-        assert np.allclose(world.gains, expected, atol=1e-9)
-        assert world.gains.sum() == pytest.approx(new_to_team.sum(), abs=1e-6)
-        assert world.team_seen[0] == after.any(axis=0).sum()
+        assert np.allclose(simulation.score.gains, expected, atol=1e-9)
+        assert simulation.score.gains.sum() == pytest.approx(new_to_team.sum(), abs=1e-6)
+        assert simulation.score.team_seen[0] == after.any(axis=0).sum()
         before = after
 
 
@@ -159,13 +161,13 @@ def test_a_window_that_hangs_over_the_masks_is_cut():
 
 
 def test_coverage_never_falls_and_reaches_one_where_all_is_seen():
-    world = team(1, beams=727)
-    world.place(0, tables_of(hall(80, 100)), np.array([[1.2, 1.0, 0.0]]), 1)
+    simulation = team(1, beams=727)
+    simulation.place(0, tables_of(hall(80, 100)), np.array([[1.2, 1.0, 0.0]]), 1)
     last = 0.0
     for step in range(80):
-        world.step(np.array([[0.0, 1.5]]), moves_bodies=step > 0)
-        assert world.coverage(0) >= last
-        last = world.coverage(0)
+        simulation.step(np.array([[0.0, 1.5]]), moves_bodies=step > 0)
+        assert simulation.score.coverage(0) >= last
+        last = simulation.score.coverage(0)
     assert last == 1.0
 
 
@@ -173,15 +175,15 @@ def test_cells_behind_walls_and_in_sealed_rooms_never_count():
     solid = hall()
     solid[:, 120:124] = 1
     tables = tables_of(solid)
-    world = team(1)
-    world.place(0, tables, np.array([[1.5, 2.0, 0.0]]), 1)
-    counted = unpack_bits(world.counted_masks[0], world.log_odds[0].shape[1])
+    simulation = team(1)
+    simulation.place(0, tables, np.array([[1.5, 2.0, 0.0]]), 1)
+    counted = unpack_bits(simulation.score.counted_masks[0], simulation.beliefs.log_odds[0].shape[1])
     assert not counted[:, 60:].any()
     assert counted[2:78, 2:58].mean() > 0.99
     for step in range(60):
-        world.step(np.array([[0.0, 2.0]]), moves_bodies=step > 0)
-    assert not unpack_bits(world.masks[0], counted.shape[1])[:, 60:].any()
-    assert world.team_seen[0] <= counted.sum()
+        simulation.step(np.array([[0.0, 2.0]]), moves_bodies=step > 0)
+    assert not unpack_bits(simulation.score.masks[0], counted.shape[1])[:, 60:].any()
+    assert simulation.score.team_seen[0] <= counted.sum()
 
 
 def test_the_cells_that_count_are_those_that_the_smallest_disc_sweeps():
@@ -189,11 +191,11 @@ def test_the_cells_that_count_are_those_that_the_smallest_disc_sweeps():
     solid[60:100, 100:104] = 1
     tables = tables_of(solid)
     start = np.array([[1.5, 2.0, 0.0]])
-    world = team(1, 0.05)
-    world.place(0, tables, start, 1)
+    simulation = team(1, 0.05)
+    simulation.place(0, tables, start, 1)
     swept = swept_free_space(tables.body, 0.18, start)
     expected = counted_cells(swept, 2)
-    counted = unpack_bits(world.counted_masks[0], world.log_odds[0].shape[1])
+    counted = unpack_bits(simulation.score.counted_masks[0], simulation.beliefs.log_odds[0].shape[1])
     assert np.array_equal(counted[:, : expected.shape[1]], expected)
     assert not counted[:, expected.shape[1] :].any()
     # The corners of the hall are where a disc does not come.
@@ -229,35 +231,38 @@ def test_noise_changes_the_map_and_not_the_score():
 
 def scored(weights, robots=2):
     options = ExplorationSettings(robots=robots, reward=weights)
-    world = team(robots, weights=reward_weights(options))
-    world.place(0, tables_of(hall()), np.array([[1.0, 2.0, 0.0], [3.0, 2.0, math.pi]])[:robots], 1)
-    scorer = Scorer(world, options)
-    world.step(np.zeros((robots, 2)), moves_bodies=False)
+    simulation = team(robots, weights=reward_weights(options))
+    simulation.place(0, tables_of(hall()), np.array([[1.0, 2.0, 0.0], [3.0, 2.0, math.pi]])[:robots], 1)
+    scorer = Scorer(simulation.world, simulation.score, options)
+    simulation.step(np.zeros((robots, 2)), moves_bodies=False)
     scorer.start()
-    return world, scorer
+    return simulation, scorer
 
 
 def test_rewards_are_area_less_prices_and_sum_over_the_steps_since_they_were_taken():
     weights = RewardSettings(area=2.0, time=0.5, contact=3.0, energy=0.25)
-    world, scorer = scored(weights)
+    simulation, scorer = scored(weights)
     assert scorer.take_rewards() == [0.0, 0.0]
     expected = np.zeros(2)
     for _ in range(30):
-        before = world.travelled.copy()
-        world.step(np.array([[0.5, 0.0], [0.6, 0.0]]))
+        before = simulation.world.travelled.copy()
+        simulation.step(np.array([[0.5, 0.0], [0.6, 0.0]]))
         scorer.advance()
         expected += (
-            2.0 * 0.05**2 * world.gains - 0.5 * 0.1 - 3.0 * world.contacts - 0.25 * (world.travelled - before)
+            2.0 * 0.05**2 * simulation.score.gains
+            - 0.5 * 0.1
+            - 3.0 * simulation.world.contacts
+            - 0.25 * (simulation.world.travelled - before)
         )
-    assert world.contacts.any()
+    assert simulation.world.contacts.any()
     assert np.allclose(scorer.take_rewards(), expected)
     assert scorer.take_rewards() == [0.0, 0.0]
 
 
 def test_thresholds_are_timed_once_and_in_order():
-    world, scorer = scored(RewardSettings(), 1)
+    simulation, scorer = scored(RewardSettings(), 1)
     for _ in range(400):
-        world.step(np.array([[0.3, 0.8]]))
+        simulation.step(np.array([[0.3, 0.8]]))
         scorer.advance()
     times = list(scorer.times.values())
     assert list(scorer.times) == list(THRESHOLDS[: len(times)])

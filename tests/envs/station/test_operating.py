@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.agents import Stop
+from lidarium.agents import Policy, Stop
 from lidarium.envs.driving.path_following import BACKING_SPEED
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.radio.messages import OperatingState, Order, OrderKind, Target
@@ -48,7 +48,7 @@ def drive(env, decisions=1, **actions):
     return outcome
 
 
-class Scripted:
+class Scripted(Policy):
     """Does at each decision what a table says, else stays; notes what it sees of the first robot."""
 
     shares_map = False

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.agents import Policy
 from lidarium.agents.policy import PerRobot
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.radio.exchange import BLOCK_BYTES, HEADER_BYTES, STATUS_BYTES
 from lidarium.envs.radio.messages import DriveState, OperatingState, Order, OrderKind, Target
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.envs.settings.radio import RadioSettings
-from lidarium.envs.simulation.radio import links, links_to
+from lidarium.envs.simulation.disturbances.radio import links, links_to
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.mapping.grids.occupancy import UNKNOWN, three_levels
 
@@ -158,7 +159,7 @@ def test_lost_reports_are_sent_again_until_one_arrives():
 def test_what_is_sent_to_the_station_is_counted_apart():
     env = team([(3.0, 3.0, 0.0)], radio=reach(5.0))
     exchange = env.perception.exchanges[0]
-    blocks = (env.world.log_odds[0].reshape(-1, 64) != 0).any(axis=1).sum()
+    blocks = (env.beliefs.log_odds[0].reshape(-1, 64) != 0).any(axis=1).sum()
     assert exchange.bytes_reported.tolist() == [HEADER_BYTES + BLOCK_BYTES * blocks + STATUS_BYTES]
     assert exchange.bytes_sent.tolist() == [0]
 
@@ -196,13 +197,13 @@ def test_a_map_that_is_rendered_anew_is_reported_as_it_is_then():
     env = team([(3.0, 3.0, 0.0)], radio=reach(9.0))
     drive(env, 10)
     before = env.station.report(0).map.levels
-    env.world.log_odds[0][:] = 0
-    env.world.log_odds[0][100:110, 100:110] = 5
+    env.beliefs.log_odds[0][:] = 0
+    env.beliefs.log_odds[0][100:110, 100:110] = 5
     drive(env, 10)
     after = env.station.report(0).map.levels
     assert env.station.report(0).time_s == 2.0
     assert not np.array_equal(after, before)
-    assert np.array_equal(env.perception.exchanges[0].copies[-1][0], env.world.log_odds[0])
+    assert np.array_equal(env.perception.exchanges[0].copies[-1][0], env.beliefs.log_odds[0])
 
 
 @pytest.mark.parametrize(("metres", "arrives"), [(9.0, True), (4.5, True), (3.0, False)])
@@ -235,7 +236,7 @@ def test_a_link_to_a_place_is_as_one_to_a_robot_there():
 
 
 def test_a_decentralised_policy_has_no_station():
-    class Asks:
+    class Asks(Policy):
         level, shares_map = "velocity", False
 
         def reset(self, team, seed):

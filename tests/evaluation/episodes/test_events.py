@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from lidarium.agents import Policy
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.radio.messages import Order, OrderKind, Target
 from lidarium.envs.settings.making import make_settings
@@ -18,7 +19,7 @@ HALL = Floor("hall", (0.0, 0.0, 20.0, 12.0))
 STARTS = [[3.0, 3.0, 0.0], [3.0, 9.0, np.pi / 2]]
 
 
-class Scripted:
+class Scripted(Policy):
     """Does at each decision what a table says; else drives ahead."""
 
     level, shares_map = "velocity", False

@@ -37,7 +37,7 @@ class Whole(Watcher):
         self.rows.append(
             (
                 env.scorer.time,
-                metrics.free_coverage(unpack_bits(env.world.team_masks[0], known.shape[1]), truth.counted),
+                metrics.free_coverage(unpack_bits(env.score.team_masks[0], known.shape[1]), truth.counted),
                 metrics.known_coverage(known, truth.knowable),
                 metrics.valid_coverage(known, truth.counted, truth.occupied),
                 *(metrics.free_coverage(own, truth.counted) for own in held),
@@ -109,7 +109,7 @@ def test_the_last_milestone_has_what_each_map_knew(known_starts):
     assert milestone.known_shares == pytest.approx(
         [metrics.known_coverage(own != 0, truth.knowable) for own in maps]
     )
-    assert milestone.overlap == metrics.overlap(episode.env.world.masks)
+    assert milestone.overlap == metrics.overlap(episode.env.score.masks)
 
 
 def test_a_lone_robot_overlaps_with_nobody():
@@ -132,8 +132,8 @@ def test_looking_on_changes_nothing():
     alone = ExplorationEnv("apartment", episode.env.settings)
     run_episode(lidarium.policy("nearest_frontier"), alone, 0)
     np.testing.assert_array_equal(episode.env.world.poses, alone.world.poses)
-    np.testing.assert_array_equal(episode.env.world.ranges, alone.world.ranges)
-    np.testing.assert_array_equal(episode.env.world.log_odds, alone.world.log_odds)
+    np.testing.assert_array_equal(episode.env.simulation.ranges, alone.simulation.ranges)
+    np.testing.assert_array_equal(episode.env.beliefs.log_odds, alone.beliefs.log_odds)
 
 
 def test_a_new_episode_is_a_new_history():

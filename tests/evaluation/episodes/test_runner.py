@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from lidarium.agents import Stop
+from lidarium.agents import Policy, Stop
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 
 
-class FirstFrontier:
+class FirstFrontier(Policy):
     """Takes the cheapest frontier on offer."""
 
     level, shares_map = "frontier", True
@@ -23,7 +23,7 @@ class FirstFrontier:
         }
 
 
-class StopsAfter:
+class StopsAfter(Policy):
     """Stands for some steps and stops, each robot with a reason of its own."""
 
     level, shares_map = "velocity", True

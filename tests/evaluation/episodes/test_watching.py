@@ -46,4 +46,4 @@ def test_a_watched_episode_is_the_same_to_the_bit():
     for env in (watched, unwatched):
         run_episode(lidarium.policy("nearest_frontier"), env, seed=3)
     np.testing.assert_array_equal(watched.world.poses, unwatched.world.poses)
-    np.testing.assert_array_equal(watched.world.log_odds, unwatched.world.log_odds)
+    np.testing.assert_array_equal(watched.simulation.beliefs.log_odds, unwatched.simulation.beliefs.log_odds)

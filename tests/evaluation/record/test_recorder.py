@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import lidarium
+from lidarium.agents import Policy
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
@@ -36,7 +37,7 @@ class MapLog(Watcher):
         self.maps[env.scorer.time] = three_levels(team_log_odds(env)[0])
 
 
-class Sends:
+class Sends(Policy):
     """Sends robot_0 to one place after the other, and lets robot_1 rest."""
 
     level, shares_map = "waypoint", True
@@ -49,7 +50,7 @@ class Sends:
         return {"robot_0": np.array([0.05 * (1 + self.decisions // 3), 0.0], np.float32), "robot_1": None}
 
 
-class Rams:
+class Rams(Policy):
     """Drives into walls and teammates at full speed, backs off and comes again."""
 
     level, shares_map = "velocity", True
@@ -185,8 +186,8 @@ def test_a_recorded_episode_is_the_same_as_one_that_is_not(recorded):
     alone = WatchedExploration("apartment", env.settings)
     run_episode(lidarium.policy("nearest_frontier"), alone, 3)
     np.testing.assert_array_equal(alone.world.poses, env.world.poses)
-    np.testing.assert_array_equal(alone.world.log_odds, env.world.log_odds)
-    np.testing.assert_array_equal(alone.world.windows, env.world.windows)
+    np.testing.assert_array_equal(alone.beliefs.log_odds, env.beliefs.log_odds)
+    np.testing.assert_array_equal(alone.beliefs.windows, env.beliefs.windows)
 
 
 def test_an_episode_broken_off_within_a_step_is_recorded_without_its_last_state():

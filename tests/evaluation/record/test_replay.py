@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lidarium.agents import Stop
+from lidarium.agents import Policy, Stop
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.settings.making import make_settings
@@ -16,7 +16,7 @@ from lidarium.evaluation.record.state import state_sha256
 from lidarium.mapping.files.map_files import write_ros_map
 
 
-class FirstFrontier:
+class FirstFrontier(Policy):
     """Takes the cheapest frontier on offer."""
 
     level, shares_map = "frontier", True
@@ -30,7 +30,7 @@ class FirstFrontier:
         }
 
 
-class Leaves:
+class Leaves(Policy):
     """Turns on the spot; one robot after the other stops, with words that the environment uses too."""
 
     level, shares_map = "velocity", True
@@ -224,10 +224,10 @@ def test_the_hash_of_a_state_covers_poses_scans_maps_masks_and_endings():
     for change in (
         lambda: world.poses.__setitem__((0, 0), np.nextafter(world.poses[0, 0], 9.0)),
         lambda: world.velocities.__setitem__((0, 1), 1e-300),
-        lambda: world.ranges.__setitem__((0, 5), np.float32(1.0)),
-        lambda: world.log_odds[0].__setitem__((0, 0), 1),
-        lambda: world.masks[0].__setitem__((0, 0), np.uint64(1)),
-        lambda: world.seen.__setitem__(0, 1),
+        lambda: env.simulation.ranges.__setitem__((0, 5), np.float32(1.0)),
+        lambda: env.beliefs.log_odds[0].__setitem__((0, 0), 1),
+        lambda: env.score.masks[0].__setitem__((0, 0), np.uint64(1)),
+        lambda: env.score.seen.__setitem__(0, 1),
         lambda: env.scorer.ended_because.update(robot_0="stopped"),
     ):
         change()

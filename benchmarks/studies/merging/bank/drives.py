@@ -12,7 +12,7 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.starts import draw_starts
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.mapping.geometry.rigid import Transform
@@ -93,7 +93,9 @@ class MapMaker(Watcher):
         pose = self._start.inverse() @ Transform(*world.poses[0].tolist())
         lidar = env.settings.lidar
         noise = (lidar.noise_floor, lidar.noise_share)
-        self._grid.integrate((pose.x + x, pose.y + y, pose.theta + theta), world.ranges[0], lidar, noise)
+        self._grid.integrate(
+            (pose.x + x, pose.y + y, pose.theta + theta), env.simulation.ranges[0], lidar, noise
+        )
         while self._shares and scorer.coverage >= self._shares[0]:
             self._keep(scorer.time, scorer.coverage)
 

@@ -15,7 +15,7 @@ from lidarium.benchmarks.speed.harness.report import about
 from lidarium.benchmarks.speed.scenes.floors import straight_floor, team_poses
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
 
@@ -45,10 +45,10 @@ def test_robots_on_the_maps_of_others_drive_alike_in_less_memory(drives):
     own, shared = Histories(drives, 8, 0.025), Histories(drives, 8, 0.025, maps=2)
     own.run()
     shared.run()
-    assert np.array_equal(own.world.ranges, shared.world.ranges)
+    assert np.array_equal(own.simulation.ranges, shared.simulation.ranges)
     assert own.working_set == 4 * shared.working_set
-    assert not shared.world.log_odds[2].any()
-    assert own.world.log_odds[2].any()
+    assert not shared.simulation.beliefs.log_odds[2].any()
+    assert own.simulation.beliefs.log_odds[2].any()
 
 
 def test_teams_start_apart_and_clear_of_walls():
@@ -92,13 +92,13 @@ def test_arrays_are_counted_once_and_by_their_whole():
 
 def test_what_belongs_to_a_robot_is_its_map_mask_and_rows():
     floor = straight_floor(256, 256)
-    world = KinematicWorld(
+    simulation = KinematicSimulation.of_team(
         [ROBOTS["kobuki"]], Lidar(beams=90), OccupancySettings(resolution=0.025), episodes=3
     )
     for episode in range(3):
-        world.place(episode, floor.tables(), team_poses(floor, 1, 1), seed=0)
-    own = own_bytes(world)
-    grids = world.log_odds[0].nbytes + world.masks[0].nbytes
+        simulation.place(episode, floor.tables(), team_poses(floor, 1, 1), seed=0)
+    own = own_bytes(simulation)
+    grids = simulation.beliefs.log_odds[0].nbytes + simulation.score.masks[0].nbytes
     assert grids + 4 * 90 < own < grids + 4 * 90 + 1000
 
 

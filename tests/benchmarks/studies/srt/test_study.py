@@ -14,7 +14,7 @@ from lidarium.benchmarks.studies.srt.goal_runs import MODES, WORLDS, GoalRun, me
 from lidarium.benchmarks.studies.srt.shortest_path import shortest_path
 from lidarium.envs.floors.catalogue.names import set_floors
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 
 WALL = Solid(np.array([[2.0, 0.0], [2.2, 0.0], [2.2, 3.0], [2.0, 3.0]]))
 

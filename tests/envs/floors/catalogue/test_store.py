@@ -14,7 +14,7 @@ from lidarium.envs.floors.catalogue import store
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.catalogue.store import PARTS, Store, floor_store, hash_of_code
 from lidarium.envs.floors.generation.buildings import generate_building
-from lidarium.envs.simulation.kinematic import floor_cache
+from lidarium.envs.simulation.kernels import floor_cache
 
 ROOT = Path(store.__file__).resolve().parents[3]
 ARRAYS = {
@@ -252,7 +252,7 @@ def imported(path):
         ),
         (
             floor_cache.MADE_BY,
-            ("envs/simulation/kinematic/floor_tables.py", "envs/floors/catalogue/store.py"),
+            ("envs/simulation/kernels/floor_tables.py", "envs/floors/catalogue/store.py"),
         ),
     ],
 )

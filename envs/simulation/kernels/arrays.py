@@ -4,17 +4,33 @@ A kernel views the arrays where they lie. Arrays handed over as arguments would 
 every use, by all threads in the same places of memory; views are not.
 """
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, get_args, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lidarium.envs.settings.lidar import Lidar
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import arrays_at
+from lidarium.mapping.kernels.views import arrays_at, table_of
 
 TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME, DEAD_RECKONING, SOME_MATES = 1, 2, 4, 8, 16, 32
 """Flags of a row: the localizer knows the true pose; teammates' poses are known; the robot has ended (its
 body stands there, its sensors are off); it believes in the frame of its own start; its localizer reckons from
 its odometry alone; the poses of those teammates are known that the radio told of."""
+
+(
+    ANGLE_FIRST,
+    ANGLE_INCREMENT,
+    FULL_CIRCLE,
+    RANGE_MIN,
+    RANGE_MAX,
+    NOISE_FLOOR,
+    NOISE_SHARE,
+    LASER_HEIGHT,
+    MAP_RESOLUTION,
+    TIME_STEP,
+) = range(10)
+"""Places in ``sensor``."""
 
 (
     SQUARES,
@@ -28,16 +44,16 @@ its odometry alone; the poses of those teammates are known that the radio told o
     BOUND,
     BODY_SOLID,
 ) = range(10)
-"""Columns of ``floors``: addresses and sizes, as ``FloorTables.row`` has them."""
+"""Columns of ``floor_rows``: addresses and sizes, as ``FloorTables.row`` has them."""
 
 FRAME_X, FRAME_Y, FRAME_RESOLUTION = range(3)
 """Columns of ``frames``."""
 
 MAP, MAP_ROWS, MAP_COLUMNS, TOUCHED, TOUCHED_ROWS = range(5)
-"""Columns of ``maps``."""
+"""Columns of ``belief_rows``."""
 
 OWN_MASK, TEAM_MASK, COUNTED_MASK, MASK_ROWS, MASK_WORDS = range(5)
-"""Columns of ``masks``."""
+"""Columns of ``mask_rows``."""
 
 
 class WorldArrays(NamedTuple):
@@ -48,14 +64,14 @@ class WorldArrays(NamedTuple):
     bodies : (robots, 8) float64
         ``Robot.numbers`` of each robot of a team.
     sensor : (10,) float64
-        Numbers of the laser, the maps and the step, see ``stages``.
+        Numbers of the laser, the maps and the step, see ``sensor_numbers``.
     unit_vectors : (2, beams) float64
         Which way the beams look.
     noise_table : (4096,) float32
         ``GAUSSIAN_TABLE``.
     increments : (4,) int64
         ``OccupancySettings.increments``.
-    floors, frames : (episodes, 10) int64, (episodes, 3) float64
+    floor_rows, frames : (episodes, 10) int64, (episodes, 3) float64
         ``FloorTables.row`` and ``FloorTables.frame`` of each episode's floor.
     seeds, steps : (episodes,) uint64, (episodes,) int64
         Where the noise comes from, and the step that comes next.
@@ -65,14 +81,14 @@ class WorldArrays(NamedTuple):
         Whether the robot drives, and its flags.
     poses, velocities, starts, believed : (rows, 3), (rows, 2), (rows, 3), (rows, 3) float64
         True poses and velocities, poses at the start, and poses as the localizers believe.
-    ranges : (rows, beams) float32
-        Scans [m]; inf for no return.
-    maps, origins : (rows, 5) int64, (rows, 2) float64
+    ranges, true_ranges : (rows, beams) float32
+        Scans as measured, and without noise where stages run one by one [m]; inf for no return.
+    belief_rows, origins : (rows, 5) int64, (rows, 2) float64
         Address, rows and columns of each robot's log-odds, address and rows (0 for none) of the words of each
         row that have changed since the pooled maps took them in, and where cell (0, 0) begins.
     windows : (rows, 4) int64
         What part of each map has changed since planning took it in.
-    masks : (rows, 5) int64
+    mask_rows : (rows, 5) int64
         Addresses of the robot's mask, the team's and F's, and their rows and words.
     boxes : (rows, 4) int64
         Part of the masks in which the robot saw new cells of F in this step: row_low, row_high, word_low,
@@ -85,6 +101,8 @@ class WorldArrays(NamedTuple):
         Length of each robot's path [m], and how often it came into contact.
     reward_weights : (4,) float64
         What a new cell earns, and what a step, a contact and a metre cost.
+    reward_terms : (rows, 4) float64
+        What each term has brought each robot since rewards were last taken.
     rewarded, rewards : (rows,) float64
         Length of each robot's path at its last reward [m], and what it has earned since rewards were last
         taken.
@@ -107,7 +125,7 @@ class WorldArrays(NamedTuple):
     unit_vectors: Annotated[Array, np.float64, 2]
     noise_table: Annotated[Array, np.float32, 1]
     increments: Annotated[Array, np.int64, 1]
-    floors: Annotated[Array, np.int64, 2]
+    floor_rows: Annotated[Array, np.int64, 2]
     frames: Annotated[Array, np.float64, 2]
     seeds: Annotated[Array, np.uint64, 1]
     steps: Annotated[Array, np.int64, 1]
@@ -119,10 +137,11 @@ class WorldArrays(NamedTuple):
     starts: Annotated[Array, np.float64, 2]
     believed: Annotated[Array, np.float64, 2]
     ranges: Annotated[Array, np.float32, 2]
-    maps: Annotated[Array, np.int64, 2]
+    true_ranges: Annotated[Array, np.float32, 2]
+    belief_rows: Annotated[Array, np.int64, 2]
     origins: Annotated[Array, np.float64, 2]
     windows: Annotated[Array, np.int64, 2]
-    masks: Annotated[Array, np.int64, 2]
+    mask_rows: Annotated[Array, np.int64, 2]
     boxes: Annotated[Array, np.int64, 2]
     seen: Annotated[Array, np.int64, 1]
     gains: Annotated[Array, np.float64, 1]
@@ -131,6 +150,7 @@ class WorldArrays(NamedTuple):
     travelled: Annotated[Array, np.float64, 1]
     collisions: Annotated[Array, np.int64, 1]
     reward_weights: Annotated[Array, np.float64, 1]
+    reward_terms: Annotated[Array, np.float64, 2]
     rewarded: Annotated[Array, np.float64, 1]
     rewards: Annotated[Array, np.float64, 1]
     odometry_model: Annotated[Array, np.float64, 1]
@@ -148,3 +168,38 @@ class WorldArrays(NamedTuple):
 def world_at(table: Array) -> WorldArrays:
     """View the arrays of a table inside a kernel."""
     return arrays_at(table, WorldArrays)  # type: ignore[no-any-return]
+
+
+def table_of_owners(*owners: object) -> NDArray[np.int64]:
+    """Return the table of a world's arrays, each an attribute of the first owner that has it.
+
+    What no owner has is empty. The owners keep the arrays alive.
+    """
+    hints = get_type_hints(WorldArrays, include_extras=True)
+    arrays = []
+    for name in WorldArrays._fields:
+        owner = next((each for each in owners if hasattr(each, name)), None)
+        _, dtype, dimensions = get_args(hints[name])
+        array = np.zeros((0,) * dimensions, dtype) if owner is None else getattr(owner, name)
+        if array.dtype != dtype or array.ndim != dimensions or not array.flags.c_contiguous:
+            raise TypeError(
+                f"{name} is {array.dtype} with {array.ndim} dimensions; want {np.dtype(dtype)} with {dimensions}, "
+                f"contiguous"
+            )
+        arrays.append(array)
+    return table_of(arrays)
+
+
+def sensor_numbers(lidar: Lidar, time_step: float, map_resolution: float) -> NDArray[np.float64]:
+    """Return what kernels know of the laser, the step [s] and the maps' cells [m], shape (10,)."""
+    numbers = np.zeros(10)
+    numbers[ANGLE_FIRST], numbers[ANGLE_INCREMENT] = lidar.angle_first, lidar.angle_increment
+    numbers[FULL_CIRCLE] = float(lidar.is_full_circle)
+    numbers[RANGE_MIN], numbers[RANGE_MAX] = lidar.range_min, lidar.range_max
+    numbers[NOISE_FLOOR], numbers[NOISE_SHARE] = lidar.noise_floor, lidar.noise_share
+    numbers[LASER_HEIGHT], numbers[MAP_RESOLUTION], numbers[TIME_STEP] = (
+        lidar.height,
+        map_resolution,
+        time_step,
+    )
+    return numbers

@@ -14,29 +14,38 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarium.envs.scoring.coverage import mark_seen
-from lidarium.envs.simulation.faults import blind_beams
-from lidarium.envs.simulation.kinematic.arrays import (
+from lidarium.envs.simulation.disturbances.faults import blind_beams
+from lidarium.envs.simulation.disturbances.noise import fill_gaussian, stream_key
+from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
+from lidarium.envs.simulation.kernels.arrays import (
+    ANGLE_FIRST,
+    ANGLE_INCREMENT,
     COUNTED_MASK,
     FRAME_RESOLUTION,
     FRAME_X,
     FRAME_Y,
+    FULL_CIRCLE,
     KNOWN_MATES,
+    LASER_HEIGHT,
     MAP,
     MAP_COLUMNS,
+    MAP_RESOLUTION,
     MAP_ROWS,
     MASK_ROWS,
     MASK_WORDS,
+    NOISE_FLOOR,
+    NOISE_SHARE,
     OWN_FRAME,
     OWN_MASK,
+    RANGE_MAX,
+    RANGE_MIN,
     SOME_MATES,
     TOUCHED,
     TOUCHED_ROWS,
     TRUE_POSE,
     WorldArrays,
 )
-from lidarium.envs.simulation.kinematic.ray_casting import cast_scan, cut_by_disc
-from lidarium.envs.simulation.noise import fill_gaussian, stream_key
-from lidarium.envs.simulation.odometry import HEIGHT, RADIUS
+from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc
 from lidarium.mapping.grids.noisy_returns import settle_returns
 from lidarium.mapping.grids.occupancy import integrate_scan
 from lidarium.mapping.grids.pooled_maps import touched_words
@@ -44,20 +53,6 @@ from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_grid_at, scratch_grid, scratch_vector, word_grid_at
-
-(
-    ANGLE_FIRST,
-    ANGLE_INCREMENT,
-    FULL_CIRCLE,
-    RANGE_MIN,
-    RANGE_MAX,
-    NOISE_FLOOR,
-    NOISE_SHARE,
-    LASER_HEIGHT,
-    MAP_RESOLUTION,
-    TIME_STEP,
-) = range(10)
-"""Places in the array of sensor numbers."""
 
 MATE_MARGIN = 1.5
 """A beam that ends within this of a teammate's body is taken to have met it [map cells]."""
@@ -102,7 +97,7 @@ def _measure(
     )
     angle_first, increment = sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
     beam_directions(heading, world.unit_vectors, directions)
-    cast_scan(world.floors[episode], x, y, heading, angle_first, increment, directions, reach, lengths)
+    cast_scan(world.floor_rows[episode], x, y, heading, angle_first, increment, directions, reach, lengths)
     for other in range(robots):
         if other != robot and world.bodies[other, HEIGHT] > sensor[LASER_HEIGHT]:
             other_x, other_y = (
@@ -124,23 +119,55 @@ def _measure(
 
 
 @kernel(borrowing=True)
-def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
-    """Take the scan of one robot: the world's ranges as the sensor tells, and ``lengths`` of the true beams [map cells]."""
+def _add_noise(world: WorldArrays, row: int, first: int, robots: int) -> None:
+    """Disturb a scan as the sensor does."""
     sensor, ranges = world.sensor, world.ranges[row]
-    _measure(world, row, first, robots, directions, ranges, lengths)
-    if _is_noisy(sensor):
-        beams = lengths.shape[0]
-        episode = first // robots
-        noise = scratch_vector(beams, np.float32)
-        fill_gaussian(
-            stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise
-        )
-        floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
-        low, high = np.float32(sensor[RANGE_MIN]), np.float32(sensor[RANGE_MAX] - RANGE_GAP)
-        for beam in range(beams):
-            true_range = ranges[beam]
-            noisy = true_range + max(floor_deviation, share * true_range) * noise[beam]
-            ranges[beam] = min(max(noisy, low), high) if true_range < np.float32(np.inf) else true_range
+    beams, episode = ranges.shape[0], first // robots
+    noise = scratch_vector(beams, np.float32)
+    fill_gaussian(
+        stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise
+    )
+    floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
+    low, high = np.float32(sensor[RANGE_MIN]), np.float32(sensor[RANGE_MAX] - RANGE_GAP)
+    for beam in range(beams):
+        true_range = ranges[beam]
+        noisy = true_range + max(floor_deviation, share * true_range) * noise[beam]
+        ranges[beam] = min(max(noisy, low), high) if true_range < np.float32(np.inf) else true_range
+
+
+@kernel(borrowing=True)
+def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
+    """Take the scan of one robot: ranges as the sensor measures, and ``lengths`` of the true beams [map cells]."""
+    _measure(world, row, first, robots, directions, world.ranges[row], lengths)
+    if _is_noisy(world.sensor):
+        _add_noise(world, row, first, robots)
+
+
+@kernel(spliced=True)
+def sense_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
+    """Take the scan of one robot, and keep its true ranges."""
+    _measure(world, row, first, robots, scratch.directions, world.true_ranges[row], scratch.lengths)
+    world.ranges[row, :] = world.true_ranges[row]
+    if _is_noisy(world.sensor):
+        _add_noise(world, row, first, robots)
+
+
+@kernel(spliced=True)
+def score_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
+    """Add what a robot's true ranges see to its mask."""
+    scratch.windows[:] = np.uint64(0)
+    beam_directions(world.poses[row, 2], world.unit_vectors, scratch.directions)
+    true_lengths(world.true_ranges[row], world.sensor, scratch.lengths)
+    _score(world, row, first, robots, scratch)
+
+
+@kernel(inline=True, borrowing=True)
+def true_lengths(ranges: Array, sensor: Array, lengths: Array) -> None:
+    """Fill the lengths of beams [map cells] from true ranges [m]; 0 for invalid ones."""
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    for beam in range(lengths.shape[0]):
+        value = ranges[beam]
+        lengths[beam] = min(value, sensor[RANGE_MAX]) * scale if value == value else 0.0
 
 
 @kernel(spliced=True)
@@ -195,7 +222,7 @@ def _score(
     box, row_offset, word_offset = _seen_area(
         world, row, first, robots, scratch.lengths, scratch.directions, scratch.ends, bits
     )
-    masks = world.masks[row]
+    masks = world.mask_rows[row]
     own, counted = (
         word_grid_at(masks[OWN_MASK], masks[MASK_ROWS], masks[MASK_WORDS]),
         word_grid_at(masks[COUNTED_MASK], masks[MASK_ROWS], masks[MASK_WORDS]),
@@ -232,11 +259,8 @@ def footprint(
         _measure(world, row, first, robots, directions, np.empty(beams, np.float32), lengths)
     else:
         # The sensor told the true ranges: nothing has to be cast again.
-        scale = 1.0 / sensor[MAP_RESOLUTION]
         beam_directions(world.poses[row, 2], world.unit_vectors, directions)
-        for beam in range(beams):
-            value = world.ranges[row, beam]
-            lengths[beam] = min(value, sensor[RANGE_MAX]) * scale if value == value else 0.0
+        true_lengths(world.ranges[row], sensor, lengths)
     return _seen_area(world, row, first, robots, lengths, directions, ends, bits)  # type: ignore[no-any-return]
 
 
@@ -307,7 +331,7 @@ def _update_map(
     """
     directions, lengths, ends, bits = scratch.directions, scratch.lengths, scratch.ends, scratch.windows[0]
     sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]
-    ranges, belief = world.ranges[row], world.maps[row]
+    ranges, belief = world.ranges[row], world.belief_rows[row]
     beams = ranges.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.settings.robots import ROBOTS, Robot
-from lidarium.envs.simulation.kinematic.motion import deepest_wall, distance_bound, move_robots
+from lidarium.envs.simulation.kernels.motion import deepest_wall, distance_bound, move_robots
 
 RESOLUTION = 0.025
 KOBUKI = Robot()

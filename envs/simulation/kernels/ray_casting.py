@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from lidarium.envs.simulation.kinematic.arrays import (
+from lidarium.envs.simulation.kernels.arrays import (
     FACE_COUNT,
     FACE_START_COUNT,
     FACE_STARTS,
@@ -24,8 +24,8 @@ from lidarium.envs.simulation.kinematic.arrays import (
     SQUARES,
     TILE_COLUMNS,
 )
-from lidarium.envs.simulation.kinematic.face_casting import cast_by_faces
-from lidarium.envs.simulation.kinematic.ray_tables import TILE
+from lidarium.envs.simulation.kernels.face_casting import cast_by_faces
+from lidarium.envs.simulation.kernels.ray_tables import TILE
 from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import bytes_at, int32_table_at

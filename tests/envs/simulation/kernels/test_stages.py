@@ -11,12 +11,12 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kinematic.arrays import ENDED, KNOWN_MATES
-from lidarium.envs.simulation.kinematic.floor_cache import floor_tables
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic.motion import distance_bound
-from lidarium.envs.simulation.kinematic.ray_tables import RayTables
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.kernels.arrays import ENDED, KNOWN_MATES
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.motion import distance_bound
+from lidarium.envs.simulation.kernels.ray_tables import RayTables
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancyGrid, OccupancySettings
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
@@ -53,9 +53,9 @@ def starts_on(tables, count, generator, apart=0.6):
     return np.array(placed)
 
 
-def world(robots=3, episodes=1, noise=0.0, threads=1, resolution=0.05, beams=181):
+def simulation(robots=3, episodes=1, noise=0.0, threads=1, resolution=0.05, beams=181):
     lidar = Lidar(beams=beams, noise_floor=noise, noise_share=noise)
-    return KinematicWorld(
+    return KinematicSimulation.of_team(
         [ROBOTS["kobuki"]] * robots,
         lidar,
         OccupancySettings(resolution=resolution),
@@ -83,7 +83,10 @@ def commands_of(generator, rows):
 @pytest.mark.parametrize("resolution", [0.025, 0.05])
 def test_the_fused_step_is_the_two_stages_one_after_the_other(tables, noise, known, resolution):
     generator = np.random.default_rng(1)
-    fused, staged = world(noise=noise, resolution=resolution), world(noise=noise, resolution=resolution)
+    fused, staged = (
+        simulation(noise=noise, resolution=resolution),
+        simulation(noise=noise, resolution=resolution),
+    )
     starts = starts_on(tables, 3, generator)
     for each in (fused, staged):
         each.place(0, tables, starts, 5, known)
@@ -104,7 +107,7 @@ def test_the_fused_step_is_the_two_stages_one_after_the_other(tables, noise, kno
 
 def test_serial_and_parallel_kernels_agree_to_the_bit(tables):
     generator = np.random.default_rng(2)
-    serial, parallel = world(16, noise=0.01), world(16, noise=0.01, threads=2)
+    serial, parallel = simulation(16, noise=0.01), simulation(16, noise=0.01, threads=2)
     assert serial._step is not parallel._step
     starts = starts_on(tables, 16, generator)
     for each in (serial, parallel):
@@ -122,7 +125,10 @@ def test_four_episodes_in_a_batch_are_four_worlds_alone(tables, threads):
     generator = np.random.default_rng(3)
     other_floor = floor_tables(load_floor("building:4"), 0.025, 0.3, 0.52)
     floors = [tables, other_floor, tables, other_floor]
-    batch, alone = world(2, 4, noise=0.01, threads=threads), [world(2, noise=0.01) for _ in range(4)]
+    batch, alone = (
+        simulation(2, 4, noise=0.01, threads=threads),
+        [simulation(2, noise=0.01) for _ in range(4)],
+    )
     for episode in range(4):
         starts = starts_on(floors[episode], 2, generator)
         batch.place(episode, floors[episode], starts, 100 + episode, known_starts=episode != 2)
@@ -140,7 +146,7 @@ def test_four_episodes_in_a_batch_are_four_worlds_alone(tables, threads):
 
 def test_an_episode_placed_anew_forgets_the_old_one_and_leaves_the_others(tables):
     generator = np.random.default_rng(4)
-    batch, alone = world(2, 2, noise=0.01), world(2, noise=0.01)
+    batch, alone = simulation(2, 2, noise=0.01), simulation(2, noise=0.01)
     first, second = starts_on(tables, 2, generator), starts_on(tables, 2, generator)
     batch.place(0, tables, first, 1)
     batch.place(1, tables, second, 2)
@@ -158,7 +164,7 @@ def test_an_episode_placed_anew_forgets_the_old_one_and_leaves_the_others(tables
 @pytest.mark.parametrize("how", ["pickle", "deepcopy"])
 def test_a_world_copied_in_mid_episode_goes_on_alike_and_apart(tables, how):
     generator = np.random.default_rng(5)
-    original = world(noise=0.01)
+    original = simulation(noise=0.01)
     original.place(0, tables, starts_on(tables, 3, generator), 5)
     for _ in range(20):
         original.step(commands_of(generator, 3))
@@ -179,7 +185,7 @@ def test_unknown_starts_give_the_same_map_in_the_frame_of_the_start(tables):
     start = starts_on(tables, 1, generator)
     start[0, :2] = np.round((start[0, :2] - tables.laser.origin) / 0.05) * 0.05 + tables.laser.origin
     start[0, 2] = 0.0
-    known, own = world(1), world(1)
+    known, own = simulation(1), simulation(1)
     known.place(0, tables, start, 1, True)
     own.place(0, tables, start, 1, False)
     for step in range(30):
@@ -196,7 +202,7 @@ def test_unknown_starts_give_the_same_map_in_the_frame_of_the_start(tables):
 
 def test_the_map_is_that_of_the_occupancy_grid_fed_with_the_same_scans(tables):
     generator = np.random.default_rng(7)
-    one = world(1, noise=0.01)
+    one = simulation(1, noise=0.01)
     one.place(0, tables, starts_on(tables, 1, generator), 1)
     one.flags[:] &= ~KNOWN_MATES
     lidar = one.lidar
@@ -220,7 +226,7 @@ def hall(rows=160, columns=240):
 def test_robots_see_each_other_but_known_teammates_stay_out_of_the_map():
     starts = np.array([[2.0, 2.0, 0.0], [3.5, 2.0, 0.0]])
     for known in (True, False):
-        pair = world(2)
+        pair = simulation(2)
         pair.place(0, hall(), starts, 1, known)
         pair.step(np.zeros((2, 2)), moves_bodies=False)
         assert pair.ranges[0, 90] == pytest.approx(1.5 - 0.18, abs=1e-6)
@@ -229,14 +235,14 @@ def test_robots_see_each_other_but_known_teammates_stay_out_of_the_map():
 
 
 def test_a_robot_too_low_for_the_laser_is_not_seen():
-    pair = KinematicWorld([ROBOTS["pioneer"]] * 2, Lidar(beams=181), OccupancySettings())
+    pair = KinematicSimulation.of_team([ROBOTS["pioneer"]] * 2, Lidar(beams=181), OccupancySettings())
     pair.place(0, hall(), np.array([[2.0, 2.0, 0.0], [3.5, 2.0, 0.0]]), 1)
     pair.step(np.zeros((2, 2)), moves_bodies=False)
     assert pair.ranges[0, 90] == pytest.approx(239 * 0.025 - 2.0, abs=1e-5)
 
 
 def test_an_ended_robot_stays_as_a_body_with_its_sensors_off():
-    pair = world(2)
+    pair = simulation(2)
     pair.place(0, hall(), np.array([[2.0, 2.0, 0.0], [2.6, 2.0, 0.0]]), 1)
     pair.step(np.zeros((2, 2)), moves_bodies=False)
     pair.flags[1] |= ENDED
@@ -255,7 +261,7 @@ def test_an_ended_robot_stays_as_a_body_with_its_sensors_off():
 
 def test_the_window_of_changes_holds_every_cell_that_changed(tables):
     generator = np.random.default_rng(9)
-    team = world(2, noise=0.01)
+    team = simulation(2, noise=0.01)
     team.place(0, tables, starts_on(tables, 2, generator), 1)
     for step in range(40):
         before = [log_odds.copy() for log_odds in team.log_odds]
@@ -272,4 +278,4 @@ def test_the_window_of_changes_holds_every_cell_that_changed(tables):
 
 def test_a_map_cell_that_is_no_multiple_of_the_rasters_is_refused(tables):
     with pytest.raises(ValueError, match="whole multiple"):
-        world(1, resolution=0.04).place(0, tables, starts_on(tables, 1, np.random.default_rng(0)), 1)
+        simulation(1, resolution=0.04).place(0, tables, starts_on(tables, 1, np.random.default_rng(0)), 1)

@@ -9,11 +9,11 @@ from scipy import stats
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
-from lidarium.envs.simulation.kinematic.motion import distance_bound
-from lidarium.envs.simulation.kinematic.ray_tables import RayTables
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
-from lidarium.envs.simulation.noise import GAUSSIAN_TABLE, fill_gaussian, stream_key
+from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, fill_gaussian, stream_key
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.motion import distance_bound
+from lidarium.envs.simulation.kernels.ray_tables import RayTables
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.kernels.compilation import kernel
 
@@ -91,9 +91,11 @@ def hall(rows=120, columns=160):
     return FloorTables(raster, raster, RayTables(solid), distance_bound(solid))
 
 
-def world(episodes=1, robots=2, floor=0.01, share=0.01, range_max=5.6):
+def simulation(episodes=1, robots=2, floor=0.01, share=0.01, range_max=5.6):
     lidar = Lidar(beams=200, noise_floor=floor, noise_share=share, range_max=range_max)
-    return KinematicWorld([ROBOTS["kobuki"]] * robots, lidar, OccupancySettings(), episodes=episodes)
+    return KinematicSimulation.of_team(
+        [ROBOTS["kobuki"]] * robots, lidar, OccupancySettings(), episodes=episodes
+    )
 
 
 STARTS = np.array([[1.0, 1.0, 0.3], [2.5, 1.5, 2.0]])
@@ -101,7 +103,7 @@ STARTS = np.array([[1.0, 1.0, 0.3], [2.5, 1.5, 2.0]])
 
 def test_the_same_seed_gives_the_same_ranges_in_any_row():
     tables, commands = hall(), np.array([[0.3, 0.5], [0.2, -1.0]])
-    alone, among = world(), world(episodes=4)
+    alone, among = simulation(), simulation(episodes=4)
     alone.place(0, tables, STARTS, 99)
     for episode in range(4):
         among.place(
@@ -115,7 +117,7 @@ def test_the_same_seed_gives_the_same_ranges_in_any_row():
 
 
 def test_ranges_spread_as_the_lidar_says_with_a_floor_and_a_share():
-    tables, lidar_world, exact = hall(), world(robots=1), world(robots=1, floor=0.0, share=0.0)
+    tables, lidar_world, exact = hall(), simulation(robots=1), simulation(robots=1, floor=0.0, share=0.0)
     gaps = []
     for each in (lidar_world, exact):
         each.place(0, tables, STARTS[:1], 3)
@@ -129,9 +131,9 @@ def test_ranges_spread_as_the_lidar_says_with_a_floor_and_a_share():
 
 
 def test_a_beam_without_return_stays_without_and_hits_stay_within_the_lidars_range():
-    tables, noisy = hall(), world(robots=1, floor=0.3, share=0.0, range_max=1.2)
+    tables, noisy = hall(), simulation(robots=1, floor=0.3, share=0.0, range_max=1.2)
     noisy.place(0, tables, STARTS[:1], 3)
-    exact = world(robots=1, floor=0.0, share=0.0, range_max=1.2)
+    exact = simulation(robots=1, floor=0.0, share=0.0, range_max=1.2)
     exact.place(0, tables, STARTS[:1], 3)
     exact.step(np.zeros((1, 2)))
     for _ in range(50):
@@ -145,7 +147,7 @@ def test_a_beam_without_return_stays_without_and_hits_stay_within_the_lidars_ran
 
 def test_noise_that_is_off_leaves_the_ideal_ranges_to_the_bit():
     tables = hall()
-    plain, off = world(floor=0.0, share=0.0), world(floor=0.0, share=0.0)
+    plain, off = simulation(floor=0.0, share=0.0), simulation(floor=0.0, share=0.0)
     plain.place(0, tables, STARTS, 1)
     off.place(0, tables, STARTS, 2)
     for _ in range(5):

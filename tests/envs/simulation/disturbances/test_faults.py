@@ -8,7 +8,7 @@ import pytest
 import lidarium
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.faults import KINDS, MOST_DRAWN, Fault, FaultSettings
-from lidarium.envs.simulation.faults import FAULT_NUMBERS, plan_faults
+from lidarium.envs.simulation.disturbances.faults import FAULT_NUMBERS, plan_faults
 from lidarium.evaluation.episodes.runner import run_episode
 
 HALL = Floor("hall", (0.0, 0.0, 30.0, 20.0))
@@ -90,8 +90,8 @@ def test_a_kidnapped_robot_is_elsewhere_and_what_it_knows_is_not_told():
     assert np.hypot(*(poses[9, :2] - [4.0, 4.0])) < 1.0
     assert np.hypot(*(poses[10, :2] - [20.0, 12.0])) < 0.1
     # Its wheels have not noticed.
-    assert env.world.believed[0, 0] == pytest.approx(4.0 + env.world.travelled[0], abs=0.05)
-    assert env.world.believed[0, 1] == pytest.approx(4.0, abs=1e-6)
+    assert env.beliefs.believed[0, 0] == pytest.approx(4.0 + env.world.travelled[0], abs=0.05)
+    assert env.beliefs.believed[0, 1] == pytest.approx(4.0, abs=1e-6)
 
 
 def test_a_kidnapped_robot_is_never_put_into_another():
@@ -168,7 +168,7 @@ def test_the_same_seed_draws_the_same_faults():
 def test_who_takes_himself_to_be_beyond_his_map_fails():
     env = lidarium.parallel_env("apartment", robots=1, localization="odometry", stop_coverage=None)
     env.reset(seed=1)
-    env.world.odometry[0, :2] = 1000.0
+    env.simulation.odometry[0, :2] = 1000.0
     _, _, terminated, _, infos = env.step({"robot_0": np.zeros(2, np.float32)})
     assert terminated["robot_0"]
     assert infos["robot_0"]["ended_because"] == "failed"

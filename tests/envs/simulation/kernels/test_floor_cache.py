@@ -16,14 +16,14 @@ from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE, floor_store
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.free_space import swept_free_space
 from lidarium.envs.floors.generation.buildings import generate_building
-from lidarium.envs.simulation.kinematic import floor_cache
-from lidarium.envs.simulation.kinematic.floor_cache import (
+from lidarium.envs.simulation.kernels import floor_cache
+from lidarium.envs.simulation.kernels.floor_cache import (
     SIZE_VARIABLE,
     TablesCache,
     floor_tables,
     prepare_tables,
 )
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
 HEIGHTS = (0.05, 0.3, 0.52)
 
@@ -235,7 +235,7 @@ def test_environments_on_stored_floors_can_be_copied(copied, own_store):
     other = copied(env)
     for one in (env, other):
         one.step({agent: np.array([0.5, -0.1], np.float32) for agent in one.agents})
-    assert np.array_equal(env.world.ranges, other.world.ranges)
+    assert np.array_equal(env.simulation.ranges, other.simulation.ranges)
     assert np.array_equal(env.world.poses, other.world.poses)
 
 
@@ -244,8 +244,8 @@ def test_another_process_finds_what_this_one_made(own_store, tmp_path):
     code = (
         "import sys, numpy as np\n"
         "from lidarium.envs.floors import catalogue\n"
-        "from lidarium.envs.simulation.kinematic.floor_cache import floor_tables\n"
-        "from lidarium.envs.simulation.kinematic.floor_tables import FloorTables\n"
+        "from lidarium.envs.simulation.kernels.floor_cache import floor_tables\n"
+        "from lidarium.envs.simulation.kernels.floor_tables import FloorTables\n"
         "catalogue.generate_building = FloorTables.of_floor = None\n"
         f"tables = floor_tables(catalogue.load_floor('building:5'), *{HEIGHTS})\n"
         "np.savez(sys.argv[1], squares=tables.rays.squares, faces=tables.rays.faces, bound=tables.bound, solid=tables.laser.solid)\n"

@@ -12,7 +12,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from lidarium.envs.simulation.kinematic.ray_tables import TILE
+from lidarium.envs.simulation.kernels.ray_tables import TILE
 from lidarium.mapping.grids.scan_geometry import fast_angle
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_grid, vector_at

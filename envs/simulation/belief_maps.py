@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.mapping.grids.occupancy import WORD
 from lidarium.mapping.grids.pooled_maps import touch
 from lidarium.mapping.kernels.huge_pages import Pages

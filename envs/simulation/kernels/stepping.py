@@ -1,4 +1,4 @@
-"""A step of the world in kernels over episodes x robots: bodies move, robots sense, the scorer shares out, maps follow.
+"""A step in kernels over episodes x robots: bodies move, lasers scan, masks fill, maps follow.
 
 Episodes do not touch each other, and within an episode only the motion and the sharing out need the robots in
 their order. So threads may take the robots of an episode, or whole episodes (``envs/batch/running.py``); all
@@ -9,9 +9,18 @@ import math
 
 import numba
 
-from lidarium.envs.scoring.coverage import add_rewards, share_news
-from lidarium.envs.simulation.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
-from lidarium.envs.simulation.kinematic.arrays import (
+from lidarium.envs.scoring.coverage import share_news
+from lidarium.envs.scoring.rewards import add_rewards
+from lidarium.envs.simulation.disturbances.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
+from lidarium.envs.simulation.disturbances.noise import stream_key
+from lidarium.envs.simulation.disturbances.odometry import (
+    TICKS_PER_METRE,
+    WHEEL_BASE,
+    disturb_commands,
+    read_encoders,
+    within_half_turns,
+)
+from lidarium.envs.simulation.kernels.arrays import (
     BODY_SOLID,
     BOUND,
     DEAD_RECKONING,
@@ -25,25 +34,19 @@ from lidarium.envs.simulation.kinematic.arrays import (
     OWN_MASK,
     SOME_MATES,
     TEAM_MASK,
+    TIME_STEP,
     TRUE_POSE,
     WorldArrays,
     world_at,
 )
-from lidarium.envs.simulation.kinematic.motion import move_robots
-from lidarium.envs.simulation.kinematic.stages import (
-    TIME_STEP,
+from lidarium.envs.simulation.kernels.motion import move_robots
+from lidarium.envs.simulation.kernels.stages import (
     invalidate_mates,
     perceive_robot,
     scan_scratch,
+    score_robot,
     sense_and_perceive,
-)
-from lidarium.envs.simulation.noise import stream_key
-from lidarium.envs.simulation.odometry import (
-    TICKS_PER_METRE,
-    WHEEL_BASE,
-    disturb_commands,
-    read_encoders,
-    within_half_turns,
+    sense_robot,
 )
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at
@@ -95,14 +98,14 @@ def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> No
 
 @kernel(spliced=True)
 def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
-    """Move the bodies of an episode by ``commands`` (rows, 2), localize, and forget what was new in the step before."""
+    """Move the bodies of an episode by ``commands`` (rows, 2), and read their encoders."""
     first, last = episode * robots, (episode + 1) * robots
     has_odometry = world.odometry_model.shape[0] > 0
     if moves_bodies:
         if has_odometry or world.faults.shape[1] > 0:
             _drive(world, episode, robots, commands)
             commands = world.driven
-        table = world.floors[episode]
+        table = world.floor_rows[episode]
         move_robots(
             table[BOUND],
             table[BODY_SOLID],
@@ -120,9 +123,8 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
             world.travelled[first:last],
             world.collisions[first:last],
         )
-    for row in range(first, last):
-        world.boxes[row] = 0
-        if moves_bodies and has_odometry:
+    if moves_bodies and has_odometry:
+        for row in range(first, last):
             read_encoders(
                 world.odometry_model,
                 world.noise_table,
@@ -135,14 +137,18 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
                 world.measured[row],
                 world.odometry[row],
             )
+
+
+@kernel(spliced=True)
+def _localize(world: WorldArrays, episode: int, robots: int) -> None:
+    """Localize the robots whose localizer is in the kernels, and forget what was new in the step before."""
+    for row in range(episode * robots, (episode + 1) * robots):
+        world.boxes[row] = 0
+        is_relative = world.flags[row] & OWN_FRAME != 0
         if world.flags[row] & TRUE_POSE:
-            _believe_truth(
-                world.poses[row], world.starts[row], world.flags[row] & OWN_FRAME != 0, world.believed[row]
-            )
+            _believe_truth(world.poses[row], world.starts[row], is_relative, world.believed[row])
         elif world.flags[row] & DEAD_RECKONING:
-            _believe_odometry(
-                world.odometry[row], world.starts[row], world.flags[row] & OWN_FRAME != 0, world.believed[row]
-            )
+            _believe_odometry(world.odometry[row], world.starts[row], is_relative, world.believed[row])
 
 
 @kernel(spliced=True)
@@ -150,10 +156,12 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
     """Credit the episode's robots with what they saw first, reward them, and count the step."""
     first, last = episode * robots, (episode + 1) * robots
     team = word_grid_at(
-        world.masks[first, TEAM_MASK], world.masks[first, MASK_ROWS], world.masks[first, MASK_WORDS]
+        world.mask_rows[first, TEAM_MASK],
+        world.mask_rows[first, MASK_ROWS],
+        world.mask_rows[first, MASK_WORDS],
     )
     world.team_seen[episode] += share_news(
-        world.masks[:, OWN_MASK], team, world.boxes, first, robots, world.gains
+        world.mask_rows[:, OWN_MASK], team, world.boxes, first, robots, world.gains
     )
     world.steps[episode] += 1
     add_rewards(
@@ -162,6 +170,7 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
         world.travelled[first:last],
         world.reward_weights,
         world.rewarded[first:last],
+        world.reward_terms[first:last],
         world.rewards[first:last],
     )
 
@@ -173,6 +182,7 @@ def step_episode(
     """Run a step of one episode: move, sense, score and (where ``perceives``) map."""
     world = world_at(table)
     _move(world, episode, robots, commands, moves_bodies)
+    _localize(world, episode, robots)
     scratch = scan_scratch(world)
     for row in range(episode * robots, (episode + 1) * robots):
         if not world.flags[row] & ENDED:
@@ -182,7 +192,9 @@ def step_episode(
 
 @kernel
 def _move_episode(table: Array, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
-    _move(world_at(table), episode, robots, commands, moves_bodies)
+    world = world_at(table)
+    _move(world, episode, robots, commands, moves_bodies)
+    _localize(world, episode, robots)
 
 
 @kernel
@@ -203,6 +215,35 @@ def _perceive_row(table: Array, row: int, robots: int, runs: Array) -> None:
     world = world_at(table)
     if runs[row // robots] and not world.flags[row] & ENDED:
         perceive_robot(world, row, row // robots * robots, robots, scan_scratch(world))
+
+
+@kernel
+def move_and_sense(table: Array, robots: int, commands: Array, runs: Array, moves_bodies: bool) -> None:
+    """Move the bodies of the episodes with ``runs`` (episodes,), then take the scans of their robots."""
+    world = world_at(table)
+    scratch = scan_scratch(world)
+    for episode in range(runs.shape[0]):
+        if not runs[episode]:
+            continue
+        _move(world, episode, robots, commands, moves_bodies)
+        for row in range(episode * robots, (episode + 1) * robots):
+            if not world.flags[row] & ENDED:
+                sense_robot(world, row, episode * robots, robots, scratch)
+
+
+@kernel
+def score_and_localize(table: Array, robots: int, runs: Array) -> None:
+    """Localize the robots of the episodes with ``runs``, score what they sensed, and count the step."""
+    world = world_at(table)
+    scratch = scan_scratch(world)
+    for episode in range(runs.shape[0]):
+        if not runs[episode]:
+            continue
+        _localize(world, episode, robots)
+        for row in range(episode * robots, (episode + 1) * robots):
+            if not world.flags[row] & ENDED:
+                score_robot(world, row, episode * robots, robots, scratch)
+        _share(world, episode, robots)
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.odometry import OdometrySettings
-from lidarium.envs.simulation.noise import gaussian_at, mix, stream_key
+from lidarium.envs.simulation.disturbances.noise import gaussian_at, mix, stream_key
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 ENCODER_STREAM, DRIVE_STREAM = 0x6F646F6D, 0x64726976

@@ -13,7 +13,7 @@ from weakref import WeakValueDictionary
 
 from lidarium.envs.floors.catalogue.store import Store, floor_store, hash_of_code, mebibytes
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.simulation.kinematic.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
 SIZE_VARIABLE = "LIDARIUM_FLOOR_CACHE_MIB"
 """Environment variable: the most that tables no episode uses take in a process [MiB]."""
@@ -23,9 +23,9 @@ DEFAULT_MIB = 256.0
 
 MADE_BY = (
     "envs/floors",
-    "envs/simulation/kinematic/floor_tables.py",
-    "envs/simulation/kinematic/motion.py",
-    "envs/simulation/kinematic/ray_tables.py",
+    "envs/simulation/kernels/floor_tables.py",
+    "envs/simulation/kernels/motion.py",
+    "envs/simulation/kernels/ray_tables.py",
     "mapping/files/output.py",
     "mapping/kernels/compilation.py",
 )

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from lidarium.envs.simulation.kinematic.arrays import FRAME_RESOLUTION, FRAME_X, FRAME_Y
-from lidarium.envs.simulation.odometry import (
+from lidarium.envs.simulation.disturbances.odometry import (
     MAX_ACCELERATION,
     MAX_SPEED,
     MAX_TURN_ACCELERATION,
     MAX_TURN_RATE,
     RADIUS,
 )
+from lidarium.envs.simulation.kernels.arrays import FRAME_RESOLUTION, FRAME_X, FRAME_Y
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import uint8_grid_at, vector_at
 

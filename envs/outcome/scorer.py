@@ -6,8 +6,11 @@ Beside ``evaluation`` the only one to see the truth.
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.outcome.reward_terms import ExtraTerms
+from lidarium.envs.scoring.rewards import TERMS
+from lidarium.envs.scoring.score import Score
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.backend import World
 from lidarium.mapping.kernels.compilation import kernel
 
 THRESHOLDS = (0.85, 0.90, 0.95, 0.99)
@@ -23,26 +26,15 @@ def is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> 
     return bool((x - goal_x) * (x - goal_x) + (y - goal_y) * (y - goal_y) <= radius * radius)
 
 
-def reward_weights(settings: ExplorationSettings) -> NDArray[np.float64]:
-    """Return what a new cell earns, and what a step, a contact and a metre cost, shape (4,)."""
-    weights = settings.reward
-    return np.array(
-        [
-            weights.area * settings.occupancy.resolution**2,
-            weights.time * settings.time_step,
-            weights.contact,
-            weights.energy,
-        ]
-    )
-
-
 class Scorer:
     """Tally of one episode.
 
     Parameters
     ----------
-    world : KinematicWorld
-        The world that is scored.
+    world : World
+        The world.
+    score : Score
+        Its score.
     settings : ExplorationSettings
         Weights of the reward and the length of a step.
 
@@ -58,23 +50,28 @@ class Scorer:
         True poses, five times a second.
     touched : (robots,) bool
         Whether each robot touched something in the last step.
+    terms : list of dict
+        What each term of the reward brought each robot, of the rewards that were last taken.
     ended_because : dict
         Why each ended agent ended.
     """
 
-    def __init__(self, world: KinematicWorld, settings: ExplorationSettings) -> None:
-        self._world, self._settings = world, settings
+    def __init__(self, world: World, score: Score, settings: ExplorationSettings) -> None:
+        self._world, self._score, self._settings = world, score, settings
         self.coverage = 0.0
         self.times: dict[float, float] = {}
         self.curve: list[tuple[float, float]] = []
         self.track: list[tuple[float, NDArray[np.float64]]] = []
         self.ended_because: dict[str, str] = {}
+        self.terms: list[dict[str, float]] = [{} for _ in range(world.robots)]
+        self._extra = ExtraTerms(settings.reward.more)
         self._last_seen = -1
         self._track_steps = max(round(TRACK_PERIOD_S / settings.time_step), 1)
 
     def start(self) -> None:
-        """Begin an episode with the scan taken at the start."""
-        self._world.rewards[:] = 0.0
+        """Start an episode with the scan taken at the start."""
+        self._score.rewards[:], self._score.reward_terms[:] = 0.0, 0.0
+        self._extra.start(self._world, 0)
         self.times, self.curve, self.track, self.ended_because = {}, [], [], {}
         self._last_seen = -1
         self.advance()
@@ -82,14 +79,14 @@ class Scorer:
     def advance(self) -> None:
         """Take in one step of the world, or the scan taken at the start."""
         world = self._world
-        step, seen = world.steps.item(0), world.team_seen.item(0)
+        step, seen = world.steps.item(0), self._score.team_seen.item(0)
         time = step * self._settings.time_step
         if step % self._track_steps == 0:
             self.track.append((time, world.poses.copy()))
         if seen == self._last_seen:
             return
         self._last_seen = seen
-        self.coverage = seen / max(world.counted.item(0), 1)
+        self.coverage = seen / max(self._score.counted.item(0), 1)
         self.curve.append((time, self.coverage))
         for threshold in THRESHOLDS[len(self.times) :]:
             if self.coverage < threshold:
@@ -107,7 +104,14 @@ class Scorer:
         return np.asarray(self._world.contacts != 0)
 
     def take_rewards(self) -> list[float]:
-        """Return each robot's reward since the last call, and begin anew."""
-        rewards: list[float] = self._world.rewards.tolist()
-        self._world.rewards.fill(0.0)
+        """Return each robot's reward since the last call, and start anew; ``terms`` says of what."""
+        rewards: list[float] = self._score.rewards.tolist()
+        self.terms = [dict(zip(TERMS, row, strict=True)) for row in self._score.reward_terms.tolist()]
+        self._score.rewards.fill(0.0)
+        self._score.reward_terms.fill(0.0)
+        if not self._extra.is_empty:
+            for name, earned in self._extra.earned(self._world).items():
+                for row, value in enumerate(earned.tolist()):
+                    self.terms[row][name] = value
+                    rewards[row] += value
         return rewards

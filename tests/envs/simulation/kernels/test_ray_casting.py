@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.settings.lidar import Lidar
-from lidarium.envs.simulation.kinematic.face_casting import cast_by_faces
-from lidarium.envs.simulation.kinematic.ray_casting import (
+from lidarium.envs.simulation.kernels.face_casting import cast_by_faces
+from lidarium.envs.simulation.kernels.ray_casting import (
     _cast_by_squares,
     cast_scan,
     cast_scans,
     cut_by_disc,
 )
-from lidarium.envs.simulation.kinematic.ray_tables import RayTables
+from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, ScanGeometry, beam_directions
 
 TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.faults import KINDS, MOST_DRAWN, Fault, FaultSettings
-from lidarium.envs.simulation.odometry import RADIUS
+from lidarium.envs.simulation.disturbances.odometry import RADIUS
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 NO_FAULT, LASER_DROPOUT, BLIND_SECTOR, STUCK_WHEEL, KIDNAPPING, DEAD_ROBOT, DEAD_RADIO = range(7)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.simulation.kinematic.motion import distance_bound
-from lidarium.envs.simulation.kinematic.ray_tables import RayTables
+from lidarium.envs.simulation.kernels.motion import distance_bound
+from lidarium.envs.simulation.kernels.ray_tables import RayTables
 
 LIMITLESS_BODY = 0.05
 """The body touches what stands higher than this above the floor [m]."""

@@ -22,7 +22,7 @@ def drive(action, steps=40, robots=1, seed=1, **options):
     env.reset(seed=seed, options={"starts": [[4.0, 4.0 + 2.0 * k, 0.0] for k in range(robots)]})
     for _ in range(steps):
         env.step({agent: np.array(action, np.float32) for agent in env.agents})
-    return env.world
+    return env.simulation
 
 
 def bias(**values):
@@ -30,9 +30,9 @@ def bias(**values):
 
 
 def test_ideal_wheels_tell_the_truth_to_within_rounding():
-    world = drive((0.5, 0.2), 100, odometry="ideal")
-    assert np.allclose(world.believed, world.poses, atol=1e-9)
-    assert np.allclose(world.measured, world.velocities, atol=1e-12)
+    simulation = drive((0.5, 0.2), 100, odometry="ideal")
+    assert np.allclose(simulation.beliefs.believed, simulation.world.poses, atol=1e-9)
+    assert np.allclose(simulation.measured, simulation.world.velocities, atol=1e-12)
 
 
 def test_wheels_that_nobody_reckons_with_change_nothing():
@@ -40,48 +40,59 @@ def test_wheels_that_nobody_reckons_with_change_nothing():
     biased = drive(
         (0.5, 0.2), localization="truth", noise="datasheet", odometry=bias(distance_bias=0.05, turn_bias=0.05)
     )
-    assert np.array_equal(plain.poses, biased.poses)
+    assert np.array_equal(plain.world.poses, biased.world.poses)
     assert np.array_equal(plain.ranges, biased.ranges)
-    assert all(np.array_equal(a, b) for a, b in zip(plain.log_odds, biased.log_odds, strict=True))
+    assert all(
+        np.array_equal(a, b) for a, b in zip(plain.beliefs.log_odds, biased.beliefs.log_odds, strict=True)
+    )
     assert not np.array_equal(plain.measured, biased.measured)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.1])
 def test_a_bias_of_distance_makes_every_way_longer_or_shorter_by_its_share(share):
-    world = drive(FORWARD, 60, robots=4, odometry=bias(distance_bias=share))
-    told = world.odometry[:, 0] / world.travelled
+    simulation = drive(FORWARD, 60, robots=4, odometry=bias(distance_bias=share))
+    told = simulation.odometry[:, 0] / simulation.world.travelled
     assert np.allclose(np.abs(told - 1.0), share, atol=1e-9)
 
 
 def test_a_bias_of_turn_makes_every_turn_wider_or_narrower_by_its_share():
-    world = drive(TURNING, 20, robots=4, odometry=bias(turn_bias=0.05))
-    turned = world.poses[:, 2]
+    simulation = drive(TURNING, 20, robots=4, odometry=bias(turn_bias=0.05))
+    turned = simulation.world.poses[:, 2]
     assert (turned > 0.5).all()
-    assert np.allclose(np.abs(world.odometry[:, 2] / turned - 1.0), 0.05, atol=1e-9)
+    assert np.allclose(np.abs(simulation.odometry[:, 2] / turned - 1.0), 0.05, atol=1e-9)
 
 
 def test_drift_turns_the_reckoned_heading_with_the_way():
-    world = drive(FORWARD, 60, robots=4, odometry=bias(drift=0.01))
-    assert np.allclose(np.abs(world.odometry[:, 2]), 0.01 * world.travelled, atol=1e-9)
+    simulation = drive(FORWARD, 60, robots=4, odometry=bias(drift=0.01))
+    assert np.allclose(np.abs(simulation.odometry[:, 2]), 0.01 * simulation.world.travelled, atol=1e-9)
 
 
 def test_signs_of_biases_are_drawn_for_each_robot_and_episode():
     told = [drive(FORWARD, 5, robots=4, seed=seed, odometry=bias(distance_bias=0.05)) for seed in range(6)]
-    longer = np.array([world.odometry[:, 0] > world.travelled for world in told])
+    longer = np.array([simulation.odometry[:, 0] > simulation.world.travelled for simulation in told])
     assert 0 < longer.sum() < longer.size
     assert len({tuple(row) for row in longer.tolist()}) > 1
 
 
 def test_encoders_count_whole_ticks_and_lose_none():
-    world = drive((0.37, 0.21), 80, robot="pioneer", odometry=bias(counts_ticks=True))
+    simulation = drive((0.37, 0.21), 80, robot="pioneer", odometry=bias(counts_ticks=True))
     robot = ROBOTS["pioneer"]
-    ways = world.measured[0, 0] * 0.1 + np.array([-0.5, 0.5]) * world.measured[0, 1] * 0.1 * robot.wheel_base
+    ways = (
+        simulation.measured[0, 0] * 0.1
+        + np.array([-0.5, 0.5]) * simulation.measured[0, 1] * 0.1 * robot.wheel_base
+    )
     ticks = ways * robot.ticks_per_metre
     assert np.allclose(ticks, np.round(ticks), atol=1e-6)
     # What is left of a tick counts in the next step: never more than a tick and a half is missing.
-    assert abs(math.hypot(*world.odometry[0, :2]) - math.hypot(*(world.poses[0, :2] - [4.0, 4.0]))) < 0.02
     assert (
-        abs(wrapped(world.odometry[0, 2] - world.poses[0, 2]))
+        abs(
+            math.hypot(*simulation.odometry[0, :2])
+            - math.hypot(*(simulation.world.poses[0, :2] - [4.0, 4.0]))
+        )
+        < 0.02
+    )
+    assert (
+        abs(wrapped(simulation.odometry[0, 2] - simulation.world.poses[0, 2]))
         < 2.0 / robot.ticks_per_metre / robot.wheel_base
     )
 
@@ -91,8 +102,10 @@ def test_noise_spreads_with_the_root_of_the_way_whatever_the_time_step():
     for time_step, steps in ((0.1, 50), (0.05, 100)):
         errors = []
         for seed in range(12):
-            world = drive(FORWARD, steps, robots=8, seed=seed, odometry=model, time_step=time_step)
-            errors += ((world.odometry[:, 0] - world.travelled) / np.sqrt(world.travelled)).tolist()
+            simulation = drive(FORWARD, steps, robots=8, seed=seed, odometry=model, time_step=time_step)
+            errors += (
+                (simulation.odometry[:, 0] - simulation.world.travelled) / np.sqrt(simulation.world.travelled)
+            ).tolist()
         assert np.std(errors) == pytest.approx(0.02, rel=0.25)
         assert abs(np.mean(errors)) < 0.008
 
@@ -114,8 +127,8 @@ def test_the_same_seed_is_the_same_run_to_the_bit():
 
 
 def test_with_unknown_starts_reckoning_begins_at_zero():
-    world = drive(FORWARD, 30, odometry="typical", known_starts=False)
-    assert np.array_equal(world.believed, world.odometry)
+    simulation = drive(FORWARD, 30, odometry="typical", known_starts=False)
+    assert np.array_equal(simulation.beliefs.believed, simulation.odometry)
 
 
 def test_the_velocity_that_is_observed_is_what_wheels_tell():
@@ -131,7 +144,10 @@ def test_presets_grow_worse_by_their_names():
     names = ["ideal", "good", "typical", "poor"]
     assert list(ODOMETRY) == names
     errors = [drive((0.4, 0.05), 150, seed=2, odometry=name) for name in names]
-    away = [float(np.hypot(*(world.believed - world.poses)[0, :2])) for world in errors]
+    away = [
+        float(np.hypot(*(simulation.beliefs.believed - simulation.world.poses)[0, :2]))
+        for simulation in errors
+    ]
     assert away == sorted(away)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.kinematic.world import KinematicWorld
+from lidarium.envs.simulation.simulation import Simulation
 
 REASONS = ("", "covered", "reached", "collision", "horizon", "no_frontier", "frontier_unreachable", "failed")
 """Why a robot ended, by number; 0 where it has not."""
@@ -13,7 +13,7 @@ COVERED, REACHED, COLLISION, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE, FAILED 
 
 
 def endings(
-    world: KinematicWorld,
+    simulation: Simulation,
     settings: ExplorationSettings,
     goals: NDArray[np.float64] | None,
     live: NDArray[np.bool_],
@@ -23,7 +23,7 @@ def endings(
 
     Parameters
     ----------
-    world : KinematicWorld
+    simulation : Simulation
         What has happened.
     settings : ExplorationSettings
         What ends an episode.
@@ -34,7 +34,7 @@ def endings(
     stopping : (rows,) int8 or None
         Why robots end of themselves, 0 where they do not; None where nobody does.
     """
-    robots = settings.robots
+    robots, world = settings.robots, simulation.world
     reasons = np.zeros(len(live), np.int8) if stopping is None else np.where(live, stopping, np.int8(0))
     if goals is not None:
         away = world.poses[:, :2] - np.repeat(goals, robots, axis=0)
@@ -54,7 +54,7 @@ def endings(
         if is_late.any():
             reasons[live & (reasons == 0) & np.repeat(is_late, robots)] = HORIZON
     if settings.stop_coverage is not None:
-        is_covered = world.coverages() >= settings.stop_coverage
+        is_covered = simulation.score.coverages() >= settings.stop_coverage
         if is_covered.any():
             reasons[live & np.repeat(is_covered, robots)] = COVERED
     return reasons

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.settings.radio import RADIO_KINDS, RadioSettings
-from lidarium.envs.simulation.radio import links, path_loss, solid_length
+from lidarium.envs.simulation.disturbances.radio import links, path_loss, solid_length
 
 RESOLUTION = 0.1
 

@@ -1,0 +1,53 @@
+"""The backends by name: what makes a simulation from settings."""
+
+from collections.abc import Callable
+
+from lidarium.envs.scoring.rewards import reward_weights
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.backend import World
+from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
+from lidarium.envs.simulation.kinematic_world import KinematicWorld
+from lidarium.envs.simulation.simulation import Simulation
+from lidarium.registry import Registry
+
+BACKENDS: Registry[Callable[[ExplorationSettings, int], Simulation]] = Registry("backend")
+"""What makes the simulation of so many episodes, by name."""
+
+
+def kinematic_world(settings: ExplorationSettings, episodes: int = 1) -> KinematicWorld:
+    """Return the kinematic world of so many episodes."""
+    return KinematicWorld(
+        [settings.robot] * settings.robots,
+        settings.lidar,
+        settings.time_step,
+        episodes,
+        settings.odometry,
+        settings.localization != "truth",
+        settings.faults,
+        settings.horizon_s,
+    )
+
+
+def simulation_of(
+    world: World, settings: ExplorationSettings, kind: type[Simulation] = Simulation
+) -> Simulation:
+    """Return the simulation of a world, with the beliefs and the score that settings ask for."""
+    return kind(
+        world,
+        settings.lidar,
+        settings.occupancy,
+        settings.time_step,
+        settings.threads,
+        settings.egocentric_scales,
+        reward_weights(settings),
+        settings.localization,
+        settings.radio.is_ideal,
+    )
+
+
+def make_kinematic(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
+    """Return the fused simulation of a kinematic world."""
+    return simulation_of(kinematic_world(settings, episodes), settings, KinematicSimulation)
+
+
+BACKENDS.register("kinematic", make_kinematic, "bodies follow commands exactly; fast")

@@ -1,0 +1,1 @@
+"""What makes a world real: noise, odometry, faults, radio links."""

@@ -1,0 +1,1 @@
+"""Kernels of a step: bodies move, lasers scan, masks fill, maps follow."""

@@ -1,1 +1,0 @@
-"""The kinematic world: bodies that follow commands, scans cast by kernels."""

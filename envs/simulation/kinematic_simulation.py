@@ -1,0 +1,64 @@
+"""The simulation of a kinematic world, each step in one kernel call."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.robots import Robot
+from lidarium.envs.simulation.kernels.stepping import step_rows, step_serial
+from lidarium.envs.simulation.kinematic_world import KinematicWorld
+from lidarium.envs.simulation.simulation import Simulation
+from lidarium.mapping.grids.occupancy import OccupancySettings
+
+
+class KinematicSimulation(Simulation):
+    """A kinematic world with beliefs and score, stepped by fused kernels.
+
+    It gives what ``Simulation`` gives for the same world, to the bit: the area seen is worked out once for the
+    mask and the map, and an episode's arrays stay in the caches.
+    """
+
+    is_fused = True
+
+    @classmethod
+    def of_team(
+        cls,
+        robots: Sequence[Robot],
+        lidar: Lidar,
+        occupancy: OccupancySettings,
+        time_step: float = 0.1,
+        episodes: int = 1,
+        **options: Any,  # noqa: ANN401
+    ) -> "KinematicSimulation":
+        """Return the simulation of a team in a kinematic world of its own.
+
+        Parameters
+        ----------
+        robots, lidar, occupancy, time_step, episodes
+            As for ``KinematicWorld`` and ``Simulation``.
+        **options
+            Further parameters of either, by name.
+        """
+        of_world = {
+            name: options.pop(name) for name in ("odometry", "faults", "horizon_s") if name in options
+        }
+        has_odometry = options.get("localization", "truth") != "truth"
+        world = KinematicWorld(robots, lidar, time_step, episodes, has_odometry=has_odometry, **of_world)
+        return cls(world, lidar, occupancy, time_step, **options)
+
+    def step(
+        self,
+        commands: NDArray[np.float64],
+        *,
+        moves_bodies: bool = True,
+        perceives: bool = True,
+        runs: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Run a step of all episodes in one call; see ``Simulation.step``."""
+        self.use_threads()
+        step = step_rows if self.threads > 1 else step_serial
+        chosen = self._everywhere if runs is None else runs
+        step(self._table, self.robots, commands, chosen, moves_bodies, perceives)

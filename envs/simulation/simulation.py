@@ -1,0 +1,258 @@
+"""The simulation of teams: a world moves and senses, beliefs follow, the score counts."""
+
+import math
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.scoring.score import Score
+from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.simulation.backend import World
+from lidarium.envs.simulation.beliefs import Beliefs
+from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE
+from lidarium.envs.simulation.disturbances.odometry import RADIUS
+from lidarium.envs.simulation.kernels.arrays import (
+    DEAD_RECKONING,
+    KNOWN_MATES,
+    OWN_FRAME,
+    SOME_MATES,
+    TRUE_POSE,
+    sensor_numbers,
+    table_of_owners,
+)
+from lidarium.envs.simulation.kernels.floor_tables import FloorTables
+from lidarium.envs.simulation.kernels.stepping import (
+    perceive_parallel,
+    perceive_serial,
+    render_row,
+    score_and_localize,
+)
+from lidarium.mapping.grids.occupancy import WORD, OccupancySettings
+from lidarium.mapping.kernels.compilation import use_threads
+from lidarium.mapping.kernels.huge_pages import Pages
+
+ROWS_FOR_THREADS = 8
+"""Threads pay only for batches of at least this many rows."""
+
+
+def within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses (robots, 3) with headings in (-pi, pi]; what lies there already keeps its bits."""
+    poses = np.array(starts, np.float64)
+    headings = poses[:, 2]
+    wrapped = math.pi - np.mod(math.pi - headings, 2.0 * math.pi)
+    poses[:, 2] = np.where((headings > -math.pi) & (headings <= math.pi), headings, wrapped)
+    return poses
+
+
+class Simulation:
+    """A world of any kind, with the beliefs of its robots and its score.
+
+    Row = episode * robots + robot. Maps of the score and of the beliefs share the floor's lattice: where a
+    robot's believed pose is the true one, its map and its mask agree to the cell.
+
+    Parameters
+    ----------
+    world : World
+        Moves the bodies and senses.
+    lidar : Lidar
+        The laser of every robot.
+    occupancy : OccupancySettings
+        Resolution and sensor model of the maps; its cell must be a whole multiple of the floors' raster cell.
+    time_step : float
+        Length of a step [s].
+    threads : int
+        1 for the serial kernels; more lets batches of 8 rows and more run on numba's threads, with the same
+        result.
+    scales : sequence of int
+        Scales at which maps are pooled for observations [cells].
+    reward_weights : (4,) float64 or None
+        Weights of ``scoring.rewards.TERMS``; nothing where None.
+    localization : str
+        Who localizes the robots: ``truth``, ``odometry``, or another, which writes ``beliefs.believed``
+        before ``perceive``.
+    knows_mates : bool
+        Whether, with known starts, all poses of teammates are known at once; otherwise those that
+        ``beliefs.contact`` names.
+
+    Attributes
+    ----------
+    world, beliefs, score : World, Beliefs, Score
+        Its three parts.
+    """
+
+    is_fused = False
+    """Whether one kernel call runs a whole step, so that batches may call it themselves."""
+
+    def __init__(
+        self,
+        world: World,
+        lidar: Lidar,
+        occupancy: OccupancySettings,
+        time_step: float = 0.1,
+        threads: int = 1,
+        scales: Sequence[int] = (),
+        reward_weights: NDArray[np.float64] | None = None,
+        localization: str = "truth",
+        knows_mates: bool = True,
+    ) -> None:
+        self.world, self.robots, self.episodes = world, world.robots, world.episodes
+        rows, is_true = self.robots * self.episodes, localization == "truth"
+        self.beliefs = Beliefs(rows, self.robots, occupancy, scales, is_true)
+        self.score = Score(self.robots, self.episodes, reward_weights)
+        self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
+        self._flags = {"truth": TRUE_POSE, "odometry": DEAD_RECKONING}.get(localization, 0)
+        self._mate_flag = KNOWN_MATES if knows_mates else SOME_MATES
+        self.sensor = sensor_numbers(lidar, time_step, occupancy.resolution)
+        self.unit_vectors, self.noise_table = lidar.unit_vectors, GAUSSIAN_TABLE
+        sensors = world.sensors
+        self.ranges, self.odometry = sensors["scan"], sensors["odometry"]
+        self.measured, self.bumpers = sensors["velocity"], sensors["bumper"]
+        self.floor_rows, self.frames = np.zeros((self.episodes, 10), np.int64), np.zeros((self.episodes, 3))
+        self._everywhere = np.ones(self.episodes, np.bool_)
+        self._pages: Pages | None = None
+        self._threads = min(threads, int(os.cpu_count() or 1))
+        self._table = table_of_owners(self, world, self.beliefs, self.score)
+
+    def place(
+        self,
+        episode: int,
+        floor: FloorTables,
+        starts: NDArray[np.float64],
+        seed: int,
+        known_starts: bool = True,
+    ) -> None:
+        """Start an episode: robots at ``starts`` (robots, 3) of a floor, blank maps and masks.
+
+        All draws come from ``seed``.
+
+        Raises
+        ------
+        ValueError
+            Where the maps' cell is not a whole multiple of the floor's raster cell.
+        """
+        multiple = self._multiple(floor)
+        first, last = episode * self.robots, (episode + 1) * self.robots
+        starts = within_half_turns(starts)
+        # What the laser cannot look into does not count, even where a low body could pass below it.
+        smallest = float(self.world.bodies[:, RADIUS].min())
+        free = swept_free_space(floor.body, smallest, starts) & (floor.laser.solid == 0)
+        floors = enumerate(self.world.floors)
+        same = [other for other, known in floors if other != episode and known is floor]
+        counted = self.score.shared(free, multiple, same)
+        rows, words = counted.shape
+        # What an episode's step goes through lies together.
+        if self._pages is None:
+            # Log-odds take a byte a cell; masks and pooled maps hardly half of that.
+            self._pages = Pages(3 * counted.size * WORD * self.robots * self.episodes // 2)
+        self.world.place(episode, floor, starts, free, seed)
+        self.frames[episode] = floor.frame
+        self.score.place(episode, counted, self._pages)
+        for row in range(first, last):
+            start = starts[row - first] if known_starts else None
+            self.score.place_robot(row, self._pages)
+            self.beliefs.place(row, floor, start, (rows, words * WORD), self._pages)
+        self._point_at(episode)
+        self.world.flags[first:last] = self._flags | (self._mate_flag if known_starts else OWN_FRAME)
+        self.beliefs.forget_changes(first, last)
+
+    def _multiple(self, floor: FloorTables) -> int:
+        """Return the number of raster cells along a map cell."""
+        resolution, map_resolution = floor.laser.resolution, self.occupancy.resolution
+        multiple = round(map_resolution / resolution)
+        if multiple < 1 or abs(multiple * resolution - map_resolution) > 1e-9:
+            raise ValueError(
+                f"a map cell of {map_resolution} m is not a whole multiple of the floor's raster cell of "
+                f"{resolution} m"
+            )
+        return multiple
+
+    def _point_at(self, episode: int) -> None:
+        """Note where the floor, the maps and the masks of an episode lie, for kernels."""
+        floor = self.world.floors[episode]
+        if floor is not None:
+            self.floor_rows[episode] = floor.row
+        for row in range(episode * self.robots, (episode + 1) * self.robots):
+            self.score.point_at(row)
+            self.beliefs.point_at(row)
+
+    @property
+    def table(self) -> NDArray[np.int64]:
+        """Where all arrays lie, as kernels take them (``kernels.arrays``); the same for life."""
+        return self._table
+
+    @property
+    def threads(self) -> int:
+        """Threads that kernels over the rows may use: 1 where there are too few rows to share out."""
+        return self._threads if self.robots * self.episodes >= ROWS_FOR_THREADS else 1
+
+    def use_threads(self) -> None:
+        """Let numba's parallel kernels run on the threads of this simulation."""
+        if self.threads > 1:
+            use_threads(self.threads)
+
+    def step(
+        self,
+        commands: NDArray[np.float64],
+        *,
+        moves_bodies: bool = True,
+        perceives: bool = True,
+        runs: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Run a step of all episodes.
+
+        Parameters
+        ----------
+        commands : (rows, 2) float64
+            Wanted speed and turn rate [m/s, rad/s].
+        moves_bodies : bool
+            False for the first scan of an episode, taken where the robots stand.
+        perceives : bool
+            False to leave the maps as they are; ``perceive`` updates them.
+        runs : (episodes,) bool or None
+            Which episodes take the step; all where None.
+        """
+        self.world.move_and_sense(commands, moves_bodies=moves_bodies, runs=runs)
+        score_and_localize(self._table, self.robots, self._everywhere if runs is None else runs)
+        if perceives:
+            self.perceive(runs)
+
+    def perceive(self, runs: NDArray[np.bool_] | None = None) -> None:
+        """Update the maps by the last scans at the believed poses.
+
+        Parameters
+        ----------
+        runs : (episodes,) bool or None
+            Of which episodes; all where None.
+        """
+        self.use_threads()
+        perceive = perceive_parallel if self.threads > 1 else perceive_serial
+        perceive(self._table, self.robots, self._everywhere if runs is None else runs)
+
+    def render_anew(self, row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+        """Forget a robot's map and render it of scans.
+
+        Parameters
+        ----------
+        row : int
+            The robot.
+        poses : (scans, 3) float64
+            Where the scans were taken, in the frame of its believed pose [m, rad].
+        ranges : (scans, beams) float32
+            The scans [m].
+        """
+        self.beliefs.wipe(row)
+        render_row(self._table, row, self.robots, np.ascontiguousarray(poses), np.ascontiguousarray(ranges))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name not in ("_table", "_pages")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._pages = None
+        self._table = table_of_owners(self, self.world, self.beliefs, self.score)
+        for episode in range(self.episodes):
+            self._point_at(episode)
