@@ -16,7 +16,10 @@ ROOT = Path(__file__).resolve().parent
 
 
 def link_folders() -> None:
-    """Link every root folder below ``src/lidarium``: junctions on Windows, relative links elsewhere."""
+    """Link every root folder below ``src/lidarium``.
+
+    Junctions on Windows, relative links elsewhere.
+    """
     for folder in FOLDERS:
         link = ROOT / "src" / "lidarium" / folder
         if os.path.lexists(link):

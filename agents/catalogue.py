@@ -7,7 +7,10 @@ from lidarium.agents.policy import Policy
 from lidarium.registry import Registry
 
 POLICIES: Registry[Callable[..., Policy]] = Registry("policy")
-"""What makes a policy, by name; keyword arguments are its settings. A module is imported when first needed."""
+"""What makes a policy, by name; keyword arguments are its settings.
+
+A module is imported when it is first needed.
+"""
 
 _FRONTIER = "lidarium.agents.frontier"
 POLICIES.register(

@@ -1,4 +1,4 @@
-"""Explorers that drive to frontiers: the nearest one, the one of greatest utility for the team, the one of least cost.
+"""Frontier explorers: nearest frontier, greatest team utility, least cost.
 
 They share everything but the choice. A robot keeps its target while the frontier there stands; having come
 near and turned to it, what still is frontier there cannot be seen and is given up by name. A robot without a
@@ -26,10 +26,16 @@ from lidarium.mapping.planning.frontiers import FRONTIER, IGNORED, Clusters
 from lidarium.mapping.planning.grid_planning import Cell, Footprint, cells_of, centres_of, search
 
 PATIENCE_S = 20.0
-"""A robot that has not moved for this long while its target stands gives the frontier there up [s]."""
+"""Time without motion after which a robot gives up its frontier [s].
+
+It counts while the robot's target stands.
+"""
 
 MOST_UTILITY_LOST = 2.0
-"""A frontier whose way costs more utility than this above the cheapest one's is not considered."""
+"""Largest excess of utility that a path to a frontier may cost.
+
+The excess is over the cheapest frontier; one that costs more is not considered.
+"""
 
 FIRST_SLACK = 4.0
 """How far beyond the cheapest frontier others are looked for at first [m].
@@ -131,7 +137,10 @@ class FrontierExplorer(Policy):
         self._work[agent] = _Work(choice, self.team.time_s, (float(pose[0]), float(pose[1])), failed_at)
 
     def _review(self, agent: str) -> None:
-        """Drop a choice whose frontier is gone, and give up what cannot be seen or reached."""
+        """Drop a choice whose frontier is gone, and give up unusable ones.
+
+        Unusable is what cannot be seen or reached.
+        """
         work = self._work[agent]
         if work.choice is None:
             return
@@ -181,7 +190,10 @@ class FrontierExplorer(Policy):
         return Target(float(x), float(y), self._heading(agent, choice))
 
     def _heading(self, agent: str, choice: Choice) -> float:
-        """Return the heading from where a robot will stand to what is unknown beside the frontier cell."""
+        """Return the heading from a robot's future place to the unknown space.
+
+        The place is where it will stand; the unknown space is that beside the frontier cell.
+        """
         row, column = choice.frontier_cell
         log_odds = self.navigation(agent).log_odds
         beside = [
@@ -219,7 +231,9 @@ class FrontierExplorer(Policy):
 
 
 class NearestFrontier(FrontierExplorer):
-    """Each robot drives to the frontier that costs it least (Yamauchi 1997; 1998 with a shared map).
+    """Explorers that each drive to their cheapest frontier (Yamauchi 1997).
+
+    With a shared map this is Yamauchi 1998.
 
     Parameters
     ----------
@@ -251,7 +265,9 @@ class NearestFrontier(FrontierExplorer):
 
 
 class ExploreLite(FrontierExplorer):
-    """Each robot drives to the frontier of least cost: distance less size, as explore_lite weighs them, both in metres.
+    """Explorers that drive to the frontier of least cost, as in explore_lite.
+
+    The cost is distance less size, as explore_lite weighs them, both in metres.
 
     Parameters
     ----------
@@ -317,7 +333,9 @@ def nearest_frontier_own_map() -> NearestFrontier:
 
 
 class UtilityFrontier(FrontierExplorer):
-    """The team shares its frontiers out by utility less cost (Burgard, Moors, Stachniss, Schneider 2005).
+    """Explorers that share out the team's frontiers by utility less cost.
+
+    The method is that of Burgard, Moors, Stachniss and Schneider (2005).
 
     Every frontier has utility 1; when a robot takes one, the utility of the others falls with the chance that
     they are seen from there: 1 less their distance over the laser's range, where there is a line of sight.
@@ -379,7 +397,10 @@ class UtilityFrontier(FrontierExplorer):
     def _share_out(
         self, agents: list[str], reaches: Mapping[str, Reach], clusters: Clusters, navigation: NavigationMap
     ) -> tuple[dict[str, Choice | None], list[str]]:
-        """Share the frontiers out, and name the agents that might do better with one beyond their reach."""
+        """Share out the frontiers, and name the agents that are unsure.
+
+        These are agents that might do better with a frontier beyond their reach.
+        """
         utility = np.where(clusters.sizes >= self._minimum_size, 1.0, 0.25)
         chosen: dict[str, Choice | None] = dict.fromkeys(agents)
         waiting = list(agents)

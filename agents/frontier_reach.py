@@ -63,7 +63,9 @@ def reach_of(
     minimum_size: float,
     slack: float,
 ) -> Reach:
-    """Look for the clusters that cost a robot no more than ``slack`` [m] above the cheapest one.
+    """Find the clusters within ``slack`` [m] of a robot's cheapest one.
+
+    They cost the robot no more than ``slack`` above the cheapest cluster.
 
     The cheapest one is that of at least ``minimum_size`` [m]; of any size, where no such one is in reach.
 

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,7 +151,9 @@ def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
 
 
 class PerRobot(Policy):
-    """A decentralised policy: one instance for each robot, which sees its own robot only.
+    """A decentralised policy: one instance for each robot.
+
+    Each instance sees its own robot only.
 
     Parameters
     ----------
@@ -171,7 +173,10 @@ class PerRobot(Policy):
         return [entry for policy in self._policies.values() for entry in policy.given_up]
 
     def reset(self, team: Team, seed: int) -> None:
-        """Begin an episode with a new instance for each robot, each with a seed of its own."""
+        """Begin an episode with a new instance for each robot.
+
+        Each instance has a seed of its own.
+        """
         seeds = np.random.SeedSequence(seed).generate_state(len(team.agents), np.uint64)
         self._policies = {}
         for agent, own_seed in zip(team.agents, seeds, strict=True):
@@ -203,7 +208,8 @@ class _Alone:
     def belief(self, agent: str) -> Belief:
         if agent != self._agent:
             raise ValueError(
-                f"{self._agent} asked for the belief of {agent}; a decentralised policy sees its own robot only"
+                f"{self._agent} asked for the belief of {agent}; a decentralised policy sees its own robot "
+                "only"
             )
         return self._team.belief(agent)
 
@@ -230,3 +236,10 @@ class _Alone:
         raise ValueError(
             f"{self._agent} would tell {agent} where others drove; a decentralised policy has no station"
         )
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -1,4 +1,7 @@
-"""Random walk: straight on until something is near, then a turn by a random angle. The floor under every comparison."""
+"""Random walk: straight on until something is near, then a random turn.
+
+It is the lower baseline of every comparison.
+"""
 
 import math
 from collections.abc import Mapping

@@ -21,9 +21,9 @@ class GivenUp:
     size_m : float
         How long the frontier is [m].
     reason : str
-        ``unseen`` (nothing new is seen from as near as the body comes), ``hidden`` (behind something occupied),
-        ``narrow`` or ``blocked`` (no path for the body), ``no_progress`` (there is a path, but the robot does
-        not advance).
+        ``unseen`` (nothing new is seen from as near as the body comes), ``hidden`` (behind something
+        occupied), ``narrow`` or ``blocked`` (no path for the body), ``no_progress`` (there is a path, but the
+        robot does not advance).
     """
 
     agent: str

@@ -1,4 +1,7 @@
-"""The world of episodes, and how one begins: floor, starts, seed and goal, drawn the same way alone and in a batch."""
+"""The world of episodes, and how one begins.
+
+Floor, starts, seed and goal are drawn in the same manner alone and in a batch.
+"""
 
 from dataclasses import dataclass
 
@@ -83,7 +86,10 @@ def make_simulation(settings: ExplorationSettings, episodes: int = 1) -> Simulat
 
 
 def map_frames(beginning: Beginning, settings: ExplorationSettings) -> NDArray[np.float64]:
-    """Return the origin of each robot's map frame in the frame of its believed pose [m], shape (robots, 2)."""
+    """Return the origin of each robot's map frame, shape (robots, 2) [m].
+
+    It is in the frame of the robot's believed pose.
+    """
     if not settings.known_starts:
         return np.zeros((settings.robots, 2))
     # The map frame begins at the corner of the cell in which the robot starts.

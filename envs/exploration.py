@@ -1,4 +1,7 @@
-"""The environment: a team of lidar robots explores a floor (PettingZoo parallel API)."""
+"""The environment of a team of lidar robots (PettingZoo parallel API).
+
+The team explores a floor.
+"""
 
 import copy
 import math
@@ -228,17 +231,21 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             shares = action if isinstance(action, np.ndarray) else np.asarray(action, np.float64)
             if shares.shape != (2,):
                 raise ValueError(
-                    f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and turn rate"
+                    f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and "
+                    "turn rate"
                 )
             commands[row] = shares
         if not scale_shares(commands, self._limits):
             raise ValueError(
-                f"an action is nan or infinite ({actions}); want two finite numbers within [-1, 1] for each agent"
+                f"an action is nan or infinite ({actions}); want two finite numbers within [-1, 1] for each "
+                "agent"
             )
         self.drive_at(commands)
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
-        """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s], without building observations.
+        """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s].
+
+        No observations are built.
 
         Those of robots that are paused, or back out after a pause, are overwritten.
         """
@@ -270,7 +277,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     ) -> tuple[
         dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
-        """Return what ``step`` returns for the time since the last outcome, and let ended agents leave."""
+        """Return what ``step`` returns for the time since the last outcome.
+
+        Ended agents leave.
+        """
         live = self.agents
         self.operating.is_interrupting = False
         observations = self._observations(live)
@@ -317,7 +327,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         )
 
     def has_event(self) -> bool:
-        """Whether something happened to an agent: the goal reached, a collision, a fault, no energy left, a pause by itself."""
+        """Whether something happened to an agent.
+
+        It is the goal reached, a collision, a fault, no energy left, or a pause by itself.
+        """
         settings = self.settings
         is_at_goal = self.goal is not None and any(
             self._is_at_goal(self._rows[agent]) for agent in self.agents
@@ -338,7 +351,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         )
 
     def stop(self, agent: str, reason: str) -> None:
-        """End an agent at its next step, with a reason that its policy gives (such as ``no_frontier``)."""
+        """End an agent at its next step, with a reason.
+
+        Its policy gives the reason (such as ``no_frontier``).
+        """
         if agent not in self.agents:
             raise ValueError(f"{agent} is not among the live agents {self.agents}")
         self._stopping[agent] = reason
@@ -418,11 +434,17 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return infos
 
     def state(self) -> NDArray[np.float64]:
-        """Return the true state of the team: x, y, theta, speed and turn rate of each robot, shape (robots * 5,)."""
+        """Return the true state of the team, shape (robots * 5,).
+
+        For each robot it is x, y, theta, speed and turn rate.
+        """
         return np.concatenate([self.world.poses, self.world.velocities], axis=1).ravel()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draw the floor, what is explored, the robots and their scans: an image (rows, columns, 3), or the window."""
+        """Draw the floor, what is explored, the robots and their scans.
+
+        The result is an image (rows, columns, 3), or the window.
+        """
         from lidarium.envs.drawing.rendering import FrameWindow, draw_frame
 
         if self.render_mode is None:

@@ -1,4 +1,7 @@
-"""What a robot observes: the spaces, and the kernel that writes the observations of all rows where the caller wants them."""
+"""Observations of a robot: the spaces, and the kernel that writes them.
+
+The kernel writes the observations of all rows where the caller wants them.
+"""
 
 import math
 import os
@@ -45,7 +48,10 @@ A tuple costs no more than its arrays alone, where a named one costs twice as mu
 
 
 def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:
-    """Return the keys of an observation: what the settings choose, and the goal where there is one."""
+    """Return the keys of an observation.
+
+    They are what the settings choose, and the goal where there is one.
+    """
     return (*settings.observe, "goal") if has_goal else settings.observe
 
 
@@ -76,7 +82,10 @@ def _boxes(settings: ExplorationSettings) -> dict[str, spaces.Box]:
 
 
 def action_space() -> spaces.Box:
-    """Return the space of one robot's action: speed and turn rate as shares of the robot's limits."""
+    """Return the space of one robot's action.
+
+    An action is speed and turn rate as shares of the robot's limits.
+    """
     return spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 
@@ -194,7 +203,9 @@ def _write_parallel(active: Array, sources: Array, observed: Arrays) -> None:
 
 
 class ObservationWriter:
-    """Writes the observations of all rows of a world, what the settings choose and nothing else, in one kernel call.
+    """Writes the observations of all rows of a world in one kernel call.
+
+    It writes what the settings choose and nothing else.
 
     Parameters
     ----------
@@ -236,7 +247,8 @@ class ObservationWriter:
                 )
         if "egocentric_map" in self.keys and simulation.beliefs.scales != settings.egocentric_scales:
             raise ValueError(
-                f"the world pools its maps at scales {simulation.beliefs.scales}; want those of the settings, {settings.egocentric_scales}"
+                f"the world pools its maps at scales {simulation.beliefs.scales}; want those of the "
+                f"settings, {settings.egocentric_scales}"
             )
         kinds = {name: ((self.rows, *box.shape), box.dtype) for name, box in _boxes(settings).items()}
         self._kinds = [kinds[name] for name in self.keys]
@@ -304,12 +316,19 @@ class ObservationWriter:
         return dict(zip(self.keys, arrays, strict=True)) if out is None else out
 
     def arguments(self, out: Mapping[str, NDArray[Any]]) -> tuple[Array, Arrays]:
-        """Return what ``write_row`` takes beside the row: where that lies which is told, and where to write, as ``buffers`` makes it."""
+        """Return what ``write_row`` takes beside the row.
+
+        These are where the sources of the observations lie, and where to write, as ``buffers`` makes
+        it.
+        """
         sources = self._table() if self._sources is None else self._sources
         return sources, self._in_order([out[name] for name in self.keys] + self._absent)
 
     def _table(self) -> NDArray[np.int64]:
-        """Return where the world's table, offsets, goals, pooled maps, limits and scales lie."""
+        """Return the addresses of the sources of the observations.
+
+        They are the world's table, offsets, goals, pooled maps, limits and scales.
+        """
         self._sources = table_of((self._simulation.table, *self._told))
         return self._sources
 
@@ -332,7 +351,8 @@ class ObservationWriter:
                 raise ValueError(f"out has no array for {name}; want {', '.join(self.keys)}")
             if array.shape != shape or array.dtype != dtype or not array.flags.carray:
                 raise ValueError(
-                    f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous and writeable"
+                    f"the array for {name} is {array.dtype} {array.shape}; want {dtype} {shape}, contiguous "
+                    "and writeable"
                 )
             arrays.append(array)
         return arrays

@@ -1,4 +1,7 @@
-"""`lidarium bench`: the table of speed on this machine, beside the other simulators that are installed."""
+"""`lidarium bench`: the table of speed on this machine.
+
+It includes the other simulators that are installed.
+"""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -8,13 +11,19 @@ from lidarium.scripts.common import INTERRUPTED, Answer, Command, table, tell
 
 @dataclass(frozen=True, kw_only=True)
 class Bench(Command):
-    """Measure the lines of the speed budget on this machine, beside the other simulators that are installed."""
+    """Measure the lines of the speed budget on this machine.
+
+    The other simulators that are installed are measured beside it.
+    """
 
     effort: Literal["quick", "moderate", "full"] = "moderate"
     """how long to measure: coarse figures, figures to look at, or those to publish"""
     only: tuple[str, ...] = ()
-    """questions to ask, all where left out: kernel_step, ray_casting, range_error, map_update,
-    exploration_projects, environment_step, batch_step, learning_preset, waypoint_decision, cached_start"""
+    """questions to ask, all where left out.
+
+    Questions are kernel_step, ray_casting, range_error, map_update, exploration_projects,
+    environment_step, batch_step, learning_preset, waypoint_decision, cached_start.
+    """
 
 
 def execute(command: Bench) -> Answer:

@@ -1,4 +1,7 @@
-"""What all commands share: their common options, what they answer, and how they tell of progress."""
+"""Common parts of all commands.
+
+Their options, their answers, and how they report progress.
+"""
 
 import math
 import sys
@@ -63,7 +66,10 @@ class TeamCommand(Command):
     `lidarium show batteries` lists them
     """
     pauses_when_blocked: bool = False
-    """robots that touch something, or whose way is blocked, pause until they are told to resume"""
+    """robots that touch something, or whose path is blocked, pause.
+
+    They pause until they are commanded to resume.
+    """
     unknown_starts: bool = False
     """robots do not know where they start, nor where the others do"""
     map_resolution: float = 0.025
@@ -156,7 +162,9 @@ def file_name(name: str) -> str:
 def counted(
     items: Iterable[T], total: int, what: str, is_quiet: bool, clock: Callable[[], float] = time.monotonic
 ) -> Iterator[T]:
-    """Pass items on and tell how many there were: a bar on a terminal, else a line every few seconds, on standard error.
+    """Yield items and report how many there were.
+
+    A bar on a terminal, else a line every few seconds, on standard error.
 
     Parameters
     ----------
@@ -185,7 +193,9 @@ def counted(
 
 
 class Progress:
-    """Tells how far an episode is: a bar on a terminal, else a line every few seconds, on standard error.
+    """Report of an episode's progress.
+
+    A bar on a terminal, else a line every few seconds, on standard error.
 
     Parameters
     ----------

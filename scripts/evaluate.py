@@ -1,4 +1,7 @@
-"""`lidarium evaluate`: policies on floors, in teams, with seeds and settings, into a folder that can be gone on with."""
+"""`lidarium evaluate`: evaluation of policies on floors into a folder.
+
+With teams, seeds and settings; an evaluation in the folder can be continued.
+"""
 
 import os
 import statistics
@@ -28,8 +31,11 @@ class Evaluate(TeamCommand):
     suite: Positional[Path | None] = None
     """TOML file that says what to run, in place of the options below"""
     preset: str | None = None
-    """evaluate as another project does: explore-bench, ariadne, chen, ir2, marvel, maexp, mapex or houseexpo;
-    settings, teams and stop rule are then its own, and its floors, too, unless --floors names others"""
+    """evaluate as another project does.
+
+    Projects are explore-bench, ariadne, chen, ir2, marvel, maexp, mapex or houseexpo. Settings, teams and
+    stop rule are its own, and its floors, too, unless --floors names others.
+    """
     data: Path | None = None
     """folder of real floors, for presets"""
     policies: tuple[str, ...] = ("nearest_frontier", "utility_frontier", "explore_lite")

@@ -1,4 +1,7 @@
-"""`lidarium floors`: the catalogue, figures and pictures of floors, generated floors, floors of other formats, and floors made ahead."""
+"""`lidarium floors`: catalogue, figures and pictures of floors.
+
+Also generated floors, floors of other formats, and floors made ahead.
+"""
 
 import multiprocessing
 import signal
@@ -19,7 +22,10 @@ if TYPE_CHECKING:
     from lidarium.envs.floors.floor import Floor
 
 LASER_HEIGHT = 0.3
-"""Height of the plane in which maps and pictures show a floor: that of the robots' lasers [m]."""
+"""Height of the plane in which maps and pictures show a floor [m].
+
+It is that of the robots' lasers.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +70,11 @@ class Import(Command):
     """
 
     file: Positional[Path]
-    """ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy array"""
+    """ROS map (yaml), plain image or other floor file.
+
+    Formats: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy
+    array.
+    """
     resolution: float | None = None
     """metres per pixel, where the file is a plain image"""
     map_resolution: float = 0.025
@@ -189,7 +199,8 @@ def prepare_floors(command: Prepare) -> Answer:
     store = floor_store()
     if store.folder is None or not is_writable(store.folder):
         raise ValueError(
-            f"no folder to keep floors in; name one that can be written to in the environment variable {FOLDER_VARIABLE}"
+            "no folder to keep floors in; name one that can be written to in the environment variable "
+            f"{FOLDER_VARIABLE}"
         )
     specs = set_floors(command.name) if command.name.startswith("set:") else (command.name,)
     settings = make_settings(robot=command.robot, lidar=command.lidar)
@@ -208,7 +219,8 @@ def prepare_floors(command: Prepare) -> Answer:
             is_interrupted = True
         except BrokenProcessPool as error:
             raise ChildProcessError(
-                f"a worker was killed, most often for want of memory; at least {prepared:,} of {len(specs):,} floors are ready and kept: "
+                f"a worker was killed, most often for want of memory; at least {prepared:,} of "
+                f"{len(specs):,} floors are ready and kept: "
                 f"call again to go on, with fewer --workers than {command.workers}"
             ) from error
     result = {

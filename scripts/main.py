@@ -1,4 +1,7 @@
-"""The command line: reads what is asked for, runs it, and turns what happens into exit codes."""
+"""The command line.
+
+It reads what is asked for, runs it, and converts the outcome into exit codes.
+"""
 
 import os
 import sys
@@ -95,12 +98,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     except MemoryError:
         tell(
-            "lidarium: this needs more memory than there is; try a smaller floor, a coarser --resolution or --map-resolution"
+            "lidarium: this needs more memory than there is; try a smaller floor, a coarser --resolution or "
+            "--map-resolution"
         )
         return BAD_INPUT
     except Exception:
         tell(
-            "lidarium: this is a defect of lidarium, not of your input. Please report it with the command line and the lines below.\n"
+            "lidarium: this is a defect of lidarium, not of your input. Please report it with the command "
+            "line and the lines below.\n"
         )
         traceback.print_exc()
         return DEFECT

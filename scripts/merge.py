@@ -1,4 +1,7 @@
-"""`lidarium merge`: joins occupancy maps of robots that know nothing of each other's start."""
+"""`lidarium merge`: merging of occupancy maps of several robots.
+
+The robots know nothing of each other's start.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +34,7 @@ class Merge(Command):
     Dark is occupied, light is free, what lies between unknown
     """
     mode: str = "default"
-    """rules of merging: default, or thesis for those of the thesis as they were printed"""
+    """rules of merging: default, or thesis for those of the thesis as printed."""
 
     def __post_init__(self) -> None:
         Command.__post_init__(self)
@@ -140,7 +143,10 @@ def _numbers(transform: "Transform | None") -> dict[str, float | None]:
 
 
 def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, Any], out: Path) -> list[str]:
-    """Write transforms, the picture and the fused map of each group in the ROS frame of its first map."""
+    """Write transforms, the picture and the fused map of each group.
+
+    In the ROS frame of the group's first map.
+    """
     from lidarium.evaluation.drawing.merge_picture import save_merge_picture
     from lidarium.evaluation.episodes.output import write_json
     from lidarium.mapping.files.map_files import write_ros_map
@@ -171,7 +177,10 @@ def _summary(merged: "Merged", files: list[str], out: Path) -> str:
             reason = "refused: contradicts stronger pairs of the group"
         elif found.is_accepted:
             agreement = found.agreement
-            reason = f"accepted: {agreement.agreeing_m:.1f} m of walls agree, {agreement.overlap_m2:.0f} m2 known in both"
+            reason = (
+                f"accepted: {agreement.agreeing_m:.1f} m of walls agree, {agreement.overlap_m2:.0f} m2 known "
+                "in both"
+            )
         else:
             reason = f"refused: {found.reason}"
         rows.append((a, b, reason))

@@ -1,4 +1,7 @@
-"""`lidarium replay`: a recorded episode, run again to the bit, or drawn by any version."""
+"""`lidarium replay`: a recorded episode, run again or drawn.
+
+It is run again to the bit; any version can draw it.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Replay(Command):
-    """Run a recorded episode again and tell whether it ends in the same state to the bit, or draw what its record shows."""
+    """Run a recorded episode again and compare its end, or draw its record.
+
+    It reports whether the episode ends in the same state to the bit.
+    """
 
     file: Annotated[Positional[Path], arg(metavar="FILE")]
     """episode.npz of `lidarium run --record`"""
@@ -124,7 +130,8 @@ def _run_again(command: Replay, record: "EpisodeRecord") -> Answer:
         ),
         (
             "together",
-            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions",
+            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} "
+            "collisions",
         ),
         ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
     ]

@@ -1,4 +1,7 @@
-"""`lidarium report`: tables and plots of the episodes that `lidarium evaluate` wrote."""
+"""`lidarium report`: tables and plots of episodes.
+
+The episodes are those that `lidarium evaluate` wrote.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -30,7 +30,10 @@ class Reproduce(Command):
     data: Path | None = None
     """folder of real floors; without it generated floors alone"""
     every: int = 1
-    """of each kind of floor (of the supervisor's seeds, then floors) every so many-th, for a shorter run"""
+    """every so many-th of each kind of floor, for a shorter run.
+
+    For the supervisor, this applies to its seeds, then to its floors.
+    """
     share: float | None = None
     """the same as a share: 0.1 is --every 10"""
     runs: Path = Path("runs/reproduce")

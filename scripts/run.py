@@ -44,13 +44,18 @@ class Run(TeamCommand):
     """
 
     floor: str = "apartment"
-    """name in the catalogue, building:SEED, set:NAME, or a file of any format that the importers know"""
+    """name in the catalogue, building:SEED, set:NAME, or a file.
+
+    A file may have any format that the importers know.
+    """
     robots: int = 3
     """number of robots"""
     policy: str | None = None
-    """who decides; `lidarium show policies` lists them. Left out, a team is supervised: it does not know its
-    starts, finds out where it is by SLAM, and merges its maps; one robot, or robots with a goal, drive to the
-    nearest frontier as the options say"""
+    """policy that decides; `lidarium show policies` lists them.
+
+    Left out, a team is supervised: it does not know its starts, localizes by SLAM, and merges its maps.
+    One robot, or robots with a goal, drive to the nearest frontier as the options say.
+    """
     resolution: float | None = None
     """metres per pixel, where the floor is a plain image"""
     horizon_s: float | None = None
@@ -64,9 +69,15 @@ class Run(TeamCommand):
     0.99 where left out, and none on a floor with a goal
     """
     starts: str | None = None
-    """where the robots start: x,y,theta of each in metres and radians, separated by semicolons"""
+    """where the robots start: x,y,theta of each.
+
+    In metres and radians, separated by semicolons.
+    """
     record: bool = False
-    """write a record of the run, episode.npz, which `lidarium replay` runs again to the bit or draws"""
+    """write a record of the run, episode.npz.
+
+    `lidarium replay` runs it again to the bit or draws it.
+    """
     video: bool = False
     """write a film of the run, run.mp4"""
     video_speed: float = 10.0
@@ -110,7 +121,10 @@ def execute(command: Run) -> Answer:
 
 
 def _completed(command: Run) -> Run:
-    """Return a command with what it leaves out: who decides, and for supervised robots a world in which they need each other's maps."""
+    """Return a command with its omitted options filled in.
+
+    The policy, and for supervised robots a world in which they need each other's maps.
+    """
     from lidarium.envs.settings.reset_options import FloorChoice
 
     if command.policy is not None:
@@ -166,7 +180,8 @@ def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
         starts = np.zeros((0, 0))
     if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():
         raise ValueError(
-            f"--starts is {text!r}; want x,y,theta of each robot, separated by semicolons, as in '1.0,2.5,0;4,2,1.57'"
+            f"--starts is {text!r}; want x,y,theta of each robot, separated by semicolons, as in "
+            "'1.0,2.5,0;4,2,1.57'"
         )
     if len(starts) != robots:
         raise ValueError(f"--starts has {len(starts)} starts for {robots} robots; want one for each")
@@ -274,12 +289,14 @@ def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: P
     facts = [
         (
             "explored",
-            f"{100.0 * result['coverage_final']:.2f} % of {area:.1f} m2 in {result['time_s']:.1f} s of simulated time",
+            f"{100.0 * result['coverage_final']:.2f} % of {area:.1f} m2 in {result['time_s']:.1f} s of "
+            "simulated time",
         ),
         ("reached", ", ".join(thresholds) or "not 85 %"),
         (
             "together",
-            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} collisions",
+            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} "
+            "collisions",
         ),
         ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
         ("given up", _given_up(result["given_up"])),

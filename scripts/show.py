@@ -1,4 +1,7 @@
-"""`lidarium show`: what can be chosen: policies, robots, lasers, what makes a world real, settings; and the supervisor's tree."""
+"""`lidarium show`: the available choices and settings.
+
+Policies, robots, lasers, options for realistic worlds, settings, and the supervisor's tree.
+"""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
@@ -10,7 +13,10 @@ from lidarium.scripts.common import Answer, Command, table
 
 @dataclass(frozen=True, kw_only=True)
 class Show(Command):
-    """Tell what can be chosen, all settings with their defaults, or the supervisor's decision tree, with --out as a picture too."""
+    """Show the choices, the settings or the supervisor's decision tree.
+
+    All settings are shown with their defaults, the tree with --out as a picture too.
+    """
 
     what: Positional[
         Literal[

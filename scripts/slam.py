@@ -30,7 +30,11 @@ class Slam(Command):
     """
 
     log: Positional[Path]
-    """CARMEN log (.log, .clf, also .gz) with FLASER or ROBOTLASER1 lines, or .npz with ranges, stamp and pose_odom"""
+    """CARMEN log or .npz file.
+
+    CARMEN logs (.log, .clf, also .gz) have FLASER or ROBOTLASER1 lines; .npz holds ranges, stamp and
+    pose_odom.
+    """
     resolution: float = 0.05
     """side of a cell of the map [m]"""
     range: float = 30.0
@@ -53,9 +57,15 @@ class Slam(Command):
     relations: Path | None = None
     """true motions between pairs of times (Kuemmerle et al. 2009)"""
     clock_shift: float = 0.0
-    """what is added to the log's stamps to compare them with the reference's and the relations' [s]"""
+    """shift added to the log's stamps [s].
+
+    For comparing them with the reference's and the relations' stamps.
+    """
     relation_poses: Literal["between", "before"] = "between"
-    """pose at a relation's time: between the scans around it, or the last one before, for logs that stamp scans with the odometry before"""
+    """pose at a relation's time: between the scans around it, or the last before.
+
+    The last one before is for logs that stamp scans with the odometry before.
+    """
 
     def __post_init__(self) -> None:
         Command.__post_init__(self)
@@ -96,7 +106,8 @@ def execute(command: Slam) -> Answer:
     followed = follow(log, settings_of(command), watch)
     if not len(followed.slam.key_scans.poses):
         raise ValueError(
-            f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or another log"
+            f"{command.log} holds no scan with a return within {command.range} m; want a larger --range or "
+            "another log"
         )
     result = _result(command, log, followed)
     if reference is not None:
@@ -184,7 +195,8 @@ def _against_reference(
     is_known = (times >= stamps[0]) & (times <= stamps[-1])
     if is_known.sum() < 2:
         raise ValueError(
-            f"{command.reference} is from {stamps[0]:.3f} to {stamps[-1]:.3f} s and the log from {times[0]:.3f} to {times[-1]:.3f} s; "
+            f"{command.reference} is from {stamps[0]:.3f} to {stamps[-1]:.3f} s and the log from "
+            f"{times[0]:.3f} to {times[-1]:.3f} s; "
             "want times in common (--clock-shift)"
         )
     believed, known = poses[is_known], interpolated(stamps, true, times[is_known])
@@ -198,7 +210,10 @@ def _against_reference(
 
 
 def _relations(command: Slam, log: "LaserLog") -> "Relations":
-    """Read the relations of times of which the log tells, and tell how many others there are."""
+    """Read the relations of times within the log, and count the others.
+
+    The number of the others is reported.
+    """
     from lidarium.evaluation.metrics.relations import covered, read_relations
 
     assert command.relations is not None
@@ -240,7 +255,8 @@ def _summary(result: dict[str, Any], out: Path) -> str:
         ("scans", f"{result['scans']:,} over {result['data_s']:.0f} s and {result['path_m']:.0f} m"),
         (
             "CPU time",
-            f"{result['cpu_s']:.1f} s, {result['scan_ms']['p50']:.1f} ms a scan (95 %: {result['scan_ms']['p95']:.1f} ms)",
+            f"{result['cpu_s']:.1f} s, {result['scan_ms']['p50']:.1f} ms a scan (95 %: "
+            f"{result['scan_ms']['p95']:.1f} ms)",
         ),
         ("closures", f"{result['closures']} in {result['corrections']} corrections"),
         ("failed matches", f"{result['failures']} of {result['failures'] + result['matches']}"),

@@ -69,7 +69,8 @@ def kept(levels, rows, columns):
 
 
 def noisy(levels, seed, share=0.1):
-    """Return a map whose walls are a cell thicker or thinner here and there, as noise of ranges makes them."""
+    """Return a map whose walls are a cell thicker or thinner here and there, as noise of ranges makes
+    them."""
     generator = np.random.default_rng(seed)
     wall = (levels == OCCUPIED).astype(np.uint8)
     beside = (cv2.dilate(wall, np.ones((3, 3), np.uint8)) > 0) & (levels == FREE)

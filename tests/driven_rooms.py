@@ -1,4 +1,5 @@
-"""Runs of a robot through rooms of straight walls, for the tests of localization: scans, odometry and where it truly was."""
+"""Runs of a robot through rooms of straight walls, for the tests of localization: scans, odometry and
+where it truly was."""
 
 import math
 from dataclasses import dataclass
@@ -120,7 +121,8 @@ def through(points, speed=0.4, turn_rate=0.8, period=0.2):
 
 
 def driven(walls, points, seed=0, noise=0.01, drift=(0.03, 0.02), period=0.2):
-    """Drive from point to point; odometry stretches motions by the drift's first share, and turns by its second a metre."""
+    """Drive from point to point; odometry stretches motions by the drift's first share, and turns by its
+    second a metre."""
     generator = np.random.default_rng(seed)
     poses = through(points, period=period)
     odometry, sensings = np.zeros(3), []

@@ -13,7 +13,8 @@ RESOLUTION, RADIUS = 0.05, 0.18
 
 
 def hall(width=8.0, height=4.0, openings=()):
-    """A hall with walls all around, its corner at (0, 0); openings (x, y) are 1 m of wall missing, with unknown behind."""
+    """A hall with walls all around, its corner at (0, 0); openings (x, y) are 1 m of wall missing, with
+    unknown behind."""
     columns, rows = round(width / RESOLUTION), round(height / RESOLUTION)
     levels = np.full((rows, columns), 255, np.uint8)
     levels[[0, -1]] = 0

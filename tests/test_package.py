@@ -82,7 +82,8 @@ def test_layers_import_downwards_only():
 
 
 def test_the_import_linter_keeps_its_contract(tmp_path):
-    """On the package as it is installed, made of links: the linter looks for folders, not for editable installs."""
+    """On the package as it is installed, made of links: the linter looks for folders, not for editable
+    installs."""
     command = shutil.which(
         "lint-imports", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     )

@@ -1,1 +1,4 @@
-"""The sensor-based random tree: an explorer that grows a tree of places with the safe region that was seen from each."""
+"""The sensor-based random tree explorer.
+
+It grows a tree of places with the safe region that was seen from each.
+"""

@@ -1,4 +1,7 @@
-"""Where to go next from a node: through one of its openings, or, in the base algorithm, anywhere."""
+"""Next places from a node: through its openings, or anywhere.
+
+Places anywhere are for the base algorithm.
+"""
 
 import math
 from collections import Counter
@@ -16,20 +19,32 @@ from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
 
 TRIED_NEAR = 0.3
-"""A place this near to one from which an opening near by was looked at is not gone to for it again [m]."""
+"""Distance within which a place counts as tried for a near opening [m].
+
+A place this near to one from which an opening near by was observed is not visited for it again.
+"""
 
 
 NEARLY = 0.95
-"""A robot that gets so far beside an edge, as a share of where it wants to be, need not try to pass it wider."""
+"""Share of the wanted offset beside an edge that suffices.
+
+A robot that reaches it need not try to pass the edge wider.
+"""
 
 
 STANDS = (1, 3, 5)
-"""Where a robot may stand before an opening that no straight way leads to, in tenths of a metre from it."""
+"""Distances at which a robot may stand before an opening [0.1 m].
+
+They are for openings that no straight path leads to, and count from the opening.
+"""
 
 
 ATTEMPTS, PATCH, ATTEMPT_REACH = 3, 0.3, 1.5
-"""How often robots look at a patch beyond openings before it counts as one that cannot be seen, its side [m],
-and how far from what they came for a look counts [m]."""
+"""Attempts to see a patch, its side [m], and the reach of an attempt [m].
+
+A patch beyond openings counts as unseeable after so many attempts. An attempt counts this far from what the
+robot came for.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +97,10 @@ class CandidateSource:
         self._attempts = Counter[tuple[int, int]]()
 
     def note_tried(self, candidate: Candidate) -> None:
-        """Remember that a robot was at a candidate: what it went for is not gone to from there again."""
+        """Remember that a robot was at a candidate.
+
+        What it was there to see is not approached from that place again.
+        """
         self._tried.append((candidate.place, candidate.focus))
         if candidate.opening is not None:
             candidate.opening.is_tried = True
@@ -91,7 +109,10 @@ class CandidateSource:
             self._attempts.update(set(_patches(near)))
 
     def of_node(self, node: Node, memory: Memory, others: Iterable[Node]) -> list[Candidate]:
-        """Return the valid candidates of a node: one for each opening, or the first valid one that is drawn."""
+        """Return the valid candidates of a node.
+
+        There is one for each opening, or the first valid one that is drawn.
+        """
         if self._settings.algorithm == "base":
             return self._anywhere(node, list(others))
         found = [(opening, self._open(node, opening, memory)) for opening in node.openings]
@@ -105,7 +126,11 @@ class CandidateSource:
         return [candidate for candidate in candidates if candidate is not None]
 
     def beside(self, node: Node, memory: Memory) -> list[Candidate]:
-        """Return places before each opening of a node, on the side from which it was seen, whether or not a straight way leads there."""
+        """Return places before each opening of a node.
+
+        They are on the side from which the opening was seen, whether or not a straight path leads
+        there.
+        """
         candidates = []
         for opening in node.openings:
             points = self._open(node, opening, memory)
@@ -128,7 +153,10 @@ class CandidateSource:
         return opening.open_points(lambda points: self._is_done(points, node, memory), self._least)
 
     def _is_done(self, points: NDArray[np.float64], node: Node, memory: Memory) -> NDArray[np.bool_]:
-        """Whether points were seen, or stayed unseen however often a robot came to look at them."""
+        """Whether points were seen, or stayed unseen after repeated attempts.
+
+        Attempts are those of robots that came to observe the points.
+        """
         is_done = memory.is_seen(points, node)
         unseen = np.flatnonzero(~is_done)
         if self._attempts and len(unseen):
@@ -138,7 +166,10 @@ class CandidateSource:
     def _through(
         self, node: Node, opening: Opening, points: NDArray[np.int64], others: list[Node]
     ) -> Candidate | None:
-        """Return the first valid candidate of an opening, from its middle or its longest ray outwards."""
+        """Return the first valid candidate of an opening.
+
+        Candidates are tried from its middle or its longest ray outwards.
+        """
         settings = self._settings
         share = 1.0 if settings.candidates == "farthest" else settings.step_share
         best: Candidate | None = None
@@ -188,7 +219,10 @@ class CandidateSource:
         return Candidate(node.number, node.place + distance * UNIT[direction], opening, focus)
 
     def _anywhere(self, node: Node, others: list[Node]) -> list[Candidate]:
-        """Draw directions of the full circle until a candidate is valid, as the base algorithm does."""
+        """Draw directions of the full circle until a candidate is valid.
+
+        The base algorithm does so.
+        """
         for _ in range(self._settings.tries):
             direction = int(self._generator.integers(DIRECTIONS))
             place = node.place + self._settings.step_share * node.safe.radii[direction] * UNIT[direction]
@@ -198,7 +232,11 @@ class CandidateSource:
         return []
 
     def is_valid(self, candidate: Candidate, node: Node, others: Iterable[Node]) -> bool:
-        """Whether a candidate is far enough from all nodes, within its own one's safe region, outside of the others', and was not tried."""
+        """Whether a candidate is valid.
+
+        It is far enough from all nodes, within its own node's safe region, outside of the others',
+        and was not tried.
+        """
         if not node.safe.contains(candidate.place):
             return False
         for other in (node, *others):

@@ -1,4 +1,7 @@
-"""Which way a robot takes: to a goal in sight of a node, to the first frontier of a tour, through the cheapest opening, or home."""
+"""The choice of a robot's next path from a node.
+
+It leads to a goal in sight of a node, to the first frontier of a tour, through the cheapest opening, or home.
+"""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +20,7 @@ from lidarium.agents.srt.tree import Node, Tree, way_to
 from lidarium.mapping.geometry.rigid import wrapped
 
 LAST_FRONTIER = 0.3
-"""Frontiers of the map of at least this length are gone to when nothing else is left [m]."""
+"""Least length of map frontiers visited when nothing else is left [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +57,9 @@ def choose(
     targets: Sequence[Candidate],
     limits: Limits,
 ) -> list[Choice]:
-    """Return the legs of the way to take from a node, none where nothing is left to go for.
+    """Return the legs of the path to take from a node.
+
+    There are none where nothing is left to visit.
 
     Nodes are looked at along the tree's ways, nearest first; with ``backtrack`` ``parent`` only the node
     itself is.
@@ -114,7 +119,9 @@ def tour_way(
     targets: Sequence[Candidate],
     limits: Limits,
 ) -> list[Choice]:
-    """Return the way to the first frontier of the shortest tour past those of the map, none where there is none.
+    """Return the path to the first frontier of the shortest tour.
+
+    The tour visits the frontiers of the map; there is no path where there is no tour.
 
     Only explorers plan tours: robots without a goal that go where what was seen is open, at the least cost.
     """
@@ -131,7 +138,10 @@ def tour_way(
 def _across(
     nodes: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]
 ) -> list[Choice]:
-    """Return the way across the map to the nearest opening that no straight way from its node leads to."""
+    """Return the path across the map to the nearest indirect opening.
+
+    No straight path from the opening's node leads to it.
+    """
     found = [candidate for each in nodes for candidate in source.beside(each, memory)]
     for candidate in sorted(_left_by(targets, found), key=lambda each: senses.distance_to(each.place)):
         way = memory.way(senses.pose[:2], candidate.place)
@@ -143,7 +153,10 @@ def _across(
 def home_way(
     tree: Tree, start: int, root: int, known: set[int], senses: Senses, memory: Memory
 ) -> list[Choice]:
-    """Return the legs of the shortest way to the first node, along the tree or else across the map; none where there is no way."""
+    """Return the legs of the shortest path to the first node.
+
+    The path follows the tree or else crosses the map; there are no legs where there is no path.
+    """
     legs = _legs(tree, way_to(root, tree.ways(start, known)[1]))
     if not legs and start != root:
         across = memory.way(senses.pose[:2], tree.nodes[root].place)
@@ -176,7 +189,10 @@ def _weighed(
     senses: Senses,
     limits: Limits,
 ) -> float:
-    """Return what a way costs [m]: its length, the turn towards its first place, and how far from the goal it ends."""
+    """Return the cost of a path [m].
+
+    It counts its length, the turn towards its first place, and how far from the goal it ends.
+    """
     gap = first - senses.pose[:2]
     turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
     way += turn * limits.speed / limits.turn_rate
@@ -192,7 +208,10 @@ def _to_frontier(
     targets: Sequence[Candidate],
     limits: Limits,
 ) -> list[Choice]:
-    """Return the way to the map's frontier of at least a length [m] that costs least, where it is no teammate's."""
+    """Return the cheapest path to a map frontier of at least a length [m].
+
+    Frontiers of teammates are left out.
+    """
     found = memory.frontiers(senses.pose[:2], least, MOST)
     if found is None:
         return []

@@ -23,16 +23,22 @@ SIDE = 0.01
 """What lies within the robot's radius and this beside its way is ahead [m]."""
 
 ALONG = 0.001
-"""To what lies nearer beside the body than that, the robot may come this much nearer on its way [m]."""
+"""Advance allowed towards what is nearer beside the body than ``SIDE`` [m].
+
+The robot may come this much nearer to it on its path.
+"""
 
 NEAR, STRAIGHT = 0.5, math.radians(2.0)
-"""Where the way ahead is free for less than this [m], the robot turns until its heading is off by less than that [rad]."""
+"""Free distance below which a robot turns first [m], and to what error [rad].
+
+Where the path ahead is free for less, the robot turns until its heading error is below the second value.
+"""
 
 TURN_GAIN = 2.0
 """Turn rate for each radian that the heading is off [1/s]."""
 
 CONTROL_SPEEDS, CONTROL_TURNS = (0.0, 1.0 / 3.0, 1.0), (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Shares of the greatest speed and turn rate of which the list of controls is made."""
+"""Shares of the greatest speed and turn rate that make the list of controls."""
 
 FORESIGHT_S = 0.2
 """Time for which the pose after a control is predicted [s]."""
@@ -67,7 +73,10 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a robot can do: greatest speed [m/s], turn rate [rad/s], deceleration [m/s2] and radius [m]."""
+    """Limits of a robot: speed [m/s], turn rate [rad/s], deceleration, radius [m].
+
+    Speed and turn rate are the greatest ones; deceleration is in m/s2.
+    """
 
     speed: float
     turn_rate: float
@@ -125,7 +134,9 @@ def driven(
     settings: SrtSettings,
     arrived: float,
 ) -> tuple[Drive, float, float]:
-    """Return the next state of a drive, and the speed [m/s] and turn rate [rad/s] for one step.
+    """Return a drive's next state, speed [m/s] and turn rate [rad/s].
+
+    The speed and turn rate are for one step.
 
     Parameters
     ----------
@@ -166,7 +177,9 @@ def driven(
 def best_control(
     pose: NDArray[np.float64], target: NDArray[np.float64], fastest: float, limits: Limits
 ) -> tuple[float, float]:
-    """Return the speed and turn rate of the list of controls whose predicted pose is closest to a target, looking at it.
+    """Return the listed control whose predicted pose best suits a target.
+
+    The control is a speed and a turn rate; the best pose is closest to the target and faces it.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""One robot that grows the tree: it looks, chooses, drives, comes back where nothing is open, and goes home in the end."""
+"""One robot that grows the tree.
+
+It observes, chooses, drives, comes back where nothing is open, and goes home in the end.
+"""
 
 import math
 from collections.abc import Sequence
@@ -39,10 +42,13 @@ REVIEW_S = 0.5
 """Time between looks at whether a target still stands [s]."""
 
 GOT_ON = 0.8
-"""A robot on its way along free rays goes on for this long before it asks whether they were seen through [m]."""
+"""Distance driven along free rays before checking their target [m].
+
+The robot then checks whether the rays were seen through.
+"""
 
 GOT_ON_ANEW = 0.5
-"""A robot without a goal plans its tour anew whenever it has got on for this long [m]."""
+"""Distance after which a robot without a goal plans its tour anew [m]."""
 
 NEAR_NODE = 0.5
 """A robot that gets no nearer to a node than this takes itself to be there [m]."""
@@ -219,7 +225,11 @@ class Explorer:
         return REST if self._looks else None
 
     def _review(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
-        """Drop a target that was seen through on the way, make a node after a while, and turn to the goal once it is in sight."""
+        """Review the target, the need for a new node, and the goal.
+
+        A target seen through on the path is dropped, a node is made after a while, and a visible goal
+        becomes the target.
+        """
         self._reviewed_at = senses.time_s
         candidate, last = self._route[-1].candidate, self._route[-1]
         if candidate is None or last.is_goal or self._settings.memory != "map":
@@ -377,7 +387,11 @@ class Explorer:
         self._looks, self._looked_at = [math.atan2(gap[1], gap[0])], focus
 
     def _return_to(self, number: int, senses: Senses, memory: Memory) -> None:
-        """Be at a node again; in the printed form of the thesis it is seen and added anew, below the parent that it had."""
+        """Be at a node again.
+
+        In the printed form of the thesis the node is seen and added anew, below the parent that it
+        had.
+        """
         if number not in self._tree.nodes[self._node].neighbours:
             self._tree.connect(self._node, number)
         self._node = number
@@ -386,7 +400,10 @@ class Explorer:
             self._add_node(senses, node.parent, np.array([*node.place, senses.pose[2]]), memory)
 
     def _settle_block(self, senses: Senses, memory: Memory) -> None:
-        """Back out, step aside, or give the target up: what stops a robot far from its target seldom has to do with it."""
+        """Back out, step aside, or give up the target.
+
+        What stops a robot far from its target seldom has to do with the target.
+        """
         leg, target, is_there = self._route[0], self.target, len(self._route) == 1
         blocks = 1 if self._is_aside else self._progress.note_block(senses)
         self._progress.stand(senses)
@@ -419,7 +436,10 @@ class Explorer:
         self._backs_until = senses.time_s + BACKING_S
 
     def _step_aside(self, senses: Senses) -> None:
-        """Go to a place in sight that is drawn, so that of two robots that block each other one lets the other pass."""
+        """Go to a drawn place in sight, to step aside.
+
+        Of two robots that block each other, one thus lets the other pass.
+        """
         node = self._tree.nodes[self._node]
         region = safe_region(
             senses.pose[:2],

@@ -1,4 +1,6 @@
-"""Openings of what is seen from a place: arcs of free rays, gaps beside edges that hide something, and the border of a blind sector.
+"""Openings of what is seen from a place.
+
+They are arcs of free rays, gaps beside edges that hide something, and the border of a blind sector.
 
 An opening is kept as points along it, each with a point just beyond. It stays open as long as enough of what
 lies beyond was not seen, whoever looked; so openings are found once, when their node is made, and are only
@@ -24,7 +26,10 @@ PAST_EDGE = 0.5
 """A robot that looks behind an edge goes at most this far beyond it [m]."""
 
 WIDER, WIDER_COUNT = math.radians(3.0), 20
-"""Angle between the directions in which a robot may pass an edge [rad], and their number."""
+"""Angle between directions past an edge [rad], and their number.
+
+These are the directions in which a robot may pass the edge.
+"""
 
 IsSeen = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 
@@ -140,7 +145,10 @@ def _free_arc(place: NDArray[np.float64], run: NDArray[np.int64], perception: fl
 
 
 def _gap(place: NDArray[np.float64], ranges: NDArray[np.float64], direction: int, body: float) -> Opening:
-    """Return the gap between a direction and the next one: the part of the longer ray behind the edge at which the shorter one ends."""
+    """Return the gap between a direction and the next one.
+
+    It is the part of the longer ray behind the edge at which the shorter one ends.
+    """
     after = (direction + 1) % DIRECTIONS
     is_after_far = bool(ranges[after] > ranges[direction])
     far, side = (after, 1) if is_after_far else (direction, -1)

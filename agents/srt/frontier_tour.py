@@ -1,4 +1,7 @@
-"""Where to go without a goal: to the first frontier of the shortest tour past all that are left."""
+"""Targets of robots without a goal: the shortest tour's first frontier.
+
+The tour visits all frontiers that are left.
+"""
 
 import math
 from collections.abc import Sequence
@@ -17,10 +20,16 @@ MOST = 14
 """Tours go past so many frontiers at most, the nearest ones."""
 
 WAY_OF_SIZE = 1.0
-"""For a metre of a frontier's length a robot drives so much farther to begin with it [m]: behind long ones more is to be seen."""
+"""Extra distance that a metre of frontier length is worth [m].
+
+A robot drives so much farther to begin with a long frontier, as more is to be seen behind it.
+"""
 
 MATE_SPREAD = 5.0
-"""Frontiers nearer than this to what a teammate goes for cost so much more as they are nearer [m]."""
+"""Distance from a teammate's target within which frontiers cost more [m].
+
+The added cost is by how much nearer they are.
+"""
 
 MATE_SAME = 1.0
 """What lies this near to what a teammate goes for is the teammate's [m]."""
@@ -29,7 +38,9 @@ MATE_SAME = 1.0
 def first_on_tour(
     memory: Memory, senses: Senses, limits: Limits, least: float, intent: Intent, of_mates: Sequence[Place]
 ) -> tuple[Legs, Place] | None:
-    """Return the way to the frontier that the shortest tour begins with, and what to look at there.
+    """Return the path to the tour's first frontier, and what to observe there.
+
+    The tour is the shortest one.
 
     A robot turns on the spot before it sets out, so the turn counts, too, as the way that it could have
     driven in the time.

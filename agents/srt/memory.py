@@ -1,4 +1,7 @@
-"""What tells which space was seen and where a straight way is clear: the robot's map, or the regions of the tree's nodes alone."""
+"""Knowledge of which space was seen and where a straight path is clear.
+
+It comes from the robot's map, or from the regions of the tree's nodes alone.
+"""
 
 import math
 from collections.abc import Callable, Iterable
@@ -69,7 +72,10 @@ class Memory(Protocol):
     """
 
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
-        """Whether points (n, 2) beyond the border of what was seen from a node were seen, shape (n,)."""
+        """Whether points (n, 2) beyond the border of a node were seen, shape (n,).
+
+        The border is that of what was seen from the node.
+        """
         ...
 
     def is_clear(self, start: Place, end: Place) -> bool:
@@ -77,7 +83,10 @@ class Memory(Protocol):
         ...
 
     def way(self, start: Place, end: Place) -> Legs | None:
-        """Return the ends of the straight legs of a way across space that was seen, the last one ``end``; None where there is none."""
+        """Return the ends of the straight legs of a path across seen space.
+
+        The last end is ``end``; None where there is no path.
+        """
         ...
 
     def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
@@ -97,7 +106,9 @@ class Memory(Protocol):
 
 
 class MapMemory:
-    """The map tells: space is seen where it is known, and a way is clear where all of it is free with room for the robot.
+    """A memory that relies on the map.
+
+    Space is seen where it is known, and a path is clear where all of it is free with room for the robot.
 
     Parameters
     ----------
@@ -111,7 +122,11 @@ class MapMemory:
         self._map, self._radius, self._body = navigation, radius, radius + CLEAR_MARGIN
 
     def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
-        """Whether points (n, 2) lie in known cells, or so near to what is occupied that they may lie in it, or outside of the map."""
+        """Whether points (n, 2) lie in known cells.
+
+        Points outside of the map count, too, and those so near to what is occupied that they may lie
+        in it.
+        """
         rows, columns, is_inside = self._cells(points)
         is_beside_wall = self._clearance(rows, columns) < WALL
         return np.asarray(~is_inside | (self._map.log_odds[rows, columns] != 0) | is_beside_wall)
@@ -129,7 +144,10 @@ class MapMemory:
         return bool((is_inside & is_free).all())
 
     def way(self, start: Place, end: Place) -> Legs | None:
-        """Return the way that the onboard planning finds across the map, its legs as long as they are clear."""
+        """Return the path that the onboard planning finds across the map.
+
+        Its legs are as long as they are clear.
+        """
         rows, columns, is_inside = self._cells(np.stack([start, end]))
         if not is_inside.all() or self._map.log_odds[rows[1], columns[1]] >= 0:
             return None
@@ -145,7 +163,10 @@ class MapMemory:
         return None if found is None else self._legs(start, [*self._centres(found[1])[1:-1], end])
 
     def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
-        """Return the frontiers that cost least to come to, and the ways between where the robot would stand."""
+        """Return the cheapest frontiers to reach, and the paths between them.
+
+        The paths join the places where the robot would stand.
+        """
         rows, columns, is_inside = self._cells(start[None])
         at_least = max(math.ceil(least / self._map.resolution - 1e-9), 1)
         clusters = self._map.frontiers.clusters(minimum_cells=at_least)
@@ -179,7 +200,10 @@ class MapMemory:
         )
 
     def _between(self, stands: list[Cell], costs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what the ways between cells (n) cost, shape (n, n) [m], of which those from the robot to each are known."""
+        """Return the costs of the paths between cells (n), shape (n, n) [m].
+
+        The costs from the robot to each cell are known.
+        """
         footprint = footprint_of(self._body)
         table = np.zeros((len(stands), len(stands)))
         targets = Targets.at(stands, self._map.log_odds.shape)

@@ -1,4 +1,7 @@
-"""The policy: a team that explores by sensor-based random trees (Oriolo, Vendittelli, Freda and Troso 2004), joined to one graph."""
+"""The policy: a team that explores by sensor-based random trees.
+
+The trees (Oriolo, Vendittelli, Freda and Troso 2004) are joined to one graph.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,7 +18,9 @@ from lidarium.envs.exploration import Observation
 
 
 class SensorBasedRandomTree(Policy):
-    """Grows a tree of places with the safe regions seen from them, towards the goal where there is one.
+    """A policy that grows a tree of places with the safe regions seen there.
+
+    It grows towards the goal where there is one.
 
     Each robot drives by its own scans. Robots that know each other's starts and are in contact share one
     graph, whose trees are joined by bridges, and leave each other what they go for. A robot without work goes

@@ -9,7 +9,10 @@ from lidarium.agents.srt.senses import Senses
 from lidarium.mapping.geometry.rigid import wrapped
 
 PATIENCE_S = 3.0
-"""A robot that has neither moved nor turned for this long while it drives is blocked [s]."""
+"""Time without motion after which a driving robot is blocked [s].
+
+The robot has neither moved nor turned for this long.
+"""
 
 MOVED, TURNED = 0.05, 0.1
 """What counts as having moved [m] and turned [rad]."""

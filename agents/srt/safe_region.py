@@ -1,4 +1,6 @@
-"""Safe regions: the space around a place in which, by what was seen from there, the robot can stand.
+"""Safe regions: the space around a place in which the robot can stand.
+
+They follow from what was seen from there.
 
 All that was seen from a place is kept as one *view*: a range for each of ``DIRECTIONS`` directions of the
 full circle, along the axes of the map frame, so that scans taken at several headings are one.
@@ -32,11 +34,17 @@ REGION_FIRST = math.radians(-120.0)
 """Where the first region begins, against the heading [rad]."""
 
 REGIONS = 8
-"""Laser regions of the full circle: right, right-front, front, left-front, left, and three of 40 degrees behind."""
+"""Number of laser regions of the full circle.
+
+They are right, right-front, front, left-front, left, and three of 40 degrees behind.
+"""
 
 
 def no_return(geometry: ScanGeometry) -> float:
-    """Return the range from which on a beam has met nothing [m]: observations are float32, which may round the greatest range down."""
+    """Return the range from which on a beam has met nothing [m].
+
+    Observations are float32, which may round the greatest range down.
+    """
     return geometry.range_max * (1.0 - 1e-6)
 
 
@@ -71,12 +79,18 @@ def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -
 
 
 def joined_views(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the nearer of two views in each direction, and the only one where one did not look."""
+    """Return the nearer of two views in each direction.
+
+    Where one view does not cover a direction, the other one counts.
+    """
     return np.fmin(first, second)
 
 
 def region_of(angle: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the laser region in which an angle against the heading lies [rad]: 0 right to 4 left, 5 to 7 behind."""
+    """Return the laser region of an angle against the heading [rad].
+
+    The regions are 0 right to 4 left, and 5 to 7 behind.
+    """
     turned = (angle - REGION_FIRST) % (2.0 * math.pi)
     behind = 5 + np.floor((turned - 5.0 * REGION_WIDTH) / math.radians(40.0) + 1e-9)
     return np.where(

@@ -1,4 +1,7 @@
-"""What one robot has before it decides: pose, scan and goal in the frame of the team's graph, and what it remembers."""
+"""The inputs of one robot's decision.
+
+They are pose, scan and goal in the frame of the team's graph, and what it remembers.
+"""
 
 import math
 from collections.abc import Iterable
@@ -71,7 +74,10 @@ def senses_of(time_s: float, observation: Observation, belief: Belief) -> Senses
 
 
 def memory_of(belief: Belief, known: Iterable[Node], settings: SrtSettings) -> Memory:
-    """Return what a robot remembers: the map that reached it, or the nodes that it knows."""
+    """Return what a robot remembers.
+
+    This is the map that reached it, or the nodes that it knows.
+    """
     if settings.memory == "regions":
         return RegionMemory(known)
     shared = belief.shared_map

@@ -1,4 +1,7 @@
-"""Every knob of the sensor-based random tree, with its unit and default, and the choices of the thesis."""
+"""Settings of the sensor-based random tree, with units and defaults.
+
+They include the choices of the thesis.
+"""
 
 import math
 from dataclasses import dataclass, fields
@@ -144,7 +147,8 @@ class SrtSettings:
             raise ValueError(f"random_share of the tree is {self.random_share}; want a share in [0, 1]")
         if not self.turning_ends < self.turning_starts <= math.pi:
             raise ValueError(
-                f"turning_starts is {self.turning_starts} rad; want more than turning_ends ({self.turning_ends} rad) and at most pi"
+                f"turning_starts is {self.turning_starts} rad; want more than turning_ends "
+                f"({self.turning_ends} rad) and at most pi"
             )
 
 

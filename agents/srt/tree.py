@@ -1,4 +1,6 @@
-"""The tree of a team: nodes with what was seen from them, their parents, bridges between them, and ways along both.
+"""The tree of a team: nodes, parents, bridges and paths.
+
+Nodes hold what was seen from them; bridges join nodes, and paths lead along parents and bridges.
 
 Robots that share a map share the graph; its places are in the frame of the map's first cell, which is common
 to all of them. A robot that hears of others only now and then knows the nodes that reached it.
@@ -79,7 +81,9 @@ class Tree:
         self.nodes: list[Node] = []
 
     def add(self, node: Node, joins: Callable[[Node, Node], bool] | None, known: Iterable[int]) -> None:
-        """Add a node below its parent, with bridges to those of the ``known`` nodes that it ``joins``; none where that is None.
+        """Add a node below its parent, with bridges to the nodes that it ``joins``.
+
+        Bridges go to ``known`` nodes only; there are none where ``joins`` is None.
 
         Raises
         ------
@@ -116,7 +120,10 @@ class Tree:
         return chain
 
     def ways(self, start: int, known: set[int]) -> tuple[dict[int, float], dict[int, int]]:
-        """Return the length of the shortest way to each node in reach along known nodes [m], and the node before it."""
+        """Return the shortest path length to each node in reach [m].
+
+        Paths lead along known nodes; the node before each one is returned, too.
+        """
         lengths, before = {start: 0.0}, dict[int, int]()
         heap = [(0.0, start)]
         while heap:
@@ -131,7 +138,10 @@ class Tree:
 
 
 def way_to(number: int, before: dict[int, int]) -> list[int]:
-    """Return the nodes of a way that ``Tree.ways`` found, without the first, the last one included."""
+    """Return the nodes of a path that ``Tree.ways`` found.
+
+    The first node is left out, the last one included.
+    """
     way = []
     while number in before:
         way.append(number)

@@ -1,1 +1,4 @@
-"""A station that merges the maps of its robots, and decides by a tree of rules who goes where and who has done his work."""
+"""A station that merges the maps of its robots and directs them.
+
+A tree of rules decides who goes where and who has finished.
+"""

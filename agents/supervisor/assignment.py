@@ -1,4 +1,7 @@
-"""Who goes where: goals of many robots by what the ways cost and by how little of it the others will see anyway."""
+"""Assignment of goals to many robots.
+
+It weighs what the paths cost and how little of a goal the others will see anyway.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +11,9 @@ NOBODY = -1
 
 
 def best_goal(costs: NDArray[np.float64], utility: NDArray[np.float64], cost_weight: float) -> int:
-    """Return the goal of most utility less cost for one robot, -1 where none is in reach.
+    """Return the goal of most utility less cost for one robot.
+
+    It is -1 where none is in reach.
 
     Parameters
     ----------
@@ -27,7 +32,9 @@ def best_goal(costs: NDArray[np.float64], utility: NDArray[np.float64], cost_wei
 
 
 def assign_by_cost(costs: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Give each robot a goal of its own so that the sum of the costs is least, and as many robots as can be have one (Kuhn 1955).
+    """Give each robot a goal of its own at the least sum of costs (Kuhn 1955).
+
+    As many robots as possible have a goal.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the supervisor writes down: every decision with what led to it, and what happened at the station."""
+"""The supervisor's log: decisions with their causes, and station events."""
 
 import math
 from dataclasses import asdict, dataclass

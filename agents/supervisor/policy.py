@@ -1,4 +1,7 @@
-"""Policies that are led: a supervisor over any policy that goes to goals, and what it is compared with."""
+"""Supervised policies, and what they are compared with.
+
+A supervisor directs any policy that goes to goals.
+"""
 
 import math
 import time
@@ -27,7 +30,7 @@ from lidarium.mapping.planning.frontiers import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
 
 PATIENCE_S = 20.0
-"""A robot that was sent somewhere and has not moved for this long explores by itself again [s]."""
+"""Time without motion after which a sent robot explores by itself again [s]."""
 
 MOVED_M = 0.15
 """What counts as having moved [m]."""
@@ -49,7 +52,9 @@ class _Errand:
 
 
 class Supervised(Policy):
-    """A supervisor over a policy: robots explore by that policy, the station merges their maps, and the tree redirects and stops them.
+    """A supervisor over a policy.
+
+    Robots explore by that policy, the station merges their maps, and the tree redirects and stops them.
 
     Robots that are joined are told what the others know, so the policy explores on the merged map where it
     looks at the shared one.
@@ -83,11 +88,13 @@ class Supervised(Policy):
     def __init__(self, policy: Policy, settings: SupervisorSettings | None = None, **options: Any) -> None:  # noqa: ANN401
         if policy.level not in ("waypoint", "frontier"):
             raise ValueError(
-                f"a policy of level {policy.level!r} goes to no goals; want one of level 'waypoint' or 'frontier'"
+                f"a policy of level {policy.level!r} goes to no goals; want one of level 'waypoint' or "
+                "'frontier'"
             )
         if settings is not None and options:
             raise ValueError(
-                f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the other"
+                f"settings of the supervisor are given twice, also as {', '.join(options)}; want one or the "
+                "other"
             )
         self.policy, self.settings = policy, settings or SupervisorSettings(**options)
         self.level, self.observes = policy.level, policy.observes
@@ -153,7 +160,8 @@ class Supervised(Policy):
         reports = [report for agent in team.agents if (report := team.report(agent)) is not None]
         if settings.trusts_starts and any(report.frame is None for report in reports):
             raise ValueError(
-                "robots with unknown starts do not know how they stand to each other; want reveals_starts, which tells the station"
+                "robots with unknown starts do not know how they stand to each other; want reveals_starts, "
+                "which tells the station"
             )
         self._supervisor = Supervisor(station, footprint_of(belief.radius))
         self._tells = not knows_starts
@@ -312,7 +320,10 @@ class Supervised(Policy):
         return errand is not None and (errand.is_new or errand.is_taken)
 
     def _sent(self, agent: str) -> Action:
-        """Return what a robot on an errand is told: its order at first, to end where it came home, else nothing."""
+        """Return the action of a robot on an errand.
+
+        It is its order at first, to end where it came home, else nothing.
+        """
         errand, state = self._errands[agent], self._team.drive_state(agent)
         if errand.is_new:
             errand.is_new = False
@@ -326,7 +337,10 @@ class Supervised(Policy):
 
 
 class _Led:
-    """A team as the policy under a supervisor sees it: what a robot drives for the supervisor is none of its business."""
+    """A team as the policy under a supervisor sees it.
+
+    Drives for the supervisor are hidden from the policy.
+    """
 
     def __init__(self, team: Team, exploring: AbstractSet[str]) -> None:
         self._team, self._exploring = team, exploring
@@ -370,7 +384,10 @@ def supervised(**options: Any) -> Supervised:  # noqa: ANN401
 
 
 def oracle_starts(**options: Any) -> Supervised:  # noqa: ANN401
-    """Return the same, for robots that are told how they stand to each other at the start, as a bound."""
+    """Return supervised explorers that know their relative starts, as a bound.
+
+    They are nearest-frontier explorers, as those of ``supervised``.
+    """
     return Supervised(NearestFrontier(), **{"trusts_starts": True, **options})
 
 
@@ -388,7 +405,10 @@ def _next(now: float, period_s: float) -> float:
 
 
 def _is_frontier(belief: Belief, place: tuple[float, float] | None) -> bool:
-    """Whether there still is a frontier at a place of a robot's map frame [m], within what frames may miss each other by."""
+    """Whether there still is a frontier at a place of a robot's map frame [m].
+
+    The tolerance is that by which frames may differ.
+    """
     if place is None:
         return True
     navigation = belief.map if belief.shared_map is None else belief.shared_map

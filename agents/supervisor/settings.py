@@ -1,4 +1,7 @@
-"""What can be chosen about the supervisor: its periods, what the thesis leaves open, and what goes beyond it."""
+"""Settings of the supervisor.
+
+They are its periods, what the thesis leaves open, and what goes beyond it.
+"""
 
 import math
 from dataclasses import dataclass, fields
@@ -105,12 +108,14 @@ class SupervisorSettings:
             or self.searches_per_merge < 1
         ):
             raise ValueError(
-                f"searches_per_merge of the supervisor is {self.searches_per_merge!r}; want a whole number of at least 1"
+                f"searches_per_merge of the supervisor is {self.searches_per_merge!r}; want a whole number "
+                "of at least 1"
             )
         for name in ("period_s", "merge_period_s", "enclosed_way_m", "sensor_range_m"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} of the supervisor is 0; want a positive number")
         if self.assignment not in get_args(Assignment):
             raise ValueError(
-                f"assignment of the supervisor is {self.assignment!r}; want one of {', '.join(get_args(Assignment))}"
+                f"assignment of the supervisor is {self.assignment!r}; want one of "
+                f"{', '.join(get_args(Assignment))}"
             )

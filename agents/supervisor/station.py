@@ -1,4 +1,7 @@
-"""The station: it collects what robots report, merges their maps, and knows how the frames of those lie that it has joined."""
+"""The station, which collects reports and merges the robots' maps.
+
+It knows how the frames of the maps that it has joined lie.
+"""
 
 from collections import deque
 from collections.abc import Mapping
@@ -30,7 +33,10 @@ Pair = tuple[str, str]
 TEAM_CONFIRMATION = ValidationSettings(
     most_contradiction_m=0.3, least_across_share=0.2, least_evidence_per_m2=0.3
 )
-"""When robots are led by a merge: rooms of one plan, corridors and halls agree well enough to be found, but hardly ever so well."""
+"""Validation settings for merges by which robots are led.
+
+Rooms of one plan, corridors and halls agree well enough to be found, but hardly ever so well.
+"""
 
 
 class MergeStation:
@@ -97,7 +103,10 @@ class MergeStation:
         self.left_behind: list[tuple[str, NDArray[np.float64]]] = []
 
     def receive(self, agent: str, report: Report | None, time_s: float) -> None:
-        """Take a report in; one that is older than the last one is dropped, and None is none."""
+        """Take in a report.
+
+        A report older than the last one is dropped, and None counts as no report.
+        """
         before = self.reports.get(agent)
         if report is None or report is before:
             return
@@ -161,7 +170,10 @@ class MergeStation:
         self._note_joins(time_s, used)
 
     def groups(self) -> list[list[str]]:
-        """Return the robots that are joined with one another and have maps to use, each group in the order of the team."""
+        """Return the groups of robots that are joined and have usable maps.
+
+        Each group is in the order of the team.
+        """
         groups: list[list[str]] = []
         for agent in self.agents:
             if not self._is_used(agent):
@@ -174,7 +186,10 @@ class MergeStation:
         return groups
 
     def lookup(self, target: str, source: str) -> Transform | None:
-        """Return the transform of a robot's map frame into that of another, None where they are not joined."""
+        """Return the transform of a robot's map frame into that of another.
+
+        None where they are not joined.
+        """
         if target == source:
             return Transform()
         names = self._tree.names
@@ -206,7 +221,10 @@ class MergeStation:
         return without_own_trail(bare, self._trail(agent), self._radius, self._merge_resolution)
 
     def _map_without_bodies(self, agent: str) -> GrowingMap:
-        """Return a robot's map without what it may have drawn of those that it is joined with."""
+        """Return a robot's map without the bodies of joined robots.
+
+        What it may have drawn of them is removed.
+        """
         return without_bodies(
             self.reports[agent].map, self._mates_trails(agent), self._radius, self.resolution
         )
@@ -221,7 +239,10 @@ class MergeStation:
         return [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
 
     def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
-        """Return the middle of what two maps both know, in the second robot's map frame [m]."""
+        """Return the middle of what two maps both know [m].
+
+        It is in the second robot's map frame.
+        """
         x, y = placed(self.reports[pair[1]].map.origin).apply(result.agreement.centre).tolist()
         return x, y
 
@@ -233,7 +254,10 @@ class MergeStation:
         return np.array(self._trails[agent], np.float64).reshape(-1, 2)
 
     def _is_used(self, agent: str) -> bool:
-        """Whether a robot's map is used: it has reported something, and has not failed (rules 1 and 2)."""
+        """Whether a robot's map is used.
+
+        The robot has reported something, and has not failed (rules 1 and 2).
+        """
         report = self.reports.get(agent)
         return (
             report is not None

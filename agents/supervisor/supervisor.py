@@ -1,4 +1,7 @@
-"""A look at the tree: what the station knows of each robot becomes a case, the tree answers it, and orders to go get their goals."""
+"""The evaluation of the decision tree for each robot.
+
+What the station knows becomes a case, the tree decides it, and orders to go get their goals.
+"""
 
 import math
 from collections.abc import Mapping
@@ -26,7 +29,10 @@ from lidarium.envs.radio.messages import OperatingState, OrderKind, Target
 from lidarium.mapping.planning.grid_planning import Footprint
 
 STICKINESS_M = 1.0
-"""Where all robots get goals at once, the one that a robot has counts as so much nearer [m]."""
+"""Distance by which a robot's present goal counts as nearer [m].
+
+It applies where all robots get goals at once.
+"""
 
 LEAST_WAY_M = 1.0
 """What a metre costs a battery is told after a way of this length [m]."""
@@ -257,7 +263,10 @@ class Supervisor:
         )
 
     def _is_battery_low(self, agent: str, survey: Survey) -> bool:
-        """Whether what is left would soon not bring a robot home, as metres have cost it until now."""
+        """Whether the battery left would soon not bring a robot home.
+
+        The estimate uses what metres have cost the robot until now.
+        """
         report = self.station.reports[agent]
         if report.energy_left_j is None:
             return False

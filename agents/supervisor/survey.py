@@ -1,4 +1,7 @@
-"""A group of joined robots on their merged map: the goals that it offers, what each robot's way there costs, and what the tree asks."""
+"""A group of joined robots on their merged map.
+
+It holds the goals on offer, what each robot's path there costs, and what the tree asks.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -115,7 +118,10 @@ class Survey:
 
     @property
     def known_area_m2(self) -> float:
-        """Area of the box around what the map knows, made wider by the laser's range on all sides [m2]."""
+        """Area of the box around what the map knows, widened on all sides [m2].
+
+        The box is wider by the laser's range on each side.
+        """
         height, width = ((int(side) - 2 * _MARGIN) * self.resolution for side in self._map.log_odds.shape)
         return float(
             (height + 2.0 * self._settings.sensor_range_m) * (width + 2.0 * self._settings.sensor_range_m)
@@ -140,7 +146,11 @@ class Survey:
         )
 
     def are_meeting(self, a: str, b: str) -> bool:
-        """Whether the goals of two robots lie near and in sight of each other, and both come nearer to the other by going there."""
+        """Whether two robots are about to meet.
+
+        Their goals lie near and in sight of each other, and both robots come nearer to the other by
+        going there.
+        """
         first, second = self.places[a], self.places[b]
         if first is None or second is None or math.dist(first, second) >= self._settings.rendezvous_m:
             return False
@@ -149,7 +159,10 @@ class Survey:
         return bool(is_sighted[0]) and math.dist(first, second) < math.dist(here, there)
 
     def seen(self) -> NDArray[np.float64]:
-        """Return how much of each goal is seen from each other, (K, K): 1 less their distance over the laser's range, in line of sight."""
+        """Return how much of each goal is seen from each other, shape (K, K).
+
+        It is 1 less their distance over the laser's range, in line of sight.
+        """
         cells = self.goals.seen_from
         seen = np.zeros((len(cells), len(cells)))
         for k, cell in enumerate(cells):
@@ -162,7 +175,10 @@ class Survey:
         return self._seen_from(self._inside(place))
 
     def stand(self, agent: str, goal: int) -> tuple[float, float, float]:
-        """Return where a robot stands to see a goal, and its heading, in its own map frame [m, rad]."""
+        """Return where a robot stands to see a goal, and its heading [m, rad].
+
+        Both are in its own map frame.
+        """
         row = self.workers.index(agent)
         place, look = (
             centres_of(cells[row, goal], self.origin, self.resolution)
@@ -174,7 +190,10 @@ class Survey:
         return x, y, math.atan2(looked_at[1] - y, looked_at[0] - x)
 
     def looks_at(self, agent: str, goal: int) -> tuple[float, float]:
-        """Return the frontier cell of a goal that a robot looks at, in its own map frame [m]."""
+        """Return the frontier cell of a goal that a robot observes [m].
+
+        It is in the robot's own map frame.
+        """
         row = self.workers.index(agent)
         x, y = (
             self.frames[agent]
@@ -185,7 +204,10 @@ class Survey:
         return x, y
 
     def way_home_m(self, agent: str, home: Transform) -> float:
-        """Return what a robot's way to a pose of its own map frame costs [m], inf where there is none."""
+        """Return the cost of a robot's path to a pose of its own map frame [m].
+
+        It is inf where there is no path.
+        """
         at = self.frames[agent] @ home
         found = search(
             self._map.space,
@@ -256,7 +278,10 @@ class Survey:
         return self._inside((pose.x, pose.y))
 
     def _inside(self, place: tuple[float, ...]) -> Cell:
-        """Return the cell of a place [m], the nearest one of the map where it lies outside."""
+        """Return the cell of a place [m].
+
+        It is the nearest one of the map where the place lies outside.
+        """
         cell = cells_of(np.asarray(place), self.origin, self.resolution)
         rows, columns = self._map.log_odds.shape
         return min(max(int(cell[0]), 0), rows - 1), min(max(int(cell[1]), 0), columns - 1)

@@ -1,4 +1,6 @@
-"""Where robots have been: no walls are there, but others may have mapped the robots themselves as such.
+"""Trails of the robots, where no walls can be.
+
+Other robots may have mapped the robots themselves as walls.
 
 Robots that do not know where the others are draw their bodies into their maps. To a merger these are walls
 that contradict the free floor on which the other one drove, and on a merged map they bar the way.
@@ -17,7 +19,9 @@ from lidarium.mapping.planning.footprint_masks import swept
 def without_own_trail(
     one: GrowingMap, trail: NDArray[np.float64], radius: float, resolution: float
 ) -> GrowingMap:
-    """Return a map that claims nothing of where its robot has been, so that its image on other maps is no contradiction.
+    """Return a map without any claim about its robot's own trail.
+
+    The robot's image on other maps is then no contradiction.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The decision tree, as data: what is asked of a robot, and what follows from the answers.
+"""The decision tree, as data: questions about a robot, and consequences.
 
 The rules are those of the thesis, reconstructed from its prose, as its figure is lost; they keep their
 numbers:
@@ -52,7 +52,9 @@ class RobotInputs:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A robot before the tree: its inputs, and what the station finds out from those of its group and from the merged map.
+    """A robot's inputs to the decision tree.
+
+    They include what the station finds out from its group and from the merged map.
 
     Attributes
     ----------
@@ -153,7 +155,10 @@ MEETING = Question(
 )
 
 OTHER, RICH, HOME = "other", "richer", "home"
-"""What orders to go lead to: a goal that no other robot has, one with more to map, the start."""
+"""What orders to go lead to.
+
+It is a goal that no other robot has, one with more to map, or the start.
+"""
 
 
 def decision_tree(settings: SupervisorSettings) -> Node:
@@ -194,7 +199,10 @@ def decision_tree(settings: SupervisorSettings) -> Node:
 
 
 def decide(tree: Node, case: Case) -> tuple[Leaf, list[tuple[str, bool]]]:
-    """Return the leaf of a case, and the answers on the way to it as names of questions with yes or no."""
+    """Return the leaf of a case, and the answers that lead to it.
+
+    Answers are names of questions with yes or no.
+    """
     answers: list[tuple[str, bool]] = []
     place: Node | Leaf = tree
     while isinstance(place, Node):

@@ -1,4 +1,6 @@
-"""The learning preset of this code beside that of another checkout, both driven in turn: what a change of the kernels gained.
+"""The learning preset of this code beside that of another checkout.
+
+Both are driven alternately; the comparison shows what a change of the kernels gained.
 
     python benchmarks/speed/against.py OTHER_PYTHON [--threads 1] [--rounds 3] [--blocks 40]
 
@@ -24,7 +26,10 @@ STEPS = 20
 
 
 def serve(threads: int) -> None:
-    """Drive a block of either kind for each line of standard input that names it, and tell its time an agent step [us]."""
+    """Drive a block of a kind for each line of standard input that names it.
+
+    Its time per agent step [us] is printed.
+    """
     preset = {"lidar": "lidar_360_6m", "resolution": 0.05}
     plain = tuple(name for name in OBSERVED if name != "egocentric_map")
     floor = straight_floor()
@@ -43,7 +48,10 @@ def serve(threads: int) -> None:
 
 
 def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[str, np.ndarray]:
-    """Return the times an agent step [us] of each kind, shape (pythons, rounds * blocks)."""
+    """Return the times per agent step of each kind [us].
+
+    The shape is (pythons, rounds * blocks).
+    """
     command = [str(Path(__file__).resolve()), "--serve", "--threads", str(threads)]
     processes = [
         subprocess.Popen([python, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)

@@ -44,10 +44,14 @@ _MODULES: tuple[ModuleType, ...] = (
 )
 
 QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}
-"""The questions by name: modules with ``CORES``, ``NOTES`` and ``measure(effort)``."""
+"""The questions by name.
+
+They are modules with ``CORES``, ``NOTES`` and ``measure(effort)``.
+"""
 
 ABOUT_QUOTES = (
-    "*quoted* marks a rate that was not measured in this run but on an AMD Zen 5 core of about 4.1 GHz; on another machine read "
+    "*quoted* marks a rate that was not measured in this run but on an AMD Zen 5 core of about 4.1 GHz; on "
+    "another machine read "
     "those ratios with that in mind.",
 )
 
@@ -61,7 +65,10 @@ def ask(name: str, effort: Effort) -> list[Line]:
 
 
 def result_of(names: Sequence[str], lines: Sequence[Line], command: str, effort: Effort) -> dict[str, Any]:
-    """Return the result of questions: their lines, what explains them, and which peers were left out."""
+    """Return the result of questions.
+
+    It holds their lines, what explains them, and which peers were left out.
+    """
     notes = [note for name in names for note in QUESTIONS[name].NOTES]
     return speed_result(lines, command, effort, [*notes, *ABOUT_QUOTES, *missing_peers()])
 

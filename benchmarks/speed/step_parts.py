@@ -1,4 +1,7 @@
-"""The parts of an agent step, each by itself on the poses and scans of robots that have driven a while."""
+"""The parts of an agent step, each by itself.
+
+They run on the poses and scans of robots that have driven a while.
+"""
 
 from collections.abc import Callable
 from functools import partial
@@ -115,7 +118,9 @@ def _map(
 
 
 class StepParts:
-    """The parts of the step of a team of 16, each as a function that does it for all robots.
+    """The parts of the step of a team of 16 robots.
+
+    Each is a function that does it for all robots.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""What an evaluation costs beside its episodes, how two workers compare with one, and what survives a killed program.
+"""The costs and robustness of an evaluation.
+
+Measured are costs beside its episodes, two workers against one, and what survives a killed program.
 
     python benchmarks/studies/evaluation.py                                   # prints the tables
     python benchmarks/studies/evaluation.py --out docs/results/evaluation.md  # and writes them
@@ -56,7 +58,10 @@ def suite(seeds: int, floors: tuple[str, ...] = FLOORS) -> Suite:
 
 
 def ways(plan: Suite, trial: Trial, folder: Path) -> dict[str, Callable[[], Any]]:
-    """Return the ways in which a trial is run, each with more beside the episode than the one before."""
+    """Return the functions that run a trial.
+
+    Each has more beside the episode than the one before.
+    """
     settings = plan.settings(trial.variant, trial.robots)
 
     def bare() -> None:
@@ -82,7 +87,10 @@ def ways(plan: Suite, trial: Trial, folder: Path) -> dict[str, Callable[[], Any]
 
 
 class Parts:
-    """Notes how long the parts of a trial take that are not the runner's own: environment, episode, figures, record."""
+    """A timer of the parts of a trial that are not the runner's own.
+
+    The parts are environment, episode, figures and record.
+    """
 
     TIMED = (
         "lidarium.evaluation.episodes.watching.WatchedExploration",
@@ -109,7 +117,10 @@ class Parts:
 
 
 def own_share(run: Callable[[], Any]) -> float:
-    """Return the share of a whole trial that is neither environment nor episode, figures or record, in percent."""
+    """Return the runner's own share of a whole trial, in percent.
+
+    It is what is neither environment nor episode, figures or record.
+    """
     parts = Parts()
     with ExitStack() as stack:
         for name in Parts.TIMED:
@@ -153,7 +164,8 @@ def costs(rounds: int) -> list[str]:
             ]
             cells.append(f"{statistics.median(shares[1:]):.2f} %")
             lines.append(
-                f"| {trial.floor}, {trial.policy} | {1e3 * statistics.median(seconds['bare']):.0f} | {' | '.join(cells)} |"
+                f"| {trial.floor}, {trial.policy} | {1e3 * statistics.median(seconds['bare']):.0f} | "
+                f"{' | '.join(cells)} |"
             )
             print(lines[-1], flush=True)
     return lines
@@ -166,7 +178,9 @@ def run_suite(seeds: int, folder: str, workers: int) -> None:
 
 
 def gain_of_workers(seeds: int, rounds: int) -> tuple[list[float], int]:
-    """Return how much faster two workers are than one, round by round, and how many episodes a round has.
+    """Return how much faster two workers are than one, round by round.
+
+    The number of episodes of a round is returned, too.
 
     Each is a program of its own, which has to start and to load its kernels, as an evaluation from the
     command line has.
@@ -176,7 +190,10 @@ def gain_of_workers(seeds: int, rounds: int) -> tuple[list[float], int]:
         seconds = []
         for workers in (1, 2):
             with tempfile.TemporaryDirectory() as name:
-                code = f"from lidarium.benchmarks.studies.evaluation import run_suite; run_suite({seeds}, {name!r}, {workers})"
+                code = (
+                    f"from lidarium.benchmarks.studies.evaluation import run_suite; run_suite({seeds}, "
+                    f"{name!r}, {workers})"
+                )
                 began = time.perf_counter()
                 subprocess.run([sys.executable, "-c", code], check=True)
                 seconds.append(time.perf_counter() - began)
@@ -266,19 +283,24 @@ def main() -> None:
         "",
         *table,
         "",
-        f"CPU time of one process, {TEAM} robots, maps of 2.5 cm, medians over {chosen.rounds} rounds of ratios to the bare episode "
-        "(environment and policy alone). *Metrics*: the history that watches, and all figures of the line. *Record*: recording, without "
-        "writing. *All*: the whole trial of a campaign, with its record written. *The runner's own* is what of the whole trial is neither "
+        f"CPU time of one process, {TEAM} robots, maps of 2.5 cm, medians over {chosen.rounds} rounds of "
+        "ratios to the bare episode "
+        "(environment and policy alone). *Metrics*: the history that watches, and all figures of the line. "
+        "*Record*: recording, without "
+        "writing. *All*: the whole trial of a campaign, with its record written. *The runner's own* is what "
+        "of the whole trial is neither "
         "environment nor episode, figures or record: settings, starts, the line on the disk; to reach: 3 %.",
         "",
         "## Workers",
         "",
-        f"Two workers are {gain:.2f} x as fast as one ({min(gains):.2f} to {max(gains):.2f}; to reach: 1.9 x) on {episodes} episodes, "
+        f"Two workers are {gain:.2f} x as fast as one ({min(gains):.2f} to {max(gains):.2f}; to reach: 1.9 "
+        f"x) on {episodes} episodes, "
         "programs of their own with all that they load: " + ("reached." if gain >= 1.9 else "not reached."),
         "",
         "## Killed",
         "",
-        f"An evaluation with two workers was killed (SIGKILL) {killed} times, 1 to 6 s after its start, and gone on with each time: "
+        f"An evaluation with two workers was killed (SIGKILL) {killed} times, 1 to 6 s after its start, and "
+        "gone on with each time: "
         f"{kept} episodes in the end, none lost, none doubled, none changed.",
         "",
     ]

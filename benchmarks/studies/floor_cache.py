@@ -1,4 +1,6 @@
-"""Reset over the floors of set:train in several processes that share a store, and write docs/results/floor_cache.md.
+"""Resets over the floors of set:train in processes that share a store.
+
+Several processes take part; the results are in docs/results/floor_cache.md.
 
     python benchmarks/studies/floor_cache.py --floors 100 --processes 2
     python benchmarks/studies/floor_cache.py --processes 2 --out docs/results/floor_cache.md
@@ -111,7 +113,10 @@ def rows_of(log: Path) -> list[dict[str, object]]:
 
 
 def run_phase(work: Callable[..., None], phase: str, shares: list[list[str]], log: Path, total: int) -> None:
-    """Run a phase in a process for each share, with a bar that follows the ``total`` lines of the log."""
+    """Run a phase in a process for each share, with a progress bar.
+
+    The bar follows the ``total`` lines of the log.
+    """
     context = multiprocessing.get_context("spawn")
     processes = [context.Process(target=work, args=(phase, k, share, log)) for k, share in enumerate(shares)]
     for process in processes:
@@ -163,11 +168,14 @@ def report(arguments: argparse.Namespace, rows: list[dict[str, object]], store_m
     lines = [
         "# Floors from cache and store",
         "",
-        f"`python benchmarks/studies/floor_cache.py --floors {arguments.floors} --processes {arguments.processes}` on {date.today().isoformat()}, "
-        f"lidarium {lidarium.__version__}, Python {platform.python_version()}, {os.cpu_count()} cores: floors of `set:train`, world of "
+        f"`python benchmarks/studies/floor_cache.py --floors {arguments.floors} --processes "
+        f"{arguments.processes}` on {date.today().isoformat()}, "
+        f"lidarium {lidarium.__version__}, Python {platform.python_version()}, {os.cpu_count()} cores: "
+        "floors of `set:train`, world of "
         f"0.025 m, {ROBOTS} robots with `{LIDAR}`, maps of 0.05 m.",
         "",
-        f"The store holds {floors:,} floors in {store_mib:.1f} MiB, {1024.0 * store_mib / max(floors, 1):.1f} KiB each. In memory the "
+        f"The store holds {floors:,} floors in {store_mib:.1f} MiB, "
+        f"{1024.0 * store_mib / max(floors, 1):.1f} KiB each. In memory the "
         f"tables of a floor take {mean(sizes):.2f} MiB in the mean, {max(sizes):.2f} MiB at most.",
         "",
         "| reset | floors | floor and tables: mean ms | median | most | rest of the reset: mean ms |",
@@ -177,11 +185,13 @@ def report(arguments: argparse.Namespace, rows: list[dict[str, object]], store_m
         times = [float(str(row["tables_s"])) * 1e3 for row in rows if row["phase"] == phase]
         rest = [float(str(row["rest_s"])) * 1e3 for row in rows if row["phase"] == phase]
         lines.append(
-            f"| {title} | {len(times):,} | {mean(times):.1f} | {median(times):.1f} | {max(times):.1f} | {mean(rest):.1f} |"
+            f"| {title} | {len(times):,} | {mean(times):.1f} | {median(times):.1f} | {max(times):.1f} | "
+            f"{mean(rest):.1f} |"
         )
     lines += [
         "",
-        "Memory of each process [MiB]: after the warm resets, where the cache is as full as it may be; and with the tables of as many "
+        "Memory of each process [MiB]: after the warm resets, where the cache is as full as it may be; and "
+        "with the tables of as many "
         "floors as there are episodes. PSS counts what processes share by halves, thirds and so on.",
         "",
         "| process | tables held | RSS | PSS | private | shared |",

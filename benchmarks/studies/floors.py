@@ -1,4 +1,6 @@
-"""Explore every real floor, dungeon and 200 generated floors with 1, 2 and 3 robots, and write docs/results/floors.md.
+"""Exploration of real and generated floors with 1, 2 and 3 robots.
+
+It covers every real floor, dungeon and 200 generated floors, and writes docs/results/floors.md.
 
     python benchmarks/studies/floors.py --data ../shared/data --out runs/floors --workers 2
     python benchmarks/studies/floors.py --out runs/floors --report docs/results/floors.md
@@ -129,12 +131,15 @@ def report(arguments: argparse.Namespace) -> None:
     lines = [
         "# Every floor, explored",
         "",
-        f"`python benchmarks/studies/floors.py --workers {arguments.workers}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, "
-        f"Python {platform.python_version()}: policy `{arguments.policy}`, Kobuki (radius 0.18 m), URG-04LX (727 beams, 240 degrees, "
+        f"`python benchmarks/studies/floors.py --workers {arguments.workers}` on {date.today().isoformat()}, "
+        f"lidarium {lidarium.__version__}, "
+        f"Python {platform.python_version()}: policy `{arguments.policy}`, Kobuki (radius 0.18 m), URG-04LX "
+        "(727 beams, 240 degrees, "
         "5.6 m), true poses, no noise, world and maps at 0.025 m, no horizon, seed 0. A run "
         "ends as `covered` when 0.99 of `C_free` is sensed.",
         "",
-        "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, median s | path, median m "
+        "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, "
+        "median s | path, median m "
         "| wall, median s |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
@@ -143,15 +148,20 @@ def report(arguments: argparse.Namespace) -> None:
             chosen = [row for row in runs if row["kind"] == kind and row["robots"] == robots]
             if chosen:
                 lines.append(
-                    f"| {title} | {robots} | {len(chosen)} | {sum(row['coverage'] >= 0.99 for row in chosen)} "
-                    f"| {min(row['coverage'] for row in chosen):.4f} | {sum(row['collisions'] for row in chosen)} "
-                    f"| {median(row['area_m2'] for row in chosen):.0f} | {median(row['time_s'] for row in chosen):.0f} "
-                    f"| {median(row['path_m'] for row in chosen):.0f} | {median(row['wall_s'] for row in chosen):.1f} |"
+                    f"| {title} | {robots} | {len(chosen)} | "
+                    f"{sum(row['coverage'] >= 0.99 for row in chosen)} "
+                    f"| {min(row['coverage'] for row in chosen):.4f} | "
+                    f"{sum(row['collisions'] for row in chosen)} "
+                    f"| {median(row['area_m2'] for row in chosen):.0f} | "
+                    f"{median(row['time_s'] for row in chosen):.0f} "
+                    f"| {median(row['path_m'] for row in chosen):.0f} | "
+                    f"{median(row['wall_s'] for row in chosen):.1f} |"
                 )
     missed = [row for row in runs if row["coverage"] < 0.99 or row["collisions"]]
     lines += ["", f"## Misses\n\n{len(missed)} of {len(runs)} runs below 0.99 or with a collision.", ""]
     lines += [
-        f"- {row['floor']}, {row['robots']} robots: coverage {row['coverage']:.4f}, collisions {row['collisions']}, ended {row['ended']}"
+        f"- {row['floor']}, {row['robots']} robots: coverage {row['coverage']:.4f}, collisions "
+        f"{row['collisions']}, ended {row['ended']}"
         for row in missed
     ]
     lines += ["", "## Floors that the robots do not fit in", ""]

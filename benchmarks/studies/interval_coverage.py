@@ -59,7 +59,10 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """A distribution of times [s] as scipy has it, and whether it belongs to what is asked for or goes beyond it."""
+    """A distribution of times [s] as scipy has it.
+
+    It states whether it belongs to what is asked for or goes beyond it.
+    """
 
     name: str
     times: Any
@@ -228,7 +231,10 @@ def _share(share: float, generator: np.random.Generator, size: int, _seed: int) 
 
 
 def held(case: Case, size: int, trials: int) -> tuple[float, int]:
-    """Return the share of trials whose interval holds the truth, of those that were not refused, and how many were."""
+    """Return the share of trials whose interval holds the truth.
+
+    Trials that were refused do not count in the share; their number is returned, too.
+    """
     generator = np.random.default_rng([_SEED, size, zlib.crc32(f"{case.figure} {case.data}".encode())])
     hits = refused = 0
     for trial in range(trials):
@@ -268,17 +274,26 @@ def page(
     lines = [
         "# How often intervals hold the truth",
         "",
-        f"`{_command(trials, resamples)}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, Python "
-        f"{platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}; {seconds:.0f} s on one core.",
+        f"`{_command(trials, resamples)}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, "
+        "Python "
+        f"{platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}; {seconds:.0f} s "
+        "on one core.",
         "",
-        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number of runs or pairs. Its standard "
-        f"error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 %. Intervals are made of {resamples:,} resamples here, of 10,000 in "
-        f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and more on normal, skewed and "
-        "20 % censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. Rows marked as beyond are "
-        "harder than what is asked for, or discrete. What each interval is made of: [statistics](../reference/statistics.md).",
+        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number "
+        "of runs or pairs. Its standard "
+        f"error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 %. Intervals are made of {resamples:,} "
+        "resamples here, of 10,000 in "
+        f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and "
+        "more on normal, skewed and "
+        "20 % censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. "
+        "Rows marked as beyond are "
+        "harder than what is asked for, or discrete. What each interval is made of: "
+        "[statistics](../reference/statistics.md).",
         "",
-        "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second policy takes 1.2 times "
-        "as long. Cut by the horizon: runs end where the first policy has missed a fifth. Cut at random: exponential cuts come "
+        "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second "
+        "policy takes 1.2 times "
+        "as long. Cut by the horizon: runs end where the first policy has missed a fifth. Cut at random: "
+        "exponential cuts come "
         "before a fifth of its times, and the horizon is its upper quartile.",
         "",
         f"**Reached in {asked - len(missed)} of {asked} rows that are asked for.**"
@@ -304,7 +319,8 @@ def page(
         lines.append(f"| {case.data} | {' | '.join(cells)} | {verdict} |")
     lines += [
         "",
-        "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to there is unknown; the "
+        "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to "
+        "there is unknown; the "
         "function says so, and the share is of the others.",
     ]
     return "\n".join(lines) + "\n"

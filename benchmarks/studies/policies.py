@@ -1,4 +1,6 @@
-"""How long the policies take on the floors of the catalogue, with 1, 2 and 3 robots: a markdown table.
+"""Times of the policies on the floors of the catalogue.
+
+They are with 1, 2 and 3 robots, as a markdown table.
 
 Perfect poses, no noise, maps of 2.5 cm as in ``lidarium run``; starts are drawn by the seed, the same for all
 policies. Each entry is the median over the seeds of the simulated time until 99 % of C_free were sensed;
@@ -54,7 +56,8 @@ def entry(floor: str, policy: str, robots: int, seeds: Sequence[int], horizon_s:
         collisions += int(env.world.collisions.sum())
         seconds = time.perf_counter() - began
         print(
-            f"{floor} {policy} {robots} seed {seed}: {scorer.coverage:.4f} in {scorer.time:.0f} s ({seconds:.1f} s)",
+            f"{floor} {policy} {robots} seed {seed}: {scorer.coverage:.4f} in {scorer.time:.0f} s "
+            f"({seconds:.1f} s)",
             file=sys.stderr,
         )
     reached = [value for value in times if value is not None]

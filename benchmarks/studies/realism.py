@@ -1,4 +1,4 @@
-"""How well robots know where they are in worlds that are not ideal, and how fast these are simulated.
+"""Localization quality and simulation speed in worlds that are not ideal.
 
 Every episode is one of `nearest_frontier` in the world of `realism="lab"`: datasheet noise, typical odometry,
 SLAM. Told are ATE (frames agree, since the start is known), the error of the last pose, wheels alone on the
@@ -42,7 +42,11 @@ TEAM = 5
 """Robots of the team whose speed is told."""
 
 REPEATED, REPEATS = 3, 5
-"""So many episodes with the longest corrections of the past run so many times, since a machine's other work falls on some moments."""
+"""Number of episodes run again, and how many times.
+
+These have the longest corrections of the past; repeats matter since a machine's other work falls on some
+moments.
+"""
 
 
 class TimedLocalizer:
@@ -77,7 +81,9 @@ class TimedLocalizer:
 
 
 class Watch(Watcher):
-    """Watches localizers: how long each scan takes them, and where wheels alone would have taken the robots to be.
+    """A watcher of localizers.
+
+    It records how long each scan takes them, and where wheels alone would have taken the robots to be.
 
     Attributes
     ----------
@@ -152,7 +158,10 @@ def episode(floor: str, robots: int, seed: int, horizon_s: float) -> dict[str, A
 
 
 def true_iou(floor: str, robots: int, seed: int, horizon_s: float) -> float:
-    """Return IoU of the team's map where robots know their poses, in an episode that is the same otherwise."""
+    """Return IoU of the team's map where robots know their poses.
+
+    The episode is the same otherwise.
+    """
     settings = make_settings(
         robots=robots, realism="lab", localization="truth", horizon_s=horizon_s, resolution=0.05
     )
@@ -161,7 +170,10 @@ def true_iou(floor: str, robots: int, seed: int, horizon_s: float) -> float:
 
 
 def aligned_iou(env: ExplorationEnv, believed: NDArray[np.float64], true: NDArray[np.float64]) -> float:
-    """Return IoU of the team's map after the best rigid motion of all believed poses (poses, 3) onto the true ones."""
+    """Return IoU of the team's map after the best rigid alignment.
+
+    The motion takes all believed poses (poses, 3) onto the true ones.
+    """
     log_odds, origin = team_log_odds(env)
     truth, resolution = truth_of(env), env.settings.occupancy.resolution
     there = Transform(*best_transform(believed, true).tolist()).inverse()
@@ -179,7 +191,10 @@ def aligned_iou(env: ExplorationEnv, believed: NDArray[np.float64], true: NDArra
 
 
 def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
-    """Return a line of the table for each floor and size of team: medians over robots and seeds, and the worst."""
+    """Return a line of the table for each floor and size of team.
+
+    It has medians over robots and seeds, and the worst.
+    """
     for key in dict.fromkeys((told["floor"], told["robots"]) for told in episodes):
         own = [told for told in episodes if (told["floor"], told["robots"]) == key]
         names = ("ate_m", "aligned_m", "last_m", "wheels_m", "way_m")
@@ -188,7 +203,8 @@ def rows_of(episodes: list[dict[str, Any]]) -> Iterator[str]:
             np.array([told[name] for told in own]) for name in ("coverage", "iou", "aligned_iou")
         )
         yield (
-            f"| {key[0]} | {key[1]} | {np.median(way):.0f} | {np.median(coverage):.3f} | {np.median(aligned):.3f} ({aligned.max():.3f}) "
+            f"| {key[0]} | {key[1]} | {np.median(way):.0f} | {np.median(coverage):.3f} | "
+            f"{np.median(aligned):.3f} ({aligned.max():.3f}) "
             f"| {np.median(ate):.3f} ({ate.max():.3f}) | {np.median(last):.3f} ({last.max():.3f}) "
             f"| {np.median(wheels):.2f} | {np.median(iou):.3f} ({iou.min():.3f}) "
             f"| {np.median(fitted):.3f} ({fitted.min():.3f}) | {own[0]['true_iou']:.3f} |"
@@ -201,7 +217,10 @@ def corrections_of(told: dict[str, Any]) -> NDArray[np.float64]:
 
 
 def longest_correction(episodes: list[dict[str, Any]], horizon_s: float) -> float:
-    """Return how long the longest correction takes [s]: each one's median over the repeats of its episode, which are equal to the bit."""
+    """Return how long the longest correction takes [s].
+
+    Each one's time is the median over the repeats of its episode, which are equal to the bit.
+    """
     longest = []
     for told in sorted(episodes, key=lambda told: -float(np.nan_to_num(corrections_of(told)).max()))[
         :REPEATED
@@ -212,21 +231,31 @@ def longest_correction(episodes: list[dict[str, Any]], horizon_s: float) -> floa
 
 
 def times_of(episodes: list[dict[str, Any]], longest: float) -> Iterator[str]:
-    """Return lines that tell how long scans take, of which the longest correction was measured by itself [s]."""
+    """Return lines that state how long scans take.
+
+    The longest correction was measured by itself [s].
+    """
     seconds = [entry for told in episodes for entry in told["seconds"]]
     plain = 1e3 * np.array([time for time, is_corrected in seconds if not is_corrected])
     corrected = 1e3 * np.concatenate([corrections_of(told) for told in episodes])
     # A scan that is not matched takes microseconds.
     matched = plain[plain > 0.2]
-    yield f"A scan that is matched takes {np.median(matched):.2f} ms (95 % within {np.quantile(matched, 0.95):.2f} ms)."
     yield (
-        f"One at which the past is corrected takes {np.nanmedian(corrected):.1f} ms, and the longest {1e3 * longest:.1f} ms (median of "
+        f"A scan that is matched takes {np.median(matched):.2f} ms (95 % within "
+        f"{np.quantile(matched, 0.95):.2f} ms)."
+    )
+    yield (
+        f"One at which the past is corrected takes {np.nanmedian(corrected):.1f} ms, and the longest "
+        f"{1e3 * longest:.1f} ms (median of "
         f"{REPEATS} runs of its episode; {np.nanmax(corrected):.1f} ms is the most that was seen once)."
     )
 
 
 def team_rates(seeds: int) -> list[float]:
-    """Return the agent steps a second of five robots on one core in episodes of two minutes, `nearest_frontier` included."""
+    """Return the agent steps per second of five robots on one core.
+
+    Episodes last two minutes, and `nearest_frontier` is included.
+    """
     rates = []
     # The first episode may compile.
     for seed in range(-1, seeds):
@@ -269,7 +298,8 @@ HEADER = (
 def page(episodes: list[dict[str, Any]], longest: float, rates: list[float], command: str) -> str:
     """Return the whole page."""
     speed = (
-        f"Five robots on building:17 make {np.median(rates):.0f} agent steps a second on one core ({min(rates):.0f} to {max(rates):.0f}), "
+        f"Five robots on building:17 make {np.median(rates):.0f} agent steps a second on one core "
+        f"({min(rates):.0f} to {max(rates):.0f}), "
         "policy, maps and localizers included."
     )
     table = [f"| {' | '.join(HEADER)} |", "|" + "---|" * len(HEADER), *rows_of(episodes)]

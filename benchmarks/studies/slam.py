@@ -1,4 +1,6 @@
-"""How well and how fast SLAM is: recorded logs of laser scans, and a simulated robot; a table, and docs/results/slam.md.
+"""The quality and speed of SLAM.
+
+It uses recorded logs of laser scans and a simulated robot; results are a table and docs/results/slam.md.
 
     python benchmarks/studies/slam.py --data ../shared/data --out docs/results/slam.md
 
@@ -163,7 +165,10 @@ def read(data: Path, name: str) -> tuple[LaserLog, float]:
 def relation_cells(
     data: Path, name: str, log: LaserLog, poses: NDArray[np.float64], shift: float
 ) -> Iterator[str]:
-    """Yield the errors of the trajectory and of the log's own corrected poses, both ways to find a relation's pose."""
+    """Yield the errors of the trajectory and of the log's corrected poses.
+
+    Both methods of finding a relation's pose are used.
+    """
     relations = read_relations(data / "relations" / f"{RELATIONS[name]}.relations.gz")
     assert log.corrected is not None
     # The corrected poses are the laser's, as if it stood in the middle of the robot.
@@ -184,7 +189,10 @@ def _errors(errors: RelationErrors) -> str:
 
 
 def log_row(name: str, log: LaserLog, followed: Followed) -> str:
-    """Return a log's line: size, time, failures, closures, agreement with the corrected poses."""
+    """Return the line of a log.
+
+    It has size, time, failures, closures, and agreement with the corrected poses.
+    """
     milliseconds, counts = 1e3 * followed.scan_s, followed.slam.counts
     data_s, cpu_s = float(log.stamps[-1] - log.stamps[0]), float(followed.scan_s.sum() + followed.finish_s)
     steps = np.diff(followed.poses[:, :2], axis=0)
@@ -222,7 +230,10 @@ def recorded_robot(floor: str, horizon_s: float) -> tuple[ExplorationEnv, _Recor
 
 
 def measured_robot(floor: str, horizon_s: float) -> Robot:
-    """Follow a simulated robot whose wheels slip by 5 % and pull aside by 1 degree a metre."""
+    """Follow a simulated robot whose wheels slip and pull aside.
+
+    They slip by 5 % and pull aside by 1 degree a metre.
+    """
     env, recorder = recorded_robot(floor, horizon_s)
     slam = Slam(SlamSettings(), env.settings.lidar)
     true = np.stack(recorder.poses)
@@ -270,15 +281,20 @@ def robot_lines(robot: Robot, floor: str) -> list[str]:
         )
 
     return [
-        f"A Kobuki with URG-04LX (727 beams, 5.6 m, noise of the data sheet) explores `{floor}` over {robot.path_m:.0f} m; its odometry "
-        "stretches motions by 5 % and pulls aside by 1 degree a metre. Positions told at each time are off by "
-        f"{robot.error_m:.3f} m (root mean square, unaligned), those of odometry by {robot.odometry_m:.2f} m.",
+        f"A Kobuki with URG-04LX (727 beams, 5.6 m, noise of the data sheet) explores `{floor}` over "
+        f"{robot.path_m:.0f} m; its odometry "
+        "stretches motions by 5 % and pulls aside by 1 degree a metre. Positions told at each time are off "
+        "by "
+        f"{robot.error_m:.3f} m (root mean square, unaligned), those of odometry by {robot.odometry_m:.2f} "
+        "m.",
         "",
         "| ms of CPU time | scans | median | p95 | most | to reach |",
         "|---|---|---|---|---|---|",
-        f"| scan matched, local maps and map updated | {len(robot.match_ms)} | {spread(robot.match_ms)} | median 4 |",
+        f"| scan matched, local maps and map updated | {len(robot.match_ms)} | {spread(robot.match_ms)} | "
+        "median 4 |",
         f"| scan that recognised a place | {len(robot.closure_ms)} | {spread(robot.closure_ms)} | 50 |",
-        f"| scan with which the past was corrected | {len(robot.correction_ms)} | {spread(robot.correction_ms)} | 50 |",
+        f"| scan with which the past was corrected | {len(robot.correction_ms)} | "
+        f"{spread(robot.correction_ms)} | 50 |",
     ]
 
 

@@ -1,4 +1,6 @@
-"""How well spline maps and the localizers on them do: a Pioneer explores the worlds with a goal; writes docs/results/splines.md.
+"""The quality of spline maps and the localizers on them.
+
+A Pioneer explores the worlds with a goal; the results are in docs/results/splines.md.
 
     python benchmarks/studies/splines.py python benchmarks/studies/splines.py --seeds 10 --floors srt_lab
     --out runs/splines.md --pictures runs/splines
@@ -98,7 +100,10 @@ def drive(floor: Floor, seed: int, noise: str) -> Drive:
 
 
 def odometry(poses: NDArray[np.float64], bias: float, seed: int) -> NDArray[np.float64]:
-    """Return odometry along true poses (n, 3): ways and turns are too long by a share, and slip as wheels do; shape (n, 3)."""
+    """Return odometry along true poses (n, 3), shape (n, 3).
+
+    Distances and turns are too long by a share, and slip as wheels do.
+    """
     generator = np.random.default_rng(seed)
     told, place = [np.zeros(3)], Transform()
     for before, after in itertools.pairwise(poses):
@@ -137,7 +142,8 @@ def measure(name: str, floor: Floor, walk: Drive, seed: int, bias: float, pictur
 
 
 HEADER = (
-    "| floor | localizer | ATE [mm] | end [mm] | end [deg] | odometry ATE / ours | wall error [mm] | its 95 % [mm] | walls found | "
+    "| floor | localizer | ATE [mm] | end [mm] | end [deg] | odometry ATE / ours | wall error [mm] | its 95 "
+    "% [mm] | walls found | "
     "curves right | bytes | of end points | of a 5 cm grid | step median, 95 % [ms] |\n"
     + "|---|---|"
     + "---:|" * 12
@@ -149,12 +155,18 @@ def row(floor: str, name: str, runs: list[Run]) -> str:
     figures = [run.figures for run in runs]
     ratio = min(each.odometry_ate_m / each.ate_m for each in figures)
     return (
-        f"| {floor} | `{name}` | {1000 * max(each.ate_m for each in figures):.0f} | {1000 * max(each.end_m for each in figures):.0f} | "
-        f"{max(each.end_deg for each in figures):.2f} | {ratio:.1f} | {1000 * max(each.wall_mean_m for each in figures):.1f} | "
-        f"{1000 * max(each.wall_p95_m for each in figures):.0f} | {100 * min(each.recall for each in figures):.1f} % | "
-        f"{100 * min(each.precision for each in figures):.1f} % | {max(each.size_bytes for each in figures)} | "
-        f"{100 * max(each.of_end_points for each in figures):.1f} % | {100 * max(each.of_grid for each in figures):.1f} % | "
-        f"{statistics.median(run.step_ms for run in runs):.1f}, {statistics.median(run.step_p95_ms for run in runs):.1f} |"
+        f"| {floor} | `{name}` | {1000 * max(each.ate_m for each in figures):.0f} | "
+        f"{1000 * max(each.end_m for each in figures):.0f} | "
+        f"{max(each.end_deg for each in figures):.2f} | {ratio:.1f} | "
+        f"{1000 * max(each.wall_mean_m for each in figures):.1f} | "
+        f"{1000 * max(each.wall_p95_m for each in figures):.0f} | "
+        f"{100 * min(each.recall for each in figures):.1f} % | "
+        f"{100 * min(each.precision for each in figures):.1f} % | {max(each.size_bytes for each in figures)} "
+        "| "
+        f"{100 * max(each.of_end_points for each in figures):.1f} % | "
+        f"{100 * max(each.of_grid for each in figures):.1f} % | "
+        f"{statistics.median(run.step_ms for run in runs):.1f}, "
+        f"{statistics.median(run.step_p95_ms for run in runs):.1f} |"
     )
 
 

@@ -1,1 +1,4 @@
-"""Many episodes at once: one kernel call steps them all, for Gymnasium's vector environments and for stable-baselines3."""
+"""Many episodes at once: one kernel call steps them all.
+
+It serves Gymnasium's vector environments and stable-baselines3.
+"""

@@ -1,4 +1,6 @@
-"""A batch of episodes: their beginnings, steps, endings and observations in arrays over rows = episodes x robots.
+"""A batch of episodes, in arrays over rows = episodes x robots.
+
+It has their beginnings, steps, endings and observations.
 
 What each row sees, earns and why it ends is what ``ExplorationEnv`` gives for the same seed, to the bit.
 """
@@ -114,8 +116,10 @@ class EpisodeBatch:
         self.rows = self.episodes * self.robots
         if settings.battery.is_limited or settings.pauses_when_blocked:
             raise ValueError(
-                f"capacity_j of the battery is {settings.battery.capacity_j}, pauses_when_blocked is {settings.pauses_when_blocked}; "
-                f"want None and False: many episodes at once have no batteries and nobody to end a pause; or use lidarium.parallel_env"
+                f"capacity_j of the battery is {settings.battery.capacity_j}, pauses_when_blocked is "
+                f"{settings.pauses_when_blocked}; "
+                "want None and False: many episodes at once have no batteries and nobody to end a pause; or "
+                "use lidarium.parallel_env"
             )
         self._choice = FloorChoice(floor, image_resolution)
         self.simulation = make_simulation(settings, self.episodes)
@@ -301,7 +305,10 @@ class EpisodeBatch:
     def _run_staged(
         self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]
     ) -> None:
-        """Run episodes as the kernel does, step by step with what runs on board between the stages of a step; ``modes`` is used up."""
+        """Run episodes as the kernel does, step by step.
+
+        What runs on board runs between the stages of a step; ``modes`` is used up.
+        """
         decides = modes == DECIDES
         left = np.where(decides, self.settings.decision_steps, 1)
         begin_decisions(decides, self.robots, self.level.drives, self._tally)
@@ -416,7 +423,7 @@ class EpisodeBatch:
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
-        """Which robots ended in the last step for another reason than the horizon, (rows,)."""
+        """Which robots ended in the last step other than by the horizon, (rows,)."""
         return np.asarray((self.reasons != 0) & (self.reasons != HORIZON))
 
     @property

@@ -1,4 +1,7 @@
-"""What an action is, for all rows of a batch: speeds, waypoints, or the choice of a frontier."""
+"""Actions for all rows of a batch.
+
+They are speeds, waypoints, or the choice of a frontier.
+"""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -49,7 +52,9 @@ class Level(Protocol):
     def take(
         self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]
     ) -> NDArray[np.int8] | None:
-        """Take the actions of live rows: write ``commands`` or orders, and in ``modes`` how the episodes run.
+        """Take the actions of live rows.
+
+        Write ``commands`` or orders, and in ``modes`` how the episodes run.
 
         Returns
         -------
@@ -61,7 +66,9 @@ class Level(Protocol):
     def look(
         self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
     ) -> None:
-        """Write what the level adds to observations and infos, after the episodes have run.
+        """Write what the level adds to observations and infos.
+
+        It is called after the episodes have run.
 
         Parameters
         ----------
@@ -90,7 +97,8 @@ def check_actions(actions: NDArray[Any], shape: tuple[int, ...], live: Rows, wan
         raise ValueError(f"actions are {actions!r}; want an array {shape}: {wanted} for each row") from error
     if array.shape != shape:
         raise ValueError(
-            f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots + robot"
+            f"actions have shape {array.shape}; want {shape}: {wanted} for each row, row = episode * robots "
+            "+ robot"
         )
     if array.dtype.kind not in "biuf":
         raise ValueError(f"actions are of type {array.dtype}; want {wanted} for each row")
@@ -246,7 +254,10 @@ class FrontierLevel:
 def _tell(
     infos: dict[str, Any], name: str, rows: Rows, values: NDArray[Any], describe: Callable[[int], Any]
 ) -> None:
-    """Add an info for some rows, with the mask that Gymnasium's vector environments put beside it."""
+    """Add an info for some rows, with its mask.
+
+    The mask is the one that Gymnasium's vector environments put beside it.
+    """
     if rows.any():
         told = np.full(len(rows), None, object)
         for row in np.flatnonzero(rows):

@@ -1,4 +1,7 @@
-"""What a batch may be asked for: settings, and at a reset seeds, a mask of episodes, and options for all or for each."""
+"""Valid requests to a batch.
+
+They are settings, and at a reset seeds, a mask of episodes, and options for all or for each.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -110,7 +113,8 @@ def _entry(name: str, value: Any, episode: int, episodes: int) -> Any:  # noqa: 
         return value
     if len(value) != episodes:
         raise ValueError(
-            f"option {name} has {len(value)} entries; want one for all, or one for each of the {episodes} episodes"
+            f"option {name} has {len(value)} entries; want one for all, or one for each of the {episodes} "
+            "episodes"
         )
     return value[episode]
 
@@ -125,7 +129,10 @@ def _is_for_all(name: str, value: Any) -> bool:  # noqa: ANN401
 
 
 def _depth(value: Any) -> int:  # noqa: ANN401
-    """Return how deep a value is nested: 2 for (robots, 3) numbers, in an array or in lists."""
+    """Return how deep a value is nested.
+
+    It is 2 for (robots, 3) numbers, in an array or in lists.
+    """
     if isinstance(value, np.ndarray):
         return value.ndim
     is_nested = isinstance(value, Sequence) and not isinstance(value, str) and len(value) > 0

@@ -1,4 +1,7 @@
-"""The kernel that runs many episodes, each for one step or for a decision of its own length."""
+"""The kernel that runs many episodes at once.
+
+Each runs for one step or for a decision of its own length.
+"""
 
 from typing import NamedTuple
 
@@ -15,8 +18,11 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.work_queue import take_turn
 
 WAITS, LOOKS, STEPS, DECIDES = range(4)
-"""What an episode does in a call: nothing; it takes the scan at the start; one step by the commands given; or
-up to the longest decision along the robots' paths."""
+"""Modes of an episode in a call.
+
+It does nothing, takes the start scan, takes one step by the commands, or follows the robots' paths up to the
+longest decision.
+"""
 
 
 class Tally(NamedTuple):
@@ -54,7 +60,10 @@ def _is_interrupted(
     radius: float,
     stops_on_contact: bool,
 ) -> bool:
-    """Whether something happened to a robot of the episode that ends it: the goal reached, a collision, a failure."""
+    """Whether something happened to a robot of the episode that ends it.
+
+    It is the goal reached, a collision or a failure.
+    """
     for robot in range(live.shape[0]):
         if live[robot] and failed[robot] != 0:
             return True
@@ -87,7 +96,10 @@ def _ends(world: WorldArrays, episode: int, robots: int, drives: Drives, tally: 
 
 @kernel
 def begin_decisions(decides: Array, robots: int, drives: Drives, tally: Tally) -> None:
-    """Note who waits for an order already in the episodes that ``decides`` (episodes,) names."""
+    """Note which robots already wait for an order.
+
+    It applies to the episodes that ``decides`` (episodes,) names.
+    """
     for episode in range(decides.shape[0]):
         if decides[episode]:
             mark_waiting(drives, episode * robots, (episode + 1) * robots, tally.waiting)
@@ -97,7 +109,10 @@ def begin_decisions(decides: Array, robots: int, drives: Drives, tally: Tally) -
 def follow_some(
     decides: Array, robots: int, table: Array, drives: Drives, following: Following, commands: Array
 ) -> None:
-    """Give the robots of the episodes that ``decides`` (episodes,) names the speeds that follow their paths."""
+    """Give robots the speeds that follow their paths.
+
+    It applies to the robots of the episodes that ``decides`` (episodes,) names.
+    """
     world = world_at(table)
     for episode in range(decides.shape[0]):
         if decides[episode]:
@@ -165,7 +180,9 @@ def _run_episodes(
     turns: Array,
     threads: int,
 ) -> None:
-    """Run the episodes by their ``modes`` (episodes,), on so many threads, and write the observations of ``seen`` rows.
+    """Run the episodes by their ``modes`` (episodes,), on so many threads.
+
+    The observations of ``seen`` rows are written.
 
     An episode's observations are written right after its run, while its maps are in the thread's cache.
     Threads take the episodes by ``new_turns`` in the ``order`` (episodes,) int64.

@@ -1,4 +1,7 @@
-"""Many episodes as one vector environment of stable-baselines3: the rows of ``ExplorationVectorEnv``, reset in the step that ends."""
+"""Many episodes as one vector environment of stable-baselines3.
+
+It has the rows of ``ExplorationVectorEnv``, reset in the step that ends.
+"""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -23,7 +26,9 @@ Infos = list[dict[str, Any]]
 
 
 class ExplorationVecEnv(VecEnv):
-    """Teams of lidar robots explore floors, many episodes in one kernel call (stable-baselines3).
+    """Teams of lidar robots that explore floors (stable-baselines3).
+
+    Many episodes run in one kernel call.
 
     Row = episode * robots + robot; one policy drives all rows. A robot that ends before its team is done
     once; its row then repeats its last observation with reward 0 and ``infos[row]["active"]`` False. Where
@@ -64,7 +69,10 @@ class ExplorationVecEnv(VecEnv):
         super().__init__(self.batch.rows, self.batch.observation_space, self.batch.action_space)
 
     def reset(self) -> Arrays:
-        """Begin all episodes, with the seeds of ``seed`` and the options of ``set_options`` where they were called."""
+        """Begin all episodes.
+
+        It uses the seeds of ``seed`` and the options of ``set_options`` where they were called.
+        """
         self._check_open()
         batch = self.batch
         batch.run(None, np.arange(batch.episodes), self._seeds[:: batch.robots], self._chosen)
@@ -118,7 +126,10 @@ class ExplorationVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> tuple[Arrays, NDArray[np.float32], NDArray[np.bool_], Infos]:
-        """Run all episodes for one step (velocity) or decision, and begin those anew that are over."""
+        """Run all episodes for one step (velocity) or decision.
+
+        Episodes that are over begin anew.
+        """
         if self._actions is None:
             raise RuntimeError("no actions were given; call step_async() before step_wait()")
         actions, self._actions = self._actions, None
@@ -178,7 +189,8 @@ class ExplorationVecEnv(VecEnv):
         """
         if "action_mask" not in self.batch.observations:
             raise AttributeError(
-                "action_masks are there at the level of frontiers only; make the environment with level='frontier'"
+                "action_masks are there at the level of frontiers only; make the environment with "
+                "level='frontier'"
             )
         return self.batch.observations["action_mask"].astype(np.bool_)
 
@@ -189,7 +201,8 @@ class ExplorationVecEnv(VecEnv):
     def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:  # noqa: ANN401
         """Refuse: rows share everything."""
         raise AttributeError(
-            f"{attr_name} cannot be set for single rows: all rows share one batch; make a new environment instead"
+            f"{attr_name} cannot be set for single rows: all rows share one batch; make a new environment "
+            "instead"
         )
 
     def env_method(

@@ -1,4 +1,7 @@
-"""Many episodes as one Gymnasium vector environment: a row for every robot of every episode."""
+"""Many episodes as one Gymnasium vector environment.
+
+It has a row for every robot of every episode.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +22,9 @@ Step = tuple[Arrays, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], 
 
 
 class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
-    """Teams of lidar robots explore floors, many episodes in one kernel call (Gymnasium).
+    """Teams of lidar robots that explore floors (Gymnasium).
+
+    Many episodes run in one kernel call.
 
     Row = episode * robots + robot. A robot that ends before its team returns terminated once; its row then
     repeats its last observation with reward 0 and ``infos["active"]`` False. When the last robot of an
@@ -65,7 +70,8 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
     ) -> None:
         if render_mode is not None:
             raise ValueError(
-                f"render_mode is {render_mode!r}; a batch is not drawn, use lidarium.parallel_env to look at an episode"
+                f"render_mode is {render_mode!r}; a batch is not drawn, use lidarium.parallel_env to look at "
+                "an episode"
             )
         settings = settings_of(options)
         self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy)
@@ -151,7 +157,9 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
 
 
 def make_vector_env(num_envs: int, **options: Any) -> ExplorationVectorEnv:  # noqa: ANN401
-    """Make the batched form of the Gymnasium environments, for ``gymnasium.make_vec``: one robot an episode.
+    """Make the batched form of the Gymnasium environments.
+
+    It is for ``gymnasium.make_vec``: one robot an episode.
 
     Raises
     ------
@@ -160,6 +168,7 @@ def make_vector_env(num_envs: int, **options: Any) -> ExplorationVectorEnv:  # n
     """
     if options.setdefault("robots", 1) != 1:
         raise ValueError(
-            f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.vector_env for teams"
+            f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.vector_env for "
+            "teams"
         )
     return ExplorationVectorEnv(num_envs, **options)

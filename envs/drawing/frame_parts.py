@@ -1,4 +1,7 @@
-"""Parts of frames, drawn from plain arrays: what part of a floor is seen, ways, robots, a header."""
+"""Parts of frames, drawn from plain arrays.
+
+They are the part of a floor that is seen, paths, robots and a header.
+"""
 
 import colorsys
 import math
@@ -82,14 +85,19 @@ class View:
     block: int
 
     def pixels(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Return points (..., 2) as x, y [m] in OpenCV's pixels with `SHIFT` fractional bits."""
+        """Return points (..., 2) as x, y [m] in OpenCV's pixels.
+
+        The pixels have `SHIFT` fractional bits.
+        """
         x = (points[..., 0] - self.origin[0]) * self.scale - 0.5
         y = self.height - (points[..., 1] - self.origin[1]) * self.scale - 0.5
         return np.rint(np.stack([x, y], axis=-1) * (1 << SHIFT)).astype(np.int32)
 
 
 def view_around(shown: NDArray[np.bool_], origin: tuple[float, float], resolution: float, size: int) -> View:
-    """Return the view on the cells of a grid that are to be shown, with a margin, the longer side ``size`` pixels.
+    """Return the view on the cells of a grid that are to be shown.
+
+    It has a margin, and its longer side is ``size`` pixels.
 
     Parameters
     ----------
@@ -119,7 +127,10 @@ def _span(is_used: NDArray[np.bool_], margin: int) -> slice:
 
 
 def enlarged(picture: Frame, view: View) -> Frame:
-    """Return a picture of a view's cells (or blocks of them), row 0 at the lowest y, as large as the view and the right way up."""
+    """Return a picture of a view's cells, as large as the view.
+
+    It may be of blocks of cells; row 0 is at the lowest y, and the picture is upright.
+    """
     interpolation = cv2.INTER_NEAREST if view.height >= picture.shape[0] else cv2.INTER_AREA
     return np.ascontiguousarray(
         cv2.resize(picture, (view.width, view.height), interpolation=interpolation)[::-1], dtype=np.uint8
@@ -141,7 +152,10 @@ def draw_robots(
     has_ended: Sequence[bool],
     colours: Sequence[Colour],
 ) -> None:
-    """Draw robots of a radius [m] with their headings at poses (robots, 3) [m, rad], paler those that have ended."""
+    """Draw robots of a radius [m] with their headings.
+
+    Poses are (robots, 3) [m, rad]; robots that have ended are paler.
+    """
     fixed = 1 << SHIFT
     shown = max(radius * view.scale, 6.0)
     for (x, y, theta), colour, is_over in zip(poses, colours, has_ended, strict=True):

@@ -1,4 +1,7 @@
-"""Frames: the floor from above, what is explored, the robots and what their lasers see."""
+"""Frames of the floor from above.
+
+They show what is explored, the robots and what their lasers see.
+"""
 
 import warnings
 from collections.abc import Callable
@@ -42,7 +45,10 @@ PALETTE = np.array([BACKGROUND, WALL, UNEXPLORED, NOT_COUNTED, EXPLORED], np.uin
 
 
 def view_of(tables: FloorTables, size: int) -> View:
-    """Return the view on a floor's free cells with a margin, the longer side ``size`` pixels."""
+    """Return the view on a floor's free cells with a margin.
+
+    The longer side is ``size`` pixels.
+    """
     raster = tables.laser
     return view_around(raster.solid == 0, raster.origin, raster.resolution, size)
 
@@ -110,7 +116,10 @@ def _draw_floor(env: "ExplorationEnv", tables: FloorTables, view: View) -> Frame
 
 
 def _on_raster(mask: NDArray[np.uint64], shape: tuple[int, int], multiple: int) -> NDArray[np.uint8]:
-    """Unpack a mask and enlarge its cells, which are ``multiple`` cells of the raster wide and begin at the same corner."""
+    """Unpack a mask and enlarge its cells.
+
+    They are ``multiple`` cells of the raster wide and begin at the same corner.
+    """
     cells = unpack_bits(mask, -(-shape[1] // multiple)).view(np.uint8)
     if multiple > 1:
         cells = np.repeat(np.repeat(cells, multiple, axis=0), multiple, axis=1)
@@ -240,7 +249,8 @@ class FrameWindow:
                 pyplot.close(figure)
             self._is_off = True
             warnings.warn(
-                "render_mode is 'human', but there is no display to open a window on; nothing is shown (use 'rgb_array' for frames)",
+                "render_mode is 'human', but there is no display to open a window on; nothing is shown (use "
+                "'rgb_array' for frames)",
                 UserWarning,
                 stacklevel=4,
             )

@@ -1,4 +1,7 @@
-"""What the robots' drives are at, in arrays over all rows, and the questions that kernels and others ask of it."""
+"""The state of the robots' drives, in arrays over all rows.
+
+It includes the questions that kernels and others ask of it.
+"""
 
 from typing import NamedTuple
 
@@ -156,14 +159,20 @@ def is_done(drives: Drives, row: int) -> bool:
 
 @kernel(borrowing=True)
 def mark_waiting(drives: Drives, first: int, last: int, waiting: Array) -> None:
-    """Note in ``waiting`` (rows,) bool which of the rows ``first`` to ``last`` wait for their next order (kernel)."""
+    """Note in ``waiting`` which rows wait for their next order (kernel).
+
+    ``waiting`` is (rows,) bool; the rows are ``first`` to ``last``.
+    """
     for row in range(first, last):
         waiting[row] = is_done(drives, row)
 
 
 @kernel(borrowing=True)
 def any_newly_done(drives: Drives, first: int, last: int, live: Array, waiting: Array) -> bool:
-    """Whether a live robot of the rows ``first`` to ``last`` waits for its next order that did not at ``mark_waiting`` (kernel)."""
+    """Whether a live robot newly waits for its next order (kernel).
+
+    It is of the rows ``first`` to ``last`` and did not wait at ``mark_waiting``.
+    """
     newly_done = 0
     for row in range(first, last):
         newly_done += live[row] and not waiting[row] and is_done(drives, row)
@@ -181,7 +190,10 @@ def follow_team(
     ranges: Array,
     commands: Array,
 ) -> None:
-    """Give each robot of a team, rows ``first`` to ``last``, the speed and turn rate that follow its path (kernel)."""
+    """Give each robot of a team the speed and turn rate to follow its path.
+
+    The rows are ``first`` to ``last`` (kernel).
+    """
     follow_paths(
         believed[first:last],
         velocities[first:last],
@@ -210,7 +222,10 @@ def follow_team(
 def follow_teams(
     drives: Drives, following: Following, believed: Array, velocities: Array, ranges: Array, commands: Array
 ) -> None:
-    """Give the robots of all teams the speed and turn rate that follow their paths (kernel)."""
+    """Give the robots of all teams the speed and turn rate to follow paths.
+
+    Each follows its own path (kernel).
+    """
     robots = len(following.radii)
     for first in range(0, len(believed), robots):
         follow_team(drives, following, first, first + robots, believed, velocities, ranges, commands)

@@ -19,7 +19,10 @@ MAX_POINTS = 512
 """Most points of a path."""
 
 LOOKAHEAD = (0.08, 0.25)
-"""How far ahead on its line a robot aims where it is tight, and where there is room [m]."""
+"""Distance ahead on its line at which a robot aims [m].
+
+The first is where it is tight, the second where there is room.
+"""
 
 TURN_GAIN = 3.0
 """Turn rate per radian of heading error [1/s]."""
@@ -37,10 +40,16 @@ MATE_GAP = 0.03
 """Gap that robots keep to each other [m]."""
 
 LEAST_MATE_GAP = 0.004
-"""Gap that the robot with the lower number keeps in passing where two stand nearer than that [m]."""
+"""Gap that the lower-numbered robot keeps in passing [m].
+
+It holds where two robots stand nearer than the usual gap.
+"""
 
 SIDE_GAP = 0.0003
-"""The swath that must be clear of returns is this much wider than the body on each side [m]."""
+"""Extra width of the swath that must be clear of returns, each side [m].
+
+The swath is this much wider than the body.
+"""
 
 FORESIGHT_TIMES = np.array([0.0, 0.4, 0.8])
 """How far ahead the robot with the higher number looks where another will be [s]."""
@@ -76,7 +85,10 @@ def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
 def _gap_to_mates(
     robot: int, poses: Array, velocities: Array, radii: Array, foresight: Array, present: Array
 ) -> float:
-    """How far the disc can go straight ahead before it meets a known teammate, now or where it will be soon [m]."""
+    """Return how far the disc can go straight to a known teammate [m].
+
+    The teammate counts now or where it will be soon.
+    """
     gap = np.inf
     cosine, sine = math.cos(poses[robot, 2]), math.sin(poses[robot, 2])
     for other in range(poses.shape[0]):
@@ -105,7 +117,10 @@ def _gap_to_mates(
 def _gap_to_heard(
     robot: int, poses: Array, radii: Array, foresight: Array, contact: Array, heard: Array
 ) -> float:
-    """How far the disc can go straight ahead before it meets a teammate that it heard of, taken to stand where it was [m]."""
+    """Return how far the disc can go straight to a teammate heard of [m].
+
+    The teammate is taken to stand where it was.
+    """
     known = heard.reshape((-1, 3)).copy()
     known[robot] = poses[robot]
     return _gap_to_mates(robot, known, np.zeros((poses.shape[0], 2)), radii, foresight, contact)  # type: ignore[no-any-return]

@@ -1,4 +1,7 @@
-"""Planning of paths for many robots at once, in kernels: to their targets, round teammates, and anew where a path is blocked."""
+"""Path planning for many robots at once, in kernels.
+
+Paths lead to their targets, round teammates, and are planned anew where one is blocked.
+"""
 
 import math
 from typing import NamedTuple
@@ -82,7 +85,10 @@ def passage_in(planning: Planning) -> Passage:
 
 @kernel
 def _place_along(first: int, last: int, step: int, steps: int, is_straight: bool) -> int:
-    """Return the cell, along rows or columns, at one of the steps from a cell to another, rounded to even."""
+    """Return the cell at one of the steps from a cell to another.
+
+    It is along rows or columns, rounded to even.
+    """
     if step == steps:
         return last
     rise = float(last - first)
@@ -107,7 +113,10 @@ def _room_before(cells: Array, k: int, closeness: Array, planning: Planning) -> 
 
 @kernel
 def _discs(planning: Planning, row: int, avoided: Array) -> Array:
-    """Bodies of the avoided teammates (robots,) as discs (row, column, radius) that a robot's centre must not enter, in cells."""
+    """Return the bodies of the avoided teammates (robots,) as discs, in cells.
+
+    They are (row, column, radius) and a robot's centre must not enter them.
+    """
     first = row // planning.robots * planning.robots
     discs = np.empty((avoided.sum(), 3))
     count = 0
@@ -233,7 +242,10 @@ def _path_is_clear(planning: Planning, drives: Drives, row: int) -> bool:
 
 @kernel
 def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> None:
-    """Drop a robot's path where it is not clear any more, and plan one to its target where it has none (kernel)."""
+    """Drop a robot's path that is not clear, and plan one where it has none.
+
+    The plan leads to its target (kernel).
+    """
     if drives.passing[row] >= 0 or not drives.is_ordered[row]:
         return
     if drives.has_path[row]:
@@ -285,7 +297,10 @@ def _prepare_teams(
     turns: Array,
     pieces: int,
 ) -> None:
-    """Prepare the live robots of some teams, in their order, on fresh maps, in so many pieces; note where a robot is blocked."""
+    """Prepare the live robots of some teams, in their order, on fresh maps.
+
+    The work is in so many pieces; it is noted where a robot is blocked.
+    """
     for piece in numba.prange(pieces):
         k = take_turn(turns)
         while k < len(episodes):

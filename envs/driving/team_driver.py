@@ -1,4 +1,7 @@
-"""Drives teams to their targets: plans the robots' paths, keeps them while they are good, and settles who gives way."""
+"""A driver of teams to their targets.
+
+It plans the robots' paths, keeps them while they are good, and settles who gives way.
+"""
 
 import math
 
@@ -43,7 +46,7 @@ PREFERRED_MARGIN = 0.15
 """Paths keep this far off walls where there is room [m]."""
 
 DETOUR = 4.0
-"""A robot that a teammate blocks drives round it where that costs at most this much more [m]."""
+"""Most extra cost at which a robot drives round a blocking teammate [m]."""
 
 NEAR = 0.6
 """Teammates within this gap may be what blocks a robot [m]."""
@@ -56,7 +59,10 @@ REFUGE_STAY_S = 15.0
 
 
 def footprint_of(radius: float) -> Footprint:
-    """Return how a robot of this radius plans: just fitting through where it must, off the walls where it can."""
+    """Return the footprint by which a robot of this radius plans.
+
+    It just fits through where it must, and keeps off the walls where it can.
+    """
     return Footprint(radius + BODY_MARGIN, radius + PREFERRED_MARGIN, 3.0)
 
 
@@ -208,7 +214,10 @@ class TeamDriver:
             self._settle_team(int(episode))
 
     def commands(self) -> NDArray[np.float64]:
-        """Return speed and turn rate of all robots for the next step, shape (rows, 2) [m/s, rad/s]."""
+        """Return speed and turn rate of all robots for the next step [m/s, rad/s].
+
+        The shape is (rows, 2).
+        """
         simulation = self._perception.simulation
         follow_teams(
             self.drives,
@@ -221,7 +230,10 @@ class TeamDriver:
         return self._commands
 
     def path(self, row: int) -> NDArray[np.float64]:
-        """Return what is left of a robot's path, from where it is, in its map frame, shape (N, 2) [m]."""
+        """Return the rest of a robot's path, in its map frame, shape (N, 2) [m].
+
+        It begins where the robot is.
+        """
         return self._remaining(row) - self._perception.offset(row)
 
     @property
@@ -254,7 +266,10 @@ class TeamDriver:
         return [row for row in range(team.start, team.stop) if not flags[row] & ENDED and not self.held[row]]
 
     def planning(self, rows: NDArray[np.int64], *, with_frontiers: bool = False) -> Planning:
-        """Return what planning needs in kernels, with the maps that the given rows plan on, if wanted with frontiers."""
+        """Return what planning needs in kernels.
+
+        It has the maps that the given rows plan on, with frontiers if wanted.
+        """
         perception, settings, resolution = (
             self._perception,
             self._settings,
@@ -321,7 +336,10 @@ class TeamDriver:
         return np.concatenate([here, self.drives.paths[row, place:count]]) if count else here.copy()
 
     def _end_refuge(self, row: int) -> None:
-        """Let a robot that gave way go on, once the other has passed or enough time has gone by."""
+        """Let a robot that gave way go on.
+
+        This is once the other has passed or enough time has gone by.
+        """
         other = int(self.drives.passing[row])
         if other < 0:
             return
@@ -359,7 +377,10 @@ class TeamDriver:
                 self._settle(row, live)
 
     def _settle(self, row: int, live: list[int]) -> None:
-        """Resolve that a teammate stands in a robot's way: drive round it, or one of the two gives way."""
+        """Resolve that a teammate blocks a robot.
+
+        It drives round the teammate, or one of the two gives way.
+        """
         drives, here = self.drives, self._perception.beliefs.believed[row, :2]
         reach = self._settings.robot.radius + NEAR + self._settings.robot.radius
         near = [

@@ -69,7 +69,9 @@ def draw_segments(
     segments: NDArray[np.float64],
     value: int,
 ) -> None:
-    """Set every cell that a segment crosses, in place: the line is 4-connected, so no ray slips through it.
+    """Set every cell that a segment crosses, in place.
+
+    The line is 4-connected, so no ray slips through it.
 
     Parameters
     ----------

@@ -57,7 +57,10 @@ class Solid:
         return np.concatenate([ring_edges(ring) for ring in (self.polygon, *self.holes)])
 
     def cuts(self, z_low: float, z_high: float) -> bool:
-        """Return whether the solid cuts a height range, or a plane where ``z_low == z_high`` [m]."""
+        """Return whether the solid cuts a height range [m].
+
+        It is a plane where ``z_low == z_high``.
+        """
         if z_low == z_high:
             return self.z_low <= z_low < self.z_high
         return self.z_low < z_high and self.z_high > z_low
@@ -123,7 +126,8 @@ class Floor:
         x_min, y_min, x_max, y_max = self.bounds
         if not np.isfinite(self.bounds).all() or x_min >= x_max or y_min >= y_max:
             raise ValueError(
-                f"floor {self.name!r} has bounds {self.bounds}; want finite x_min < x_max and y_min < y_max in metres"
+                f"floor {self.name!r} has bounds {self.bounds}; want finite x_min < x_max and y_min < y_max "
+                "in metres"
             )
         if self.solids and self.cells is not None:
             raise ValueError(
@@ -131,12 +135,14 @@ class Floor:
             )
         if self.cells is not None and (self.cells.solid.ndim != 2 or not self.cells.resolution > 0.0):
             raise ValueError(
-                f"floor {self.name!r} has cells of shape {self.cells.solid.shape} at {self.cells.resolution} m; want a grid, resolution > 0"
+                f"floor {self.name!r} has cells of shape {self.cells.solid.shape} at {self.cells.resolution} "
+                "m; want a grid, resolution > 0"
             )
         starts = np.asarray(self.starts, dtype=np.float64)
         if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():
             raise ValueError(
-                f"floor {self.name!r} has starts of shape {starts.shape} or not finite; want (K, 3): x, y, theta"
+                f"floor {self.name!r} has starts of shape {starts.shape} or not finite; want (K, 3): x, y, "
+                "theta"
             )
         if self.goal is not None and (len(self.goal) != 2 or not np.isfinite(self.goal).all()):
             raise ValueError(f"floor {self.name!r} has goal {self.goal}; want (x, y) in metres")
@@ -198,7 +204,8 @@ class Floor:
         while math.prod(_frame(self.bounds, fitting)[1]) > MAX_RASTER_CELLS:
             fitting = math.ceil(fitting * 1.05 * 1000.0) / 1000.0
         return (
-            f"floor {self.name!r} has {columns} x {rows} cells at {resolution} m, more than {MAX_RASTER_CELLS}; "
+            f"floor {self.name!r} has {columns} x {rows} cells at {resolution} m, more than "
+            f"{MAX_RASTER_CELLS}; "
             f"a resolution of {fitting:g} m fits"
         )
 
@@ -225,7 +232,10 @@ class Floor:
 
     @cached_property
     def geometry_sha256(self) -> str:
-        """Hash of the bounds and of what stands there, to the bit: floors that share it have the same rasters."""
+        """Hash of the bounds and of the solids, to the bit.
+
+        Floors that share it have the same rasters.
+        """
         digest = hashlib.sha256(np.array(self.bounds, np.float64).tobytes())
         for solid in self.solids:
             digest.update(np.array((solid.z_low, solid.z_high, 1 + len(solid.holes)), np.float64).tobytes())
@@ -245,7 +255,8 @@ def _ring(kind: str, ring: NDArray[np.float64]) -> NDArray[np.float64]:
     corners = np.ascontiguousarray(ring, dtype=np.float64)
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
         raise ValueError(
-            f"{kind} has shape {corners.shape} or values that are not finite; want at least 3 points (x, y) in metres"
+            f"{kind} has shape {corners.shape} or values that are not finite; want at least 3 points (x, y) "
+            "in metres"
         )
     return corners
 
@@ -253,7 +264,10 @@ def _ring(kind: str, ring: NDArray[np.float64]) -> NDArray[np.float64]:
 def _frame(
     bounds: tuple[float, float, float, float], resolution: float
 ) -> tuple[tuple[float, float], tuple[int, int]]:
-    """Return origin and (rows, columns) of the raster: at least one cell beyond the bounds on all sides."""
+    """Return origin and (rows, columns) of the raster.
+
+    It has at least one cell beyond the bounds on all sides.
+    """
     margin = math.ceil(resolution / LATTICE - 1e-9)
     # Divided, not multiplied: 3 / 10 is the double nearest to 0.3, and 3 * 0.1 is not.
     x, y = ((math.floor(low / LATTICE + 1e-9) - margin) / round(1.0 / LATTICE) for low in bounds[:2])
@@ -295,7 +309,10 @@ def _area(polygon: NDArray[np.float64]) -> float:
 
 
 def _width(polygon: NDArray[np.float64]) -> float:
-    """Return the width of a polygon: of its smallest rectangle or, for a bent strip, of the strip."""
+    """Return the width of a polygon.
+
+    It is that of its smallest rectangle or, for a bent strip, of the strip.
+    """
     edges = np.roll(polygon, -1, axis=0) - polygon
     perimeter = float(np.hypot(*edges.T).sum())
     rectangle = min(cv2.minAreaRect((polygon - polygon[0]).astype(np.float32))[1])
@@ -305,7 +322,10 @@ def _width(polygon: NDArray[np.float64]) -> float:
 
 
 def _line(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the segments that stand for a thin polygon: the middle line of four corners, else the outline."""
+    """Return the segments that stand for a thin polygon.
+
+    They are the middle line of four corners, else the outline.
+    """
     if len(polygon) != 4:
         return ring_edges(polygon)
     middles = (polygon + np.roll(polygon, -1, axis=0)) / 2.0

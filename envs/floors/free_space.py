@@ -1,4 +1,6 @@
-"""Where a disc fits on a raster, and the free space that it sweeps from its starts.
+"""Where a disc fits on a raster, and its reachable free space.
+
+That is the space that the disc's footprint covers from its starts.
 
 What follows from the raster and the disc alone is kept with rasters that are read-only, for all episodes that
 share one.
@@ -19,7 +21,10 @@ from lidarium.mapping.kernels.compilation import kernel
 Made = TypeVar("Made")
 
 KEPT = 8
-"""The most that a raster keeps: components for radii, and what is swept from some of them."""
+"""Most entries that a raster keeps.
+
+It keeps components for radii, and the footprints covered from some of them.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +49,9 @@ class Components:
 
 
 def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
-    """Return where the centre of a disc may be: cells whose centre is no nearer than the radius to any solid cell's square.
+    """Return where the centre of a disc may be.
+
+    It is cells whose centre is no nearer than the radius to any solid cell's square.
 
     Parameters
     ----------
@@ -77,7 +84,10 @@ def configuration_space(raster: Raster, radius: float) -> NDArray[np.bool_]:
 
 
 def components(raster: Raster, radius: float) -> Components:
-    """Return the components of the configuration space of a disc of a radius [m], read-only; raises ``ValueError`` as that does."""
+    """Return the components of the configuration space of a disc, read-only.
+
+    The disc has a radius [m]; ``ValueError`` is raised as by ``configuration_space``.
+    """
 
     def make() -> Components:
         space = configuration_space(raster, radius)
@@ -135,7 +145,10 @@ def swept_free_space(raster: Raster, radius: float, starts: NDArray[np.float64])
 
 
 def cell_of(raster: Raster, point: NDArray[np.float64]) -> tuple[int, int]:
-    """Return the cell (row, column) of a point, or the nearest one of the raster, which is solid."""
+    """Return the cell (row, column) of a point, or the nearest of the raster.
+
+    The nearest one is solid.
+    """
     column, row = ((point[axis] - raster.origin[axis]) / raster.resolution for axis in (0, 1))
     rows, columns = raster.solid.shape
     return min(max(math.floor(row + 1e-9), 0), rows - 1), min(max(math.floor(column + 1e-9), 0), columns - 1)
@@ -144,7 +157,10 @@ def cell_of(raster: Raster, point: NDArray[np.float64]) -> tuple[int, int]:
 def component_near(
     raster: Raster, labels: NDArray[np.unsignedinteger[Any]], start: NDArray[np.float64], radius: float
 ) -> int:
-    """Return the component at a start, or at the nearest cell beside it where rounding to cells puts the start outside."""
+    """Return the component at a start, or at the nearest cell beside it.
+
+    The nearest cell is used where rounding to cells puts the start outside.
+    """
     i, j = cell_of(raster, start)
     if raster.solid[i, j]:
         raise ValueError(f"start ({start[0]:.3f}, {start[1]:.3f}) m is inside a wall; want one in free space")
@@ -155,7 +171,8 @@ def component_near(
         if labels[near]:
             return int(labels[near])
     raise ValueError(
-        f"a robot of radius {radius} m does not fit at start ({start[0]:.3f}, {start[1]:.3f}) m; want more room"
+        f"a robot of radius {radius} m does not fit at start ({start[0]:.3f}, {start[1]:.3f}) m; want more "
+        "room"
     )
 
 
@@ -199,7 +216,10 @@ def _box_of_free_cells(raster: Raster) -> tuple[slice, slice] | None:
 
 
 def _dilated(mask: NDArray[np.bool_], shape: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Dilate by a shape that is symmetric about both axes, given as its quadrant ``shape[|di|, |dj|]``."""
+    """Dilate by a shape that is symmetric about both axes.
+
+    The shape is given as its quadrant ``shape[|di|, |dj|]``.
+    """
     widths = shape.sum(axis=1).astype(np.int64) - 1
     widths = widths[widths >= 0]
     if widths.size == 0:

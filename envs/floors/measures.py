@@ -1,4 +1,7 @@
-"""Measures of a building: what a generator was asked for, read off the floor that came out."""
+"""Measures of a building, to compare a generated floor with its request.
+
+What the generator was asked for is measured on the floor that it produced.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,7 @@
-"""Where robots start: drawn in the free space of a floor, or checked where a user names them."""
+"""Starts of robots: drawn in the free space of a floor, or checked.
+
+Starts that a user names are checked.
+"""
 
 import math
 from typing import Any
@@ -21,7 +24,9 @@ def draw_starts(
     generator: np.random.Generator,
     proposed: NDArray[np.float64] = _NO_STARTS,
 ) -> NDArray[np.float64]:
-    """Return starts for a team: the first proposed ones that fit, the rest drawn uniformly.
+    """Return starts for a team.
+
+    The first proposed ones that fit are taken; the rest are drawn uniformly.
 
     Drawn starts lie at cell centres of one 4-connected component of the configuration space (with a cell to
     spare): that of the first proposed start that fits, else the largest. They keep two robot diameters,
@@ -58,7 +63,8 @@ def draw_starts(
     labels = found.labels
     if found.areas.size == 1:
         raise ValueError(
-            f"a robot of radius {radius} m does not fit anywhere on this floor; want a smaller robot or a larger floor"
+            f"a robot of radius {radius} m does not fit anywhere on this floor; want a smaller robot or a "
+            "larger floor"
         )
     taken = _fitting(raster, labels, radius, count, np.asarray(proposed, dtype=np.float64).reshape(-1, 3))
     component = labels[cell_of(raster, taken[0])] if taken else 1 + int(np.argmax(found.areas[1:]))
@@ -98,18 +104,21 @@ def check_starts(raster: Raster, radius: float, starts: NDArray[np.float64]) -> 
         label = component_near(raster, labels, start, radius)
         if _reaches_into_solid(raster, start, radius):
             raise ValueError(
-                f"start ({start[0]:.3f}, {start[1]:.3f}) m is nearer than the radius of {radius} m to a wall; want more room"
+                f"start ({start[0]:.3f}, {start[1]:.3f}) m is nearer than the radius of {radius} m to a "
+                "wall; want more room"
             )
         first = first or label
         if label != first:
             raise ValueError(
-                f"starts of robots 0 and {robot} are disconnected for a robot of radius {radius} m; want starts that can reach each other"
+                f"starts of robots 0 and {robot} are disconnected for a robot of radius {radius} m; want "
+                "starts that can reach each other"
             )
         for other in range(robot):
             apart = math.dist(start[:2], starts[other][:2])
             if apart < 2.0 * radius:
                 raise ValueError(
-                    f"starts of robots {other} and {robot} are {apart:.3f} m apart; want at least {2.0 * radius} m"
+                    f"starts of robots {other} and {robot} are {apart:.3f} m apart; want at least "
+                    f"{2.0 * radius} m"
                 )
 
 
@@ -136,7 +145,8 @@ def check_goal(raster: Raster, goal: tuple[float, float]) -> None:
     if not (0 <= row < rows and 0 <= column < columns):
         (x, y), side = raster.origin, raster.resolution
         raise ValueError(
-            f"goal ({goal[0]:.3f}, {goal[1]:.3f}) m is outside of the floor; want x from {x:.3f} to {x + columns * side:.3f} m "
+            f"goal ({goal[0]:.3f}, {goal[1]:.3f}) m is outside of the floor; want x from {x:.3f} to "
+            f"{x + columns * side:.3f} m "
             f"and y from {y:.3f} to {y + rows * side:.3f} m"
         )
     if raster.solid[row, column]:
@@ -162,7 +172,8 @@ def _fitting(
             continue
         if taken and labels[cell] != labels[cell_of(raster, taken[0])]:
             raise ValueError(
-                f"proposed starts ({taken[0][0]:.3f}, {taken[0][1]:.3f}) and ({start[0]:.3f}, {start[1]:.3f}) m are disconnected "
+                f"proposed starts ({taken[0][0]:.3f}, {taken[0][1]:.3f}) and ({start[0]:.3f}, "
+                f"{start[1]:.3f}) m are disconnected "
                 f"for a robot of radius {radius} m; want starts in one room system, or a smaller robot"
             )
         taken.append(start)
@@ -225,7 +236,10 @@ def _nth_cell(mask: NDArray[np.bool_], row_ends: NDArray[np.int64], n: int) -> t
 
 
 def _reaches_into_solid(raster: Raster, start: NDArray[np.float64], radius: float) -> bool:
-    """Whether the disc at a start, exactly there and not at a cell's centre, enters a solid cell."""
+    """Whether the disc at a start enters a solid cell.
+
+    The disc is exactly at the start, not at a cell's centre.
+    """
     reach = math.ceil(radius / raster.resolution) + 1
     i, j = cell_of(raster, start)
     rows, columns = np.nonzero(

@@ -1,4 +1,7 @@
-"""What the wrappers of the levels of decision share: all but the decisions is the environment's."""
+"""Shared parts of the wrappers of the levels of decision.
+
+Everything but the decisions belongs to the environment.
+"""
 
 from typing import Any
 
@@ -12,7 +15,9 @@ from lidarium.envs.radio.messages import Order
 
 
 class DecisionWrapper(ParallelEnv[str, Observation, Any]):
-    """Lets another level of decision drive an environment, which stays the one that keeps the episode.
+    """Lets another level of decision drive an environment.
+
+    The environment remains the one that keeps the episode.
 
     Parameters
     ----------

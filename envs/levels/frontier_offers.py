@@ -1,4 +1,6 @@
-"""The frontiers that robots may choose among, and what becomes of a choice, for the rows of many episodes in kernels.
+"""Frontiers that robots may choose among, and the results of their choices.
+
+Kernels compute them for the rows of many episodes.
 
 A robot is offered the frontiers that it can come near and see, cheapest way first. A frontier to which it has
 driven and turned and that is still there, to which there is no path, or towards which it does not get on, is
@@ -127,7 +129,10 @@ class Looking(NamedTuple):
 
 @kernel
 def _why_in_vain(planning: Planning, drives: Drives, choices: Choices, row: int, time: float) -> int:
-    """Return the number of the reason why a chosen frontier is not worth more driving, or 0; note where the robot gets on."""
+    """Return the reason why a chosen frontier is not worth more driving, or 0.
+
+    The reason is a number. Where the robot makes progress is noted.
+    """
     state = drive_state(drives, row)
     if state == STATE_ARRIVED:
         return UNSEEN
@@ -149,7 +154,10 @@ def _why_in_vain(planning: Planning, drives: Drives, choices: Choices, row: int,
 
 @kernel
 def _cheapest(left: Array, is_wanted: Array, ranked: Array) -> int:
-    """Rank the wanted clusters by what is left of the budget there, the first of equals first; return how many there are."""
+    """Rank the wanted clusters by what is left of the budget; return their number.
+
+    The budget is what is left at the cluster; the first of equals comes first.
+    """
     count = 0
     while count < len(ranked):
         best = -1
@@ -168,7 +176,10 @@ def _cheapest(left: Array, is_wanted: Array, ranked: Array) -> int:
 def _offer(
     planning: Planning, looking: Looking, offers: Offers, row: int, cells: Array, starts: Array, piece: int
 ) -> None:
-    """Offer a robot those clusters of frontier cells that it can come near and see, cheapest way first."""
+    """Offer a robot the frontier clusters that it can approach and see.
+
+    The cheapest path comes first.
+    """
     table, mask = offers.tables[row], offers.masks[row]
     table[:], mask[:], offers.counts[row] = 0.0, 0, 0
     mask[CANDIDATES] = 1

@@ -1,4 +1,7 @@
-"""Decisions by frontiers: a robot chooses among the frontiers that it can come near, cheapest way first."""
+"""Decisions by frontiers: a robot chooses one that it can come near.
+
+The frontiers are offered with the cheapest path first.
+"""
 
 from typing import Any
 
@@ -76,7 +79,8 @@ class FrontierExploration(DecisionWrapper):
             number = int(actions[agent])
             if not 0 <= number <= CANDIDATES:
                 raise ValueError(
-                    f"action of {agent} is {number}; want a frontier from 0 to {CANDIDATES - 1}, or {CANDIDATES} to stay"
+                    f"action of {agent} is {number}; want a frontier from 0 to {CANDIDATES - 1}, or "
+                    f"{CANDIDATES} to stay"
                 )
             numbers[self.possible_agents.index(agent)] = number
             choosing.append(agent)

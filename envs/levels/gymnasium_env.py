@@ -50,7 +50,8 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
     ) -> None:
         if options.setdefault("robots", 1) != 1:
             raise ValueError(
-                f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.parallel_env for a team"
+                f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.parallel_env "
+                "for a team"
             )
         base = ExplorationEnv(floor, make_settings(**options), render_mode, image_resolution)
         self.parallel = at_level(base, level)

@@ -1,4 +1,7 @@
-"""Decisions by waypoints: the onboard driving takes a robot there, a decision holds for a period or until a robot is done."""
+"""Decisions by waypoints: the onboard driver takes a robot to its waypoint.
+
+A decision holds for a period or until a robot is done.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -89,7 +92,10 @@ class WaypointExploration(DecisionWrapper):
     ) -> tuple[
         dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
-        """Drive for one decision by the orders of the robots that ``is_chosen`` (robots,) names; the others keep theirs. As ``step``."""
+        """Drive for one decision by the orders of the chosen robots.
+
+        ``is_chosen`` (robots,) names them; the others keep their orders. Returns as ``step``.
+        """
         env, driver = self.env, self.driver
         if not env.agents:
             return env.step({})

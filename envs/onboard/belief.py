@@ -95,7 +95,10 @@ class Belief:
 
     @property
     def map_origin(self) -> tuple[float, float]:
-        """Lower left corner of cell (0, 0) of the own map, and of the shared map, in the map frame [m]."""
+        """Lower left corner of cell (0, 0) of the own and shared map [m].
+
+        It is in the map frame.
+        """
         return self._perception.origin_in_frame(self._row)
 
     @property

@@ -1,4 +1,4 @@
-"""What the robots of an episode measure of themselves: how far they have come by their wheels, and what they have used of their batteries.
+"""Meters on board: distance by wheels, and battery use, of an episode's robots.
 
 Nothing is done in a step where wheels tell the truth and batteries have no limit.
 """

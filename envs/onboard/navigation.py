@@ -1,4 +1,6 @@
-"""A map with what planning needs of it, and the kernels that bring the maps of many teams up to date.
+"""A map with what planning needs of it.
+
+Kernels update the maps of many teams.
 
 Kernels find a map through its *record*: a row of whole numbers with the addresses of its arrays. Frontiers
 are kept from the first time that somebody asks for them, so that driving by waypoints never touches their
@@ -36,7 +38,10 @@ CLEARANCE_LIMIT = 0.6
 """Clearance is told exactly up to this [m]."""
 
 LOG_ODDS, ROWS, COLUMNS, CLOSENESS, FLAGS, TILES, ROW_LOW, ROW_HIGH, COLUMN_LOW, COLUMN_HIGH = range(10)
-"""Places in a record: addresses (0 for what is not kept), shape, and the window outside of which nothing is known."""
+"""Places in a record: addresses, shape and the known window.
+
+Addresses are 0 for what is not kept. Nothing is known outside the window.
+"""
 
 RECORD = 10
 """Numbers of a record."""
@@ -92,7 +97,10 @@ class NavigationMap:
         return self._space
 
     def changed(self, window: Window) -> None:
-        """Bring clearance and frontiers up to date in a window (row_low, row_high, column_low, column_high)."""
+        """Update clearance and frontiers in a window.
+
+        The window is (row_low, row_high, column_low, column_high).
+        """
         refresh_map(self._record, self.clearance.limit, self.clearance.stamp, np.array(window, np.int64))
 
     def keep_record_in(self, record: NDArray[np.int64]) -> None:
@@ -155,19 +163,28 @@ def closeness_of(record: Array) -> Any:  # noqa: ANN401
 
 @kernel(inline=True)
 def flags_of(record: Array) -> Any:  # noqa: ANN401
-    """View the flags of frontiers (rows, columns) uint8 of a record that keeps them (kernel)."""
+    """View the frontier flags (rows, columns) uint8 of a record (kernel).
+
+    The record must keep them.
+    """
     return uint8_grid_at(record[FLAGS], record[ROWS], record[COLUMNS])
 
 
 @kernel(inline=True)
 def tiles_of(record: Array) -> Any:  # noqa: ANN401
-    """View the counts of frontier cells by tiles of 16 x 16 cells, int32, of a record that keeps them (kernel)."""
+    """View the counts of frontier cells by tiles of a record, int32 (kernel).
+
+    Tiles are 16 x 16 cells. The record must keep the counts.
+    """
     return int32_table_at(record[TILES], (record[ROWS] + 15) // 16, (record[COLUMNS] + 15) // 16)
 
 
 @kernel
 def refresh_map(record: Array, limit: int, stamp: Array, window: Array) -> None:
-    """Bring clearance, and frontiers where they are kept, up to date in a window (4,) of a map that changed (kernel)."""
+    """Update clearance and frontiers in a window (4,) of a map (kernel).
+
+    The window is where the map changed; frontiers are updated where they are kept.
+    """
     inside = _inside(record, window)
     _take_in(
         record, limit, stamp, inside, changed_cells(log_odds_of(record), closeness_of(record), limit, inside)
@@ -182,7 +199,10 @@ def _inside(record: Array, window: Array) -> Window:
 
 @kernel
 def _take_in(record: Array, limit: int, stamp: Array, inside: Window, changed: Array) -> None:
-    """Bring up to date what is kept beside a map that changed in a window, where the cells (N, 2) became occupied or ceased to be."""
+    """Update what is kept beside a map that changed in a window.
+
+    The cells (N, 2) became occupied or ceased to be.
+    """
     if inside[0] >= inside[1] or inside[2] >= inside[3]:
         return
     extend_window(record[ROW_LOW:], np.array(inside))
@@ -193,7 +213,7 @@ def _take_in(record: Array, limit: int, stamp: Array, inside: Window, changed: A
 
 @kernel
 def extend_window(known: Array, window: Array) -> None:
-    """Extend a window (4,) so that it holds another, where that one holds anything (kernel)."""
+    """Extend a window (4,) to hold another one that is not empty (kernel)."""
     if window[0] < window[1] and window[2] < window[3]:
         known[0], known[1] = min(known[0], window[0]), max(known[1], window[1])
         known[2], known[3] = min(known[2], window[2]), max(known[3], window[3])
@@ -201,7 +221,9 @@ def extend_window(known: Array, window: Array) -> None:
 
 @kernel
 def _sum_maps(beliefs: Array, window: Window, total: Array) -> Array:
-    """Write the sum of maps of one shape into ``total`` within a window and nowhere else, cut to [-127, 127].
+    """Write the sum of maps of one shape into ``total`` within a window.
+
+    Nothing is written outside the window; the sum is clipped to [-127, 127].
 
     Returns
     -------
@@ -292,7 +314,10 @@ class TeamMaps(NamedTuple):
 
 @kernel
 def sum_maps(record: Array, beliefs: Array, limit: int, stamp: Array, window: Array) -> None:
-    """Make the map of a record the sum of maps (maps, 3 or more) of its shape in a window (4,) in which these changed (kernel)."""
+    """Sum maps (maps, 3 or more) into a record's map within a window (4,) (kernel).
+
+    The maps have its shape and changed in this window.
+    """
     inside = _inside(record, window)
     # Nobody else writes a sum: where it changed is known without a look at its clearance, which takes twice
     # the memory of a map.
@@ -301,14 +326,20 @@ def sum_maps(record: Array, beliefs: Array, limit: int, stamp: Array, window: Ar
 
 @kernel
 def sum_team(maps: TeamMaps, episode: int, window: Array) -> None:
-    """Bring the map of a team up to date in a window (4,) in which robots' own maps changed (kernel)."""
+    """Update the map of a team in a window (4,) of changes (kernel).
+
+    In this window the robots' own maps changed.
+    """
     first = episode * maps.robots
     sum_maps(maps.shared[episode], maps.beliefs[first : first + maps.robots], maps.limit, maps.stamp, window)
 
 
 @kernel
 def refresh_team(maps: TeamMaps, episode: int) -> None:
-    """Take in what the maps of a team have changed since the last look, robot by robot (kernel)."""
+    """Update a team's maps by their changes since the last call (kernel).
+
+    The changes are taken in robot by robot.
+    """
     if maps.fresh_at[episode] == maps.steps[episode]:
         return
     maps.fresh_at[episode] = maps.steps[episode]

@@ -1,4 +1,6 @@
-"""What the robots' onboard software knows: their poses and maps, and what reached each of the others.
+"""What the robots' onboard software knows: poses, maps and received data.
+
+This includes what reached each of the others.
 
 With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. A robot
 that does not know its start can be told what others know, laid over its own map. All maps come with what
@@ -41,7 +43,9 @@ from lidarium.mapping.planning.path_search import SearchMemory
 
 
 class Perception:
-    """The onboard software of the teams of all episodes: keeps maps for navigation up to date, on demand.
+    """The onboard software of the teams of all episodes.
+
+    It keeps maps for navigation up to date, on demand.
 
     Parameters
     ----------
@@ -149,7 +153,10 @@ class Perception:
         )
 
     def threads_for(self, episodes: int) -> int:
-        """Return the number of threads for kernels over so many episodes, having seen to it that parallel kernels run on as many."""
+        """Return the number of threads for kernels over so many episodes.
+
+        Parallel kernels are set to run on as many.
+        """
         threads = min(self._threads, episodes)
         if threads > 1:
             use_threads(self._threads)
@@ -176,7 +183,10 @@ class Perception:
         return navigation
 
     def known_window(self, row: int) -> tuple[int, int, int, int]:
-        """Return the first and last rows and columns, exclusive, that hold all that a robot's own map knows."""
+        """Return the rows and columns that hold all that a robot's own map knows.
+
+        They are the first and the last, the last exclusive.
+        """
         self.own_map(row)
         low_row, high_row, low_column, high_column = (int(value) for value in self._known[row])
         rows, columns = self.beliefs.log_odds[row].shape
@@ -234,11 +244,13 @@ class Perception:
         resolution = self.settings.occupancy.resolution
         if self.settings.known_starts:
             raise ValueError(
-                "robots that know their starts have the team's map; want robots with unknown starts to be told of others"
+                "robots that know their starts have the team's map; want robots with unknown starts to be "
+                "told of others"
             )
         if others is not None and others.resolution != resolution:
             raise ValueError(
-                f"the map that is told has cells of {others.resolution} m; want {resolution} m, as the robots' own maps"
+                f"the map that is told has cells of {others.resolution} m; want {resolution} m, as the "
+                "robots' own maps"
             )
         if others is None and self._told[row] is None:
             return
@@ -253,7 +265,9 @@ class Perception:
             self._sum_heard(row, np.array([rows[0], rows[-1] + 1, columns[0], columns[-1] + 1]))
 
     def forget_walls(self, row: int, trail: NDArray[np.float64]) -> None:
-        """Let a robot forget the walls along a trail: they may be images of the robot that drove there. It sees for itself.
+        """Let a robot forget the walls along a trail.
+
+        They may be images of the robot that drove there. The robot senses the place for itself.
 
         Parameters
         ----------
@@ -270,13 +284,17 @@ class Perception:
         """
         if trail.ndim != 2 or trail.shape[1] != 2 or not len(trail) or not np.isfinite(trail).all():
             raise ValueError(
-                f"the trail has shape {trail.shape} and may not be finite; want places (N, 2) in metres, at least one"
+                f"the trail has shape {trail.shape} and may not be finite; want places (N, 2) in metres, at "
+                "least one"
             )
         self._trails[row].append(trail)
         self._forget(row, trail)
 
     def forget_again(self, row: int) -> None:
-        """Forget the walls once more along all trails that a robot was told, after its map was rendered anew."""
+        """Forget the walls again along all trails that a robot has received.
+
+        This is done after its map was rendered anew.
+        """
         for trail in self._trails[row]:
             self._forget(row, trail)
 
@@ -301,7 +319,7 @@ class Perception:
         self._fresh_at[self.episode_of(row)] = -2
 
     def _heard_map(self, row: int) -> NavigationMap:
-        """Return the sum of a robot's own map and of what came to it from others, up to date."""
+        """Return the sum of a robot's own map and those received, up to date."""
         self._refresh(self.episode_of(row))
         navigation = self._heard[row]
         if navigation is None:
@@ -336,7 +354,10 @@ class Perception:
         sum_maps(self._heard_records[row], beliefs, self._maps.limit, self._maps.stamp, window)
 
     def planning_map(self, row: int, shares_map: bool) -> NavigationMap:
-        """Return the map that a robot plans on, up to date: the team's where it reaches the robot, else its own."""
+        """Return the map that a robot plans on, up to date.
+
+        It is the team's where that reaches the robot, else the robot's own.
+        """
         if shares_map and self._adds_up:
             # Also that of a robot to which nothing came: kernels look the maps of all up in one table.
             return self._heard_map(row)
@@ -384,11 +405,17 @@ class Perception:
                 self._sum_heard(first + robot, window)
 
     def offset(self, row: int) -> NDArray[np.float64]:
-        """Return the origin of a robot's map frame in the frame of its believed pose [m], shape (2,)."""
+        """Return the origin of a robot's map frame [m], shape (2,).
+
+        It is in the frame of the robot's believed pose.
+        """
         return np.asarray(self.offsets[row])
 
     def pose_in_frame(self, of: int, to: int) -> NDArray[np.float64]:
-        """Return the believed pose of a robot in the map frame of another (or its own), shape (3,)."""
+        """Return the believed pose of a robot in a map frame, shape (3,).
+
+        The frame is another robot's or its own.
+        """
         x, y, theta = self.beliefs.believed[of]
         return np.array([x - self.offsets[to, 0], y - self.offsets[to, 1], theta])
 
@@ -398,18 +425,28 @@ class Perception:
         return float(x), float(y)
 
     def spread(self, row: int) -> NDArray[np.float64]:
-        """Return the standard deviation of a robot's pose as its localizer tells [m, m, rad], shape (3,)."""
+        """Return the standard deviation of a robot's pose [m, m, rad], shape (3,).
+
+        The robot's localizer reports it.
+        """
         localizer = self.localizers[row]
         return np.zeros(3) if localizer is None else np.sqrt(np.maximum(np.diag(localizer.covariance), 0.0))
 
     def pose_known_to(self, row: int, other: int) -> NDArray[np.float64]:
-        """Return the pose of a teammate as a robot knows it, in the frame of believed poses, shape (3,)."""
+        """Return the pose of a teammate as a robot knows it, shape (3,).
+
+        It is in the frame of believed poses.
+        """
         if self.knows_mates:
             return np.asarray(self.beliefs.believed[other])
         return np.asarray(self.beliefs.heard[row].reshape(-1, 3)[other % self._robots])
 
     def teammates(self, row: int) -> dict[str, Teammate]:
-        """Return what a robot knows of the others: with known starts and the ideal radio where they are now, else where they last said."""
+        """Return what a robot knows of its teammates.
+
+        With known starts and the ideal radio these are their current poses, else the last reported
+        ones.
+        """
         if not self.settings.known_starts:
             return {}
         first = self.episode_of(row) * self._robots

@@ -1,4 +1,6 @@
-"""What happens on board between sensing and deciding: who tells where a robot is, and what the radio brings.
+"""Onboard steps between sensing and deciding: localization and radio.
+
+They cover who reports where a robot is, and what the radio brings.
 
 In the ideal world the kernels of a step do all of it. Localizers and radios that are not kernels run here,
 between and after the two stages of a step, robot by robot.
@@ -99,7 +101,10 @@ class Software:
                 self._perception.forget_again(row)
 
     def _exchange(self, episode: int) -> None:
-        """Let the robots of an episode talk, and tell the kernels whom each has heard of lately."""
+        """Let the robots of an episode exchange messages.
+
+        The kernels receive which teammates each robot has heard of lately.
+        """
         world, settings, exchange = (
             self._perception.world,
             self._settings,

@@ -1,4 +1,7 @@
-"""Why robots end, for all rows at once: by the rules of ``ExplorationEnv``, to the letter."""
+"""Reasons of the robots' ends, for all rows at once.
+
+They follow the rules of ``ExplorationEnv``, to the letter.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

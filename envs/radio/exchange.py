@@ -1,4 +1,6 @@
-"""What the robots of a team tell each other over a radio that is not ideal, and what has reached whom.
+"""Messages that robots of a team exchange over a radio that is not ideal.
+
+The module also keeps what has reached whom.
 
 In every step each robot tells where it is; once a period, over each link, what the other does not have of any
 map that it holds: its own, and copies of others that reached it. So news travels on over robots that meet
@@ -36,10 +38,16 @@ Each block is its number and a byte for each cell.
 """
 
 STATUS_BYTES = 80
-"""What a robot tells of itself with its map: pose, target and three figures, 8 bytes each, and its states."""
+"""Bytes of the status that a robot sends with its map.
+
+The status is pose, target and three figures, 8 bytes each, and the robot's states.
+"""
 
 STATION_STREAM = 1
-"""Sets the draws for the station's links apart from those of the robots, which are the same with and without it."""
+"""Separates the draws for the station's links from those of the robots.
+
+The robots' draws are the same with and without the station.
+"""
 
 NEVER = -2
 """Step of news that never came.
@@ -53,7 +61,10 @@ CONTACT_S = 0.5
 
 @kernel
 def _differing_blocks(source: Array, target: Array, low: int, high: int, found: Array) -> int:
-    """Fill ``found`` with the numbers of the blocks of rows ``low`` to ``high`` in which two maps differ; return how many."""
+    """Fill ``found`` with the differing blocks of two maps; return their count.
+
+    Blocks are numbered, over rows ``low`` to ``high``.
+    """
     columns, count = source.shape[1], 0
     words = columns // 64
     for row in range(low, high):
@@ -187,7 +198,10 @@ class Exchange:
         self.bytes_sent, self.bytes_reported = np.zeros(robots, np.int64), np.zeros(robots, np.int64)
 
     def take_window(self, robot: int) -> NDArray[np.int64]:
-        """Return what part of a robot's copies has changed since the last call: rows, columns (4,); empty where low is not below high."""
+        """Return the window of a robot's copies that changed since the last call.
+
+        It holds rows and columns (4,), and is empty where low is not below high.
+        """
         window: NDArray[np.int64] = self.windows[robot].copy()
         self._forget_changes(robot)
         return window
@@ -247,7 +261,7 @@ class Exchange:
         self.station_links = is_linked & self._works(int(world.steps[self._episode]))
 
     def order_delay(self, receiver: int) -> int | None:
-        """Return after how many steps an order of the station that is sent now reaches a robot.
+        """Return the delay in steps of an order of the station sent now to a robot.
 
         An order goes over links that stand now, from robot to robot; None where there are none, or it is lost
         by chance.

@@ -99,11 +99,13 @@ class Order:
         object.__setattr__(self, "kind", OrderKind(self.kind))
         if self.kind is OrderKind.GO_TO and not isinstance(self.target, Target):
             raise ValueError(
-                f"target of the order {self.kind.value!r} is {self.target!r}; want a Target, the place to go to"
+                f"target of the order {self.kind.value!r} is {self.target!r}; want a Target, the place to go "
+                "to"
             )
         if self.kind is not OrderKind.GO_TO and self.target is not None:
             raise ValueError(
-                f"target of the order {self.kind.value!r} is {self.target!r}; want None, only 'go_to' has a target"
+                f"target of the order {self.kind.value!r} is {self.target!r}; want None, only 'go_to' has a "
+                "target"
             )
 
 

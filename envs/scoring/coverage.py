@@ -17,7 +17,10 @@ ROWS_AHEAD = 24
 
 
 def pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
-    """Pack a (rows, columns) mask into (rows, words) uint64, bit 0 of word 0 at column 0."""
+    """Pack a (rows, columns) mask into (rows, words) uint64.
+
+    Bit 0 of word 0 is at column 0.
+    """
     rows, columns = cells.shape
     words = -(-columns // 64)
     padded = np.zeros((rows, words * 64), np.bool_)
@@ -97,7 +100,9 @@ def mark_seen(
 
 @kernel(borrowing=True)
 def share_news(owns: Array, team: Array, news: Array, first: int, robots: int, gains: Array) -> int:
-    """Credit each cell that is new to the team in equal parts to the robots that saw it in this step, in robot order.
+    """Credit each cell that is new to the team to the robots that saw it.
+
+    Those that saw it in this step share it equally, in robot order.
 
     What a robot's mask holds and the team's does not is what the robot saw in this step.
 

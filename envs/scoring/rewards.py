@@ -14,7 +14,10 @@ AREA, TIME, CONTACT, ENERGY = range(len(TERMS))
 
 
 def reward_weights(settings: ExplorationSettings) -> NDArray[np.float64]:
-    """Return what a new cell earns, and what a step, a contact and a metre cost, shape (4,)."""
+    """Return the value of a new cell and the costs, shape (4,).
+
+    The costs are of a step, a contact and a metre.
+    """
     weights = settings.reward
     numbers = np.zeros(len(TERMS))
     numbers[AREA] = weights.area * settings.occupancy.resolution**2

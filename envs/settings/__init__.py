@@ -1,5 +1,7 @@
 """Settings of an environment."""
 
+from typing import Any
+
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import make_settings
@@ -7,3 +9,10 @@ from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import Robot
 
 __all__ = ["ExplorationSettings", "Lidar", "RewardSettings", "Robot", "make_settings"]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

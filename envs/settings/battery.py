@@ -38,7 +38,8 @@ class Battery:
     def __post_init__(self) -> None:
         if self.capacity_j is not None and not 0.0 < self.capacity_j < math.inf:
             raise ValueError(
-                f"capacity_j of the battery is {self.capacity_j}; want a number of joules above 0, or None for no limit"
+                f"capacity_j of the battery is {self.capacity_j}; want a number of joules above 0, or None "
+                "for no limit"
             )
         for name in ("idle_w", "per_metre_j", "per_radian_j"):
             if not 0.0 <= getattr(self, name) < math.inf:

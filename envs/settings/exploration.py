@@ -32,7 +32,10 @@ TRUE_POSE = "truth"
 """The localization that is none: the robot is given its true pose."""
 
 KERNEL_LOCALIZATIONS = (TRUE_POSE, "odometry")
-"""Who can say where a robot is within the kernels of a step: the truth, or the wheels alone."""
+"""Localizations that can run within the kernels of a step.
+
+They are the truth, or the wheels alone.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,12 +140,14 @@ class ExplorationSettings:
         ):
             if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), kind):
                 raise ValueError(
-                    f"{name} is {getattr(self, name)!r}; want a whole number{' from 1 to 64' if name == 'robots' else ''}"
+                    f"{name} is {getattr(self, name)!r}; want a whole "
+                    f"number{' from 1 to 64' if name == 'robots' else ''}"
                 )
         for name, wanted in PARTS.items():
             if not isinstance(getattr(self, name), wanted):
                 raise ValueError(
-                    f"{name} is {getattr(self, name)!r}; want {wanted.__name__}{' or its name' if name in REGISTRIES else ''}"
+                    f"{name} is {getattr(self, name)!r}; want "
+                    f"{wanted.__name__}{' or its name' if name in REGISTRIES else ''}"
                 )
         if not 1 <= self.robots <= MAX_ROBOTS:
             raise ValueError(f"robots is {self.robots}; a team has 1 to {MAX_ROBOTS}")
@@ -166,7 +171,8 @@ class ExplorationSettings:
             raise ValueError(f"map_cells is {self.map_cells}; want an even number from 2 to {MAX_MAP_CELLS}")
         if not 2 <= self.egocentric_cells <= MAX_EGOCENTRIC_CELLS or self.egocentric_cells % 2:
             raise ValueError(
-                f"egocentric_cells is {self.egocentric_cells}; want an even number from 2 to {MAX_EGOCENTRIC_CELLS}"
+                f"egocentric_cells is {self.egocentric_cells}; want an even number from 2 to "
+                f"{MAX_EGOCENTRIC_CELLS}"
             )
         # Lists, as files of settings have them, become tuples: settings can be compared and hashed.
         object.__setattr__(self, "observe", _observed(self.observe))
@@ -181,7 +187,8 @@ class ExplorationSettings:
             )
         if not self.time_step <= self.decision_period_s < math.inf:
             raise ValueError(
-                f"decision_period_s is {self.decision_period_s} s; want at least the time step of {self.time_step} s"
+                f"decision_period_s is {self.decision_period_s} s; want at least the time step of "
+                f"{self.time_step} s"
             )
         if self.threads < 1:
             raise ValueError(f"threads is {self.threads}; want at least 1")
@@ -194,7 +201,8 @@ class ExplorationSettings:
         wanted = LOCALIZERS[self.localization].Settings
         if not isinstance(self.localizer, wanted):
             raise ValueError(
-                f"localizer is {self.localizer!r}; want {wanted.__name__} for localization {self.localization!r}"
+                f"localizer is {self.localizer!r}; want {wanted.__name__} for localization "
+                f"{self.localization!r}"
             )
 
     @property

@@ -53,7 +53,8 @@ class Fault:
             raise ValueError(f"lasts_s of the fault is {self.lasts_s}; want more than 0 s, or None for ever")
         if not (math.isfinite(self.bearing) and 0.0 < self.width <= 2.0 * math.pi):
             raise ValueError(
-                f"the blind sector is {self.width} rad wide at {self.bearing} rad; want a width above 0 and at most 2 pi"
+                f"the blind sector is {self.width} rad wide at {self.bearing} rad; want a width above 0 and "
+                "at most 2 pi"
             )
         if self.wheel not in ("left", "right"):
             raise ValueError(f"wheel of the fault is {self.wheel!r}; want left or right")
@@ -104,7 +105,10 @@ class FaultSettings:
 
     @property
     def rates(self) -> tuple[float, ...]:
-        """How often each kind befalls a robot [1/h], in the order of ``KINDS`` without the first."""
+        """Return how often each kind of fault befalls a robot [1/h].
+
+        The order is that of ``KINDS`` without the first.
+        """
         return tuple(getattr(self, kind) for kind in KINDS[1:])
 
     @property

@@ -22,12 +22,12 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     settings : ExplorationSettings or None
         Where to start from; the defaults where None.
     **options
-        Any attribute of ``ExplorationSettings``; a part such as ``robot`` or ``reward`` also as a mapping of its
-        values, and ``robot``, ``lidar``, ``odometry``, ``radio`` and ``battery`` by name. ``noise`` (none,
-        datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m], ``max_cycles`` (steps)
-        in place of ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise, odometry, localization,
-        radio and faults that is not given itself; ``assigned`` for single values, as ``assign`` takes them, set
-        last.
+        Any attribute of ``ExplorationSettings``; a part such as ``robot`` or ``reward`` also as a mapping of
+        its values, and ``robot``, ``lidar``, ``odometry``, ``radio`` and ``battery`` by name. ``noise``
+        (none, datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m],
+        ``max_cycles`` (steps) in place of ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise,
+        odometry, localization, radio and faults that is not given itself; ``assigned`` for single values, as
+        ``assign`` takes them, set last.
 
     Returns
     -------
@@ -86,8 +86,8 @@ def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> Explora
     settings : ExplorationSettings
         Where to start from.
     assignments : iterable of str
-        ``name=value`` each: a name as ``lidarium show settings`` lists it, such as ``reward.time``, a value as
-        in TOML, ``none`` for None; text needs no quotes.
+        ``name=value`` each: a name as ``lidarium show settings`` lists it, such as ``reward.time``, a value
+        as in TOML, ``none`` for None; text needs no quotes.
 
     Raises
     ------

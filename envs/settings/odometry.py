@@ -61,7 +61,10 @@ class OdometrySettings:
 
     @property
     def numbers(self) -> NDArray[np.float64]:
-        """What the kernels know of it, shape (7,): four of encoder noise, ticks or not, two of the drive's noise."""
+        """Numbers of the odometry for the kernels, shape (7,).
+
+        Four are of encoder noise, one says whether there are ticks, two are of the drive's noise.
+        """
         return np.array(
             [
                 self.turn_noise_of_turn,

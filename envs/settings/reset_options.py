@@ -27,7 +27,8 @@ class FloorChoice:
     def __init__(self, floor: str | Path | Floor, image_resolution: float | None = None) -> None:
         if not isinstance(floor, str | Path | Floor):
             raise ValueError(
-                f"floor is {floor!r}; want a name such as apartment, building:17 or set:train, a path, or a Floor"
+                f"floor is {floor!r}; want a name such as apartment, building:17 or set:train, a path, or a "
+                "Floor"
             )
         self._image_resolution = image_resolution
         if isinstance(floor, str) and floor.startswith(SET_PREFIX):
@@ -81,7 +82,8 @@ def read_options(options: dict[str, Any] | None, robots: int) -> ResetOptions:
         if poses is None or poses.shape != (robots, 3):
             what = f"is {starts!r}" if poses is None else f"has shape {poses.shape}"
             raise ValueError(
-                f"option starts {what}; want ({robots}, 3) finite numbers: x, y [m] and theta [rad] of each robot"
+                f"option starts {what}; want ({robots}, 3) finite numbers: x, y [m] and theta [rad] of each "
+                "robot"
             )
         starts = poses
     goal = options.get("goal")

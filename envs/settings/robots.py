@@ -59,17 +59,24 @@ class Robot:
             raise ValueError(f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s")
 
     def wheel_speeds(self, speed: float, turn_rate: float) -> tuple[float, float]:
-        """Return the speeds of the left and the right wheel [m/s] for a speed [m/s] and turn rate [rad/s] of the body."""
+        """Return the speeds of the left and the right wheel [m/s].
+
+        They belong to a speed [m/s] and turn rate [rad/s] of the body.
+        """
         side = 0.5 * turn_rate * self.wheel_base
         return speed - side, speed + side
 
     def body_motion(self, left: float, right: float) -> tuple[float, float]:
-        """Return speed [m/s] and turn rate [rad/s] of the body for the speeds of its wheels [m/s]."""
+        """Return speed [m/s] and turn rate [rad/s] of the body for wheel speeds [m/s]."""
         return 0.5 * (left + right), (right - left) / self.wheel_base
 
     @property
     def numbers(self) -> NDArray[np.float64]:
-        """What the kernels know, shape (8,): radius, greatest speed, turn rate and their changes, height, wheel base, ticks."""
+        """Numbers of the robot for the kernels, shape (8,).
+
+        They are radius, greatest speed, greatest turn rate, their greatest changes, height, wheel
+        base and ticks.
+        """
         return np.array(
             [
                 self.radius,

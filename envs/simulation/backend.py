@@ -1,7 +1,7 @@
 """What a world is: it moves the bodies of robots and senses for them.
 
-Maps are not its business, nor is the score: it has bodies, sensors, and the truth. Row = episode * robots + robot
-in all arrays over rows, which keep their place in memory for the life of a world.
+Maps are not its business, nor is the score: it has bodies, sensors, and the truth. Row = episode * robots +
+robot in all arrays over rows, which keep their place in memory for the life of a world.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,8 @@ class World(Protocol):
     moves, flags, failed : (rows,) uint8, (rows,) int64, (rows,) uint8
         Whether a robot drives; its flags (``kernels.arrays``); whether it is dead.
     contacts, travelled, collisions : (rows,) uint8, float64, int64
-        Whether a body touched anything in the last step, length of its path [m], how often it came into contact.
+        Whether a body touched anything in the last step, length of its path [m], how often it came into
+        contact.
     faults : (rows, numbers) float64
         Faults of each robot (``disturbances.faults``).
     true_ranges : (rows, beams) float32

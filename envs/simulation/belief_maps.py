@@ -18,7 +18,10 @@ Map = tuple[NDArray[np.int8], tuple[float, float]]
 
 
 def map_around_start(pages: Pages, floor: FloorTables, resolution: float) -> Map:
-    """Return a map in the start's own frame that holds the whole floor, however it is turned."""
+    """Return a map in the start's own frame that holds the whole floor.
+
+    It does so however the floor is turned.
+    """
     rows, columns = floor.laser.solid.shape
     # A square around the start, in steps of 32 m: its size and place tell nothing of the floor's shape.
     diagonal = math.hypot(rows, columns) * floor.laser.resolution
@@ -27,7 +30,10 @@ def map_around_start(pages: Pages, floor: FloorTables, resolution: float) -> Map
 
 
 def map_with_margin(pages: Pages, floor: FloorTables, rows: int, columns: int, resolution: float) -> Map:
-    """Return a map on the floor's lattice of ``rows`` x ``columns`` cells that reaches beyond it, for poses that drift."""
+    """Return a map on the floor's lattice that reaches beyond the floor.
+
+    It has ``rows`` x ``columns`` cells, for poses that drift.
+    """
     margin = (
         math.ceil(max(LEAST_MARGIN, 0.5 * math.hypot(rows, columns) * resolution) / resolution / WORD) * WORD
     )
@@ -39,7 +45,10 @@ def map_with_margin(pages: Pages, floor: FloorTables, rows: int, columns: int, r
 
 
 def wipe(log_odds: NDArray[np.int8], touched: NDArray[np.uint64], window: NDArray[np.int64]) -> None:
-    """Make a map blank again, and note in ``touched`` and in the ``window`` of changes (4,) where it was not."""
+    """Make a map blank again, and note where it was not.
+
+    This is noted in ``touched`` and in the ``window`` of changes (4,).
+    """
     used = (log_odds.view(np.uint64) != 0).reshape(len(log_odds), -1, WORD // 8).any(axis=2)
     lines, words = np.flatnonzero(used.any(axis=1)), np.flatnonzero(used.any(axis=0))
     if not lines.size:
@@ -56,7 +65,10 @@ def blank(
     touched: NDArray[np.uint64],
     window: NDArray[np.int64],
 ) -> None:
-    """Make the cells of a mask unknown, whose first one lies at ``corner`` (row, column), and note that as `wipe` does."""
+    """Make the cells of a mask unknown, and note that as `wipe` does.
+
+    The first cell of the mask lies at ``corner`` (row, column).
+    """
     rows, columns = (
         np.flatnonzero(where.any(axis=axis)) + first for axis, first in zip((1, 0), corner, strict=True)
     )
@@ -74,7 +86,10 @@ def _note(
     words: tuple[int, int],
     columns: tuple[int, int],
 ) -> None:
-    """Note that a map has changed in rows and columns (low, high), and in which words of 64 cells of these rows."""
+    """Note that a map has changed in rows and columns (low, high).
+
+    The words of 64 cells of these rows that changed are noted as well.
+    """
     if touched.size:
         touch(touched, rows, words)
     window[0], window[1] = min(window[0], rows[0]), max(window[1], rows[1])

@@ -37,7 +37,8 @@ class Beliefs:
     origins : (rows, 2) float64
         Where cell (0, 0) of each map begins [m].
     windows : (rows, 4) int64
-        What part of each map has changed since ``forget_changes``: row_low, row_high, column_low, column_high.
+        What part of each map has changed since ``forget_changes``: row_low, row_high, column_low,
+        column_high.
     belief_rows : (rows, 5) int64
         Where the maps lie (``maps`` of ``kernels.arrays``).
     pool_rows : (rows, scales, 3) int64
@@ -125,7 +126,10 @@ class Beliefs:
         blank(self.log_odds[row], where, corner, self._touched[row], self.windows[row])
 
     def forget_changes(self, first: int, last: int) -> None:
-        """Start anew to note what part of the maps changes, for rows ``first`` to ``last``."""
+        """Start anew to note which part of the maps changes.
+
+        This concerns rows ``first`` to ``last``.
+        """
         for row in range(first, last):
             map_rows, map_columns = self.log_odds[row].shape
             self.windows[row] = (map_rows, 0, map_columns, 0)

@@ -1,4 +1,6 @@
-"""Operating states and orders: whether each robot of an episode takes part in the work, what it was told last, and what came of it.
+"""Operating states and orders of the robots of an episode.
+
+They hold whether each robot takes part in the work, its last order, and what came of it.
 
 A robot that operates takes any order. One that is paused stands still and takes only the orders to resume and
 to stop; one that was stopped or has failed takes none. A robot pauses when it is told to, and, where
@@ -21,7 +23,10 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.planning.grid_planning import cells_of
 
 RETREAT_S = 1.0
-"""How long a robot that resumes after a contact backs out, at ``BACKING_SPEED`` [s]."""
+"""Time that a robot backs out when it resumes after a contact [s].
+
+It drives at ``BACKING_SPEED``.
+"""
 
 TAKES: dict[OperatingState, frozenset[OrderKind]] = {
     OperatingState.OPERATING: frozenset(OrderKind),
@@ -148,7 +153,10 @@ class Operating:
 
     @property
     def sent(self) -> dict[int, Target]:
-        """Where robots have been ordered to go since ``take_sent`` was last called, by number."""
+        """Targets that robots were ordered to since ``take_sent`` was last called.
+
+        They are given by robot number.
+        """
         return self._sent
 
     def take_sent(self) -> dict[int, Target]:
@@ -157,7 +165,10 @@ class Operating:
         return sent
 
     def order(self, row: int, order: Order) -> None:
-        """Send a robot an order: it takes it, now or when the radio brings it, or refuses it, or never hears of it."""
+        """Send a robot an order, which it takes, refuses or never receives.
+
+        It takes the order now, or when the radio brings it.
+        """
         self._addressed.add(row)
         delay = self._carry(row)
         if delay is None:
@@ -169,7 +180,10 @@ class Operating:
             self._note_activity()
 
     def before_step(self, commands: NDArray[np.float64]) -> None:
-        """Hand over orders that arrive now, and hold or back out the robots that have to, in ``commands`` (robots, 2) [m/s, rad/s]."""
+        """Deliver orders that arrive now, and hold or back out robots that have to.
+
+        This is done in ``commands`` (robots, 2) [m/s, rad/s].
+        """
         due = [entry for entry in self._under_way if entry[0] <= self._step]
         self._under_way = [entry for entry in self._under_way if entry[0] > self._step]
         for _, row, order in due:
@@ -182,7 +196,10 @@ class Operating:
         self._note_activity()
 
     def after_step(self) -> None:
-        """Pause the robots that have touched something or are blocked, where they do so by themselves."""
+        """Pause the robots that have touched something or are blocked.
+
+        This holds where they do so by themselves.
+        """
         if not self._settings.pauses_when_blocked:
             return
         pressed = np.asarray(self._perception.simulation.bumpers.any(axis=1))

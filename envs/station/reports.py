@@ -56,7 +56,10 @@ def known_map(perception: Perception, row: int) -> GrowingMap:
 def _cut(
     perception: Perception, row: int, log_odds: NDArray[np.int8], window: tuple[int, int, int, int]
 ) -> GrowingMap:
-    """Return a window (rows and columns, low and high) of a map that has the place and the size of a robot's own."""
+    """Return a window of a map with the place and the size of a robot's own.
+
+    The window is rows and columns, low and high.
+    """
     row_low, row_high, column_low, column_high = window
     resolution = perception.settings.occupancy.resolution
     x, y = perception.origin_in_frame(row)
@@ -65,7 +68,10 @@ def _cut(
 
 
 def _window_of(log_odds: NDArray[np.int8]) -> tuple[int, int, int, int]:
-    """Return the first and last rows and columns, exclusive, that hold all that a map knows."""
+    """Return the rows and columns that hold all that a map knows.
+
+    They are the first and the last, the last exclusive.
+    """
     rows, columns = np.flatnonzero(log_odds.any(axis=1)), np.flatnonzero(log_odds.any(axis=0))
     if not len(rows):
         return 0, 0, 0, 0
@@ -134,7 +140,11 @@ class Station:
         return True
 
     def forget_walls(self, row: int, trail: NDArray[np.float64]) -> bool:
-        """Tell a robot where another one drove (`Perception.forget_walls`), if the links to it stand; return whether they do."""
+        """Send a robot where another drove; return whether the links to it stand.
+
+        The robot forgets the walls there (`Perception.forget_walls`); nothing is sent where the links
+        do not stand.
+        """
         if _order_delay(self._perception, row) is None:
             return False
         self._perception.forget_walls(row, trail)
@@ -164,7 +174,7 @@ class Station:
         )
 
     def _drive(self, row: int) -> tuple[DriveState, Target | None, float]:
-        """Return what a robot's driving is about, where to, and how much of its path is left [m]."""
+        """Return a robot's drive state, its target and the rest of its path [m]."""
         driver = self.operating.driver
         # At the scan at the start the driver has not begun yet.
         if driver is None or int(self._perception.world.steps[0]) == 0:

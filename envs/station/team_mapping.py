@@ -1,4 +1,7 @@
-"""How robots that do not know each other's starts come to a common map: they exchange maps, merge them, and remember what they got."""
+"""Common maps for robots that do not know each other's starts.
+
+They exchange maps, merge them, and remember what they received.
+"""
 
 from dataclasses import dataclass, field
 from itertools import combinations

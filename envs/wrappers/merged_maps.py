@@ -1,4 +1,7 @@
-"""Merged maps: robots exchange their maps at a period, and each sees the team's map and its teammates in its own frame."""
+"""Merged maps: robots exchange their maps at a period.
+
+Each sees the team's map and its teammates in its own frame.
+"""
 
 import math
 from collections.abc import Callable
@@ -30,7 +33,10 @@ Returns which robots reach each other, (robots, robots).
 TEAM_VALIDATION = ValidationSettings(
     most_contradiction_m=1.0, plenty_of_overlap_m2=0.0, plenty_of_wall_m=10.0, contradiction_share=0.1
 )
-"""Robots that do not know where the others are map their bodies as walls, so more may contradict than in maps of robots alone."""
+"""Validation of merges where robots map their teammates' bodies as walls.
+
+They do not know where the others are, so more may contradict than in maps of robots alone.
+"""
 
 OLDEST_S = 3600.0
 """Bound of the age of news in observations [s]."""
@@ -87,7 +93,9 @@ class MergeEvent:
 
 
 class MergedMaps(ParallelEnv[str, Observation, Any]):
-    """Gives each robot the map that it and all it is joined with have made, and where those are.
+    """Gives each robot the map made by all it is joined with, and their poses.
+
+    The robot's own map is part of it.
 
     The observation has, beside that of the environment below, ``team_map`` uint8 (1, M, M) like ``map``, as
     of the last exchange, and ``teammates`` float32 (robots - 1, 5), one row for each of the others in their

@@ -1,4 +1,7 @@
-"""Reads the episodes of a directory that `lidarium evaluate` wrote, and refuses what does not belong together."""
+"""Reads the episodes of a directory that `lidarium evaluate` wrote.
+
+Episodes that do not belong together are refused.
+"""
 
 import json
 import math
@@ -81,7 +84,8 @@ def read_episodes(directory: Path) -> Episodes:
     if lines.cut_off is not None:
         number, size = lines.cut_off
         warnings = [
-            f"Line {number} of {path.name} breaks off ({size} bytes) and was left out: its episode was not finished."
+            f"Line {number} of {path.name} breaks off ({size} bytes) and was left out: its episode was not "
+            "finished."
         ]
     for number, row in numbered:
         _check_row(row, f"{path}, line {number}")
@@ -98,7 +102,10 @@ def key_of(row: Row) -> tuple[Any, ...]:
 
 
 def pair_key_of(row: Row) -> tuple[Any, ...]:
-    """Return what partners of a pair share: settings, floor, starts, seed and number of robots."""
+    """Return what partners of a pair share.
+
+    They share settings, floor, starts, seed and number of robots.
+    """
     return (
         variant_of(row),
         row["floor"],
@@ -147,24 +154,30 @@ def _without_doubles(
         ]
         if differing:
             raise ValueError(
-                f"{path}, lines {known[0]} and {number} tell of the same episode ({name_of(row)}) but differ in {', '.join(differing)}; "
+                f"{path}, lines {known[0]} and {number} tell of the same episode ({name_of(row)}) but differ "
+                f"in {', '.join(differing)}; "
                 "want each episode once"
             )
         warnings.append(
-            f"Lines {known[0]} and {number} of {path.name} are the same episode ({name_of(row)}), which is counted once."
+            f"Lines {known[0]} and {number} of {path.name} are the same episode ({name_of(row)}), which is "
+            "counted once."
         )
     return list(kept.values()), warnings
 
 
 def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
-    """Refuse episodes of two versions, or for one name of settings and one number of robots of two sets of settings."""
+    """Refuse episodes of two versions, or of two sets of settings under one name.
+
+    The name of the settings is checked for each number of robots.
+    """
     first: tuple[int, Row] | None = None
     alike: dict[tuple[str, int], tuple[int, Row]] = {}
     for number, row in numbered:
         first = first or (number, row)
         if row["version"] != first[1]["version"]:
             raise ValueError(
-                f"{path} has episodes of two versions: {first[1]['version']} in line {first[0]} and {row['version']} in line {number}; "
+                f"{path} has episodes of two versions: {first[1]['version']} in line {first[0]} and "
+                f"{row['version']} in line {number}; "
                 "want one version in a directory"
             )
         known_number, known = alike.setdefault((variant_of(row), row["robots"]), (number, row))
@@ -179,6 +192,7 @@ def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
                 or f"settings_sha256 {known['settings_sha256'][:12]}... and {row['settings_sha256'][:12]}..."
             )
             raise ValueError(
-                f"{path} has episodes of two settings with {row['robots']} robots, in lines {known_number} and {number}: {told}; "
+                f"{path} has episodes of two settings with {row['robots']} robots, in lines {known_number} "
+                f"and {number}: {told}; "
                 "want a name for each set of settings"
             )

@@ -1,4 +1,7 @@
-"""The figures of a report: of each policy alone, and of policies against a baseline pair by pair."""
+"""The figures of a report: of each policy, and of policies against a baseline.
+
+Policies are compared with the baseline pair by pair.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -155,7 +158,10 @@ def value_figure(values: Sequence[float], seed: int) -> ValueFigure:
 
 
 def further_keys(rows: Sequence[Row]) -> list[str]:
-    """Return the other keys under which every run has a number, times that were not reached among them as null."""
+    """Return the other keys under which every run has a number.
+
+    Times that were not reached among them are null.
+    """
     first = rows[0]
     candidates = [key for key in first if key not in _NOT_FIGURES and not key.endswith("_sha256")]
     return [key for key in candidates if all(_is_figure(key, row.get(key, "")) for row in rows)]

@@ -1,4 +1,7 @@
-"""Sorts episodes into groups whose figures may be put side by side, and into pairs."""
+"""Sorts episodes into comparable groups, and into pairs.
+
+The figures of the episodes in a group may be compared side by side.
+"""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -19,7 +22,7 @@ _NAMES = ("seed", "key", "record")
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Episodes with one set of settings and one number of robots on the floors of one set.
+    """Episodes with one set of settings, one number of robots and one floor set.
 
     Attributes
     ----------
@@ -125,7 +128,10 @@ def grouped(rows: Iterable[Row]) -> list[Group]:
 
 
 def floor_set_of(floor: str) -> str:
-    """Name the set that a floor belongs to: one of those of the catalogue, other generated floors, drawn ones, or files."""
+    """Name the set that a floor belongs to.
+
+    It is one of the catalogue's sets, other generated floors, drawn floors, or files.
+    """
     kind, _, seed = floor.partition(":")
     if kind not in GENERATORS or not seed.isdigit():
         return "drawn floors" if floor in floor_names() else "floors from files"
@@ -161,14 +167,19 @@ def times_to(rows: Sequence[Row], key: str, horizon_s: float) -> Reached:
 
 
 def paired(a: Iterable[Row], b: Iterable[Row]) -> tuple[list[Row], list[Row]]:
-    """Return the runs of both that have a partner on the same floor, starts and seed, in the same order."""
+    """Return the runs of both that have a partner, in the same order.
+
+    Partners are on the same floor, with the same starts and seed.
+    """
     partners = {pair_key_of(row): row for row in b}
     pairs = [(row, partners[pair_key_of(row)]) for row in a if pair_key_of(row) in partners]
     return [first for first, _ in pairs], [second for _, second in pairs]
 
 
 def repeats(rows: Iterable[Row]) -> int:
-    """Return how many runs say what another run on the same floor said already, seed and wall time aside.
+    """Return the number of runs that repeat another run on the same floor.
+
+    Seed and wall time are not compared.
 
     Where neither starts nor noise are drawn, a policy without chance does the same whatever the seed.
     """

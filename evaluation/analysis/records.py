@@ -1,4 +1,7 @@
-"""What a report takes from the records of episodes: coverage over time, ways and maps."""
+"""Data of the records of episodes for a report: coverage, paths and maps.
+
+Coverage is over time.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -118,6 +121,9 @@ def read_track(entry: Entry) -> Track:
 
 
 def coverage_at(coverage: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the coverage of a step function at given times, the last value from the end on."""
+    """Return the coverage of a step function at given times.
+
+    From its end on, the last value holds.
+    """
     places = np.searchsorted(coverage[:, 0], times + 1e-9, side="right") - 1
     return np.where(places >= 0, coverage[np.maximum(places, 0), 1], 0.0)

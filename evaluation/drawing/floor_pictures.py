@@ -1,4 +1,7 @@
-"""Pictures of what robots did on a floor: their paths over the map they made, and where they spent their time."""
+"""Pictures of the robots' paths and of their time spent on a floor.
+
+The paths are drawn over the map that the robots made.
+"""
 
 import math
 from dataclasses import dataclass
@@ -52,7 +55,10 @@ class Visits:
 
 
 def recorded_pair(group: Group, floor: str, records: dict[Key, Entry]) -> dict[str, Row]:
-    """Return for a floor the first runs by policy that have the same starts and seed and are recorded for the most policies."""
+    """Return the first recorded runs on a floor that share starts and seed.
+
+    They are keyed by policy, from the pair that is recorded for the most policies.
+    """
     by_pair: dict[tuple[Any, ...], dict[str, Row]] = {}
     for policy, rows in group.on_floor(floor).items():
         for row in rows:
@@ -63,7 +69,10 @@ def recorded_pair(group: Group, floor: str, records: dict[Key, Entry]) -> dict[s
 
 
 def save_paths(path: Path, group: Group, floor: str, records: dict[Key, Entry]) -> None:
-    """Draw the paths of one run of each policy, same starts and seed, over the map that the team made."""
+    """Draw the paths of one run of each policy over the map that the team made.
+
+    The runs have the same starts and seed.
+    """
     runs = dict(list(recorded_pair(group, floor, records).items())[:MOST_PANELS])
     tracks = {policy: read_track(records[record_key(row)]) for policy, row in runs.items()}
     extent = _united([_known_extent(track) for track in tracks.values()])
@@ -103,7 +112,10 @@ def save_paths(path: Path, group: Group, floor: str, records: dict[Key, Entry]) 
 def visits_on(
     group: Group, floor: str, records: dict[Key, Entry]
 ) -> tuple[dict[str, Visits], dict[str, Track]]:
-    """Return where the robots of each policy were on a floor, over all recorded runs, and a track for the map below."""
+    """Return where the robots of each policy were on a floor, and a track.
+
+    All recorded runs count; the track is for the map below.
+    """
     tracks = {
         policy: [read_track(records[record_key(row)]) for row in rows if record_key(row) in records]
         for policy, rows in list(group.on_floor(floor).items())[:MOST_PANELS]
@@ -203,7 +215,10 @@ def _united(extents: list[Extent]) -> Extent:
 
 
 def _panels(count: int, extent: Extent, bar: float) -> tuple[Figure, list[Axes]]:
-    """Lay out equal panels of a floor's shape, and beside them room for a colour bar [inch]."""
+    """Arrange equal panels of a floor's shape, with room for a colour bar [inch].
+
+    The colour bar is beside the panels.
+    """
     aspect = (extent[1] - extent[0]) / (extent[3] - extent[2])
     most = 3 if aspect < 2.2 else 2 if aspect < 4.0 else 1
     lines = -(-count // most)

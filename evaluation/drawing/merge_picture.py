@@ -1,4 +1,7 @@
-"""Picture of a merge: the maps of each group over each other, in their colours, with the corners that were matched."""
+"""Picture of a merge: the overlaid maps of each group with matched corners.
+
+Each group's maps have its colours.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,7 @@
-"""Parts of pictures, drawn from plain arrays: the page, a floor's cells, ways, coverage over time, a list of robots."""
+"""Parts of pictures, drawn from plain arrays.
+
+They are the picture layout, a floor's cells, paths, coverage over time and a list of robots.
+"""
 
 import io
 import math
@@ -29,7 +32,10 @@ _MARGIN = 0.15
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """What part of a raster is shown: rows, columns, and its extent in metres (x_min, x_max, y_min, y_max)."""
+    """Part of a raster to show: rows, columns and extent [m].
+
+    The extent is (x_min, x_max, y_min, y_max).
+    """
 
     rows: slice
     columns: slice
@@ -43,7 +49,10 @@ class Box:
 
 
 def box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution: float) -> Box:
-    """Return the part of a raster around the cells of a mask (rows, columns) that are to be seen."""
+    """Return the part of a raster around the cells of a mask (rows, columns).
+
+    The mask marks the cells that are to be seen.
+    """
     spans, limits = [], []
     for axis in (1, 0):
         used = np.flatnonzero(free.any(axis=axis))
@@ -55,7 +64,10 @@ def box_around(free: NDArray[np.bool_], origin: tuple[float, float], resolution:
 
 
 def page(aspect: float) -> tuple[Figure, Axes, Axes, Axes]:
-    """Lay the page out: the floor, and beside or (where it is wide) below it the curve and the team."""
+    """Arrange a picture: the floor, the curve and the team.
+
+    The curve and the team are beside the floor, or below it where it is wide.
+    """
     if aspect > _WIDE:
         width = 14.0
         height = width / min(aspect, 8.0) + 1.0
@@ -132,7 +144,10 @@ def drawn_together(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def draw_ways(axes: Axes, track: NDArray[np.float64], radius: float) -> None:
-    """Draw the ways of robots of a radius [m] along their poses (times, robots, 3) from start to end."""
+    """Draw the paths of robots along their poses (times, robots, 3).
+
+    The robots have a radius [m]; paths run from start to end.
+    """
     shown = max(radius, 0.009 * float(np.ptp(axes.get_xlim())))
     colours = hex_colours(track.shape[1])
     halo = [Stroke(linewidth=3.6, foreground="white", alpha=0.85), Normal()]
@@ -233,7 +248,9 @@ def draw_curve(
 def list_robots(
     axes: Axes, columns: Sequence[str], robots: Sequence[Sequence[str]], below: Sequence[str]
 ) -> None:
-    """List each robot's ending and some figures, and below what is to be said of the team.
+    """List each robot's ending and some figures.
+
+    Below them is the text on the team.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Plots of a group of episodes: coverage over time, box plots, performance profiles."""
+"""Plots of a group of episodes: coverage over time, box plots, and profiles.
+
+The profiles are performance profiles.
+"""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,7 +23,10 @@ from lidarium.evaluation.statistics import median_bands, ratio_profile, score_pr
 
 CURVE_POINTS = 181
 COVERAGE_STEPS = 200
-"""Thresholds of coverage lie so many to the whole, so that those at which episodes end (90, 95, 99 %) are among them."""
+"""Number of coverage thresholds up to the whole.
+
+With it, those at which episodes end (90, 95, 99 %) are among the thresholds.
+"""
 
 FACTORS = np.geomspace(1.0, 4.0, 121)
 BOXED = ("path_m", "overlap_percent")
@@ -35,7 +41,9 @@ Curves = dict[str, dict[str, Any]]
 
 
 def coverage_curves(group: Group, records: dict[Key, Entry]) -> Curves:
-    """Return the median coverage of each policy's recorded runs over time and its interval [%], for plot and ``report.json``.
+    """Return the median coverage of each policy over time and its interval [%].
+
+    It is of the policy's recorded runs, for the plot and ``report.json``.
 
     A run that ends keeps its coverage. Ends of intervals that the runs do not bound (fewer than six) are
     None.
@@ -61,7 +69,10 @@ def coverage_curves(group: Group, records: dict[Key, Entry]) -> Curves:
 
 
 def save_coverage(path: Path, group: Group, curves: Curves) -> None:
-    """Draw coverage over time: the median of the runs with its pointwise 95 % interval."""
+    """Draw coverage over time: the median of the runs with its interval.
+
+    The interval is a pointwise 95 % interval.
+    """
     figure = Figure(figsize=(8.4, 5.0), layout="constrained")
     axes = figure.add_subplot()
     shown = list(group.runs)
@@ -150,7 +161,10 @@ def save_boxes(path: Path, group: Group) -> None:
         )
         axes.tick_params(axis="x", labelsize=8.5, labelcolor=INK, length=0)
         axes.set_xlim(0.4, len(policies) + 0.6)
-    note = "box: quartiles and median; whiskers: to 1.5 box heights; dots: runs; dashed: horizon, with the runs that did not get there"
+    note = (
+        "box: quartiles and median; whiskers: to 1.5 box heights; dots: runs; dashed: horizon, with the runs "
+        "that did not get there"
+    )
     save(path, figure, f"Times, paths, overlap: {group.title}", note)
 
 
@@ -222,7 +236,10 @@ def save_profiles(path: Path, group: Group, found: dict[str, Any]) -> None:
 
 
 def _end_of(curves: Curves, horizon_s: float) -> float:
-    """Return when the last curve has come to rest, so that the plot does not show much of nothing."""
+    """Return when the last curve has settled.
+
+    The plot then does not show a long part without change.
+    """
     rests = []
     for curve in curves.values():
         median, times = np.array(curve["median_percent"]), np.array(curve["times_s"])
@@ -231,7 +248,10 @@ def _end_of(curves: Curves, horizon_s: float) -> float:
 
 
 def _paired_costs(group: Group, key: str) -> NDArray[np.float64]:
-    """Return the times (runs, policies) of the runs that all policies have, inf where the share was not reached."""
+    """Return the times (runs, policies) of the runs that all policies have.
+
+    They are inf where the share was not reached.
+    """
     by_policy = [
         dict(zip(map(pair_key_of, rows), times_to(rows, key, group.horizon_s).or_never, strict=True))
         for rows in group.runs.values()
@@ -262,7 +282,10 @@ def _draw_share(
 
 
 def _draw_boxes(axes: Axes, samples: Sequence[NDArray[np.float64]]) -> None:
-    """Draw a box of each sample, where it is large enough for one, and its values beside each other."""
+    """Draw a box of each sample, and its values beside each other.
+
+    A box is drawn where the sample is large enough for one.
+    """
     chosen = colours(len(samples))
     # Positions of dots say nothing; they come from a seed so that the picture is the same each time.
     generator = np.random.default_rng(0)

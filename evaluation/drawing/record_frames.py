@@ -1,4 +1,7 @@
-"""Pictures and films of what any version can show of a record: the team's map, ways, coverage, targets, endings."""
+"""Pictures and films of what any version can show of a record.
+
+They show the team's map, paths, coverage, targets and endings.
+"""
 
 import math
 from pathlib import Path
@@ -73,7 +76,10 @@ class TrackFrames:
         self._colours = team_colours(len(self._agents))
 
     def draw(self, time_s: float) -> Frame:
-        """Return the frame at a time: the team's map, the ways of the last minute, targets as rings, robots with their headings."""
+        """Return the frame at a time: the team's map, paths, targets and robots.
+
+        Paths are those of the last minute, targets are rings, and robots have their headings.
+        """
         display, view = self._display, self.view
         levels = without_specks(display.map_at(time_s))[view.rows, view.columns]
         frame = enlarged(_PALETTE[_blocks(levels, view)], view)
@@ -116,7 +122,9 @@ class TrackFrames:
 
 
 def save_track_film(path: Path, record: EpisodeRecord, speed: float = 10.0, size: int = SIZE) -> None:
-    """Film what a record shows (mp4, H.264), at the speed of so many simulated seconds per second.
+    """Film what a record shows (mp4, H.264).
+
+    The speed is so many simulated seconds per second.
 
     Raises
     ------
@@ -137,7 +145,10 @@ def save_track_film(path: Path, record: EpisodeRecord, speed: float = 10.0, size
 
 
 def save_track_picture(path: Path, record: EpisodeRecord) -> None:
-    """Draw what a record shows at its end: the team's map, all ways, coverage over time, endings (PNG, whole or not at all)."""
+    """Draw what a record shows at its end (PNG, written whole or not at all).
+
+    It shows the team's map, all paths, coverage over time and endings.
+    """
     header, display = record.header, record.display
     levels = without_specks(display.map_at(math.inf))
     box = box_around(levels != UNKNOWN, display.origin, display.resolution)

@@ -1,4 +1,7 @@
-"""Pictures: what a run found on a floor, and floors themselves (PNG, drawn without a display)."""
+"""Pictures of what a run found on a floor, and of floors themselves.
+
+They are PNG files, drawn without a display.
+"""
 
 import math
 from collections import Counter
@@ -44,7 +47,9 @@ _START_COLOUR = "#2563eb"
 
 
 def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
-    """Draw what a run found: truth, team map, ways, starts and ends, frontiers left and given up, coverage over time.
+    """Draw what a run found: truth, team map, paths, frontiers and coverage.
+
+    Starts and ends are marked. Frontiers are those left and those given up; coverage is over time.
 
     Parameters
     ----------
@@ -73,13 +78,16 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
     area = float(env.score.counted[0]) * env.settings.occupancy.resolution**2
     robots = "1 robot" if env.settings.robots == 1 else f"{env.settings.robots} robots"
     how = ", interrupted" if episode.is_interrupted else ""
-    title = f"{env.floor.name}: {100 * scorer.coverage:.1f} % of {area:.0f} m² explored in {scorer.time:.1f} s{how}"
+    title = (
+        f"{env.floor.name}: {100 * scorer.coverage:.1f} % of {area:.0f} m² explored in {scorer.time:.1f} "
+        f"s{how}"
+    )
     subtitle = f"{robots}, {policy}, seed {episode.seed}, {float(env.world.travelled.sum()):.1f} m driven"
     save_page(path, figure, title, subtitle)
 
 
 def save_floor_picture(path: Path, floor: Floor, height: float, resolution: float = 0.025) -> None:
-    """Draw a floor: what the laser sees at a height [m], where its starts are, and its goal.
+    """Draw a floor: what the laser sees at a height [m], its starts and its goal.
 
     Parameters
     ----------
@@ -119,7 +127,10 @@ def save_floor_picture(path: Path, floor: Floor, height: float, resolution: floa
 
 
 def frontiers_left(episode: Episode) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the frontier cells that are left and those that were given up, (N, 2) and (M, 2), in the floor's frame [m]."""
+    """Return the frontier cells that are left and those given up [m].
+
+    Their shapes are (N, 2) and (M, 2), in the floor's frame.
+    """
     env = episode.env
     shared = env.perception.shared_map() if episode.policy.shares_map else None
     rows = [0] if shared is not None else list(range(env.settings.robots))
@@ -179,7 +190,9 @@ def _draw_frontiers(axes: Axes, episode: Episode) -> tuple[bool, bool]:
 
 
 def _border_of_team_map(episode: Episode) -> tuple[NDArray[np.bool_], tuple[float, float]]:
-    """Return which cells of the team's map, as it is drawn, lie within a cell of both what is free and what is unknown, and its origin.
+    """Return the border cells of the team's map as it is drawn, and its origin.
+
+    They lie within a cell of both what is free and what is unknown.
 
     What one robot has left on its own map another may have seen.
     """

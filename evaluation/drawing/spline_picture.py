@@ -1,4 +1,7 @@
-"""Picture of a spline map over the true floor, with the way of the robot and, where there is one, its tree."""
+"""Picture of a spline map over the true floor, with the robot's path.
+
+The robot's tree is drawn where there is one.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""How the plots of a report look: colours that the colour-blind tell apart, axes, legends."""
+"""Style of the plots of a report: colours, axes and legends.
+
+The colours can be distinguished by the colour-blind.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +18,10 @@ from lidarium.envs.drawing.rendering import team_colours
 from lidarium.evaluation.drawing.picture_parts import FAINT, INK, save_figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4b4b4b")
-"""Okabe and Ito, Color universal design (2008), without yellow, which is pale on white."""
+"""Colours of Okabe and Ito, Color universal design (2008), without yellow.
+
+Yellow is pale on white.
+"""
 
 DASHES = ("-", "--", "-.", (0, (1, 1.2)), (0, (5, 1, 1, 1, 1, 1)), (0, (7, 2)), (0, (3, 1, 1, 1)))
 GRID, FRAME = "#e5e7eb", "#d1d5db"

@@ -23,7 +23,10 @@ _JOIN_COLOUR = "#0f766e"
 
 
 def draw_supervision(axes: Axes, env: ExplorationEnv, policy: Policy) -> list[Line2D]:
-    """Draw where robots were joined, redirected and stopped by rules on a map of the floor; return the entries of the legend."""
+    """Draw where rules joined, redirected and stopped robots; return the legend.
+
+    They are drawn on a map of the floor; what is returned are the entries of the legend.
+    """
     station = policy.report().supervision
     if station is None:
         return []

@@ -15,7 +15,9 @@ _ORDER_COLOUR, _NO_ORDER_COLOUR, _QUESTION_COLOUR = "#fde68a", "#e5e7eb", "#dbea
 
 
 def save_tree_picture(path: Path, settings: SupervisorSettings | None = None) -> None:
-    """Draw the tree that settings make: questions with their answers, and at the leaves rule and order.
+    """Draw the tree that settings make.
+
+    It has questions with their answers, and rule and order at the leaves.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Films of a run: frames at equal simulated time, as an mp4 that is there whole or not at all."""
+"""Films of a run: frames at equal intervals of simulated time.
+
+The film is an mp4 that is written whole or not at all.
+"""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

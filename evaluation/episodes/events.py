@@ -1,4 +1,7 @@
-"""What is told of an episode in words: events of orders, states and merges, ready for JSON, with positions in the floor's frame."""
+"""Events of an episode for JSON: orders, states and merges in words.
+
+Positions are in the floor's frame.
+"""
 
 import math
 from typing import Any
@@ -23,7 +26,10 @@ def in_floor_frame(env: ExplorationEnv, agent: str, x: float, y: float) -> tuple
 
 
 def place_of(env: ExplorationEnv, agent: str, place: tuple[float, float] | None) -> dict[str, float | None]:
-    """Return a position of a robot's map frame as an event has it: ``x`` and ``y`` in the floor's frame to a millimetre, null for none."""
+    """Return a position of a robot's map frame as an event has it.
+
+    It has ``x`` and ``y`` in the floor's frame to a millimetre, null for none.
+    """
     if place is None:
         return {"x": None, "y": None}
     x, y = in_floor_frame(env, agent, *place)
@@ -31,7 +37,7 @@ def place_of(env: ExplorationEnv, agent: str, place: tuple[float, float] | None)
 
 
 def operating_events(env: ExplorationEnv) -> list[dict[str, Any]]:
-    """Return what became of the robots' operating states and orders, in the order of time."""
+    """Return the events of the robots' operating states and orders, by time."""
     return [_operating_event(env, event) for event in env.operating.events]
 
 
@@ -43,7 +49,10 @@ def _operating_event(env: ExplorationEnv, event: OperatingEvent) -> dict[str, An
 
 
 def merge_event(env: ExplorationEnv, merge: MergeEvent) -> dict[str, Any]:
-    """Return a merge as an event of the record: who was joined with whom, where, and how far off the truth."""
+    """Return a merge as an event of the record.
+
+    It has who was joined with whom, where, and how far off the truth.
+    """
     distance, angle = transform_error(merge.found, merge.true, merge.at)
     place = place_of(env, merge.b, merge.at)
     errors = {"error_m": round(distance, 6), "error_rad": round(angle, 6)}

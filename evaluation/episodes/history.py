@@ -1,4 +1,6 @@
-"""Watches an episode for the metrics over time: what the team and each robot knew, and how far they had come by then.
+"""Watches an episode for the metrics over time.
+
+It keeps what the team and each robot knew, and how far they had driven by then.
 
 A sample is taken at the start, every decision period of simulated time and at the end; what a threshold of
 coverage asks for is noted in the very step that reaches it.
@@ -166,12 +168,18 @@ class History(Watcher):
         )
 
     def milestone(self, share: float) -> Milestone | None:
-        """Return the step in which coverage first was at least one of the thresholds, None where it was not reached."""
+        """Return the step in which coverage first reached one of the thresholds.
+
+        Coverage is then at least the threshold. None where it was not reached.
+        """
         return next((milestone for milestone in self.milestones if milestone.coverage >= share), None)
 
     @property
     def believed(self) -> NDArray[np.float64]:
-        """Believed poses (times, robots, 3) at the times of the scorer's track, each in its robot's map frame [m, rad]."""
+        """Believed poses (times, robots, 3), in each robot's map frame [m, rad].
+
+        They are at the times of the scorer's track.
+        """
         return np.stack(self._believed)
 
     @property

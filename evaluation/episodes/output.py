@@ -60,7 +60,9 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def check_writable(folder: Path) -> None:
-    """Check, without leaving anything behind, that files can be written to a folder that need not be there yet.
+    """Check that files can be written to a folder that need not exist yet.
+
+    The check leaves nothing behind.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""What a run found, as the dictionary of ``result.json`` (docs/reference/files.md)."""
+"""Results of a run, as the dictionary of ``result.json``.
+
+The format is in docs/reference/files.md.
+"""
 
 import hashlib
 import json
@@ -26,7 +29,9 @@ from lidarium.evaluation.truth.true_map import left_by_failed, truth_of
 
 
 def result_of(episode: Episode, policy: str | None = None, history: History | None = None) -> dict[str, Any]:
-    """Return the figures of an episode, finished or interrupted, as ``result.json`` has them.
+    """Return the figures of an episode as ``result.json`` has them.
+
+    The episode is finished or interrupted.
 
     Parameters
     ----------
@@ -99,7 +104,10 @@ def result_of(episode: Episode, policy: str | None = None, history: History | No
 
 
 def _success(env: ExplorationEnv) -> dict[str, Any]:
-    """Return whether the run reached what stops it, and the area under its curve of coverage."""
+    """Return whether the run reached what stops it, and its coverage area.
+
+    The area is that under its curve of coverage.
+    """
     settings = env.settings
     times, coverage = np.array(env.scorer.curve).reshape(-1, 2).T
     stop = THRESHOLDS[-1] if settings.stop_coverage is None else settings.stop_coverage
@@ -189,7 +197,10 @@ def _trajectories(env: ExplorationEnv, history: History) -> Trajectories:
 
 
 def map_figures(env: ExplorationEnv) -> dict[str, Any]:
-    """Return how much of the floor the maps know in the end, and how well they agree with the truth."""
+    """Return the known share of the floor, and how well maps agree with the truth.
+
+    Both are those of the maps in the end.
+    """
     truth, maps = truth_of(env), maps_on_floor(env)
     team = np.sum(maps, axis=0, dtype=np.int16)
     known, believed, believed_free = (
@@ -215,7 +226,11 @@ def map_figures(env: ExplorationEnv) -> dict[str, Any]:
 
 
 def others_coverage(env: ExplorationEnv) -> float | None:
-    """Return the share that robots which have not failed have sensed of what the bodies of the others leave in reach; None without such."""
+    """Return the share of the reachable floor sensed by robots that have not failed.
+
+    Reachable is what the bodies of the failed ones leave in reach. None where no robot has failed, or all
+    have.
+    """
     left = left_by_failed(env)
     if left is None:
         return None
@@ -228,7 +243,10 @@ def others_coverage(env: ExplorationEnv) -> float | None:
 
 
 def realism_of(settings: ExplorationSettings) -> str:
-    """Return the name of the preset of realism that the settings are of, ``custom`` where they are of none."""
+    """Return the name of the preset of realism that the settings are of.
+
+    It is ``custom`` where they are of none.
+    """
     for name in REALISM:
         if make_settings(settings, realism=name) == settings:
             return name
@@ -238,8 +256,8 @@ def realism_of(settings: ExplorationSettings) -> str:
 def settings_sha256(settings: ExplorationSettings) -> str:
     """Return a hash of all settings that can change a result.
 
-    It is of their JSON with sorted keys, without ``threads``, and without what older records do not have where
-    it is not used.
+    It is of their JSON with sorted keys, without ``threads``, and without what older records do not have
+    where it is not used.
     """
     values = asdict(settings)
     del values["threads"]

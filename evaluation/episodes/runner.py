@@ -216,7 +216,10 @@ def decide(
     world: ExplorationEnv | WaypointExploration | FrontierExploration | MergedMaps,
     observations: Mapping[str, Observation],
 ) -> dict[str, NDArray[np.float32] | Any]:
-    """Ask a policy, and hand each ``Stop`` and ``Order`` to the environment: these agents have no action."""
+    """Ask a policy for actions, and pass ``Stop`` and ``Order`` to the environment.
+
+    Agents with one of these have no action.
+    """
     actions: dict[str, Any] = {}
     for agent, action in policy.act(observations).items():
         if isinstance(action, Stop):

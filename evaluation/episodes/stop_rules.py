@@ -1,4 +1,7 @@
-"""When an episode of an evaluation ends, beside what the environment's settings say: the rules of other projects."""
+"""Rules for when an episode of an evaluation ends, from other projects.
+
+They apply beside what the environment's settings say.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -54,7 +57,8 @@ class StopRule:
             raise ValueError(f"figure of the stop rule is {self.figure!r}; want one of {', '.join(_FIGURES)}")
         if len(bounds) != (0 if self.figure is None else 1):
             raise ValueError(
-                f"the stop rule asks for {self.figure!r} with {len(bounds)} bounds; want a figure with one of at_least, above, at_most"
+                f"the stop rule asks for {self.figure!r} with {len(bounds)} bounds; want a figure with one "
+                "of at_least, above, at_most"
             )
         if self.decisions is not None and self.decisions < 1:
             raise ValueError(f"decisions of the stop rule is {self.decisions}; want at least 1")

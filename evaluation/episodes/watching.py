@@ -1,4 +1,7 @@
-"""An environment that shows every step of its world to those who watch: cameras, histories, records."""
+"""An environment that shows every step of its world to watchers.
+
+Watchers are cameras, histories and records.
+"""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path

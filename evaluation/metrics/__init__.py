@@ -1,4 +1,7 @@
-"""The figures of a run, each a pure function on arrays with its formula and where it comes from; docs/reference/metrics.md lists them."""
+"""The figures of a run, each a pure function on arrays.
+
+Each has its formula and its source; docs/reference/metrics.md lists them.
+"""
 
 from lidarium.evaluation.metrics.communication import (
     bytes_per_robot_second,

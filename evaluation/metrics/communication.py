@@ -1,4 +1,6 @@
-"""How well a team is connected, what it sends, and how late each robot knows what the team knows.
+"""Communication of a team: connection, data sent, and delay of knowledge.
+
+The delay is how late each robot knows what the team knows.
 
 References
 ----------
@@ -46,7 +48,9 @@ def connected_share(links: NDArray[np.bool_]) -> float:
 
 
 def largest_cluster_share(links: NDArray[np.bool_]) -> float:
-    """Return the mean over time of |largest cluster| / |team| (MAES's biggest cluster %); 1 where there is no time.
+    """Return the mean over time of |largest cluster| / |team|.
+
+    It is MAES's biggest cluster %; 1 where there is no time.
 
     Parameters
     ----------
@@ -73,7 +77,9 @@ def bytes_per_robot_second(sent: ArrayLike, duration: float) -> float:
 def sharing_lag(
     times: ArrayLike, own: NDArray[np.float64], team: ArrayLike, share: float = 0.99
 ) -> float | None:
-    """Return ``T_p(min_i C_own,i) - T_p(C_team)`` [s]: how much later the last robot knows what the team knows; None where not reached.
+    """Return ``T_p(min_i C_own,i) - T_p(C_team)`` [s].
+
+    It is how much later the last robot knows what the team knows; None where not reached.
 
     Parameters
     ----------

@@ -18,7 +18,9 @@ from lidarium.evaluation.metrics.shares import Mask, share
 
 
 def free_coverage(sensed: Mask, counted: Mask) -> float:
-    """Return ``C_free`` = |sensed and F| / |F|, the share of F that was sensed (1 where F is empty).
+    """Return ``C_free`` = |sensed and F| / |F|, the share of F that was sensed.
+
+    It is 1 where F is empty.
 
     Parameters
     ----------
@@ -31,7 +33,9 @@ def free_coverage(sensed: Mask, counted: Mask) -> float:
 
 
 def own_coverage(sensed: NDArray[np.bool_], counted: Mask) -> tuple[float, float]:
-    """Return the least and the mean ``C_own,i`` = |known free by robot i and F| / |F| over the robots (IR2).
+    """Return the least and the mean ``C_own,i`` over the robots (IR2).
+
+    ``C_own,i`` = |known free by robot i and F| / |F|.
 
     Parameters
     ----------
@@ -63,7 +67,9 @@ def known_coverage(known: Mask, knowable: Mask) -> float:
 
 
 def valid_coverage(known: Mask, counted: Mask, occupied: Mask) -> float:
-    """Return ``C_valid`` = |known and (F or S)| / |F or S| with S around all of F (MapEx).
+    """Return ``C_valid`` = |known and (F or S)| / |F or S| (MapEx).
+
+    S lies around all of F.
 
     Parameters
     ----------

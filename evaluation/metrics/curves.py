@@ -34,7 +34,7 @@ class WallError:
 
 
 def distances_to_walls(points: Points, edges: Edges) -> NDArray[np.float64]:
-    """Return the distance of each point (n, 2) from the nearest of the walls, shape (n,) [m].
+    """Return the distance of each point (n, 2) from the nearest wall, (n,) [m].
 
     Raises
     ------
@@ -49,7 +49,10 @@ def distances_to_walls(points: Points, edges: Edges) -> NDArray[np.float64]:
 
 
 def wall_error(curve_points: Points, edges: Edges) -> WallError:
-    """Return how far points, evenly along the curves (n, 2), lie from the nearest wall."""
+    """Return how far points along the curves (n, 2) lie from the nearest wall.
+
+    The points lie evenly along the curves.
+    """
     if len(curve_points) == 0:
         return WallError(float("nan"), float("nan"))
     distances = distances_to_walls(curve_points, edges)
@@ -95,7 +98,9 @@ def wall_recall(wall_points: Points, curve_points: Points, tolerance: float = TO
 
 
 def seen_walls(edges: Edges, hits: Points, spacing: float = 0.02, reach: float = 0.05) -> Points:
-    """Return points evenly along the walls on which beams have ended, shape (n, 2) [m].
+    """Return points on walls at which beams have ended, shape (n, 2) [m].
+
+    The points lie evenly along the walls.
 
     Parameters
     ----------
@@ -150,7 +155,10 @@ def end_point_bytes(points: int) -> int:
 
 
 def grid_bytes(bounds: tuple[float, float, float, float], resolution: float = 0.05) -> int:
-    """Return the size of a grid of one byte a cell over x_min, y_min, x_max, y_max [bytes]."""
+    """Return the size of a grid of one byte a cell [bytes].
+
+    The grid covers x_min, y_min, x_max, y_max.
+    """
     x_min, y_min, x_max, y_max = bounds
     return int(np.ceil((x_max - x_min) / resolution - 1e-9)) * int(
         np.ceil((y_max - y_min) / resolution - 1e-9)

@@ -7,7 +7,10 @@ import numpy as np
 
 
 def decision_percentiles(seconds: Sequence[float]) -> dict[str, float | None]:
-    """Return the median and the 95th percentile of decision times in milliseconds, None where there was no decision."""
+    """Return the median and 95th percentile of decision times in milliseconds.
+
+    They are None where there was no decision.
+    """
     if not len(seconds):
         return {"p50": None, "p95": None}
     half, most = np.percentile(np.asarray(seconds, np.float64) * 1e3, [50.0, 95.0])

@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike
 
 
 def balance(shares: ArrayLike) -> float:
-    """Return the population standard deviation of the robots' shares ``C_known,i`` (Explore-Bench's "std").
+    """Return the population standard deviation of the robots' shares ``C_known,i``.
+
+    It is Explore-Bench's "std".
 
     Parameters
     ----------
@@ -36,7 +38,9 @@ def path_balance(lengths: ArrayLike) -> float:
 
 
 def jain_index(lengths: ArrayLike) -> float:
-    """Return ``(sum L_i)^2 / (n sum L_i^2)``: 1 where all robots drive alike, 1/n where one drives alone; 1 where nobody moved.
+    """Return Jain's index ``(sum L_i)^2 / (n sum L_i^2)``.
+
+    It is 1 where all robots drive alike, 1/n where one drives alone, and 1 where nobody moved.
 
     Parameters
     ----------

@@ -24,7 +24,10 @@ TRANSLATION_TOLERANCE = 2.0
 """Largest error of the translation of a correct merge [cells]."""
 
 WRONG_TRANSLATION, WRONG_ROTATION = 0.3, math.radians(3.0)
-"""A merge that errs by more than one of these puts a team's walls where there are none [m, rad]."""
+"""Errors beyond which a merge is wrong [m, rad].
+
+A merge that errs by more than one of them puts a team's walls where there are none.
+"""
 
 LEAST_OVERLAP = 0.10
 """Share of the area that maps must have in common for a merge to be expected."""
@@ -33,7 +36,9 @@ LEAST_OVERLAP = 0.10
 def transform_error(
     found: ArrayLike, true: ArrayLike, at: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[float, float]:
-    """Return ``|T a - T* a|`` [m] and ``|wrap(theta - theta*)|`` [rad] of a transform T that was found for a true one T*.
+    """Return the errors [m] and [rad] of a transform T for a true one T*.
+
+    They are ``|T a - T* a|`` and ``|wrap(theta - theta*)|``, of a T that was found.
 
     Parameters
     ----------
@@ -52,7 +57,9 @@ def transform_error(
 
 
 def is_correct(translation_error: float, rotation_error: float, resolution: float) -> bool:
-    """Return whether a merge is correct: within ``ROTATION_TOLERANCE`` and ``TRANSLATION_TOLERANCE``.
+    """Return whether a merge is correct.
+
+    It is within ``ROTATION_TOLERANCE`` and ``TRANSLATION_TOLERANCE``.
 
     m-explore's test takes the tolerance of each axis alone; here it is that of the distance.
 
@@ -71,7 +78,11 @@ def is_correct(translation_error: float, rotation_error: float, resolution: floa
 
 
 def is_wrong(translation_error: float, rotation_error: float) -> bool:
-    """Return whether a merge is wrong: beyond ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``, errors as of `transform_error` [m, rad]."""
+    """Return whether a merge is wrong.
+
+    It is beyond ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``, with errors as of `transform_error` [m,
+    rad].
+    """
     return translation_error > WRONG_TRANSLATION or rotation_error > WRONG_ROTATION
 
 
@@ -95,7 +106,10 @@ class Trajectories:
     believed: NDArray[np.float64]
 
     def floor_from_map(self, agent: str, at: ArrayLike, until_s: float) -> Transform:
-        """Return how a robot's map lies on the floor around a point of it [m]: as its poses did when it was nearest to there."""
+        """Return how a robot's map lies on the floor around a point of it [m].
+
+        It lies as the robot's poses did when the robot was nearest to there.
+        """
         robot = list(self.agents).index(agent)
         known = max(int(np.searchsorted(self.times, until_s, side="right")), 1)
         nearest = int(
@@ -106,7 +120,9 @@ class Trajectories:
 
 
 def drifted_truth(event: MergeEvent, trajectories: Trajectories) -> tuple[float, float, float]:
-    """Return how two robots' maps truly lie to each other where they overlap, ``a_from_b``.
+    """Return the true transform ``a_from_b`` of two robots' maps.
+
+    It holds where they overlap.
 
     Maps drift: what their starts say of each other is not what is true of two maps where they meet. A merger
     sees the maps alone.
@@ -191,7 +207,9 @@ def precision(accepted: NDArray[np.bool_], correct: NDArray[np.bool_]) -> float 
 
 
 def recall(accepted: NDArray[np.bool_], correct: NDArray[np.bool_], overlaps: ArrayLike) -> float | None:
-    """Return |accepted and correct| / |attempts| over those whose maps overlap by ``LEAST_OVERLAP`` or more; None without such.
+    """Return |accepted and correct| / |attempts|; None without attempts.
+
+    Attempts are those whose maps overlap by ``LEAST_OVERLAP`` or more.
 
     Parameters
     ----------

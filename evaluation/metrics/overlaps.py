@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def overlap(masks: Sequence[NDArray[np.uint64]] | NDArray[np.uint64]) -> float:
-    """Return ``Overlap_MX`` = |cells seen by two or more| / |cells seen by one or more| (MAexp); 0 where none was seen.
+    """Return ``Overlap_MX``, the share of seen cells seen by several (MAexp).
+
+    It is |cells seen by two or more| / |cells seen by one or more|; 0 where none was seen.
 
     MAexp prints it at T_0.85 and T_0.95.
 
@@ -46,7 +48,9 @@ def overlap_of_maps(known_shares: ArrayLike) -> float:
 
 
 def instant_overlap(seen_once: ArrayLike, seen_twice: ArrayLike) -> float:
-    """Return ``Overlap_MV`` = mean over decisions of |footprint of two or more| / |footprint of one or more| (MARVEL).
+    """Return ``Overlap_MV``, the mean footprint overlap over decisions (MARVEL).
+
+    It is the mean of |footprint of two or more| / |footprint of one or more|.
 
     Decisions at which nobody sees anything count as 0; 0 where there is no decision.
 

@@ -25,7 +25,9 @@ def wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def best_transform(points: NDArray[np.float64], onto: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the motion x, y, theta that brings points nearest to others: ``min sum |R(theta) p_k + (x, y) - q_k|^2``, shape (3,).
+    """Return the motion x, y, theta that brings points nearest to others, (3,).
+
+    It solves ``min sum |R(theta) p_k + (x, y) - q_k|^2``.
 
     Parameters
     ----------
@@ -42,7 +44,9 @@ def moved(poses: Poses, transform: NDArray[np.float64]) -> Poses:
 
 
 def absolute_error(believed: Poses, true: Poses, is_aligned: bool = True) -> float:
-    """Return ``ATE = sqrt(mean_k |t_k - S b_k|^2)``, S the best motion of the believed positions onto the true ones [m].
+    """Return ``ATE = sqrt(mean_k |t_k - S b_k|^2)`` [m].
+
+    S is the best motion of the believed positions onto the true ones.
 
     Parameters
     ----------
@@ -84,6 +88,9 @@ def relative_error(believed: Poses, true: Poses, steps: int) -> tuple[float, flo
 
 
 def _motions(poses: Poses, steps: int) -> Poses:
-    """Return the motions from each pose to the one so many steps later, in the frame of the former."""
+    """Return the motions from each pose to the one so many steps later.
+
+    They are in the frame of the former.
+    """
     poses = np.asarray(poses, np.float64)
     return relative(poses[:-steps], poses[steps:])

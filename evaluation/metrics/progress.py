@@ -19,7 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def first_reached(coverage: ArrayLike, share: float) -> int | None:
-    """Return the index of the first coverage that is at least ``share``, None where there is none.
+    """Return the index of the first coverage that is at least ``share``.
+
+    It is None where there is none.
 
     Parameters
     ----------
@@ -47,7 +49,9 @@ def time_to(times: ArrayLike, coverage: ArrayLike, share: float) -> float | None
 
 
 def decisions_to(decisions: ArrayLike, coverage: ArrayLike, share: float) -> int | None:
-    """Return ``N_p``, the decisions taken until C_free >= p, the one under way included; None where it is not reached.
+    """Return ``N_p``, the decisions taken until C_free >= p.
+
+    The one in progress is included; None where p is not reached.
 
     Parameters
     ----------
@@ -63,7 +67,9 @@ def decisions_to(decisions: ArrayLike, coverage: ArrayLike, share: float) -> int
 
 
 def distance_to(lengths: NDArray[np.float64], coverage: ArrayLike, share: float) -> float | None:
-    """Return ``D_p`` = max_i L_i(T_p), the longest path of the team when C_free >= p first [m]; None where it is not reached.
+    """Return ``D_p`` = max_i L_i(T_p), the longest path of the team [m].
+
+    It is taken when C_free >= p first; None where p is not reached.
 
     Parameters
     ----------
@@ -79,13 +85,18 @@ def distance_to(lengths: NDArray[np.float64], coverage: ArrayLike, share: float)
 
 
 def distance_sum_to(lengths: NDArray[np.float64], coverage: ArrayLike, share: float) -> float | None:
-    """Return ``D_sum,p`` = sum_i L_i(T_p), the way of the whole team when C_free >= p first [m]; as `distance_to`."""
+    """Return ``D_sum,p`` = sum_i L_i(T_p), the path length of the whole team [m].
+
+    It is taken when C_free >= p first; as `distance_to`.
+    """
     k = first_reached(coverage, share)
     return None if k is None else float(lengths[k].sum())
 
 
 def is_success(times: ArrayLike, coverage: ArrayLike, share: float, horizon: float | None) -> bool:
-    """Return whether ``T_p <= H``: the coverage that stops a run was reached within the horizon.
+    """Return whether ``T_p <= H``.
+
+    The coverage that stops a run was then reached within the horizon.
 
     Parameters
     ----------
@@ -102,7 +113,9 @@ def is_success(times: ArrayLike, coverage: ArrayLike, share: float, horizon: flo
 
 
 def area_under_curve(times: ArrayLike, coverage: ArrayLike, horizon: float) -> float:
-    """Return ``AUC = (1 / H) integral from 0 to H of C_free dt`` of a step function, 0 before its first time.
+    """Return ``AUC = (1 / H) integral from 0 to H of C_free dt``.
+
+    C_free is a step function, 0 before its first time.
 
     A run that ends before the horizon keeps its last coverage: what is explored stays explored.
 
@@ -123,19 +136,25 @@ def area_under_curve(times: ArrayLike, coverage: ArrayLike, horizon: float) -> f
     at, values = np.asarray(times, np.float64), np.asarray(coverage, np.float64)
     if at.shape != values.shape or at.ndim != 1 or (np.diff(at) < 0.0).any():
         raise ValueError(
-            f"times have the shape {at.shape} and coverage {values.shape}; want as many values as times, in the order of time"
+            f"times have the shape {at.shape} and coverage {values.shape}; want as many values as times, in "
+            "the order of time"
         )
     ends = np.minimum(np.append(at, horizon), horizon)
     return float((np.maximum(np.diff(ends), 0.0) * values).sum() / horizon)
 
 
 def restricted_time(reached: float | None, horizon: float) -> float:
-    """Return ``min(T_p, H)``, H where the threshold was not reached: its mean over runs is the restricted mean [s]."""
+    """Return ``min(T_p, H)``, H where the threshold was not reached [s].
+
+    Its mean over runs is the restricted mean.
+    """
     return horizon if reached is None else min(reached, horizon)
 
 
 def path_lengths(track: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ``L_i = sum_k |x_k - x_(k-1)|``, the length of each robot's way through its positions [m], shape (robots,).
+    """Return each robot's path length ``L_i = sum_k |x_k - x_(k-1)|`` [m].
+
+    It is the length of the robot's path through its positions, shape (robots,).
 
     Parameters
     ----------

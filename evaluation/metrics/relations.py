@@ -20,7 +20,10 @@ from lidarium.mapping.geometry.rigid import relative
 Which = Literal["between", "before"]
 
 BEYOND_S = 1.0
-"""How far the times of relations may lie beyond a log: stamps are rounded, and not always those of scans [s]."""
+"""Bound of the times of relations beyond a log [s].
+
+Stamps are rounded, and not always those of scans.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +109,8 @@ def covered(relations: Relations, stamps: NDArray[np.float64]) -> Relations:
     is_inside = (first >= stamps[0] - BEYOND_S) & (last <= stamps[-1] + BEYOND_S)
     if not is_inside.any():
         raise ValueError(
-            f"the relations are of {first.min():.3f} to {last.max():.3f} s, the log of {stamps[0]:.3f} to {stamps[-1]:.3f} s; "
+            f"the relations are of {first.min():.3f} to {last.max():.3f} s, the log of {stamps[0]:.3f} to "
+            f"{stamps[-1]:.3f} s; "
             "want what they have in common: shift the log's clock"
         )
     return Relations(relations.begin[is_inside], relations.end[is_inside], relations.motions[is_inside])
@@ -115,7 +119,9 @@ def covered(relations: Relations, stamps: NDArray[np.float64]) -> Relations:
 def relation_errors(
     begin: NDArray[np.float64], end: NDArray[np.float64], relations: Relations
 ) -> RelationErrors:
-    """Return by how much poses miss relations: the motion between the poses of each, as seen from the true one.
+    """Return the errors of poses against relations.
+
+    An error is the motion between a relation's two poses, as seen from the true one.
 
     Parameters
     ----------

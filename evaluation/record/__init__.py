@@ -1,4 +1,7 @@
-"""Records of episodes: written as they run, run again to the bit by the same version, shown by any."""
+"""Records of episodes: written during the run, and run again or shown later.
+
+The same version runs them again to the bit; any version shows them.
+"""
 
 from lidarium.evaluation.record.display import DisplayTrack as DisplayTrack
 from lidarium.evaluation.record.episode_record import EpisodeRecord as EpisodeRecord

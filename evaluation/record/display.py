@@ -1,4 +1,7 @@
-"""What of an episode can be shown whatever the version that recorded it: ways, coverage, the team's map, events."""
+"""What can be shown of an episode, whatever version recorded it.
+
+It is paths, coverage, the team's map and events.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +14,9 @@ from lidarium.mapping.grids.map_deltas import levels_of_planes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapChanges:
-    """How the team's three-level map changed from sample to sample, beginning with a map of which nothing is known.
+    """Changes of the team's three-level map from sample to sample.
+
+    They begin with a map of which nothing is known.
 
     Two planes of bits hold the map, one of known and one of occupied cells; a word has 64 cells of a row, bit
     0 the first one.
@@ -39,7 +44,10 @@ class MapChanges:
     occupied: NDArray[np.uint64]
 
     def levels_at(self, time_s: float) -> NDArray[np.uint8]:
-        """Return the map of the last sample up to a time: 0 occupied, 127 unknown, 255 free, shape (rows, words * 64)."""
+        """Return the map of the last sample up to a time, shape (rows, words * 64).
+
+        Values are 0 occupied, 127 unknown, 255 free.
+        """
         samples = int(np.searchsorted(self.times, time_s + 1e-9, side="right"))
         changes = int(self.counts[:samples].sum())
         planes = np.zeros((2, self.rows * self.words), np.uint64)
@@ -81,11 +89,17 @@ class DisplayTrack:
     events: list[dict[str, Any]]
 
     def map_at(self, time_s: float) -> NDArray[np.uint8]:
-        """Return the team's map of the last sample up to a time: 0 occupied, 127 unknown, 255 free, shape (rows, columns)."""
+        """Return the team's map of the last sample up to a time.
+
+        Values are 0 occupied, 127 unknown, 255 free; the shape is (rows, columns).
+        """
         return self.changes.levels_at(time_s)
 
     def poses_at(self, time_s: float) -> NDArray[np.float64]:
-        """Return the last sampled poses up to a time, those of the start before it, shape (robots, 3)."""
+        """Return the last sampled poses up to a time, shape (robots, 3).
+
+        Before the first sample they are the poses of the start.
+        """
         return np.asarray(
             self.poses[max(int(np.searchsorted(self.times, time_s + 1e-9, side="right")) - 1, 0)]
         )

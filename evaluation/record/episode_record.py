@@ -20,7 +20,9 @@ It reads this one and those before.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EpisodeRecord:
-    """An episode, to be run again by the version that recorded it and to be shown by any.
+    """An episode to be run again by its version and shown by any.
+
+    Its version is the one that recorded it.
 
     Attributes
     ----------
@@ -121,7 +123,8 @@ def check_header(header: Any) -> None:  # noqa: ANN401
     if number > FORMAT:
         raise NewerFormatError(
             f"is an episode record of format {number}, written by lidarium {header.get('version')}; "
-            f"this is lidarium {lidarium.__version__}, which reads formats up to {FORMAT}: use the newer version"
+            f"this is lidarium {lidarium.__version__}, which reads formats up to {FORMAT}: use the newer "
+            "version"
         )
     for name, (wanted, is_good) in _WANTED.items():
         if name not in header:

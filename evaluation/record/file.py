@@ -1,4 +1,7 @@
-"""Records as files: a zip of a header, events and compressed arrays, which ``numpy.load`` opens as well."""
+"""Records as files: a zip of a header, events and compressed arrays.
+
+``numpy.load`` opens it as well.
+"""
 
 import io
 import json
@@ -41,14 +44,19 @@ _DAMAGE = (
     ValueError,
     RuntimeError,
 )
-"""What readers of zips, arrays and JSON raise over bytes that are not as they were written."""
+"""Errors that readers raise on damaged bytes.
+
+The readers are those of zips, arrays and JSON.
+"""
 
 _UNITS = 1e3
 """Steps of positions and headings in a metre and a radian."""
 
 
 def write_record(path: Path, record: EpisodeRecord) -> None:
-    """Write a record; the file is there whole or not at all, and the same record gives the same file.
+    """Write a record, whole or not at all.
+
+    The same record gives the same file.
 
     Parameters
     ----------
@@ -100,7 +108,8 @@ def read_record(path: Path) -> EpisodeRecord:
         raise ValueError(f"{path} {error}") from error
     except _DAMAGE as error:
         raise ValueError(
-            f"{path} is not a whole episode record: {_reason(error)}; want a file that lidarium run --record wrote"
+            f"{path} is not a whole episode record: {_reason(error)}; want a file that lidarium run --record "
+            "wrote"
         ) from error
 
 
@@ -125,7 +134,10 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
 
 
 def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a record as they are in the file: times as steps, poses and places as differences of whole numbers."""
+    """Return the arrays of a record as they are in the file.
+
+    Times are steps; poses and places are differences of whole numbers.
+    """
     display, time_step = record.display, float(record.header["time_step"])
     changes, counted = display.changes, max(int(record.header["counted_cells"]), 1)
     poses = np.rint(display.poses * _UNITS).astype(np.int32)
@@ -172,7 +184,8 @@ def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any
         kind = {"commands": np.float64, "map_known": np.uint64, "map_occupied": np.uint64}.get(name, np.int32)
         if arrays[name].shape != shape or arrays[name].dtype != kind:
             raise ValueError(
-                f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of {np.dtype(kind)}"
+                f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of "
+                f"{np.dtype(kind)}"
             )
     places = np.cumsum(arrays["map_places"], dtype=np.int64)
     if int(arrays["map_counts"].sum()) != changed or (

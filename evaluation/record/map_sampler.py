@@ -114,7 +114,10 @@ class MapSampler:
 
 
 def _lays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
-    """Return how maps in the frames of the starts lie over the floor's lattice, as ``note_laid_changes`` takes it."""
+    """Return how maps in the frames of the starts lie over the floor's lattice.
+
+    It is in the form that ``note_laid_changes`` takes.
+    """
     world = env.world
     return np.array(
         [

@@ -82,7 +82,10 @@ class Recorder(Watcher):
         self._maps = MapSampler(env, MAP_PERIOD_S)
 
     def step(self, env: ExplorationEnv, commands: NDArray[np.float64]) -> None:
-        """Note how the robots were driven, contacts that began, and from time to time the map."""
+        """Note how the robots were driven, contacts that began, and the map.
+
+        The map is noted from time to time.
+        """
         self._commands += commands.tobytes()
         world = env.world
         if world.collisions.tobytes() != self._told_collisions:

@@ -1,4 +1,7 @@
-"""Runs a recorded episode again, from its beginning and the speeds that its robots were driven at."""
+"""Runs a recorded episode again, from its beginning and speeds.
+
+The speeds are those that its robots were driven at.
+"""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -24,7 +27,9 @@ from lidarium.evaluation.record.state import state_sha256
 def rerun(
     record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()
 ) -> ExplorationEnv:
-    """Run a recorded episode again and check that it ends in the same state, to the bit.
+    """Run a recorded episode again and check that its end state is the same.
+
+    It must be the same to the bit.
 
     Parameters
     ----------
@@ -59,12 +64,14 @@ def drive_again(
     header = record.header
     if header["version"] != lidarium.__version__:
         raise ValueError(
-            f"the record is of lidarium {header['version']}, this is {lidarium.__version__}; only the version that recorded an episode "
+            f"the record is of lidarium {header['version']}, this is {lidarium.__version__}; only the "
+            "version that recorded an episode "
             f"runs it again, its pictures and films can be drawn by any"
         )
     if header["final_sha256"] is None:
         raise ValueError(
-            "the episode was broken off within a time step, its last state is not known; pictures and films can be drawn"
+            "the episode was broken off within a time step, its last state is not known; pictures and films "
+            "can be drawn"
         )
     settings = settings_of(header)
     there = find_floor(header, floor)
@@ -89,7 +96,10 @@ def is_same(record: EpisodeRecord, env: ExplorationEnv) -> bool:
 
 
 def first_difference(record: EpisodeRecord, env: ExplorationEnv) -> str:
-    """Tell when and where a re-run first leaves the recorded ways, and what the record was made with."""
+    """Describe when and where a re-run first leaves the recorded paths.
+
+    What the record was made with is included.
+    """
     made_with = ", ".join(f"{name} {version}" for name, version in record.header.get("made_with", {}).items())
     display = record.display
     for time_s, poses in env.scorer.track:
@@ -98,7 +108,10 @@ def first_difference(record: EpisodeRecord, env: ExplorationEnv) -> str:
         if apart.max() > 1e-3:
             robot = env.possible_agents[int(apart.argmax())]
             return f"{robot} is {apart.max():.3f} m off at {time_s:.1f} s (recorded with {made_with})"
-    return f"the ways are the same to a millimetre, the final state is not to the bit (recorded with {made_with})"
+    return (
+        "the ways are the same to a millimetre, the final state is not to the bit (recorded with "
+        f"{made_with})"
+    )
 
 
 def settings_of(header: dict[str, Any]) -> ExplorationSettings:
@@ -151,7 +164,8 @@ def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) 
             f"{what} has the hash {found.sha256[:12]}, the record's floor has {header['floor_sha256'][:12]}"
         )
     raise ValueError(
-        f"the floor {header['floor']!r} of the record is not found: {'; '.join(tried)}; name the floor that was recorded"
+        f"the floor {header['floor']!r} of the record is not found: {'; '.join(tried)}; name the floor that "
+        "was recorded"
     )
 
 

@@ -1,4 +1,7 @@
-"""The hash by which a re-run is told to be the same: of all that an episode leaves in its world."""
+"""The hash that identifies a re-run as the same.
+
+It is of all that an episode leaves in its world.
+"""
 
 import hashlib
 import json
@@ -52,7 +55,10 @@ def _add(digest: "hashlib._Hash", name: str, array: NDArray[Any]) -> None:
 
 
 def _add_map(digest: "hashlib._Hash", log_odds: NDArray[np.int8]) -> None:
-    """Add the rows of a map from the first to the last that is not blank: much of a large map was never touched."""
+    """Add the rows of a map from the first to the last that is not blank.
+
+    Much of a large map was never touched.
+    """
     used = np.flatnonzero(log_odds.view(np.uint64).any(axis=1))
     low, high = (int(used[0]), int(used[-1]) + 1) if used.size else (0, 0)
     digest.update(f"map {log_odds.shape} from row {low};".encode())

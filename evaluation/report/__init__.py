@@ -1,4 +1,7 @@
-"""The report of a directory of episodes: tables and plots of policies side by side."""
+"""The report of a directory of episodes.
+
+It has tables and plots of policies side by side.
+"""
 
 from lidarium.evaluation.analysis.episodes import read_episodes
 from lidarium.evaluation.report.report import write_report

@@ -1,4 +1,7 @@
-"""Writes the report of a directory of episodes: tables, plots, and all numbers behind them."""
+"""Writes the report of a directory of episodes.
+
+It has tables, plots, and all numbers behind them.
+"""
 
 import json
 from collections.abc import Sequence
@@ -73,7 +76,10 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
 
 
 def jsonable(content: Any) -> Any:  # noqa: ANN401
-    """Return the same of what JSON knows: dataclasses as objects, numbers that are not finite as null."""
+    """Return the same content in types that JSON knows.
+
+    Dataclasses become objects, numbers that are not finite become null.
+    """
     if is_dataclass(content) and not isinstance(content, type):
         return jsonable(asdict(content))
     if isinstance(content, dict):
@@ -102,7 +108,8 @@ def _about_names(episodes: Episodes) -> list[str]:
     unknown = sorted({str(row["policy"]) for row in episodes.rows} - set(policy_names()))
     return (
         [
-            f"Policies that this lidarium does not have: {', '.join(unknown)}; their figures are told all the same."
+            f"Policies that this lidarium does not have: {', '.join(unknown)}; their figures are told all "
+            "the same."
         ]
         if unknown
         else []
@@ -122,11 +129,16 @@ def _about_records(episodes: Episodes, records: dict[Key, Entry]) -> list[str]:
 def _page(result: dict[str, Any], sections: Sequence[Section]) -> str:
     paragraphs = [
         "# Report",
-        f"{result['episodes']} episodes of lidarium {result['episodes_version']}, {result['records']} of them recorded; baseline "
-        f"`{result['baseline']}`. Times are simulated. In brackets stand 95 % intervals: medians by interpolated order statistics, "
-        f"shares by Wilson, means, differences and ratios by the studentised bootstrap (10,000 resamples, seed {result['seed']}). "
-        "Differences and ratios of times are those of restricted means, in which a run that did not get there counts with the horizon; "
-        "those of other figures are the mean difference and the geometric mean of the ratios. All numbers are in `report.json`.",
+        f"{result['episodes']} episodes of lidarium {result['episodes_version']}, {result['records']} of "
+        "them recorded; baseline "
+        f"`{result['baseline']}`. Times are simulated. In brackets stand 95 % intervals: medians by "
+        "interpolated order statistics, "
+        "shares by Wilson, means, differences and ratios by the studentised bootstrap (10,000 resamples, "
+        f"seed {result['seed']}). "
+        "Differences and ratios of times are those of restricted means, in which a run that did not get "
+        "there counts with the horizon; "
+        "those of other figures are the mean difference and the geometric mean of the ratios. All numbers "
+        "are in `report.json`.",
     ]
     if result["warnings"]:
         paragraphs += ["## Be careful", "\n".join(f"- {warning}" for warning in result["warnings"])]
@@ -136,7 +148,8 @@ def _page(result: dict[str, Any], sections: Sequence[Section]) -> str:
         runs = sum(len(rows) for rows in group.runs.values())
         paragraphs += [
             f"## {group.title}",
-            f"{runs} runs of {len(group.runs)} policies on {len(group.floors)} floor{'s' if len(group.floors) != 1 else ''}, "
+            f"{runs} runs of {len(group.runs)} policies on {len(group.floors)} "
+            f"floor{'s' if len(group.floors) != 1 else ''}, "
             f"{seeds} seed{'s' if seeds != 1 else ''}; times count up to {group.horizon_s:.0f} s.",
             *section.markdown,
         ]

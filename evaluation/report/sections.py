@@ -1,4 +1,7 @@
-"""What a report tells of one group of episodes: numbers, tables, plots, and what to be careful with."""
+"""Section of a report on one group of episodes.
+
+It has numbers, tables, plots, and cautions.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -35,7 +38,10 @@ PICTURED_FLOORS = 3
 """Floors of each group of which paths and visits are drawn."""
 
 
-_OF_FEW = "95 % intervals of so few may hold the truth more or less often than that (docs/results/interval_coverage.md)."
+_OF_FEW = (
+    "95 % intervals of so few may hold the truth more or less often than that "
+    "(docs/results/interval_coverage.md)."
+)
 
 
 @dataclass(slots=True)
@@ -117,7 +123,8 @@ def _tell_times(section: Section, seed: int) -> None:
         if repeats(rows)
     ]:
         section.warnings.append(
-            f"runs that repeat another one on their floor in every figure: {', '.join(again)}. The seed changed nothing there, so they "
+            f"runs that repeat another one on their floor in every figure: {', '.join(again)}. The seed "
+            "changed nothing there, so they "
             "are no further evidence: intervals are too narrow and p values too small."
         )
     if few:
@@ -168,8 +175,10 @@ def _tell_comparisons(section: Section, baseline: str, seed: int) -> None:
             tables.comparisons_table(comparisons),
         ]
         section.markdown.append(
-            "Policy less baseline, policy over baseline. Wilcoxon's signed rank test and the sign test leave out pairs that are the same; "
-            f"Holm's correction is for the {len(comparisons)} comparisons of this table, and what is beyond chance at 5 % is in bold."
+            "Policy less baseline, policy over baseline. Wilcoxon's signed rank test and the sign test leave "
+            "out pairs that are the same; "
+            f"Holm's correction is for the {len(comparisons)} comparisons of this table, and what is beyond "
+            "chance at 5 % is in bold."
         )
 
 
@@ -189,7 +198,8 @@ def _warn_of_pairs(section: Section, others: Sequence[str], baseline: str) -> No
         )
     if unpaired:
         section.warnings.append(
-            f"runs without a partner on the same floor, starts and seed were left out of comparisons: {', '.join(unpaired)}."
+            "runs without a partner on the same floor, starts and seed were left out of comparisons: "
+            f"{', '.join(unpaired)}."
         )
 
 

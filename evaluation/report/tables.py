@@ -32,7 +32,10 @@ def number(value: float, horizon_s: float | None = None, digits: int = 1) -> str
 def interval(
     found: Interval | None, horizon_s: float | None = None, scale: float = 1.0, digits: int = 1
 ) -> str:
-    """Return an estimate with its interval in brackets, of which unbounded ends are left open."""
+    """Return an estimate with its interval in brackets.
+
+    Unbounded ends of the interval are left open.
+    """
     if found is None:
         return NONE
     estimate, low, high = (
@@ -127,7 +130,10 @@ def comparisons_table(comparisons: Sequence[Comparison]) -> str:
 
 
 def floors_table(group: Group, key: str) -> str:
-    """Return the median time of each policy on each floor, and how many of its runs reached the share."""
+    """Return the median time of each policy on each floor.
+
+    How many of its runs reached the share is given as well.
+    """
     rows = []
     for floor in group.floors:
         cells = []
@@ -137,7 +143,8 @@ def floors_table(group: Group, key: str) -> str:
                 continue
             found = times_to(rows_of_policy, key, group.horizon_s)
             cells.append(
-                f"{number(median_interval(found.or_never).estimate, group.horizon_s)} ({found.is_reached.sum()}/{len(found.times)})"
+                f"{number(median_interval(found.or_never).estimate, group.horizon_s)} "
+                f"({found.is_reached.sum()}/{len(found.times)})"
             )
         rows.append([floor, *cells])
     return markdown_table(["floor", *(f"`{policy}`" for policy in group.runs)], rows)

@@ -1,4 +1,6 @@
-"""What figures of many episodes are worth: estimates with intervals, paired comparisons, profiles.
+"""Value of the figures of many episodes: intervals, comparisons, profiles.
+
+Estimates have intervals, and comparisons are paired.
 
 Pure functions on arrays. Which interval belongs to which figure, and how often each holds the truth, is in
 docs/reference/statistics.md and docs/results/interval_coverage.md.

@@ -1,4 +1,6 @@
-"""Means, interquartile means and paired comparisons of values that are all known, with studentised bootstrap intervals.
+"""Means, interquartile means and paired comparisons.
+
+The values are all known; the intervals are studentised bootstrap intervals.
 
 References
 ----------
@@ -81,7 +83,9 @@ def paired_difference(
 def paired_ratio(
     a: ArrayLike, b: ArrayLike, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
 ) -> Interval:
-    """Return the geometric mean of ``a / b`` over pairs and its studentised bootstrap interval, made of logarithms.
+    """Return the geometric mean of ``a / b`` over pairs and its interval.
+
+    The interval is a studentised bootstrap interval, made of logarithms.
 
     Parameters
     ----------
@@ -126,7 +130,10 @@ def _means(sample: Values) -> Replicates:
 
 
 def _middle_means(counts: Counts, ordered: Values) -> tuple[Values, Values]:
-    """Return interquartile means and their standard errors of resamples (resamples, n) of a sorted sample."""
+    """Return interquartile means and their standard errors of resamples.
+
+    The resamples (resamples, n) are of a sorted sample.
+    """
     size = len(ordered)
     quarter = 0.25 * size
     cumulated = np.cumsum(counts, axis=1, dtype=np.float64)

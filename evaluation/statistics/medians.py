@@ -55,7 +55,9 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, is_interpolated
 
 
 def median_bands(values: Values, confidence: float = 0.95) -> Values:
-    """Return the median of each column and the ends of its interval, (3, k), of finite values (n, k).
+    """Return the median of each column and the ends of its interval, (3, k).
+
+    The values (n, k) are finite.
 
     For curves over time; the same figures as `median_interval` gives column by column.
     """
@@ -65,7 +67,9 @@ def median_bands(values: Values, confidence: float = 0.95) -> Values:
 
 @lru_cache(maxsize=1024)
 def _rank_and_share(size: int, tail: float) -> tuple[int, float]:
-    """Return the greatest rank d with P(Binomial(n, 1/2) < d) <= tail, and how far to go from there to rank d + 1.
+    """Return the greatest rank d with P(Binomial(n, 1/2) < d) <= tail, and a share.
+
+    The share is how far to go from there to rank d + 1.
 
     The latter is equation 2 of Hettmansperger and Sheather. Rank 0 where there is none.
     """

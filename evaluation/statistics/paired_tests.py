@@ -1,4 +1,6 @@
-"""Tests of whether the partners of pairs differ, and what many of them in one table are worth.
+"""Tests of whether the partners of pairs differ, singly and in a table.
+
+They also give what many of them in one table are worth.
 
 References
 ----------
@@ -70,7 +72,9 @@ def sign_test(a: ArrayLike, b: ArrayLike) -> PairedTest:
 
 
 def holm(p_values: ArrayLike) -> Values:
-    """Return p values corrected for how many there are: the least times m, the next times m - 1, and so on, never falling.
+    """Return p values corrected for how many there are.
+
+    They are the least times m, the next times m - 1, and so on, never falling.
 
     A table in which those below 0.05 are taken for real holds a false one with a probability of at most 0.05.
 

@@ -14,7 +14,9 @@ from lidarium.evaluation.statistics.shares import share_interval
 
 
 def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
-    """Return in what share of runs each policy is within a factor of the best policy of that run.
+    """Return the share of runs in which each policy is within a factor of the best.
+
+    The best is the best policy of that run.
 
     Parameters
     ----------
@@ -51,7 +53,9 @@ def ratio_profile(costs: ArrayLike, factors: ArrayLike) -> Values:
 
 
 def score_profile(scores: ArrayLike, thresholds: ArrayLike, confidence: float = 0.95) -> Values:
-    """Return in what share of runs the score is at least each threshold, with the ends of Wilson's intervals.
+    """Return the share of runs with a score of at least each threshold.
+
+    The ends of Wilson's intervals are returned with it.
 
     Parameters
     ----------

@@ -29,7 +29,10 @@ _MOST_VALUES = 65_535
 _CHUNK = 500
 
 Replicates = Callable[[Counts], tuple[Values, Values]]
-"""From counts (resamples, n): the statistic of each resample, and its standard error, both (resamples,)."""
+"""Function from counts (resamples, n) to the statistic of each resample.
+
+It also gives the standard error of each; both have shape (resamples,).
+"""
 
 
 @lru_cache(maxsize=8)
@@ -68,7 +71,10 @@ def resample_counts(size: int, resamples: int, seed: int) -> Counts:
 
 
 def in_parts(replicates: Replicates) -> Replicates:
-    """Return the same function, which works on some resamples at a time so that what it makes on the way stays small."""
+    """Return the same function, working on some resamples at a time.
+
+    Its intermediate results thus stay small.
+    """
 
     def in_turn(counts: Counts) -> tuple[Values, Values]:
         parts = [replicates(counts[first : first + _CHUNK]) for first in range(0, len(counts), _CHUNK)]
@@ -87,7 +93,9 @@ def studentised_interval(
     seed: int,
     is_symmetric: bool = False,
 ) -> Interval:
-    """Return an estimate and its interval from the quantiles q of t = (estimate* - estimate) / error* over resamples.
+    """Return an estimate and its studentised interval.
+
+    The interval is from the quantiles q of t = (estimate* - estimate) / error* over resamples.
 
     With equal tails it goes from estimate - q_high error to estimate - q_low error; the symmetric form takes
     the quantile of |t| on both sides. An error of 0, where all values are equal, gives an interval of no
@@ -126,6 +134,9 @@ def studentised_interval(
 
 
 def _ranked(ratios: Values, share: float) -> float:
-    """Return the value of rank (number + 1) share, which no rounding of the number of resamples makes too near the middle."""
+    """Return the value of rank (number + 1) share.
+
+    No rounding of the number of resamples makes it too near the middle.
+    """
     rank = min(max(round((len(ratios) + 1) * share), 1), len(ratios))
     return float(np.partition(ratios, rank - 1)[rank - 1])

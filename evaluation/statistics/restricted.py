@@ -1,4 +1,6 @@
-"""Restricted means of censored times: the mean of min(T, horizon), with studentised bootstrap intervals.
+"""Restricted means of censored times: the mean of min(T, horizon).
+
+Their intervals are studentised bootstrap intervals.
 
 A time that was cut before the event is censored: the event comes later than that, nobody knows when. The
 restricted mean is the area below the Kaplan-Meier curve S up to a horizon. Where all times are known or cut
@@ -26,7 +28,9 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 
 
 class CensoredTimes:
-    """Times of which some are known only to be greater, ready for their restricted mean.
+    """Times of which some are censored, ready for their restricted mean.
+
+    Censored times are known only to be greater.
 
     Parameters
     ----------
@@ -52,7 +56,8 @@ class CensoredTimes:
         longest = float(known.max())
         if longest < horizon and not happened[known == longest].all():
             raise ValueError(
-                f"the longest time, {longest:g} s, is censored before the horizon of {horizon:g} s; want a horizon of at most {longest:g} s"
+                f"the longest time, {longest:g} s, is censored before the horizon of {horizon:g} s; want a "
+                f"horizon of at most {longest:g} s"
             )
         self.times: Values = np.minimum(known, horizon)
         self.is_observed: NDArray[np.bool_] = happened
@@ -88,7 +93,10 @@ def checked_times(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, NDA
 
 
 def kaplan_meier(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, Values]:
-    """Return the times at which something happened, and the estimated share of runs in which it has not happened after each."""
+    """Return event times and the estimated share of runs without the event.
+
+    The share is that of runs in which it has not happened after each time.
+    """
     known, happened = checked_times(times, is_observed)
     moments, events = np.unique(known[happened], return_counts=True)
     at_risk = len(known) - np.searchsorted(np.sort(known), moments, side="left")
@@ -103,7 +111,9 @@ def restricted_mean(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> Interval:
-    """Return the restricted mean of censored times [s] and its studentised bootstrap interval.
+    """Return the restricted mean of censored times [s] and its interval.
+
+    It is a studentised bootstrap interval.
 
     Parameters
     ----------
@@ -131,7 +141,9 @@ def restricted_mean(
 def restricted_difference(
     a: CensoredTimes, b: CensoredTimes, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
 ) -> Interval:
-    """Return the restricted mean of ``a`` minus that of ``b`` over paired runs [s] and its studentised bootstrap interval.
+    """Return the restricted mean of ``a`` minus that of ``b`` [s] and its interval.
+
+    It is over paired runs, with a studentised bootstrap interval.
 
     Parameters
     ----------
@@ -156,7 +168,9 @@ def restricted_difference(
 def restricted_ratio(
     a: CensoredTimes, b: CensoredTimes, confidence: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
 ) -> Interval:
-    """Return the restricted mean of ``a`` over that of ``b`` over paired runs and its interval, made of logarithms.
+    """Return the restricted mean of ``a`` over that of ``b`` and its interval.
+
+    Both are over paired runs; the interval is made of logarithms.
 
     Parameters and errors as `restricted_difference`; also refused where one of the means is 0.
     """
@@ -180,7 +194,8 @@ def _check_partners(a: CensoredTimes, b: CensoredTimes) -> None:
         raise ValueError(f"the horizon of a is {a.horizon:g} s and that of b {b.horizon:g} s; want the same")
     if not (a.is_observed.any() or b.is_observed.any()):
         raise ValueError(
-            f"nothing was observed up to the horizon of {a.horizon:g} s, neither in a nor in b; want one time at least"
+            f"nothing was observed up to the horizon of {a.horizon:g} s, neither in a nor in b; want one "
+            "time at least"
         )
 
 
@@ -190,7 +205,10 @@ def _unzipped(pairs: Values) -> tuple[Values, Values]:
 
 @kernel
 def _means_of(counts: Array, times: Array, is_observed: Array, order: Array, horizon: float) -> Array:
-    """Return restricted means and their standard errors, (resamples, 2), of resamples (resamples, n) uint16."""
+    """Return restricted means and their standard errors, (resamples, 2).
+
+    They are of resamples (resamples, n) uint16.
+    """
     found = np.empty((counts.shape[0], 2))
     influences = np.empty(times.size)
     areas = np.empty(times.size)
@@ -216,7 +234,10 @@ def _differences_of(
     horizon_b: float,
     is_logarithmic: bool,
 ) -> Array:
-    """Return differences of restricted means, or of their logarithms, and their standard errors, (resamples, 2)."""
+    """Return differences of restricted means and their errors, (resamples, 2).
+
+    The means may be taken as logarithms; the errors are standard errors.
+    """
     size = times_a.size
     found = np.empty((counts.shape[0], 2))
     of_a, of_b, areas = np.empty(size), np.empty(size), np.empty(size)

@@ -1,4 +1,7 @@
-"""What all statistics share: an estimate with its interval, and the checks of what they are given."""
+"""Shared parts of all statistics: an estimate with its interval, and checks.
+
+The checks are of the values that the statistics are given.
+"""
 
 from dataclasses import dataclass
 
@@ -8,7 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 Values = NDArray[np.float64]
 
 FEWEST_FOR_NOMINAL = 50
-"""Sample size from which intervals hold the truth about as often as they say (docs/results/interval_coverage.md)."""
+"""Sample size from which intervals hold the truth about as often as stated.
+
+See docs/results/interval_coverage.md.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +41,10 @@ class Interval:
 
     @property
     def is_nominal(self) -> bool:
-        """Whether the sample is large enough for the interval to hold the truth as often as it says."""
+        """Whether the sample is large enough for the interval to be nominal.
+
+        The interval then holds the truth as often as it says.
+        """
         return self.size >= FEWEST_FOR_NOMINAL
 
 
@@ -80,7 +89,8 @@ def checked_pairs(a: ArrayLike, b: ArrayLike, names: tuple[str, str] = ("a", "b"
     first, second = checked_values(a, names[0]), checked_values(b, names[1])
     if len(first) != len(second):
         raise ValueError(
-            f"{names[0]} has {len(first)} values and {names[1]} has {len(second)}; want as many, each with its partner"
+            f"{names[0]} has {len(first)} values and {names[1]} has {len(second)}; want as many, each with "
+            "its partner"
         )
     return first, second
 

@@ -1,4 +1,6 @@
-"""Runs a suite into a folder: every finished episode is kept at once, and what was interrupted goes on where it stopped.
+"""Runs a suite into a folder, and keeps every finished episode at once.
+
+What was interrupted continues where it stopped.
 
 A folder holds ``suite.json`` (what was asked for), ``episodes.jsonl`` (a line per finished episode) and
 ``records/`` (a record per episode). Episodes depend on their trial alone, never on the worker or on those
@@ -168,7 +170,7 @@ def drawn_starts(
 
 
 def check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:
-    """Check that episodes that are there already are of this version and of the suite's settings.
+    """Check that existing episodes are of this version and the suite's settings.
 
     Raises
     ------
@@ -178,7 +180,8 @@ def check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> No
     for episode in episodes:
         if episode.get("version") != lidarium.__version__:
             raise ValueError(
-                f"{folder} holds episodes of lidarium {episode.get('version')}, this is {lidarium.__version__}; "
+                f"{folder} holds episodes of lidarium {episode.get('version')}, this is "
+                f"{lidarium.__version__}; "
                 "results of two versions are not compared, choose another folder"
             )
     kept = _kept_suite(folder / SUITE_FILE)
@@ -188,11 +191,13 @@ def check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> No
     for name, options in kept.get("policy_settings", {}).items():
         if name in suite.policies and suite.as_dict()["policy_settings"].get(name) != options:
             raise ValueError(
-                f"{folder} holds episodes of policy {name!r} with other settings, {options}; choose another folder"
+                f"{folder} holds episodes of policy {name!r} with other settings, {options}; choose another "
+                "folder"
             )
     if kept and kept.get("stop") != suite.as_dict()["stop"]:
         raise ValueError(
-            f"{folder} holds episodes that ended by the rule {kept.get('stop')}, this suite has {suite.stop}; choose another folder"
+            f"{folder} holds episodes that ended by the rule {kept.get('stop')}, this suite has "
+            f"{suite.stop}; choose another folder"
         )
     for floor, teams in kept.get("starts", {}).items():
         if floor in suite.floors and suite.as_dict()["starts"].get(floor) != teams:
@@ -206,7 +211,8 @@ def _check_same_options(
         before, now = kept.get(option, "its default"), asked.get(option, "its default")
         if before != now:
             raise ValueError(
-                f"{folder} holds episodes of variant {variant!r} with {option} = {before}, this suite has {option} = {now}; "
+                f"{folder} holds episodes of variant {variant!r} with {option} = {before}, this suite has "
+                f"{option} = {now}; "
                 "choose another folder, or another name for the variant"
             )
 

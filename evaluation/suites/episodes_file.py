@@ -1,4 +1,6 @@
-"""A file of finished episodes, one JSON object a line: written at once, never in part, by one writer at a time.
+"""A file of finished episodes, one JSON object a line.
+
+They are written at once, never in part, by one writer at a time.
 
 What is in the file stays there. A line that was cut off when its writer was killed is dropped, with a
 warning; anything else that is wrong is told and left to the user.
@@ -94,20 +96,23 @@ def _parsed(path: Path) -> tuple[list[dict[str, Any]], int]:
     lines = read_lines(path)
     if lines.cut_off is not None:
         warnings.warn(
-            f"{path}, line {lines.cut_off[0]}: the last line was cut off and is left out; its episode runs again",
+            f"{path}, line {lines.cut_off[0]}: the last line was cut off and is left out; its episode runs "
+            "again",
             stacklevel=3,
         )
     episodes: dict[str, dict[str, Any]] = {}
     for number, episode in lines.numbered:
         if not isinstance(episode.get(KEY), str):
             raise ValueError(
-                f"{path}, line {number} has the key {episode.get(KEY)!r}; want text that tells its episode from all others"
+                f"{path}, line {number} has the key {episode.get(KEY)!r}; want text that tells its episode "
+                "from all others"
             )
         known = episodes.setdefault(episode[KEY], episode)
         if known is not episode:
             if _lasting(known) != _lasting(episode):
                 raise ValueError(
-                    f"{path}, line {number}: episode {episode[KEY]!r} is there before, with another end; take one of them out"
+                    f"{path}, line {number}: episode {episode[KEY]!r} is there before, with another end; "
+                    "take one of them out"
                 )
             warnings.warn(
                 f"{path}, line {number}: episode {episode[KEY]!r} is there before; counted once", stacklevel=3
@@ -183,7 +188,8 @@ class EpisodesFile:
             os.ftruncate(self._handle, self._size)
             raise OSError(
                 error.errno,
-                f"{error.strerror or error}; the episodes before are kept, the same command goes on from there",
+                f"{error.strerror or error}; the episodes before are kept, the same command goes on from "
+                "there",
                 str(self.path),
             ) from error
         self._size += len(content)

@@ -1,4 +1,6 @@
-"""Suites as other projects evaluate: their sensor, team, stop rule and figures, on their floors where there are any at hand.
+"""Suites as other projects evaluate: sensor, team, stop rule and figures.
+
+They run on these projects' floors where any are at hand.
 
 Sources: the projects' own scripts at the commits named. What cannot be the same is said in ``differences``;
 the figures of such a run stand beside a project's only where none of them matters.
@@ -97,7 +99,8 @@ PRESETS: dict[str, Preset] = {
         files=("floorplans/synthetic_dungeon/ARiADNE__*.png",),
         differences=(
             _GRAPH,
-            "four of the project's floors, where it has the first hundred of a listing that differs between machines",
+            "four of the project's floors, where it has the first hundred of a listing that differs between "
+            "machines",
         ),
     ),
     "chen": Preset(
@@ -109,7 +112,8 @@ PRESETS: dict[str, Preset] = {
         figures=("path_m", "decisions"),
         files=("floorplans/synthetic_dungeon/DRL_robot_explor__*.png",),
         differences=(
-            "robots drive at 1 m/s with a body of 1 cm; the project jumps to one of 50 places around the robot",
+            "robots drive at 1 m/s with a body of 1 cm; the project jumps to one of 50 places around the "
+            "robot",
         ),
     ),
     "ir2": Preset(
@@ -238,7 +242,9 @@ def preset_named(name: str) -> Preset:
 
 
 def preset_floors(preset: Preset, data: Path | None) -> tuple[str, ...]:
-    """Return the floors of a preset: its files below a folder of real data, else what stands in for them.
+    """Return the floors of a preset.
+
+    They are its files below a folder of real data, else what stands in for them.
 
     Raises
     ------
@@ -254,7 +260,8 @@ def preset_floors(preset: Preset, data: Path | None) -> tuple[str, ...]:
         return tuple(dict.fromkeys(files)) or preset.floors
     where = "no folder of real data was given" if data is None else f"there are none below {data}"
     raise ValueError(
-        f"{preset.project} has floors in files ({', '.join(preset.files)}), and {where}; give --data, or --floors of your own"
+        f"{preset.project} has floors in files ({', '.join(preset.files)}), and {where}; give --data, or "
+        "--floors of your own"
     )
 
 

@@ -1,4 +1,7 @@
-"""What an evaluation asks for: policies x floors x robots x seeds x settings, and the single trials that this makes."""
+"""What an evaluation asks for, and the single trials that this makes.
+
+It asks for policies x floors x robots x seeds x settings.
+"""
 
 import hashlib
 import json
@@ -142,7 +145,8 @@ class Suite:
             for team in teams:
                 if len(team) < max(self.robots) or any(len(start) != 3 for start in team):
                     raise ValueError(
-                        f"a team of starts on {floor!r} is {team}; want x, y, theta of at least {max(self.robots)} robots"
+                        f"a team of starts on {floor!r} is {team}; want x, y, theta of at least "
+                        f"{max(self.robots)} robots"
                     )
 
     def settings(self, variant: str, robots: int) -> ExplorationSettings:
@@ -179,7 +183,10 @@ class Suite:
             raise ValueError(f"policy {name!r} of the suite cannot be made: {error}") from error
 
     def trials(self) -> Iterator[Trial]:
-        """Yield all trials; those that are paired come one after the other, so that a suite that is cut short is still paired."""
+        """Yield all trials, paired ones one after the other.
+
+        A suite that is cut short is therefore still paired.
+        """
         for variant in self.variants:
             for floor in self.floors:
                 teams = range(len(self.starts[floor])) if floor in self.starts else (-1,)

@@ -1,4 +1,7 @@
-"""Work shared out to processes: results come as they are ready, and no worker's death is anyone's but its own task's."""
+"""Work distributed to processes, with results as they are ready.
+
+The death of a worker affects only its own task.
+"""
 
 import ctypes
 import multiprocessing
@@ -24,7 +27,9 @@ WAITING_PER_WORKER = 2
 def shared_out(
     work: Callable[[Task], Result], tasks: Iterable[Task], workers: int, *, is_apart: bool = False
 ) -> Iterator[tuple[Task, Result | Exception]]:
-    """Do tasks in this process (one worker) or in several of their own, and yield each with its result as it is ready.
+    """Do tasks in this process or in several; yield each with its result when ready.
+
+    One worker means this process, more mean processes of their own.
 
     Parameters
     ----------
@@ -113,7 +118,10 @@ def _attempted(work: Callable[[Task], Result], task: Task) -> Result | Exception
 
 
 def _done(work: Callable[[Task], Result], task: Task) -> Result:
-    """Do a task and give the memory back that it has freed: between maps of all sizes, the C library's heap only grows."""
+    """Do a task and give the memory that it has freed back to the system.
+
+    Between maps of all sizes, the C library's heap only grows.
+    """
     try:
         return work(task)
     finally:
@@ -122,7 +130,10 @@ def _done(work: Callable[[Task], Result], task: Task) -> Result:
 
 
 def _begin_worker() -> None:
-    """Leave interrupts to the parent, and keep libraries to one thread: there are as many processes as cores."""
+    """Leave interrupts to the parent, and keep libraries to one thread.
+
+    There are as many processes as cores.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     import cv2
 
@@ -131,7 +142,10 @@ def _begin_worker() -> None:
 
 
 def _leave_with_parent() -> None:
-    """End this process when its parent is gone, killed perhaps, with nobody left to take the results."""
+    """End this process when its parent is gone.
+
+    The parent may have been killed, which leaves nobody to take the results.
+    """
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

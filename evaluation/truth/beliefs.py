@@ -9,7 +9,9 @@ from lidarium.envs.exploration import ExplorationEnv
 
 
 def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
-    """Return the robots' log-odds on the lattice of the scorer's masks, (robots, rows, columns) int8; 0 beyond a map.
+    """Return the robots' log-odds on the lattice of the scorer's masks.
+
+    The shape is (robots, rows, columns) int8; 0 beyond a map.
 
     Maps of robots that do not know their starts are laid over it by their true starts: with true poses that
     is the best fit of the trajectories.
@@ -37,7 +39,10 @@ def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
 
 
 def cells_beyond(env: ExplorationEnv, row: int) -> tuple[int, int]:
-    """Return by how many rows and columns the map of a robot that knows its start begins before the lattice of the scorer's masks."""
+    """Return the rows and columns by which a robot's map begins before the masks.
+
+    The robot knows its start; the lattice is that of the scorer's masks.
+    """
     tables, resolution = env.world.floors[0], env.settings.occupancy.resolution
     assert tables is not None
     x, y = (corner - own for corner, own in zip(tables.laser.origin, env.beliefs.origins[row], strict=True))
@@ -45,14 +50,19 @@ def cells_beyond(env: ExplorationEnv, row: int) -> tuple[int, int]:
 
 
 def on_floor(env: ExplorationEnv, row: int, log_odds: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Return the part of the map of a robot that knows its start that lies on the lattice of the scorer's masks, (rows, columns)."""
+    """Return a robot's map on the lattice of the scorer's masks, (rows, columns).
+
+    The part that lies on it is taken; the robot knows its start.
+    """
     first_row, first_column = cells_beyond(env, row)
     rows, words = env.score.counted_masks[0].shape
     return log_odds[first_row : first_row + rows, first_column : first_column + words * 64]
 
 
 def team_log_odds(env: ExplorationEnv) -> tuple[NDArray[np.int16], tuple[float, float]]:
-    """Return the sum of the robots' maps, and the lower left corner of its cell (0, 0) in the floor's frame [m].
+    """Return the sum of the robots' maps and its lower left corner [m].
+
+    The corner is that of cell (0, 0), in the floor's frame.
 
     The lattice is that of the scorer's masks; see `maps_on_floor`.
     """
@@ -62,12 +72,18 @@ def team_log_odds(env: ExplorationEnv) -> tuple[NDArray[np.int16], tuple[float, 
 
 
 def shares_one_map(env: ExplorationEnv) -> bool:
-    """Return whether the robots' maps reach all of them: with known starts and the ideal radio each holds the sum of all."""
+    """Return whether the robots' maps reach all of them.
+
+    With known starts and the ideal radio each holds the sum of all.
+    """
     return env.settings.known_starts and env.settings.robots > 1 and env.settings.radio.is_ideal
 
 
 def held_maps(env: ExplorationEnv) -> list[NDArray[np.int8]]:
-    """Return what each robot holds by a radio that is not ideal: its map and those that reached it, summed, on the masks' lattice."""
+    """Return the summed map that each robot holds, on the masks' lattice.
+
+    The radio is not ideal: the sum is of its own map and those that reached it.
+    """
     held = [env.perception.shared_map(row) for row in range(env.settings.robots)]
     return [
         on_floor(env, row, navigation.log_odds)
@@ -77,7 +93,9 @@ def held_maps(env: ExplorationEnv) -> list[NDArray[np.int8]]:
 
 
 def free_as_held(env: ExplorationEnv, maps: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Return which cells each robot holds to be free, by its own map or, where it reaches it, the team's.
+    """Return which cells each robot holds to be free.
+
+    A cell is free by its own map or, where the team's map reaches it, by the team's.
 
     Parameters
     ----------

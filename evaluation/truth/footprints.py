@@ -1,4 +1,7 @@
-"""What the robots of a team see from where they stand, and how much of it several see at once."""
+"""Footprints of a team: what its robots see, and how much several see at once.
+
+The robots see it from where they stand.
+"""
 
 import numpy as np
 

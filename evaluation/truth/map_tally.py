@@ -1,4 +1,7 @@
-"""Counts what the robots' maps know, in step with them: only what lies within reach of where a robot has been since is looked at."""
+"""Counts what the robots' maps know, in step with them.
+
+Only what lies within reach of where a robot has been since is examined.
+"""
 
 import math
 
@@ -17,13 +20,19 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_grid_at
 
 KNOWABLE, VALID, COUNTED = range(3)
-"""Places of the true masks, and of what is counted: known cells within the first and the second, free ones within the third."""
+"""Places of the true masks, and of the counts made with them.
+
+Counted are known cells within the first and the second, and free cells within the third.
+"""
 
 KNOWN, FREE = range(2)
 """Places of the bits of a map."""
 
 SLACK = 4
-"""Cells by which a map may change beyond the longest range: a hit lies in the cell beyond its beam."""
+"""Cells by which a map may change beyond the longest range.
+
+A hit lies in the cell beyond its beam.
+"""
 
 
 @kernel
@@ -37,7 +46,10 @@ def _cells_beyond(world: WorldArrays, row: int, episode: int) -> tuple[int, int]
 def _box(
     world: WorldArrays, row: int, episode: int, pose: Array, way: float, change: Array, shape: tuple[int, int]
 ) -> tuple[int, int, int, int]:
-    """Rows and words that a robot's scans may have changed since it stood at a pose: row_low, row_high, word_low, word_high."""
+    """Return the rows and words that a robot's scans may have changed since a pose.
+
+    They are row_low, row_high, word_low, word_high, since the robot stood at the pose.
+    """
     resolution, frame = world.sensor[MAP_RESOLUTION], world.frames[episode]
     first_row, first_column = _cells_beyond(world, row, episode)
     if not world.flags[row] & TRUE_POSE:
@@ -83,7 +95,10 @@ def _free_of_sum(
 def _recount_free(
     truth: Array, bits: Array, counts: Array, who: int, i: int, j: int, free: np.uint64
 ) -> None:
-    """Put new bits of free cells in place of the old ones, and change the count by the difference."""
+    """Replace old bits of free cells by new ones, and update the count.
+
+    The count changes by the difference.
+    """
     old = bits[who, i, j, FREE]
     if free != old:
         counts[who, COUNTED] += count_bits(free & truth[COUNTED, i, j]) - count_bits(
@@ -139,7 +154,10 @@ def _take_in_aligned(
     counts: Array,
     box: tuple[int, int, int, int],
 ) -> None:
-    """Bring up to date what comes of a map on the floor's lattice, in a box of rows and words."""
+    """Update the counts for a map on the floor's lattice.
+
+    The update is in a box of rows and words.
+    """
     own, columns = bits[robot], world.belief_rows[first + robot, 2]
     first_row, first_column = _cells_beyond(world, first + robot, first // robots)
     address = world.belief_rows[first + robot, 0] + first_row * columns + first_column
@@ -174,7 +192,9 @@ def _take_in_turned(
     counts: Array,
     change: Array,
 ) -> None:
-    """Bring up to date what comes of a map in a frame of its own: lay each cell that has changed over the floor's lattice.
+    """Update the counts for a map in a frame of its own.
+
+    Each cell that has changed is transformed to the floor's lattice.
 
     ``signs`` (rows, words, 2) are the bits on the map's own lattice. As in `beliefs.maps_on_floor`, a cell of
     the floor is what the cell of the map says in which its centre lies.
@@ -283,7 +303,10 @@ def _take_in(
 
 @kernel
 def _note_changes(windows: Array, changes: Array) -> None:
-    """Extend what has changed (robots, 4) by windows, which planning begins anew whenever it takes a map in."""
+    """Extend the windows of changes (robots, 4) by those of the maps.
+
+    Planning begins the latter anew whenever it takes a map in.
+    """
     for row in range(changes.shape[0]):
         changes[row, 0], changes[row, 1] = (
             min(changes[row, 0], windows[row, 0]),
@@ -360,7 +383,10 @@ class MapTally:
 
     @property
     def known_shares(self) -> NDArray[np.float64]:
-        """``C_known`` of each robot's own map when the maps were taken in last, shape (robots,)."""
+        """Return ``C_known`` of each robot's own map at the last update, (robots,).
+
+        The last update is when the maps were taken in last.
+        """
         known = np.bitwise_count(self._bits[:-1, :, :, KNOWN] & self._truth[KNOWABLE]).sum(
             axis=(1, 2), dtype=np.int64
         )

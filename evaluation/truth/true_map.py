@@ -53,7 +53,9 @@ def truth_of(env: ExplorationEnv) -> Truth:
 
 
 def left_by_failed(env: ExplorationEnv) -> Mask | None:
-    """Return the part of F that the others can get to past the bodies of robots that have failed, from where they are now.
+    """Return the part of F that the others can reach past failed robots' bodies.
+
+    They reach it from where they are now.
 
     None where none has failed, or all have.
     """
@@ -80,7 +82,10 @@ def left_by_failed(env: ExplorationEnv) -> Mask | None:
 
 
 def occupied_in_truth(env: ExplorationEnv) -> NDArray[np.bool_]:
-    """Return the truth on the lattice of the maps: cells of which any of the world's cells is solid; free beyond the world's raster."""
+    """Return the true occupied cells on the lattice of the maps.
+
+    A cell is occupied where any of the world's cells in it is solid, and free beyond the world's raster.
+    """
     tables = env.world.floors[0]
     assert tables is not None
     raster = tables.laser

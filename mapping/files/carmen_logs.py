@@ -1,4 +1,6 @@
-"""Logs of the CARMEN robot navigation toolkit: text, a message a line, plain or gzipped.
+"""Logs of the CARMEN robot navigation toolkit: text, a message a line.
+
+They are plain or gzipped.
 
 Read are FLASER and ROBOTLASER1 (scans), ODOM (odometry) and PARAM (where the laser is). A scan's odometry
 stands in its own line. GridFastSLAM, which says so by NEFF lines, puts its own result there, in scans and in
@@ -127,7 +129,10 @@ def _numbers(words: list[str], count: int) -> list[float]:
 
 
 def _flaser(words: list[str]) -> _Scan:
-    """Read ``FLASER n ranges laser_pose robot_pose stamp host logger_stamp``, of which old logs lack the last two."""
+    """Read a ``FLASER`` line, of which old logs lack the last two values.
+
+    It is ``FLASER n ranges laser_pose robot_pose stamp host logger_stamp``.
+    """
     beams = int(words[1])
     ranges, tail = [float(word) for word in words[2 : 2 + beams]], words[2 + beams :]
     if beams < 1 or len(ranges) != beams:
@@ -142,7 +147,10 @@ def _flaser(words: list[str]) -> _Scan:
 
 
 def _robotlaser(words: list[str]) -> _Scan:
-    """Read type, start, field of view, step, longest range, accuracy, mode, n, ranges, m, remissions, laser, robot, and what follows.
+    """Read the values of a robot-laser message.
+
+    They are type, start, field of view, step, longest range, accuracy, mode, n, ranges, m, remissions,
+    laser, robot, and what follows.
 
     These are five numbers on the drive, the stamp, the host and the logger's stamp.
     """
@@ -233,7 +241,10 @@ def _has_odometry(before: NDArray[np.int64], is_own: NDArray[np.bool_]) -> bool:
 def _chained(
     readings: NDArray[np.float64], scans_before: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the sum of the motions between readings, and which of these are odometry: the first after a scan is the scan's pose."""
+    """Return the sum of the motions between readings, and which are odometry.
+
+    The first reading after a scan is the scan's pose.
+    """
     is_own = np.ones(len(readings), np.bool_)
     is_own[scans_before[scans_before < len(readings)]] = False
     chained = np.zeros_like(readings)
@@ -254,7 +265,10 @@ def _max_range(ranges: NDArray[np.float32], first: _Scan) -> float:
 
 
 def _mounting(content: _Content, first: _Scan) -> NDArray[np.float64]:
-    """Return the laser's pose on the robot: of the parameters, or where the first scan's line has two poses."""
+    """Return the laser's pose on the robot.
+
+    It is from the parameters, or, where the first scan's line has two poses, from them.
+    """
     if "robot_frontlaser_offset" in content.parameters:
         return np.array([_parameter(content, "robot_frontlaser_offset", 0.0), 0.0, 0.0])
     return relative(np.array(first.robot_pose), np.array(first.laser_pose))

@@ -1,4 +1,6 @@
-"""Recorded scans with odometry: what a log holds, how it is made fit for use, and a format of our own.
+"""Recorded scans with odometry: content of a log, and a format of our own.
+
+A log is made fit for use.
 
 The format is an npz archive with these arrays (times n, beams b), of which the first three have to be there:
 
@@ -102,7 +104,10 @@ class LaserLog:
 
 
 def made_usable(log: LaserLog, where: str) -> LaserLog:
-    """Return a log without what cannot be used: scans without any finite stamp, or back in time; odometry that says nothing.
+    """Return a log without unusable scans and odometry.
+
+    Scans are dropped without any finite stamp or where stamps go back in time. Odometry is dropped where
+    it contains no information.
 
     Where most stamps stand still or run backwards, the clock is useless, and scans are numbered by the second
     instead.
@@ -127,7 +132,8 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
         skipped["scans back in time"] = int((~is_kept).sum())
     if not is_kept.any():
         raise ValueError(
-            f"{where} holds no scan that can be used; want FLASER or ROBOTLASER1 lines, or an npz with ranges and stamps"
+            f"{where} holds no scan that can be used; want FLASER or ROBOTLASER1 lines, or an npz with "
+            "ranges and stamps"
         )
     odometry = None if log.odometry is None else log.odometry[is_kept]
     if odometry is not None and (
@@ -149,7 +155,9 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
 def symmetric_scans(
     ranges: NDArray[np.float32], angle_min: float, increment: float, reach: tuple[float, float]
 ) -> tuple[NDArray[np.float32], ScanGeometry]:
-    """Return scans with invalid beams added on one side, so that they are symmetric about the heading, and their geometry.
+    """Return scans symmetric about the heading, and their geometry.
+
+    Invalid beams are added on one side.
 
     Parameters
     ----------
@@ -170,7 +178,8 @@ def symmetric_scans(
         increment > 0.0 and beams * increment < 2.0 * math.pi + 1.5 * increment and math.isfinite(angle_min)
     ):
         raise ValueError(
-            f"{beams} beams from {angle_min} rad in steps of {increment} rad; want steps of more than 0 within a circle"
+            f"{beams} beams from {angle_min} rad in steps of {increment} rad; want steps of more than 0 "
+            "within a circle"
         )
     if beams * increment > 2.0 * math.pi + 1e-6:
         # The last beam repeats the first.

@@ -71,7 +71,8 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     low, high = _number(yaml_path, header, "free_thresh"), _number(yaml_path, header, "occupied_thresh")
     if not 0.0 <= low < high <= 1.0:
         raise ValueError(
-            f"{yaml_path}: free_thresh is {low} and occupied_thresh {high}; want 0 <= free_thresh < occupied_thresh <= 1"
+            f"{yaml_path}: free_thresh is {low} and occupied_thresh {high}; want 0 <= free_thresh < "
+            "occupied_thresh <= 1"
         )
     mode = str(header.get("mode", "trinary"))
     if mode not in _MODES:
@@ -89,7 +90,9 @@ def read_ros_map(yaml_path: Path) -> MapImage:
 
 
 def read_grey_map(path: Path, resolution: float) -> MapImage:
-    """Read a plain image as a map: black is occupied, white free, and what lies between is unknown.
+    """Read a plain image as a map.
+
+    Black is occupied, white is free, and values between are unknown.
 
     Parameters
     ----------
@@ -153,7 +156,8 @@ def write_ros_map(
         raise ValueError(f"map {name!r} has shape {levels.shape}; want rows and columns")
     if not np.isin(levels, list(_PGM_LEVELS)).all():
         raise ValueError(
-            f"map {name!r} has levels {np.unique(levels)[:6]}; want only {OCCUPIED} occupied, {UNKNOWN} unknown, {FREE} free"
+            f"map {name!r} has levels {np.unique(levels)[:6]}; want only {OCCUPIED} occupied, {UNKNOWN} "
+            f"unknown, {FREE} free"
         )
     if len(origin) != 3 or not np.isfinite(origin).all():
         raise ValueError(f"map {name!r} has origin {origin}; want (x, y, yaw) in metres and radians")
@@ -184,7 +188,9 @@ def write_ros_map(
 def cropped(
     levels: NDArray[np.uint8], origin: tuple[float, float], resolution: float, margin: int = 4
 ) -> tuple[NDArray[np.uint8], tuple[float, float]]:
-    """Return the part of a map that is known, with a margin [cells] where the map has one, and its lower left corner [m].
+    """Return the known part of a map and its lower left corner [m].
+
+    The part includes a margin [cells] where the map has one.
 
     Parameters
     ----------

@@ -28,7 +28,9 @@ _WEIGHT_STEP = 0.25
 
 
 def write_spline_map(path: Path, spline_map: SplineMap) -> None:
-    """Write a map, as JSON where the name ends in ``.json``, compact where it ends in ``.npz``; whole or not at all.
+    """Write a map as JSON or in compact form, whole or not at all.
+
+    JSON where the name ends in ``.json``, compact where it ends in ``.npz``.
 
     Raises
     ------
@@ -147,7 +149,10 @@ def from_compact_arrays(arrays: dict[str, NDArray[Any]], settings: SplineSetting
 
 
 def _kept_points(spline: Spline) -> NDArray[np.float64]:
-    """Return the control points that determine a curve: of a straight one the first and the last."""
+    """Return the control points that determine a curve.
+
+    For a straight curve, the first and the last.
+    """
     points = spline.control_points
     if len(points) == ORDER:
         evenly = points[0] + np.linspace(0.0, 1.0, ORDER)[:, None] * (points[-1] - points[0])
@@ -157,7 +162,10 @@ def _kept_points(spline: Spline) -> NDArray[np.float64]:
 
 
 def _restored(points: NDArray[np.float64], shares: NDArray[np.float64]) -> Spline:
-    """Return the curve of kept control points and inner knots, with knots along it in metres."""
+    """Return the curve of kept control points and inner knots.
+
+    Its knots are along the curve, in metres.
+    """
     if len(points) == 2:
         points = points[0] + np.linspace(0.0, 1.0, ORDER)[:, None] * (points[1] - points[0])
     knots = np.concatenate([np.zeros(ORDER), shares, np.ones(ORDER)])

@@ -16,7 +16,9 @@ from lidarium.mapping.geometry.rigid import composed, relative
 
 
 def write_tum(path: Path, stamps: NDArray[np.float64], poses: NDArray[np.float64]) -> None:
-    """Write stamps (n,) [s] and poses x, y, theta (n, 3) [m, rad], whole or not at all.
+    """Write stamps (n,) [s] and poses (n, 3), whole or not at all.
+
+    Poses are x, y, theta [m, rad].
 
     Raises
     ------
@@ -82,7 +84,10 @@ def read_numbers(path: Path, columns: int, what: str) -> NDArray[np.float64]:
 def interpolated(
     stamps: NDArray[np.float64], poses: NDArray[np.float64], times: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return poses (times, 3) at constant speed between the poses (n, 3) at stamps (n,); the first and the last beyond them."""
+    """Return poses (times, 3) interpolated at constant speed.
+
+    The given poses (n, 3) are at stamps (n,). Beyond them, the first or the last pose holds.
+    """
     if len(stamps) == 1:
         return np.repeat(poses, len(times), axis=0)
     after = np.clip(np.searchsorted(stamps, times), 1, len(stamps) - 1)
@@ -94,7 +99,7 @@ def interpolated(
 def at_readings(
     poses: NDArray[np.float64], numbers: NDArray[np.int64], readings: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return poses (readings, 3) that go through known ones and between them as odometry does.
+    """Return poses (readings, 3) through known poses, with odometry between them.
 
     Parameters
     ----------
@@ -124,7 +129,9 @@ def last_before(
     times: NDArray[np.float64],
     tolerance: float = 0.006,
 ) -> NDArray[np.float64]:
-    """Return the pose (times, 3) with the stamp nearest to each time, if as near as a tolerance [s], else with the last stamp before.
+    """Return the pose (times, 3) with the stamp nearest to each time.
+
+    Where the nearest stamp is farther than a tolerance [s], the pose with the last stamp before.
 
     Of poses with one and the same stamp the mean: a clock of few digits does not tell them apart.
     """

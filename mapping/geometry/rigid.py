@@ -47,7 +47,11 @@ class Transform:
         )
 
     def difference(self, other: "Transform", at: ArrayLike = (0.0, 0.0)) -> tuple[float, float]:
-        """Return how far the images of a point under both lie apart [m], and the angle between them [rad]."""
+        """Return by how much two transforms differ at a point [m, rad].
+
+        The distance between the point's images under both [m], and the angle between the transforms
+        [rad].
+        """
         return float(np.linalg.norm(self.apply(at) - other.apply(at))), abs(wrapped(self.theta - other.theta))
 
 
@@ -57,19 +61,25 @@ def wrapped(angle: float) -> float:
 
 
 def yaw_of_quaternion(z: float, w: float) -> float:
-    """Return the angle in (-pi, pi] of a rotation about the vertical, of the quaternion (0, 0, z, w), of whatever length and sign."""
+    """Return the angle in (-pi, pi] of a rotation about the vertical.
+
+    The quaternion is (0, 0, z, w), of any length and sign.
+    """
     return wrapped(2.0 * math.atan2(z, w))
 
 
 def halfway(first: Transform, second: Transform, at: ArrayLike) -> Transform:
-    """Return the motion half way between two, which takes a point half way between its images."""
+    """Return the motion midway between two motions.
+
+    It takes a point to the middle between its images.
+    """
     turn = Transform(0.0, 0.0, wrapped(first.theta + 0.5 * wrapped(second.theta - first.theta)))
     x, y = (0.5 * (first.apply(at) + second.apply(at)) - turn.apply(at)).tolist()
     return Transform(x, y, turn.theta)
 
 
 def fit(source: NDArray[np.float64], target: NDArray[np.float64]) -> Transform:
-    """Return the rigid motion that brings points nearest to others in the sense of least squares.
+    """Return the rigid motion that best aligns points with others by least squares.
 
     Parameters
     ----------
@@ -98,7 +108,10 @@ def fit(source: NDArray[np.float64], target: NDArray[np.float64]) -> Transform:
 
 
 def composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return poses x, y, theta (..., 3) given in the frames ``outer`` (..., 3), in the frame of these [m, rad]."""
+    """Return poses (..., 3) transformed out of the frames ``outer`` [m, rad].
+
+    Poses are x, y, theta, given in the frames ``outer`` (..., 3), and returned in the frame of these.
+    """
     cosine, sine = np.cos(outer[..., 2]), np.sin(outer[..., 2])
     x, y = inner[..., 0], inner[..., 1]
     return np.stack(
@@ -112,7 +125,10 @@ def composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[
 
 
 def relative(frame: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return poses x, y, theta (..., 3) as seen from the frames (..., 3) [m, rad]: ``composed(frame, relative(frame, pose)) = pose``."""
+    """Return poses (..., 3) relative to frames (..., 3) [m, rad].
+
+    Poses are x, y, theta: ``composed(frame, relative(frame, pose)) = pose``.
+    """
     cosine, sine = np.cos(frame[..., 2]), np.sin(frame[..., 2])
     x, y = pose[..., 0] - frame[..., 0], pose[..., 1] - frame[..., 1]
     return np.stack([cosine * x + sine * y, cosine * y - sine * x, _turned(pose, frame, -1.0)], axis=-1)

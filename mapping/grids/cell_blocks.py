@@ -1,4 +1,6 @@
-"""Blocks of 64 cells at once: what kernels do to log-odds and distances by the word.
+"""Operations on blocks of 64 cells of log-odds and distances at once.
+
+Kernels use them to process cells by the word.
 
 A word of bits says which cells of a block are meant. LLVM turns the operations on vectors of 64 numbers into
 what the machine has, whatever the width of its registers; numba cannot write them as loops, since it keeps no
@@ -114,7 +116,10 @@ def _fetch(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
 
 
 def _sum_blocks(typing_context: Any, first: Any, second: Any, result: Any) -> Any:  # noqa: ANN401
-    """Write the sum of two blocks, cut to [-127, 127], where it is another than what is there."""
+    """Write the sum of two blocks, clipped to [-127, 127], where it has changed.
+
+    The sum is written only where it differs from the present values.
+    """
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         one, other, old = (load_at(builder, address, BYTES) for address in arguments)
@@ -137,7 +142,10 @@ def _greatest_of_groups(
     halvings: Any,  # noqa: ANN401
     result: Any,  # noqa: ANN401
 ) -> Any:  # noqa: ANN401
-    """Write the greatest of the blocks of some rows, and of neighbours in it, halved and halved again."""
+    """Write the maximum of the blocks of some rows and of groups of neighbours.
+
+    Each halving takes the maximum of two neighbours.
+    """
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         rows_at, stride, count, least, halvings, result_at = arguments
@@ -165,7 +173,10 @@ def _greatest_of_groups(
 
 
 def _levels_of(cells: int) -> Any:  # noqa: ANN401
-    """Return what writes so many log-odds as levels: 0 where positive, 127 at zero, 255 where negative."""
+    """Return a function that writes so many log-odds as levels.
+
+    Levels: 0 where positive, 127 at zero, 255 where negative.
+    """
 
     def levels_of(typing_context: Any, log_odds: Any, levels: Any) -> Any:  # noqa: ANN401
         def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
@@ -262,7 +273,10 @@ def fetch_block(address: int) -> None:
 
 @kernel(inline=True)
 def sum_blocks(first: int, second: int, result: int) -> None:
-    """Write the sum of two blocks of int8, cut to [-127, 127], into a third, which may be one of them; not where it is there already."""
+    """Write the sum of two int8 blocks, clipped to [-127, 127], into a third.
+
+    The third may be one of the two. Nothing is written where the sum is there already.
+    """
     _sum(first, second, result)
 
 
@@ -286,7 +300,10 @@ def write_greatest(rows: int, stride: int, count: int, least: int, halvings: int
 
 @kernel(inline=True)
 def write_levels(log_odds: int, levels: int) -> None:
-    """Write 32 cells of int8 as levels of uint8: 0 occupied where positive, 127 unknown at zero, 255 free where negative."""
+    """Write 32 int8 cells as uint8 levels.
+
+    Levels: 0 occupied where positive, 127 unknown at zero, 255 free where negative.
+    """
     _half_block_of_levels(log_odds, levels)
 
 
@@ -298,7 +315,10 @@ def write_block_of_levels(log_odds: int, levels: int) -> None:
 
 @kernel(inline=True)
 def sign_bits(address: int) -> tuple[np.uint64, np.uint64]:
-    """Return which of the 64 int16 at an address are below 0, and which are above, bit 0 the first one."""
+    """Return which of 64 int16 at an address are below 0, and which above.
+
+    Bit 0 is the first one.
+    """
     return _signs(address)  # type: ignore[no-any-return]
 
 

@@ -102,7 +102,10 @@ def line_is_open(log_odds: NDArray[np.int8], row: int, column: int, to_row: int,
 
 @kernel
 def line_is_free(log_odds: NDArray[np.int8], row: int, column: int, to_row: int, to_column: int) -> bool:
-    """Whether all cells from one to another, the last included, are known to be free (kernel)."""
+    """Whether all cells from one to another are known to be free (kernel).
+
+    The last cell is included.
+    """
     row_step = 1 if to_row > row else -1
     column_step = 1 if to_column > column else -1
     rise = abs(to_row - row)

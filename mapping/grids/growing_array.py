@@ -46,5 +46,8 @@ class GrowingArray:
 
     @property
     def rows(self) -> NDArray[Any]:
-        """All rows so far, shape (rows, ...): a view, which rows that come later do not change."""
+        """All rows so far, shape (rows, ...).
+
+        A view, which later rows do not change.
+        """
         return self._room[: self._count]

@@ -1,4 +1,6 @@
-"""Crops of a map around a robot as three levels: along the axes of the map, and turned with the robot at several scales.
+"""Crops of a map around a robot as three levels.
+
+Crops are aligned with the map's axes, or rotated with the robot at several scales.
 
 A crop at scale s shows s x s cells of the map as one, by their greatest log-odds: occupied where any is, else
 unknown where any is, else free. Such pooled maps are kept beside the map and brought up to date where it has
@@ -52,7 +54,10 @@ def _write_row(log_odds: int, count: int, levels: int) -> None:
 
 @kernel(borrowing=True)
 def crop_levels(log_odds: Array, row: int, column: int, crop: Array) -> None:
-    """Copy the cells around (row, column) into ``crop`` (side, side), contiguous, as levels; unknown outside of the map."""
+    """Copy the cells around (row, column) into ``crop`` (side, side) as levels.
+
+    ``crop`` is contiguous. Cells outside of the map are unknown.
+    """
     side = crop.shape[0]
     first_row, first_column = row - side // 2, column - side // 2
     rows, columns = log_odds.shape
@@ -88,7 +93,10 @@ def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Arra
 
 @kernel(borrowing=True)
 def turn_in_registers(pools: Array, x: float, y: float, heading: float, scales: Array, crops: Array) -> None:
-    """Fill the crops of ``crop_turned`` by blocks: of a side that is a multiple of ``BLOCK_SIDE``, where ``CAN_LOOK_UP_IN_REGISTERS``."""
+    """Fill the crops of ``crop_turned`` by blocks.
+
+    The side must be a multiple of ``BLOCK_SIDE``, and ``CAN_LOOK_UP_IN_REGISTERS`` true.
+    """
     cosine, sine = math.cos(heading), math.sin(heading)
     half = _half_patch(crops.shape[1], cosine, sine)
     corners = scratch_grid(scales.shape[0], 2, np.int64)
@@ -110,13 +118,19 @@ def _half_patch(cells: int, cosine: float, sine: float) -> int:
 
 @kernel(inline=True)
 def _nearest_corner(x: float, y: float, scale: int) -> tuple[int, int]:
-    """Return row and column of the corner of pooled cells that is nearest to a place [cells of the map]."""
+    """Return row and column of the corner of pooled cells nearest to a place.
+
+    The place is given in cells of the map.
+    """
     return int(math.floor(y / scale + 0.5)), int(math.floor(x / scale + 0.5))
 
 
 @kernel
 def _look_up(patch: Array, places: Array, crop: Array) -> None:
-    """Write what a patch has at each of the places into a crop, four cells at a time: a core loads more often than it can store."""
+    """Write the values of a patch at each of the places into a crop.
+
+    Four cells are written at a time: a core can load more often than it can store.
+    """
     for word in range(crop.size):
         place = 4 * word
         low = np.uint32(patch[places[place]]) | (np.uint32(patch[places[place + 1]]) << np.uint32(8))
@@ -126,7 +140,10 @@ def _look_up(patch: Array, places: Array, crop: Array) -> None:
 
 @kernel
 def _touched_columns(cells: int, half: int, cosine: float, sine: float, spans: Array) -> None:
-    """Tell which columns of each row of a patch the turned crop covers, in whole blocks: (rows, 2), high ends exclusive."""
+    """Find the columns of each row of a patch that the rotated crop covers.
+
+    In whole blocks, shape (rows, 2), high ends exclusive.
+    """
     # Each pair of parallel sides of the crop bounds the columns of a row; near the axes one of them hardly
     # does.
     along, across = max(abs(cosine), 1e-9), max(abs(sine), 1e-9)
@@ -146,7 +163,10 @@ def _touched_columns(cells: int, half: int, cosine: float, sine: float, spans: A
 
 @kernel
 def _copy_levels(pooled: Array, first_row: int, first_column: int, spans: Array, patch: Array) -> None:
-    """Fill the spans of a patch (rows * width) with the levels of a pooled map from (first_row, first_column) on."""
+    """Fill the spans of a patch (rows * width) with levels of a pooled map.
+
+    The levels are those from (first_row, first_column) on.
+    """
     (rows, columns), width = pooled.shape, patch.size // spans.shape[0]
     inside_low, inside_high = min(max(0, -first_column), width), max(min(width, columns - first_column), 0)
     for row in range(spans.shape[0]):
@@ -161,7 +181,10 @@ def _copy_levels(pooled: Array, first_row: int, first_column: int, spans: Array,
 
 @kernel
 def _places(half: int, width: int, step_x: int, step_y: int, cells: int) -> Array:
-    """Return where in a patch, row * width + column, the centre of each cell of the crop lies: (cells * cells,) uint32."""
+    """Return the place in a patch of each crop cell's centre: (cells * cells,).
+
+    Places are row * width + column, uint32.
+    """
     stride = np.uint32(width)
     forward_x, forward_y = np.empty(cells, np.int32), np.empty(cells, np.int32)
     for j in range(cells):

@@ -17,17 +17,25 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_at, word_grid_at
 
 _GROUP = 8
-"""Cells of a turned map that are compared at once, and of the lattice that are looked at anew: as many as bytes fit into a word."""
+"""Cells of a rotated map compared, or lattice cells recomputed, at once.
+
+As many as bytes fit into a word.
+"""
 
 _ALL = np.uint64(2**64 - 1)
 
 CORNER_X, CORNER_Y, START_X, START_Y, COSINE, SINE, ORIGIN_X, ORIGIN_Y = range(8)
-"""Places in a lay: the lattice's corner, the start and its heading, and the map's corner in the start's frame."""
+"""Indices into the array that places a robot's map on the lattice.
+
+The lattice's corner, the start and its heading, and the map's corner in the start's frame.
+"""
 
 
 @kernel
 def _spans(poses: Array, last: Array, reach: float, frame: Array) -> Array:
-    """Return the cells that robots can have seen since they were at ``last``, which becomes where they are now: (robots, 4).
+    """Return the cells that robots can have seen since ``last``: (robots, 4).
+
+    ``last`` holds their earlier places, and is set to the present ones.
 
     Columns and rows in the grid of ``frame`` (3,), corner and side of a cell: column_low, column_high,
     row_low, row_high.
@@ -46,7 +54,11 @@ def _spans(poses: Array, last: Array, reach: float, frame: Array) -> Array:
 def _note_word(
     sums: int, where: np.uint64, row: int, word: int, known: Array, occupied: Array, change: Array
 ) -> bool:
-    """Compare 64 sums, int16 at an address, with a word of the planes in the bits ``where``; write into ``change`` (3,) what flipped."""
+    """Compare 64 sums with a word of the planes and record flipped bits.
+
+    The sums are int16 at an address. Only bits ``where`` are compared; flips are written into ``change``
+    (3,).
+    """
     is_free, is_occupied = sign_bits(sums)
     flipped_known, flipped_occupied = (
         ((is_free | is_occupied) ^ known[row, word]) & where,
@@ -80,7 +92,9 @@ def note_changes(
     occupied: Array,
     changes: Array,
 ) -> int:
-    """Bring the planes of a team's map up to date where its robots' maps, all on one lattice, may have changed.
+    """Update the planes of a team's map where its robots' maps may have changed.
+
+    All robots' maps are on one lattice.
 
     Parameters
     ----------
@@ -134,7 +148,10 @@ def note_changes(
 def _mark_stale(
     log_odds: Array, before: int, lay: Array, resolution: float, span: Array, stale: Array
 ) -> None:
-    """Mark the groups of the lattice over cells that changed since ``before`` (an address), which becomes what is now."""
+    """Mark the groups of the lattice over cells that changed since ``before``.
+
+    ``before`` is an address; its cells are set to the present ones.
+    """
     rows, groups = stale.shape
     now_groups = word_grid_at(log_odds[0], log_odds[1], log_odds[2] // _GROUP)
     old_groups = word_grid_at(before, log_odds[1], log_odds[2] // _GROUP)
@@ -170,7 +187,10 @@ def _mark_stale(
 def _add_laid_group(
     log_odds: Array, lay: Array, resolution: float, row: int, first: int, total: Array
 ) -> None:
-    """Add the cells of a turned map that lie below the centres of a group of the lattice, from column ``first`` on."""
+    """Add the cells of a rotated map that lie below a group of the lattice.
+
+    A cell counts where it lies below the centre of a lattice cell, from column ``first`` on.
+    """
     cosine, sine = lay[COSINE], lay[SINE]
     north = (row + 0.5) * resolution + lay[CORNER_Y] - lay[START_Y]
     for k in range(_GROUP):
@@ -196,7 +216,9 @@ def note_laid_changes(
     occupied: Array,
     changes: Array,
 ) -> int:
-    """Bring the planes of a team's map up to date, as ``note_changes``, where each robot's map is in the frame of its own start.
+    """Update the planes of a team's map from maps in frames of their own starts.
+
+    As ``note_changes``, but each robot's map is in the frame of its own start.
 
     Parameters
     ----------
@@ -247,7 +269,10 @@ def note_laid_changes(
 
 
 def levels_of_planes(known: NDArray[np.uint64], occupied: NDArray[np.uint64]) -> NDArray[np.uint8]:
-    """Return the three-level map of two planes (rows, words): 0 occupied, 127 unknown, 255 free, shape (rows, words * 64)."""
+    """Return the three-level map of two planes (rows, words).
+
+    Levels: 0 occupied, 127 unknown, 255 free, shape (rows, words * 64).
+    """
     rows, words = known.shape
     is_known, is_occupied = (
         np.unpackbits(np.ascontiguousarray(plane, "<u8").view(np.uint8), bitorder="little").reshape(

@@ -25,7 +25,10 @@ STEP = 0.5
 
 @kernel(inline=True, borrowing=True)
 def _is_beside_free(log_odds: Array, row: int, column: int) -> bool:
-    """Whether one of the four cells beside a cell is free, so that the cell may be a wall's surface."""
+    """Whether one of the four neighbours of a cell is free.
+
+    The cell may then be the surface of a wall.
+    """
     rows, columns = log_odds.shape
     is_row, is_column = 0 <= row < rows, 0 <= column < columns
     return bool(
@@ -47,7 +50,9 @@ def _unsettled(
     occupied: int,
     listed: Array,
 ) -> int:
-    """List the returns that have to be looked at: neither in an occupied cell nor beside a free one, as most are, or at the map's border.
+    """List the returns that have to be examined.
+
+    Those neither in an occupied cell nor beside a free one, as most are, and those at the map's border.
 
     They are listed without branches, which could not be foreseen; tells how many there are.
     """

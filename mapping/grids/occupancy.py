@@ -91,7 +91,9 @@ def integrate_scan(
     hit_bits: Array,
     touched: Array,
 ) -> None:
-    """Update a map by a scan: lower the seen cells, raise those in which beams ended, each once.
+    """Update a map by a scan.
+
+    Seen cells are lowered, and cells in which beams ended are raised, each once.
 
     Parameters
     ----------
@@ -331,7 +333,10 @@ class OccupancyGrid:
         return max(low_row - 1, 0), min(high_row + 1, rows), max(low_column, 0), min(high_column, columns)
 
     def levels(self) -> NDArray[np.uint8]:
-        """Return the three-level map: 0 occupied, 127 unknown, 255 free, shape (rows, columns)."""
+        """Return the three-level map, shape (rows, columns).
+
+        Levels: 0 occupied, 127 unknown, 255 free.
+        """
         return three_levels(self.log_odds)
 
     def probability(self) -> NDArray[np.float32]:

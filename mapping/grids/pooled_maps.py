@@ -1,4 +1,6 @@
-"""Maps of which a cell shows the greatest log-odds of a square of cells, kept beside a map and made anew only where it has changed.
+"""Maps whose cells hold the greatest log-odds of a square of cells.
+
+They are kept beside a map and recomputed only where it has changed.
 
 Where that is, is told by bits: one for each word of 64 cells in which a level has changed, and one for each
 row that has such words, behind the last row, so that rows in which nothing has changed are not even looked
@@ -22,12 +24,15 @@ def touched_words(columns: int) -> int:
 
 
 def untouched(rows: int, columns: int) -> NDArray[np.uint64]:
-    """Return the bits of what has changed in a map, where nothing has: (rows + rows / 64, ``touched_words``); none for no rows."""
+    """Return the change bits of a map in which nothing has changed.
+
+    Shape (rows + rows / 64, ``touched_words``); none for no rows.
+    """
     return np.zeros((rows + -(-rows // WORD), touched_words(columns)), np.uint64)
 
 
 def touch(touched: NDArray[np.uint64], rows: tuple[int, int], words: tuple[int, int]) -> None:
-    """Note that a map has changed in rows and in words of 64 cells of them (low, high)."""
+    """Mark a map as changed in rows and words of 64 cells of them (low, high)."""
     of_rows = len(touched) - -(-len(touched) // (WORD + 1))
     for word in range(*words):
         touched[rows[0] : rows[1], word // WORD] |= np.uint64(1 << word % WORD)

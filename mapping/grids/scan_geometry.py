@@ -14,7 +14,9 @@ MOST_BEAMS = 16_384
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScanGeometry:
-    """Beams of a planar laser range finder, counter-clockwise, symmetric about the heading.
+    """Beams of a planar laser range finder, symmetric about the heading.
+
+    They are ordered counter-clockwise.
 
     Attributes
     ----------
@@ -39,7 +41,8 @@ class ScanGeometry:
             raise ValueError(f"field_of_view is {self.field_of_view} rad; want more than 0 and at most 2 pi")
         if not 0.0 <= self.range_min < self.range_max or not math.isfinite(self.range_max):
             raise ValueError(
-                f"range_min is {self.range_min} m and range_max is {self.range_max} m; want 0 <= range_min < range_max"
+                f"range_min is {self.range_min} m and range_max is {self.range_max} m; want 0 <= range_min < "
+                "range_max"
             )
 
     @property
@@ -71,7 +74,10 @@ class ScanGeometry:
 
 @kernel(borrowing=True)
 def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> None:
-    """Turn the beams' unit vectors (2, beams) by the heading, into ``directions`` (4, beams): x, y and their inverses."""
+    """Rotate the beams' unit vectors (2, beams) by the heading.
+
+    The result ``directions`` (4, beams) holds x, y and their inverses.
+    """
     cosine, sine = math.cos(heading), math.sin(heading)
     for beam in range(unit_vectors.shape[1]):
         direction_x = cosine * unit_vectors[0, beam] - sine * unit_vectors[1, beam]
@@ -104,7 +110,9 @@ def fast_angle(y: float, x: float) -> float:
 def beams_towards(
     offset_x: float, offset_y: float, radius: float, heading: float, angle_first: float, increment: float
 ) -> tuple[float, float]:
-    """Beams that a disc at an offset from the laser may meet: the first (not rounded) and how many; the next lap is a turn later.
+    """Return the range of beams that a disc at an offset from the laser may meet.
+
+    The first beam (not rounded) and how many. The range repeats after a full turn.
 
     Good to a few thousandths of a beam's gap at a third of a degree; a caller that must miss none looks one
     beam further.

@@ -17,15 +17,24 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_vector, vector_at
 
 GRAZING = 8.0
-"""Cotangent of the flattest angle under which two neighbouring end points still belong to one surface."""
+"""Cotangent of the flattest angle at which neighbours share a surface.
+
+Neighbours are two neighbouring end points.
+"""
 
 JUMP = np.uint8(255)
-"""Mark of an edge that is walked by itself: from a near to a far end point, or across more rows than a byte holds."""
+"""Mark of an edge that is traced by itself.
+
+Such an edge leads from a near to a far end point, or crosses more rows than a byte holds.
+"""
 
 
 @kernel(inline=True)
 def window_words(reach: float) -> int:
-    """Words per row of a scan's window: ``reach`` cells to both sides, from any alignment."""
+    """Words per row of a scan's window.
+
+    It extends ``reach`` cells to both sides, at any alignment.
+    """
     return (2 * (int(reach) + 3)) // 64 + 2
 
 
@@ -49,7 +58,10 @@ def _toggle_bit(bits: int, place: int) -> None:
 def _toggle_edge(
     bits: int, width: int, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int
 ) -> None:
-    """Toggle the cell centres right of the edge, in the rows of ``width`` between its ends (half open, so that corners count once)."""
+    """Toggle the cell centres right of the edge, in the rows between its ends.
+
+    Rows have ``width``. The interval is half open, so that corners count once.
+    """
     slope = (to_x - from_x) / (to_y - from_y)
     first, last = min(from_row, to_row), max(from_row, to_row)
     x = from_x + (first + 0.5 - from_y) * slope + 0.5
@@ -137,7 +149,9 @@ def _find_edges(
     crossings: Array,
     slopes: Array,
 ) -> None:
-    """Tell how many rows the edge from each beam to the next crosses (or ``JUMP``), which bits it toggles in the first two, its line.
+    """Compute the rows crossed, the toggled bits and the line of each edge.
+
+    An edge joins a beam to the next. Bits are of the first two rows; rows may be ``JUMP``.
 
     The line is where it crosses the first row, and by how much farther each one after it. Loops without
     branches over few arrays, which LLVM runs on vectors.

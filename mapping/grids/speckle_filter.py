@@ -1,4 +1,7 @@
-"""Specks of free cells within walls: what noise leaves in fine maps, and what nobody who looks at a picture of one wants to see."""
+"""Small components of free cells within walls, and their removal.
+
+Noise leaves them in fine maps, and they are unwanted in pictures.
+"""
 
 import cv2
 import numpy as np
@@ -7,13 +10,18 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 
 LARGEST_SPECK = 3
-"""So many free cells that no other free cell touches over a side are a speck, where they lie in a wall."""
+"""Most free cells of a small component, where it lies in a wall.
+
+No other free cell touches the component over a side.
+"""
 
 _CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 
 
 def without_specks(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a three-level map with the specks of free cells within its walls closed, for pictures.
+    """Return a three-level map with small free components within walls closed.
+
+    The map is for pictures.
 
     Where cells are finer than the noise of the laser, ends of beams scatter over a wall's front, and single
     free cells remain between them. A speck is a group of at most `LARGEST_SPECK` free cells, joined over

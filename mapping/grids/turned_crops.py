@@ -1,4 +1,6 @@
-"""Blocks of 8 x 8 cells of a turned crop at once, looked up within registers where the processor can do that.
+"""Blocks of 8 x 8 cells of a rotated crop, computed at once.
+
+Cells are looked up within registers where the processor can do that.
 
 However a block is turned, the cells that it shows lie within 11 rows and 11 columns of the map: few enough to
 be held in registers, from which AVX-512 VBMI picks 64 bytes by their places in two instructions. Other
@@ -112,7 +114,7 @@ def _load_some(builder: Any, address: Any, columns: Any) -> Any:  # noqa: ANN401
 
 
 def _store_levels(builder: Any, rows: list[Any], places_at: Any, crop_at: Any, side: Any) -> None:  # noqa: ANN401
-    """Write a block of a crop from the rows that it has loaded, by the places of its cells in them."""
+    """Write a block of a crop from loaded rows, by its cells' places in them."""
     registers = rows
     while len(registers) > ROWS * COLUMNS // _CELLS:
         joined = _lanes(*range(2 * registers[0].type.count))
@@ -161,7 +163,10 @@ def _write_border(
     crop: Any,  # noqa: ANN401
     side: Any,  # noqa: ANN401
 ) -> Any:  # noqa: ANN401
-    """Write a block that loads only those cells whose bits are set, uint16 for each row; the others are unknown."""
+    """Write a block that loads only those cells whose bits are set.
+
+    Bits are uint16 for each row; the other cells are unknown.
+    """
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         row_at, stride, cells_at, *where = arguments
@@ -185,7 +190,9 @@ _border: Any = intrinsic(_write_border)
 
 @kernel(borrowing=True)
 def _write_all_places(half: int, cells: int, step_x: int, step_y: int, corners: Array, places: Array) -> None:
-    """Tell which part of a patch of 2 * ``half`` rows each block of a crop loads, and where its cells lie in it.
+    """Compute the part of a patch each block of a crop loads, and its cells there.
+
+    The patch has 2 * ``half`` rows.
 
     Parameters
     ----------
@@ -230,7 +237,10 @@ def _fill(crop: int, side: int) -> None:
 
 @kernel(inline=True)
 def _bits_within(first: int, count: int, size: int) -> np.uint16:
-    """Return the bits of those of ``count`` indices from ``first`` on that are of something of a size."""
+    """Return the bits of those of ``count`` indices that lie within a size.
+
+    The indices count from ``first`` on; the size is that of the indexed object.
+    """
     low, high = min(max(-first, 0), count), max(min(size - first, count), 0)
     return np.uint16((1 << high) - (1 << low))
 

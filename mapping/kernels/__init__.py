@@ -1,1 +1,13 @@
-"""Compiled functions: the decorator, their cache, views of arrays at addresses, work for threads."""
+"""Compiled functions and their utilities.
+
+The decorator, the kernel cache, views of arrays at addresses, and work for threads.
+"""
+
+from typing import Any
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -1,4 +1,7 @@
-"""Words of 64 bits, one for each cell: what takes many steps to write and few instructions to do."""
+"""Operations on words of 64 bits, one bit for each cell.
+
+They take many steps to write and few instructions to execute.
+"""
 
 from typing import Any
 
@@ -24,7 +27,10 @@ def _place_of_first(typing_context: Any, word: Any) -> Any:  # noqa: ANN401
 
 
 def _multiply_without_carry(builder: Any, word: Any) -> Any:  # noqa: ANN401
-    """Return the lower half of the product with a word of ones in which sums are exclusive-ors: their running sums."""
+    """Return the lower half of the carry-less product with a word of ones.
+
+    Sums are exclusive-ors, so the product is their running sum.
+    """
     insert: Any = cgutils.get_or_insert_function
     pair = ir.VectorType(_WORD, 2)
     first, zero = ir.Constant(ir.IntType(32), 0), ir.Constant(pair, [0, 0])
@@ -67,6 +73,9 @@ def first_bit(word: np.uint64) -> int:
 
 @kernel(inline=True)
 def running_xor(word: np.uint64) -> np.uint64:
-    """Return a word of which each bit is the exclusive-or of the given word's bits up to it, bit 0 the first."""
+    """Return the running exclusive-or of a word's bits.
+
+    Each bit is the exclusive-or of the given word's bits up to it, bit 0 the first.
+    """
     value: np.uint64 = _run(word)
     return value

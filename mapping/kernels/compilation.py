@@ -1,4 +1,6 @@
-"""The one decorator of all numba kernels: exact arithmetic, cached where a directory can be written.
+"""The one decorator of all numba kernels.
+
+Arithmetic is exact, and kernels are cached where a directory can be written.
 
 Numba caches compiled code per source file and does not see a change in another file that the kernel calls
 into. The cache directory is therefore keyed by a hash of all sources with kernels, and is the first writable
@@ -59,7 +61,10 @@ _CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
 
 
 def is_cache_empty() -> bool:
-    """Whether no kernel has been compiled into the cache yet, so that this start compiles; False where nothing can be kept."""
+    """Whether the cache holds no compiled kernel yet, so that this start compiles.
+
+    False where nothing can be cached.
+    """
     folder = os.environ.get("NUMBA_CACHE_DIR") or _FOLDER
     return folder is not None and next(Path(folder).rglob("*.nbi"), None) is None
 
@@ -72,7 +77,9 @@ def kernel(
     spliced: bool = False,
     borrowing: bool = False,
 ) -> Any:  # noqa: ANN401
-    """Compile a function of arrays with numba: nopython, exact floating point, no GIL, cached.
+    """Compile a function of arrays with numba.
+
+    In nopython mode, with exact floating point, without the GIL, and cached.
 
     Parameters
     ----------

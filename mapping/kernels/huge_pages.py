@@ -1,4 +1,6 @@
-"""Blank memory that the system provides where it is touched, in few large pages where it can.
+"""Blank memory that the system provides on first access.
+
+In few large pages where it can.
 
 Kernels go through the maps of many robots in each step. In pages of 4 KiB, the maps of a hundred robots take
 more pages than the processor remembers the places of, and looking a place up takes longer than loading a line
@@ -28,7 +30,10 @@ LARGE_PAGE = 2**21
 """A large page [bytes]."""
 
 MOST_IN_LARGE_PAGES = 2**27
-"""Who expects more than this does without large pages [bytes]: all of such a page takes room as soon as a part of it is touched."""
+"""Largest expected size for which large pages are used [bytes].
+
+A large page takes up memory as a whole as soon as a part of it is accessed.
+"""
 
 Number = TypeVar("Number", bound=np.generic)
 

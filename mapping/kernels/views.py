@@ -67,7 +67,10 @@ def _grid_of(typing_context: Any, address: Any, rows: Any, columns: Any, kind: A
 
 
 def _room_for(typing_context: Any, count: Any, kind: Any) -> Any:  # noqa: ANN401
-    """Set aside room for so many numbers of a kind on the stack of the kernel that asks, until it returns; tell its address."""
+    """Reserve room for so many numbers on the calling kernel's stack.
+
+    Returns its address, valid until that kernel returns. The numbers are of a given kind.
+    """
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         room = builder.alloca(context.get_data_type(kind.dtype), arguments[0])
@@ -114,7 +117,9 @@ _room: Any = intrinsic(_room_for)
 
 @kernel(spliced=True)
 def scratch_vector(count: int, kind: Any) -> Any:  # noqa: ANN401
-    """Return ``count`` numbers of a kind, undefined at first, that are gone when the kernel that asks for them returns.
+    """Return ``count`` numbers of a kind, for use within the calling kernel.
+
+    Undefined at first, and gone when the calling kernel returns.
 
     For some numbers a beam, not for grids: a stack holds a few megabytes. Not within a loop, which would set
     aside room each time.
@@ -130,13 +135,19 @@ def scratch_grid(rows: int, columns: int, kind: Any) -> Any:  # noqa: ANN401
 
 @kernel(spliced=True)
 def vector_at(address: int, count: int, kind: Any) -> Any:  # noqa: ANN401
-    """View ``count`` numbers of a kind (such as np.float64) at an address inside a kernel; the caller keeps the array alive."""
+    """View ``count`` numbers of a kind at an address inside a kernel.
+
+    A kind is such as np.float64. The caller keeps the array alive.
+    """
     return _vector_view(address, count, kind)
 
 
 @kernel(spliced=True)
 def grid_at(address: int, rows: int, columns: int, kind: Any) -> Any:  # noqa: ANN401
-    """View a (rows, columns) grid of a kind (such as np.float64) at an address inside a kernel."""
+    """View a (rows, columns) grid of a kind at an address inside a kernel.
+
+    A kind is such as np.float64.
+    """
     return _grid_view(address, rows, columns, kind)
 
 
@@ -148,7 +159,10 @@ def bytes_at(address: int, count: int) -> Any:  # noqa: ANN401
 
 @kernel(spliced=True)
 def int8_at(address: int, count: int) -> Any:  # noqa: ANN401
-    """View ``count`` int8 at an address inside a kernel: a part of a row at less cost than a slice."""
+    """View ``count`` int8 at an address inside a kernel.
+
+    It gives a part of a row at less cost than a slice.
+    """
     return _vector_view(address, count, np.int8)
 
 

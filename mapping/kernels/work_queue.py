@@ -1,4 +1,6 @@
-"""Turns at a loop on threads: each thread takes the next piece of work that no other has taken, so that all end at about the same time.
+"""Dynamic distribution of a loop's work among threads.
+
+Each thread takes the next free piece of work, so that all end at about the same time.
 
 Which thread runs a piece changes nothing in it; pieces must not touch each other.
 """

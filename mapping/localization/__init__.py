@@ -1,1 +1,4 @@
-"""Where robots believe they are: localizers on odometry and scans, all behind one protocol."""
+"""Localizers on odometry and scans, all behind one protocol.
+
+They estimate the robots' poses.
+"""

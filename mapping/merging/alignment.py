@@ -1,4 +1,7 @@
-"""From matched corners to transforms: each match proposes one, the others vote, and the walls refine it."""
+"""Transforms from matched corners.
+
+Each match proposes one, the others vote, and the walls refine it.
+"""
 
 import math
 from dataclasses import dataclass
@@ -95,7 +98,10 @@ class Candidate:
 
 
 def propose(first: Corners, second: Corners, matches: Matches) -> NDArray[np.float64]:
-    """Return the transform that each match proposes, shape (n, 3): x, y [m], theta [rad]."""
+    """Return the transform that each match proposes, shape (n, 3).
+
+    x, y [m], theta [rad].
+    """
     p, q = first.points[matches.first], second.points[matches.second]
     cosine, sine = np.cos(matches.rotation), np.sin(matches.rotation)
     x = p[:, 0] - (cosine * q[:, 0] - sine * q[:, 1])
@@ -199,7 +205,10 @@ def distinct(
     count: int,
     apart: tuple[float, float],
 ) -> list[int]:
-    """Return the first few of the proposals, in an order, that differ from one another by more than a distance [m] or an angle [rad]."""
+    """Return the first few distinct proposals, in an order.
+
+    They differ from one another by more than a distance [m] or an angle [rad].
+    """
     chosen: list[int] = []
     images = np.stack(
         [
@@ -222,7 +231,10 @@ def distinct(
 def refine(
     a: DescribedMap, b: DescribedMap, matches: Matches, candidate: Candidate, settings: AlignmentSettings
 ) -> Candidate:
-    """Return a candidate with its transform made better by each of the settings' refinements in turn."""
+    """Return a candidate with its transform improved by each refinement in turn.
+
+    The refinements are those of the settings.
+    """
     transform = candidate.a_from_b
     p, q = (
         a.corners.points[matches.first[candidate.inliers]],
@@ -239,7 +251,9 @@ def refine(
 
 
 def sweep_rotation(p: NDArray[np.float64], q: NDArray[np.float64], a_from_b: Transform) -> Transform:
-    """Return the transform with the rotation, of 29 within 7 degrees, that brings the inliers q of map b nearest to p of map a.
+    """Return the transform with the rotation that best aligns the inliers.
+
+    Of 29 rotations within 7 degrees, the one that brings q of map b nearest to p of map a.
 
     The translation follows from the centres of the inliers.
     """

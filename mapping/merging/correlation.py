@@ -1,4 +1,6 @@
-"""Two maps laid over each other at all translations at once, for some rotations: slow, but it needs no corners.
+"""Correlation of two maps at all translations at once, for some rotations.
+
+It is slow, but needs no corners.
 
 Maps are reduced to coarse counts of walls and of free space away from walls. Walls on walls count for a
 translation, walls in free space against it; the sums over all translations are correlations, products of
@@ -56,13 +58,17 @@ class CorrelationSettings:
             )
         if not (0.0 <= self.miss_weight < math.inf and 0.0 <= self.free_weight < math.inf):
             raise ValueError(
-                f"miss_weight and free_weight of correlation are {self.miss_weight} and {self.free_weight}; want zero or more"
+                f"miss_weight and free_weight of correlation are {self.miss_weight} and {self.free_weight}; "
+                "want zero or more"
             )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Coarse:
-    """A map in coarse cells: walls as points [coarse cells] with what each weighs, and free space."""
+    """A map in coarse cells: weighted wall points, and free space.
+
+    Wall points are in coarse cells.
+    """
 
     walls: NDArray[np.float64]
     weight: float
@@ -76,7 +82,9 @@ def best_translations(
     settings: CorrelationSettings,
     apart_m: float = 0.5,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Find for each rotation of map b the translations under which its walls agree best with those of map a.
+    """Find the best translations for each rotation of map b.
+
+    The walls of map b agree best with those of map a under them.
 
     Parameters
     ----------
@@ -141,7 +149,10 @@ def _coarse(described: DescribedMap, cell: float) -> _Coarse:
 
 
 def _drawn(walls: NDArray[np.float64], weight: float, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return the walls counted in the cells of a grid, each cell at most as if one wall ran through it."""
+    """Return the walls counted in the cells of a grid.
+
+    The count of a cell is limited to that of one wall running through it.
+    """
     column = np.clip(walls[:, 0].astype(np.int64), 0, shape[1] - 1)
     row = np.clip(walls[:, 1].astype(np.int64), 0, shape[0] - 1)
     counts = np.bincount(row * shape[1] + column, minlength=shape[0] * shape[1]).reshape(shape[0], shape[1])
@@ -157,7 +168,10 @@ def _clear(free: NDArray[np.float32], walls: NDArray[np.float32]) -> NDArray[np.
 def _turned(
     coarse: _Coarse, theta: float, side: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], tuple[float, float]]:
-    """Return walls and free space turned into a grid, and where the map's own corner lies in it [cells]."""
+    """Return walls and free space rotated into a grid, and the map's corner in it.
+
+    The corner is the map's own, in cells.
+    """
     rows, columns = coarse.free.shape
     cosine, sine = math.cos(theta), math.sin(theta)
     x = side / 2.0 - (cosine * columns / 2.0 - sine * rows / 2.0)
@@ -175,7 +189,10 @@ def _turned(
 
 
 def _peaks(total: NDArray[np.float32], count: int, apart: int) -> list[tuple[int, int, float]]:
-    """Return row, column and value of the largest entries that are apart from one another; the array is changed."""
+    """Return row, column and value of the largest entries, apart from one another.
+
+    The array is changed.
+    """
     found = []
     rows, columns = total.shape
     for _ in range(count):

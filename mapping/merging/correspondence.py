@@ -149,7 +149,9 @@ def match_corners(
 def compare_descriptors(
     first: Descriptors, second: Descriptors, settings: CorrespondenceSettings
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Compare each descriptor of a map with each of another under all shifts of the angle.
+    """Compare each descriptor of a map with each of another.
+
+    Under all shifts of the angle.
 
     Returns
     -------
@@ -189,7 +191,10 @@ def _standardised(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _correlation(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return for all pairs and shifts the sum over rings and columns of first[column + shift] ... second[column], shape (n, m, columns)."""
+    """Return the correlation of all pairs at all shifts, shape (n, m, columns).
+
+    The sum over rings and columns of first[column + shift] ... second[column].
+    """
     columns = first.shape[2]
     # One product of matrices for each frequency: (n, rings) by (rings, m).
     left = np.ascontiguousarray(scipy.fft.rfft(first, axis=2).transpose(2, 0, 1))
@@ -201,7 +206,10 @@ def _correlation(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDA
 def _chosen(
     similarity: NDArray[np.floating], threshold: float, settings: CorrespondenceSettings
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the pairs that are similar enough, near the best of their corner, and among its first few."""
+    """Return the pairs that are similar enough.
+
+    They are near the best pair of their corner, and among its first few.
+    """
     best = similarity.max(axis=1, keepdims=True)
     count = min(settings.per_corner, similarity.shape[1])
     order = np.argsort(-similarity, axis=1, kind="stable")[:, :count]
@@ -214,7 +222,10 @@ def _chosen(
 def _distance_votes(
     first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float
 ) -> NDArray[np.float64]:
-    """Return for each pair of corners the share of the first one's distances that the second one has too, shape (n, m)."""
+    """Return the share of common distances of each pair of corners, (n, m).
+
+    The share of the first corner's distances that the second one has too.
+    """
     left, right = _distances(first), _distances(second)
     votes = np.zeros((len(first), len(second)))
     for j in range(len(second)):
@@ -235,7 +246,10 @@ def _distance_votes(
 def _triplet_similarity(
     first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float
 ) -> NDArray[np.float64]:
-    """Return for each pair of corners how alike the triangles with their two nearest neighbours are, 0 where they are not, shape (n, m)."""
+    """Return the similarity of the triangles of each pair of corners, (n, m).
+
+    Triangles are with the two nearest neighbours; 0 where they are not alike.
+    """
     if len(first) < 3 or len(second) < 3:
         return np.zeros((len(first), len(second)))
     left, right = _triangles(first), _triangles(second)
@@ -245,7 +259,10 @@ def _triplet_similarity(
 
 
 def _triangles(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return distances to the nearest and second neighbour and between the two, shape (n, 3) [m]."""
+    """Return the sides of each corner's triangle of neighbours, (n, 3) [m].
+
+    Distances to the nearest and second neighbour, and between the two.
+    """
     distances = _distances(points)
     order = np.argsort(distances + np.diag(np.full(len(points), np.inf)), axis=1, kind="stable")[:, :2]
     rows = np.arange(len(points))

@@ -1,4 +1,6 @@
-"""How maps that were joined in pairs lie in common frames: the best forest of transforms that contradicts no other one.
+"""Common frames of maps that were joined in pairs.
+
+They follow from the best forest of transforms, in which none contradicts another.
 
 Maps are nodes, accepted transforms edges. Of each group of joined maps one is the root; the world's frame is
 that of the root of the group that was there first, and stays where it is while others join.
@@ -74,7 +76,10 @@ class FrameTree(Generic[Name]):
         return [edge for edge in self._edges.values() if edge not in self._dropped]
 
     def has_edge(self, a: Name, b: Name) -> bool:
-        """Return whether an edge that contradicts none joins two maps, so that no others need lie between them."""
+        """Return whether an edge that contradicts none joins two maps directly.
+
+        No other maps need lie between them.
+        """
         edge = self._edges.get(frozenset((a, b)))
         return edge is not None and edge not in self._dropped
 
@@ -85,7 +90,9 @@ class FrameTree(Generic[Name]):
             self._tree[name] = {}
 
     def add_edge(self, edge: Edge[Name]) -> None:
-        """Add a transform; one between the same maps is replaced where the new one has more weight.
+        """Add a transform between two maps.
+
+        One between the same maps is replaced where the new one has more weight.
 
         Raises
         ------
@@ -147,7 +154,10 @@ class FrameTree(Generic[Name]):
         return frozenset((edge.a, edge.b))
 
     def groups(self) -> list[list[Name]]:
-        """Return the maps that are joined with one another, each group with its root first; the world's first."""
+        """Return the groups of maps that are joined with one another.
+
+        Each group has its root first; the world's group comes first.
+        """
         found, seen = [], set()
         for start in [*self._roots, *self._names]:
             if start not in seen:
@@ -157,7 +167,9 @@ class FrameTree(Generic[Name]):
         return found
 
     def lookup(self, target: Name, source: Name) -> Transform | None:
-        """Return the transform that maps points of one map into another, None where they are not joined.
+        """Return the transform that maps points of one map into another.
+
+        None where they are not joined.
 
         Raises
         ------
@@ -170,7 +182,10 @@ class FrameTree(Generic[Name]):
         return self._reached_from(target).get(source)
 
     def pose_in(self, target: Name, source: Name, pose: Transform) -> Transform | None:
-        """Return a robot's pose, known in its own map, in another map, None where they are not joined."""
+        """Return a robot's pose, known in its own map, in another map.
+
+        None where they are not joined.
+        """
         transform = self.lookup(target, source)
         return None if transform is None else transform @ pose
 
@@ -210,7 +225,10 @@ class FrameTree(Generic[Name]):
         self._settle_roots()
 
     def _culprit(self, contradicts: Callable[[Name, Name, Transform], bool]) -> Edge[Name] | None:
-        """Return the weakest edge on the way between two maps that the forest lays over each other and that contradict each other so."""
+        """Return the weakest edge on the path between two contradicting maps.
+
+        The forest overlays the two maps, and they contradict each other so.
+        """
         for a, b in combinations(self._names, 2):
             way = self._way(a, b)
             if (
@@ -252,7 +270,10 @@ class FrameTree(Generic[Name]):
         return left_over
 
     def _misses(self, edge: Edge[Name]) -> float:
-        """Return by how many times what is allowed an edge differs from the way through the forest."""
+        """Return an edge's deviation from the path through the forest.
+
+        As a multiple of what is allowed.
+        """
         through = self._reached_from(edge.a)[edge.b]
         distance, angle = through.difference(edge.a_from_b, edge.centre)
         return max(distance / self.cycle_distance_m, angle / self.cycle_angle)

@@ -1,4 +1,7 @@
-"""One map of several that were joined: the sum of their log-odds in a common frame, and who saw which cell."""
+"""One map of several that were joined.
+
+It holds the sum of their log-odds in a common frame, and which maps know each cell.
+"""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +15,10 @@ from lidarium.mapping.grids.occupancy import FREE, LOG_ODDS_UNIT, OCCUPIED, UNKN
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 OCCUPIED_LOG_ODDS, FREE_LOG_ODDS = 1.0, -0.6
-"""What an occupied and a free cell of a three-level map add: one map that says occupied outweighs one that says free, not two."""
+"""Log-odds that an occupied and a free cell of a three-level map add.
+
+One map that reports occupied outweighs one that reports free, but not two.
+"""
 
 MOST_MAPS = 64
 MAX_CELLS = 400_000_000
@@ -69,13 +75,15 @@ def fuse(
     """
     if not 0 < len(maps) <= MOST_MAPS or len(maps) != len(common_from_map):
         raise ValueError(
-            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MOST_MAPS} of each"
+            f"{len(maps)} maps with {len(common_from_map)} transforms are to be fused; want 1 to {MOST_MAPS} "
+            "of each"
         )
     low, high = _bounds(maps, common_from_map, resolution)
     columns, rows = (high - low).tolist()
     if rows * columns > MAX_CELLS:
         raise ValueError(
-            f"the fused map would have {rows} x {columns} cells, more than {MAX_CELLS}; use a coarser resolution"
+            f"the fused map would have {rows} x {columns} cells, more than {MAX_CELLS}; use a coarser "
+            "resolution"
         )
     origin = (float(low[0] * resolution), float(low[1] * resolution))
     log_odds, sources = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.uint64)
@@ -92,7 +100,10 @@ def fuse(
 def _bounds(
     maps: Sequence[NDArray[np.uint8]], transforms: Sequence[Transform], resolution: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first and the last column and row, exclusive, of the known cells in the common frame."""
+    """Return the bounds of the known cells in the common frame.
+
+    First and last column and row, exclusive.
+    """
     corners = []
     for levels, transform in zip(maps, transforms, strict=True):
         is_known = levels != UNKNOWN

@@ -1,4 +1,6 @@
-"""Maps that grow, merged again and again: only what has changed is described, and transforms that were verified are not searched for.
+"""Incremental merging of maps that grow.
+
+Only what has changed is described, and verified transforms are not searched for again.
 
 A robot's map keeps its frame while it grows: its origin tells where the array's lower left corner lies in
 that frame. Two maps that know little can look alike without being of one place. Who acts on a merge can ask
@@ -216,7 +218,7 @@ class IncrementalMerger:
         return before is not None and before.frames is not None and not before.is_confirmed
 
     def _has_news(self, pair: tuple[str, str]) -> bool:
-        """Whether maps have changed so much since a pair was tried that it is to be tried again."""
+        """Whether maps have changed enough since a pair was last tried to retry it."""
         before = self._pairs.get(pair)
         if before is not None and max(self._changed_at[name] for name in pair) <= before.at:
             return False
@@ -235,7 +237,10 @@ class IncrementalMerger:
         return sum(self._known_m2[name] for name in pair)
 
     def _kept(self, pair: tuple[str, str]) -> _Tried | None:
-        """Return what is known of a pair that is not tried now, by the corners that its maps have now."""
+        """Return the known result of a pair that is not tried now.
+
+        It refers to the corners that the maps have now.
+        """
         before = self._pairs.get(pair)
         if before is None or before.frames is None:
             return before

@@ -1,4 +1,7 @@
-"""Many maps: every pair is tried, and what is accepted and consistent becomes groups with one map each."""
+"""Merging of many maps.
+
+Every pair is tried; accepted and consistent pairs form groups with one map each.
+"""
 
 import itertools
 from collections.abc import Mapping
@@ -68,7 +71,10 @@ class Merged:
         )
 
     def _into(self, root: str, name: str) -> Transform:
-        """Return the transform from a map's lower left corner into the frame of another map."""
+        """Return the transform from a map's lower left corner into another's frame.
+
+        The other frame is that of a map.
+        """
         transform = self.tree.lookup(root, name)
         if transform is None:
             raise ValueError(f"map {name!r} is not joined with {root!r}; want maps of one group")
@@ -139,7 +145,10 @@ def _all_pairs(
 def _implied(
     a: DescribedMap, b: DescribedMap, a_from_b: Transform | None, settings: MergeSettings
 ) -> PairResult | None:
-    """Return the result of laying maps over each other as others imply, None where these do not say or the maps do not agree so."""
+    """Return the result of aligning two maps as other maps imply, or None.
+
+    None where the others imply no transform, or the maps do not agree under it.
+    """
     # The thesis's test needs inliers, which only a search finds.
     if a_from_b is None or settings.validation.test == "discs":
         return None

@@ -1,4 +1,4 @@
-"""Two maps: the transform that joins them, or why there is none that can be believed."""
+"""Transform that joins two maps, or the reason that none is credible."""
 
 import math
 import time
@@ -120,7 +120,9 @@ def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None 
 def verify_pair(
     a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings | None = None
 ) -> PairResult:
-    """Verify a transform that was found before, when the maps knew less: it is refined and judged, nothing is searched for.
+    """Verify a transform found before, when the maps knew less.
+
+    It is refined and judged; nothing is searched for.
 
     Parameters
     ----------
@@ -152,7 +154,9 @@ def verify_pair(
 
 
 def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings) -> bool:
-    """Return whether maps contradict each other where a transform that other maps imply lays them, and also once they have settled.
+    """Return whether maps contradict each other under an implied transform.
+
+    The transform is implied by other maps; the maps contradict each other also once they have settled.
 
     What was implied is a little off after some maps; but where walls hold the maps in one direction alone
     they may settle far away.
@@ -213,7 +217,10 @@ def _merge_by_walls(
 def _merge_by_discs(
     a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings
 ) -> PairResult:
-    """Merge by the thesis's rules: the proposal with most inliers, refined, is accepted where the discs around its inliers agree."""
+    """Merge by the thesis's rules.
+
+    The proposal with most inliers, refined, is accepted where the discs around its inliers agree.
+    """
     candidates, shortage = _corner_candidates(a, b, matches, settings)
     if not candidates:
         return PairResult(False, shortage or "too few inliers: no transform was found")
@@ -300,7 +307,10 @@ def _by_correlation(
 def _beside(
     a: DescribedMap, b: DescribedMap, judged: list[_Judged], settings: MergeSettings
 ) -> list[_Judged]:
-    """Judge transforms beside the best refused ones, by a thin wall's thickness: they may have laid its two sides on each other."""
+    """Judge transforms beside the best refused ones, by a thin wall's thickness.
+
+    The refused ones may have aligned the two sides of a thin wall with each other.
+    """
     found = []
     for one in sorted(judged, key=lambda one: -one.agreement.evidence_m)[:_NEARLY]:
         x, y, theta = one.candidate.a_from_b.x, one.candidate.a_from_b.y, one.candidate.a_from_b.theta
@@ -317,7 +327,10 @@ def _judged(a: DescribedMap, b: DescribedMap, candidate: Candidate, settings: Me
 
 
 def _polished(a: DescribedMap, b: DescribedMap, judged: _Judged, settings: MergeSettings) -> _Judged:
-    """Settle a transform on more walls, of b on those of a and of a on those of b, half way between the two."""
+    """Refine a transform on more walls, in both directions.
+
+    The result is midway between b on the walls of a and a on the walls of b.
+    """
     if "walls" not in settings.alignment.refinements:
         return judged
     start, reach, samples = (
@@ -333,7 +346,10 @@ def _polished(a: DescribedMap, b: DescribedMap, judged: _Judged, settings: Merge
 
 
 def _best(judged: list[_Judged]) -> _Judged | None:
-    """Return the candidate with most evidence, before all others one against which nothing speaks."""
+    """Return the candidate with most evidence.
+
+    One against which there is no objection comes before all others.
+    """
     return max(judged, key=lambda one: (one.refusal is None, one.agreement.evidence_m), default=None)
 
 
@@ -356,13 +372,15 @@ def _ambiguity(
         if other.agreement.evidence_m > validation.rival_lead * best.agreement.evidence_m:
             return (
                 f"contradiction: moved by {distance:.1f} m and turned by {math.degrees(angle):.0f} deg, "
-                f"{other.agreement.evidence_m:.1f} m of walls speak for it instead of {best.agreement.evidence_m:.1f} m, "
+                f"{other.agreement.evidence_m:.1f} m of walls speak for it instead of "
+                f"{best.agreement.evidence_m:.1f} m, "
                 f"but {other.refusal}"
             )
         if is_rival(other.agreement, best.agreement, validation):
             return (
                 f"ambiguous: moved by {distance:.1f} m and turned by {math.degrees(angle):.0f} deg, "
-                f"{other.agreement.agreeing_m:.1f} m of walls agree instead of {best.agreement.agreeing_m:.1f} m"
+                f"{other.agreement.agreeing_m:.1f} m of walls agree instead of "
+                f"{best.agreement.agreeing_m:.1f} m"
             )
     return None
 

@@ -166,7 +166,10 @@ class Agreement:
 
     @property
     def evidence_m(self) -> float:
-        """Walls that agree less those that do not, and less those that contradict, which weigh more [m]."""
+        """Evidence: agreeing walls less those that do not and those that contradict [m].
+
+        Contradicting walls weigh more.
+        """
         return 2.0 * self.agreeing_m - self.wall_m - 3.0 * self.contradicting_m
 
 
@@ -229,14 +232,20 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
 
 
 def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | None:
-    """Return why a transform is refused, rivals aside, or None where nothing speaks against it."""
+    """Return why a transform is refused, or None where there is no objection.
+
+    Rivals are not considered here.
+    """
     if agreement.overlap_m2 < settings.least_overlap_m2:
         return (
             f"small overlap: {agreement.overlap_m2:.1f} m2 known in both, want {settings.least_overlap_m2:g}"
         )
     if has_contradiction(agreement, settings):
         allowed = _excused(agreement, settings)
-        return f"contradiction: {agreement.contradicting_m:.1f} m of walls stand where the other map is free, at most {allowed:.1f} m may"
+        return (
+            f"contradiction: {agreement.contradicting_m:.1f} m of walls stand where the other map is free, "
+            f"at most {allowed:.1f} m may"
+        )
     if agreement.hit_rate < settings.hit_rate:
         share, wanted = 100.0 * agreement.hit_rate, 100.0 * settings.hit_rate
         return f"contradiction: {share:.0f} % of the walls in the overlap agree, want {wanted:.0f} %"
@@ -247,7 +256,10 @@ def why_refused(agreement: Agreement, settings: ValidationSettings) -> str | Non
         return f"small overlap: {agreement.evidence_m:.1f} m of walls speak for it, want {evidence_m:.3g}"
     across_m = max(settings.least_across_m, settings.least_across_share * agreement.agreeing_m)
     if agreement.across_m < across_m:
-        return f"ambiguous: {agreement.across_m:.1f} m of walls hold the maps in one direction, want {across_m:.3g}"
+        return (
+            f"ambiguous: {agreement.across_m:.1f} m of walls hold the maps in one direction, want "
+            f"{across_m:.3g}"
+        )
     return None
 
 
@@ -257,7 +269,10 @@ def has_contradiction(agreement: Agreement, settings: ValidationSettings) -> boo
 
 
 def is_rival(agreement: Agreement, best: Agreement, settings: ValidationSettings) -> bool:
-    """Return whether another transform explains the maps nearly as well as the best: as many walls agree and nothing contradicts."""
+    """Return whether another transform explains the maps nearly as well.
+
+    As many walls agree as under the best, and nothing contradicts.
+    """
     return (
         agreement.overlap_m2 >= settings.least_overlap_m2
         and agreement.contradicting_m <= _excused(agreement, settings)
@@ -278,7 +293,9 @@ def _excused(agreement: Agreement, settings: ValidationSettings) -> float:
 def disc_agreement(
     a: DescribedMap, b: DescribedMap, a_from_b: Transform, points: NDArray[np.float64], radius_cells: int
 ) -> float:
-    """Return the share of map b's cells within discs around points [m of map b] that are in the same state in map a.
+    """Return the share of map b's cells within discs whose state in map a agrees.
+
+    The discs are around points [m of map b].
 
     Unknown is a state as others are; what lies outside of map a is unknown. A cell in several discs counts
     once.
@@ -337,7 +354,10 @@ def _count_walls(
 
 @kernel
 def _count_overlap(a: Array, b: Array, side: float, pose: tuple[float, float, float], found: Array) -> None:
-    """Count the cells known in both maps, from every so many-th cell of every so many-th row, and find their centroid in b [m]."""
+    """Count the cells known in both maps, and find their centroid in b [m].
+
+    Every so many-th cell of every so many-th row is examined.
+    """
     rows, columns = a.shape
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     count, column_sum, row_sum = 0, 0, 0

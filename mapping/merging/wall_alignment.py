@@ -1,4 +1,7 @@
-"""Walls of one map laid on those of another: what tells good transforms from bad ones, and makes good ones better."""
+"""Walls of one map aligned with those of another.
+
+They distinguish good transforms from bad ones, and improve good ones.
+"""
 
 import math
 
@@ -22,7 +25,10 @@ def wall_sample(walls: int, count: int) -> NDArray[np.int64]:
 def rank_by_walls(
     a: DescribedMap, b: DescribedMap, proposals: NDArray[np.float64], samples: int, near_m: float = 0.15
 ) -> NDArray[np.int64]:
-    """Return for each proposal how many of map b's walls come to lie on walls of map a, less twice those that lie in its free space."""
+    """Return per proposal how many walls of b lie on those of a, less conflicts.
+
+    Walls of map b that lie in the free space of map a are subtracted twice.
+    """
     scores = np.empty(len(proposals), np.int64)
     walls = b.walls[wall_sample(len(b.walls), samples)]
     _score_walls(a.levels, a.distance, 1.0 / a.resolution, walls, proposals, near_m, scores)
@@ -52,7 +58,9 @@ def _score_walls(
 def refine_on_walls(
     a: DescribedMap, b: DescribedMap, a_from_b: Transform, reach_m: float, samples: int
 ) -> Transform:
-    """Return the transform that brings walls of map b onto those of map a that face the same way, by least squares.
+    """Return the transform that aligns walls of map b with those of map a.
+
+    By least squares, on walls that face the same direction.
 
     Each wall looks along its normal for the nearest wall of map a, as far as a reach, which shrinks to four
     cells; walls that find none do not count: there the other map may know nothing.
@@ -146,7 +154,10 @@ def _settle(
 def _gap_to_wall(
     levels: Array, distance: Array, side: float, x: float, y: float, u: float, v: float, steps: int
 ) -> float:
-    """Return how far along the normal the nearest wall that faces the same way lies [cells], more than ``steps`` where there is none."""
+    """Return the distance along the normal to the nearest wall [cells].
+
+    The wall faces the same direction; more than ``steps`` where there is none.
+    """
     rows, columns = levels.shape
     column, row = int(math.floor(x)), int(math.floor(y))
     # Near the border nothing is known; this spares a check of each step.

@@ -1,4 +1,6 @@
-"""How far each cell is from the nearest occupied one, exact to the cell and kept up to date window by window.
+"""Distance of each cell from the nearest occupied one.
+
+It is exact to the cell and updated window by window.
 
 Clearance is the distance from the centre of a cell to the nearest occupied cell's square, so that a disc of
 radius r centred there touches nothing exactly where the clearance is at least r. In half cells the squared
@@ -23,17 +25,25 @@ LARGEST_LIMIT = 32_767  # twice the limit must fit into 16 bits
 
 
 def limit_of(distance: float, resolution: float) -> int:
-    """Least squared distance in half cells that is no less than ``distance`` [m], at ``resolution`` [m/cell]."""
+    """Return the least squared distance that is no less than ``distance`` [m].
+
+    The result is in half cells, at ``resolution`` [m/cell].
+    """
     return math.ceil((2.0 * distance / resolution) ** 2 - 1e-6)
 
 
 def full_window(shape: tuple[int, ...]) -> Window:
-    """Return the window (row_low, row_high, column_low, column_high) of a whole grid, high ends excluded."""
+    """Return the window of a whole grid, high ends excluded.
+
+    (row_low, row_high, column_low, column_high).
+    """
     return 0, int(shape[0]), 0, int(shape[1])
 
 
 def clearance(occupied: NDArray[np.bool_], resolution: float, maximum: float = 0.6) -> NDArray[np.float32]:
-    """Distance from each cell's centre to the nearest occupied cell's square, over a whole grid.
+    """Return each cell's distance to the nearest occupied cell, over a whole grid.
+
+    From the cell's centre to the occupied cell's square.
 
     Parameters
     ----------
@@ -87,7 +97,8 @@ class ClearanceField:
         limit = limit_of(maximum, resolution) if math.isfinite(maximum) and maximum > 0.0 else 0
         if not 1 <= limit <= LARGEST_LIMIT:
             raise ValueError(
-                f"maximum is {maximum} m; want {0.5 * resolution} to {90 * resolution} m at cells of {resolution} m"
+                f"maximum is {maximum} m; want {0.5 * resolution} to {90 * resolution} m at cells of "
+                f"{resolution} m"
             )
         self.resolution = float(resolution)
         self.maximum = float(maximum)
@@ -150,7 +161,9 @@ class ClearanceField:
 
 @lru_cache(maxsize=16)
 def stamp_of(limit: int) -> NDArray[np.uint16]:
-    """Return the closeness around one occupied cell, k cells either way: (2 k + 1, 2 k + 1 and more) uint16.
+    """Return the closeness around one occupied cell, up to k cells away.
+
+    Shape (2 k + 1, 2 k + 1 and more), uint16.
 
     Rows begin with a block of zeros, and end with zeros to whole blocks and one more: 64 lanes from any place
     on are there, and raise nothing beyond the stamp.

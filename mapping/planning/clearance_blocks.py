@@ -1,4 +1,7 @@
-"""What clearance does to blocks of 64 cells at once, see ``cell_blocks``: steps to what is occupied, their squares, and what is nearest."""
+"""Operations of the clearance on blocks of 64 cells at once.
+
+Steps to occupied cells, their squares, and the nearest; see ``cell_blocks``.
+"""
 
 from typing import Any
 
@@ -26,7 +29,10 @@ from lidarium.mapping.kernels.compilation import kernel
 
 
 def _positive_differs(typing_context: Any, log_odds: Any, numbers: Any, number: Any) -> Any:  # noqa: ANN401
-    """Tell in which cells it does not go together that the log-odds are positive and the number is the given one."""
+    """Return in which cells only one of two conditions holds.
+
+    The log-odds are positive, or the number is the given one.
+    """
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         beliefs_at, numbers_at, value = arguments
@@ -49,7 +55,10 @@ def _count_rows(
     fewest: Any,  # noqa: ANN401
     width: Any,  # noqa: ANN401
 ) -> Any:  # noqa: ANN401
-    """Count the steps in each lane, row by row, up to the largest number, or begin anew at 0 where the log-odds are positive."""
+    """Count the steps in each lane, row by row, up to the largest number.
+
+    The count starts again at 0 where the log-odds are positive.
+    """
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         beliefs_at, stride, rows, steps_at, most, fewest_at, width = arguments
@@ -102,7 +111,10 @@ def _least_sums(
     cap: Any,  # noqa: ANN401
     result: Any,  # noqa: ANN401
 ) -> Any:  # noqa: ANN401
-    """Write cap - min(cap, numbers[j + k] + costs[k]) for the lanes j, the least over k from low to high."""
+    """Write cap - min(cap, numbers[j + k] + costs[k]) for the lanes j.
+
+    The minimum is over k from low to high.
+    """
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         numbers_at, costs_at, first, last, most, result_at = arguments
@@ -154,7 +166,10 @@ _same: Any = intrinsic(_same_block)
 
 @kernel(inline=True)
 def cells_that_differ(log_odds: int, numbers: int, number: int) -> np.uint64:
-    """Tell in which cells of two blocks, int8 and uint16, only one is true: the log-odds are positive, the other is ``number``."""
+    """Return in which cells of two blocks, int8 and uint16, only one is true.
+
+    The log-odds are positive, or the other is ``number``.
+    """
     cells: np.uint64 = _differs(log_odds, numbers, number)
     return cells
 
@@ -163,7 +178,9 @@ def cells_that_differ(log_odds: int, numbers: int, number: int) -> np.uint64:
 def count_rows(
     log_odds: int, stride: int, rows: int, steps: int, largest: int, fewest: int, width: int
 ) -> None:
-    """Count, row by row, the rows since the last occupied cell of each of 64 columns, and keep the fewest that each place has had.
+    """Count the rows since the last occupied cell of each of 64 columns.
+
+    Row by row; the fewest that each place has had are kept.
 
     Parameters
     ----------
@@ -182,7 +199,9 @@ def count_rows(
 
 @kernel(inline=True)
 def write_squares(steps: int, far: int, cap: int, result: int) -> int:
-    """Write how far it is, squared and in half cells, after the steps of cells in a block of uint16, and return the fewest steps.
+    """Write squared distances [half cells] of a uint16 block of steps in cells.
+
+    Returns the fewest steps.
 
     From ``far`` steps on it is ``cap``, which it never exceeds; (2 ``far`` - 1) ^ 2 must fit into 16 bits.
     """
@@ -192,7 +211,9 @@ def write_squares(steps: int, far: int, cap: int, result: int) -> int:
 
 @kernel(inline=True)
 def write_least_sums(numbers: int, costs: int, low: int, high: int, cap: int, result: int) -> None:
-    """Write what is left of ``cap`` after the least of ``numbers[j + k] + costs[k]`` over k from ``low`` to ``high``, for 64 cells j.
+    """Write ``cap`` less the least of ``numbers[j + k] + costs[k]``, for 64 cells j.
+
+    The least is over k from ``low`` to ``high``; the result is not negative.
 
     All are uint16, of which no sum may exceed 65,535; high ends excluded.
     """

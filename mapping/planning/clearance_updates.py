@@ -1,4 +1,6 @@
-"""How closeness is brought up to date: stamps around cells that became occupied, blocks computed anew where cells became free.
+"""Updates of closeness.
+
+Stamps are placed around cells that became occupied, and blocks recomputed where cells became free.
 
 The distance transform is separable (Felzenszwalb and Huttenlocher, Distance transforms of sampled functions,
 Theory of Computing 8, 2012); with a small largest distance the plain minimum along rows, of many cells at
@@ -38,7 +40,9 @@ def grown_window(window: Window, margin: int, shape: tuple[int, int]) -> Window:
 
 @kernel
 def update_closeness(log_odds: Array, closeness: Array, limit: int, stamp: Array, window: Window) -> bool:
-    """Bring closeness up to date where cells of a window became occupied or ceased to be; whether any did (kernel).
+    """Update closeness where cells of a window became or ceased to be occupied.
+
+    Returns whether any did (kernel).
 
     Parameters are those of :class:`ClearanceField` and its ``update``.
     """
@@ -47,7 +51,10 @@ def update_closeness(log_odds: Array, closeness: Array, limit: int, stamp: Array
 
 @kernel
 def update_around(log_odds: Array, closeness: Array, limit: int, stamp: Array, changed: Array) -> bool:
-    """Bring closeness up to date around the cells (N, 2) that became occupied or ceased to be, all of them; whether any did (kernel)."""
+    """Update closeness around all cells (N, 2) that changed occupancy (kernel).
+
+    They became occupied or ceased to be. Returns whether any did.
+    """
     if len(changed) == 0:
         return False
     reach, added = stamp.shape[0] // 2, 0
@@ -82,7 +89,10 @@ def update_around(log_odds: Array, closeness: Array, limit: int, stamp: Array, c
 
 @kernel(inline=True)
 def _next_stale(stale: Array, row: int) -> int:
-    """Return the first stale row from ``row`` on, as many as there are rows where there is none."""
+    """Return the first stale row from ``row`` on.
+
+    The number of rows where there is none.
+    """
     while row < stale.size and not stale[row]:
         row += 1
     return row
@@ -90,7 +100,10 @@ def _next_stale(stale: Array, row: int) -> int:
 
 @kernel(inline=True)
 def _within(column: int, columns: int) -> int:
-    """Return from which column on 64 columns lie within the grid that hold all of those from ``column`` on that do; -1 for none."""
+    """Return the first of 64 columns within the grid that cover those wanted.
+
+    They hold all columns from ``column`` on that lie in the grid; -1 for none.
+    """
     return min(max(column, 0), columns - BLOCK) if columns >= BLOCK and -BLOCK < column < columns else -1
 
 
@@ -98,7 +111,9 @@ def _within(column: int, columns: int) -> int:
 def _mark_stale(
     closeness: Array, stamp: Array, row: int, column: int, first_row: int, first_block: int, is_stale: Array
 ) -> None:
-    """Mark the rows of blocks in which the closeness of a cell may have come from one that ceased to be occupied.
+    """Mark the rows of blocks whose closeness may come from a freed cell.
+
+    A freed cell is one that ceased to be occupied.
 
     Where it did not come from there it was greater, and the occupied cell from which it came is still there,
     or marks it itself.
@@ -129,7 +144,10 @@ def _mark_stale(
 
 @kernel
 def changed_cells(log_odds: Array, closeness: Array, limit: int, window: Window) -> Array:
-    """List the cells (row, column) of a window that became occupied or ceased to be since closeness was brought up to date (kernel)."""
+    """List the changed cells (row, column) of a window (kernel).
+
+    They became occupied or ceased to be since closeness was last updated.
+    """
     row_low, row_high, column_low, column_high = grown_window(window, 0, log_odds.shape)
     columns = log_odds.shape[1]
     changed, count = room_for_cells(), 0
@@ -152,7 +170,9 @@ def room_for_cells() -> Array:
 
 @kernel
 def list_cells(listed: Array, count: int, word: np.uint64, row: int, column: int) -> tuple[Array, int]:
-    """Add the cells (row, column) of a block of a row, from ``column`` on, whose bits are set, to a list of so many (kernel).
+    """Add the cells (row, column) of a block whose bits are set to a list (kernel).
+
+    The block is part of a row, from ``column`` on; the list has so many entries.
 
     Returns
     -------
@@ -176,7 +196,10 @@ def list_cells(listed: Array, count: int, word: np.uint64, row: int, column: int
 
 @kernel
 def _that_differ(log_odds: Array, closeness: Array, limit: int, place: int, cells: int) -> np.uint64:
-    """Tell which of up to 64 cells from a place in the grid on became occupied or free."""
+    """Return which of up to 64 cells from a place on became occupied or free.
+
+    The place is an index into the grid.
+    """
     if place + BLOCK <= log_odds.size:
         found: np.uint64 = cells_that_differ(
             log_odds.ctypes.data + place, closeness.ctypes.data + 2 * place, limit
@@ -232,7 +255,9 @@ def _count_rows(
     lane: int,
     largest: int,
 ) -> None:
-    """Do what ``count_rows`` does for the columns from ``column`` on, from a row on in steps of 1 or -1.
+    """Apply ``count_rows`` to the columns from ``column`` on.
+
+    From a row on, in steps of 1 or -1.
 
     ``steps`` is (64,); ``fewest`` (rows, width), in which the columns begin at ``lane``, may have one row for
     all. Beyond the grid nothing is occupied.
@@ -253,7 +278,10 @@ def _count_rows(
 
 @kernel
 def _nearest_rows(log_odds: Array, reach: int, row_low: int, row_high: int, column: int, width: int) -> Array:
-    """Return how many rows off the nearest occupied cell of the same column is, ``reach`` + 1 for farther: (rows, width) uint16."""
+    """Return the number of rows to the nearest occupied cell of the same column.
+
+    ``reach`` + 1 for farther: (rows, width) uint16.
+    """
     far, low, high = reach + 1, max(row_low - reach, 0), min(row_high + reach, log_odds.shape[0])
     steps, beyond = np.empty(BLOCK, np.uint16), np.empty((1, width), np.uint16)
     fewest = np.full((row_high - row_low, width), far, np.uint16)
@@ -274,7 +302,10 @@ def _nearest_rows(log_odds: Array, reach: int, row_low: int, row_high: int, colu
 def _recompute(
     log_odds: Array, closeness: Array, limit: int, reach: int, row_low: int, stale: Array, column: int
 ) -> None:
-    """Compute the closeness of a block of columns, from ``column`` on, in the stale rows from ``row_low`` on from all occupied cells."""
+    """Compute the closeness of a block of columns in its stale rows.
+
+    Columns from ``column``, rows from ``row_low`` on; from all occupied cells.
+    """
     columns, far = log_odds.shape[1], reach + 1
     width = (BLOCK + 2 * reach + BLOCK - 1) // BLOCK * BLOCK
     costs, sides = np.empty(2 * reach + 1, np.uint16), np.empty(far, np.int64)

@@ -19,7 +19,7 @@ def swept(
     resolution: float,
     margin_m: float = MARGIN_M,
 ) -> NDArray[np.bool_]:
-    """Return the cells of a grid in which others may have drawn a body that drove along a trail.
+    """Return the cells where others may have mapped a body driving along a trail.
 
     Parameters
     ----------
@@ -58,7 +58,9 @@ def passed(
     radius: float,
     resolution: float,
 ) -> NDArray[np.bool_]:
-    """Return the cells where the body itself has been, without what lies so near to the end of the trail that it may show it as it stands.
+    """Return the cells of the body's own footprint along its trail.
+
+    Cells so near to the trail's end that they may show the standing body are left out.
 
     No wall is where a body was, but beside it there may be one.
     """
@@ -78,5 +80,8 @@ def passed(
 
 
 def _pixels(points: NDArray[np.float64], origin: tuple[float, float], resolution: float) -> NDArray[np.int32]:
-    """Return points [m] as pixels, which are addressed by their centres, in parts of a cell."""
+    """Return points [m] as pixels in parts of a cell.
+
+    Pixels are addressed by their centres.
+    """
     return np.rint(((points - origin) / resolution - 0.5) * _CELL).astype(np.int32)

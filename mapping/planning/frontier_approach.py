@@ -1,4 +1,6 @@
-"""Which frontiers a body can come near to, where it stands then, and which costs least.
+"""Frontiers that a body can approach, the places there, and the cheapest.
+
+At its place the body is near to the frontier.
 
 A frontier cell often lies where the body does not fit, beside a wall or the edge of what is known. It is
 enough to stand within reach of it and to see it: what lies beyond an occupied cell is not approached, be it a
@@ -147,7 +149,9 @@ def nearest_frontier(
     reach: float | None = None,
     blocked: Iterable[Disc] = (),
 ) -> NearestFrontier | None:
-    """Search outwards until the first place from which a frontier cell is in reach and sight.
+    """Search outwards for a place with a frontier cell in reach and sight.
+
+    The first such place ends the search.
 
     Parameters
     ----------
@@ -188,7 +192,10 @@ def approach_places(
     least: int,
     spans: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-    """Per cluster the place, its frontier cell, what remains there of the budget, and whether one sees the other (kernel)."""
+    """Return per cluster the place, its frontier cell, budget and visibility (kernel).
+
+    The budget is what remains at the place; visibility is whether the place sees the frontier cell.
+    """
     rows, columns = log_odds.shape
     reach = len(spans) // 2
     count = len(starts) - 1

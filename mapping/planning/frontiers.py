@@ -28,7 +28,9 @@ TILE = 1 << TILE_SHIFT
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """8-connected groups of frontier cells, by their first cell in the order of rows and columns.
+    """8-connected groups of frontier cells.
+
+    Ordered by their first cell in the order of rows and columns.
 
     Attributes
     ----------
@@ -82,7 +84,9 @@ class FrontierMap:
         self.tiles: NDArray[np.int32] = np.zeros(tuple(-(-side // TILE) for side in shape), dtype=np.int32)
 
     def update(self, log_odds: NDArray[np.int8], window: Window | None = None) -> None:
-        """Recompute the flags around a window (row_low, row_high, column_low, column_high) of the belief that changed (all by default).
+        """Recompute the flags around a window of the belief that changed.
+
+        (row_low, row_high, column_low, column_high), all by default.
 
         Raises
         ------
@@ -104,7 +108,10 @@ class FrontierMap:
         return np.asarray(_listed(self.flags, self.tiles, len(self)))
 
     def ignore(self, cells: NDArray[np.integer]) -> None:
-        """Leave cells (N, 2) out for as long as they stay frontier cells, such as those of a cluster that cannot be reached."""
+        """Ignore cells (N, 2) for as long as they stay frontier cells.
+
+        Such as those of a cluster that cannot be reached.
+        """
         chosen = np.asarray(cells, dtype=np.int64).reshape(-1, 2)
         chosen = np.unique(chosen[self.flags[chosen[:, 0], chosen[:, 1]] == FRONTIER], axis=0)
         self.flags[chosen[:, 0], chosen[:, 1]] = IGNORED
@@ -155,7 +162,10 @@ class FrontierMap:
 
 @kernel
 def update_frontiers(log_odds: Array, flags: Array, tiles: Array, window: Window) -> None:
-    """Recompute the flags in and beside a window that changed, and the counts of its tiles; see ``FrontierMap`` (kernel)."""
+    """Recompute the flags in and beside a changed window (kernel).
+
+    The counts of its tiles are recomputed too; see ``FrontierMap``.
+    """
     rows, columns = log_odds.shape
     row_low, row_high, column_low, column_high = grown_window(window, 1, log_odds.shape)
     for row in range(row_low, row_high):
@@ -212,7 +222,10 @@ def ignore_frontiers_near(flags: Array, tiles: Array, row: int, column: int, rea
 
 @kernel
 def frontier_clusters(flags: Array, tiles: Array, minimum: int) -> tuple[Array, Array]:
-    """8-connected clusters of at least ``minimum`` frontier cells: the cells, and where each cluster starts (kernel)."""
+    """Return 8-connected clusters of frontier cells and their starts (kernel).
+
+    Each has at least ``minimum`` cells. The starts index the first cell of each cluster.
+    """
     cells, starts = _clustered(flags, _listed(flags, tiles, tiles.sum()), minimum)
     return cells, starts
 

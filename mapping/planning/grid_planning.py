@@ -71,7 +71,8 @@ class Footprint:
     def __post_init__(self) -> None:
         if not 0.0 <= self.radius <= self.preferred:
             raise ValueError(
-                f"radius is {self.radius} m and preferred clearance {self.preferred} m; want 0 <= radius <= preferred"
+                f"radius is {self.radius} m and preferred clearance {self.preferred} m; want 0 <= radius <= "
+                "preferred"
             )
         if not 0.0 <= self.penalty <= 1000.0:
             raise ValueError(f"penalty is {self.penalty}; want 0 to 1000 times the length of a step")
@@ -79,7 +80,9 @@ class Footprint:
 
 @lru_cache(maxsize=64)
 def passage_of(footprint: Footprint, resolution: float, limit: int) -> Passage:
-    """Return how a body passes over a grid of cells of ``resolution`` [m], whose clearance field has this ``limit``.
+    """Return how a body passes over a grid of cells of ``resolution`` [m].
+
+    The grid's clearance field has this ``limit``.
 
     Raises
     ------
@@ -89,7 +92,8 @@ def passage_of(footprint: Footprint, resolution: float, limit: int) -> Passage:
     least = limit_of(footprint.radius, resolution)
     if limit_of(footprint.preferred, resolution) > limit:
         raise ValueError(
-            f"preferred clearance {footprint.preferred} m is beyond the largest one that the clearance field knows"
+            f"preferred clearance {footprint.preferred} m is beyond the largest one that the clearance field "
+            "knows"
         )
     squared = limit - np.arange(limit + 1)
     clearance = np.sqrt(squared) * 0.5 * resolution
@@ -241,7 +245,8 @@ class Search:
         """
         if math.isinf(self.cost(cell)):
             raise ValueError(
-                f"cell {(int(cell[0]), int(cell[1]))} was not reached from {self.start}; ask for its cost first"
+                f"cell {(int(cell[0]), int(cell[1]))} was not reached from {self.start}; ask for its cost "
+                "first"
             )
         return np.asarray(
             grid_search.trace(self.space.parent, self.start[0], self.start[1], int(cell[0]), int(cell[1]))
@@ -250,7 +255,8 @@ class Search:
     def _check(self) -> None:
         if self.generation != self.space.generation:
             raise ValueError(
-                "another search has used this space since; read a search before the next one, or give it a space of its own"
+                "another search has used this space since; read a search before the next one, or give it a "
+                "space of its own"
             )
 
 
@@ -268,7 +274,9 @@ def search(
     maximum_cost: float = math.inf,
     blocked: Iterable[Disc] = (),
 ) -> Search:
-    """Spread costs from a cell over all that a body can reach, or until what is looked for is found.
+    """Spread costs from a cell over all that a body can reach.
+
+    Ends early where the target is found.
 
     Parameters
     ----------
@@ -346,7 +354,9 @@ def plan(
     maximum_cost: float = math.inf,
     blocked: Iterable[Disc] = (),
 ) -> tuple[float, NDArray[np.int64]] | None:
-    """Cheapest path to one cell, by A* with the octile distance (Hart, Nilsson and Raphael, IEEE T-SSC 1968).
+    """Return the cheapest path to one cell, by A* with the octile distance.
+
+    Hart, Nilsson and Raphael, IEEE T-SSC 1968.
 
     Parameters are those of :func:`search`; the cost is the same as there.
 
@@ -375,7 +385,10 @@ def plan(
 
 
 def discs_of(discs: Iterable[Disc], origin: tuple[float, float], resolution: float) -> list[Disc]:
-    """Discs (x, y, radius) [m] as (row, column, radius) in cells, counted from the centre of cell (0, 0)."""
+    """Return discs (x, y, radius) [m] as (row, column, radius) in cells.
+
+    Counted from the centre of cell (0, 0).
+    """
     return [
         ((y - origin[1]) / resolution - 0.5, (x - origin[0]) / resolution - 0.5, radius / resolution)
         for x, y, radius in discs

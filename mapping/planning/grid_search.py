@@ -1,4 +1,6 @@
-"""The kernel of all searches over a belief: Dijkstra's algorithm and A* with buckets.
+"""The kernel of all searches over a belief.
+
+Dijkstra's algorithm and A* with buckets.
 
 Costs are integers, so that sums are exact and the same everywhere: a straight step on open floor costs 4756
 units and a diagonal one 6726 (their ratio is sqrt 2 to one part in ten million). A bucket holds the cells of
@@ -101,7 +103,10 @@ def sees_target(
     row: int,
     column: int,
 ) -> bool:
-    """Whether a cell with mask 1 lies in the disc of ``spans`` around a cell and in its line of sight (kernel)."""
+    """Whether a cell with mask 1 is within reach and sight of a cell (kernel).
+
+    Within the disc of ``spans`` around the cell, and in its line of sight.
+    """
     if near[row >> TILE_SHIFT, column >> TILE_SHIFT] == 0:
         return False
     reach = len(spans) // 2
@@ -123,7 +128,10 @@ def _margin(
     row: int,
     column: int,
 ) -> float:
-    """Room [cells] between a body centred in a cell and what is nearest, walls and discs; negative inside a blocked zone."""
+    """Return the room [cells] between a body centred in a cell and obstacles.
+
+    To the nearest wall or disc; negative inside a blocked zone.
+    """
     margin = np.sqrt(float(limit - closeness[row, column])) * 0.5 - radius
     for k in range(len(discs)):
         distance = np.sqrt((row - discs[k, 0]) ** 2 + (column - discs[k, 1]) ** 2)
@@ -135,7 +143,9 @@ def _margin(
 def _step_is_open(
     log_odds: Array, closeness: Array, half_costs: Array, roomy: int, nearest: int, beside: int, abeam: int
 ) -> bool:
-    """Whether a diagonal step between cells of closeness up to ``nearest`` keeps its clearance on the way; flat grids and places.
+    """Whether a diagonal step keeps its clearance between its ends.
+
+    The ends have closeness up to ``nearest``; grids and places are flat.
 
     Between the centres of two diagonal neighbours the squared clearance in half cells falls at most 2 below
     that of both ends, and not at all where both cells beside the step have it too. So the path of centres is
@@ -171,7 +181,9 @@ def _leave(
     goal_column: int,
     guided: bool,
 ) -> tuple[int, int, int]:
-    """Step on from a cell inside a blocked zone: to open cells, or to blocked ones with no less room.
+    """Expand a cell inside a blocked zone.
+
+    Steps lead to open cells, or to blocked ones with no less room.
 
     Each step costs as much as the dearest of all, so that the way out is short.
     """
@@ -382,7 +394,9 @@ def spread(
     beyond: int,
     hits: NDArray[np.int32],
 ) -> tuple[int, int, int, NDArray[np.int32]]:
-    """Spread costs from the start until the goal, the wanted number of targets, the budget or all is reached (kernel).
+    """Spread costs from the start until an end condition is met (kernel).
+
+    The goal, the wanted number of targets, the budget or all is reached.
 
     With the targets found it goes on to costs of ``beyond`` above theirs. Returns the number of touched
     cells, of targets hit, the last band of costs that is final, and the buckets (grown where they were too

@@ -1,4 +1,6 @@
-"""The cheapest path between two cells, in kernels that plan for many bodies at once.
+"""The cheapest path between two cells.
+
+It is found in kernels that plan for many bodies at once.
 
 A kernel that plans works on memory of its own thread; what a search touched is cleared behind it, so that
 neither the order of the searches nor the number of threads shows in what they find.
@@ -24,7 +26,10 @@ from lidarium.mapping.planning.grid_search import (
 )
 
 REMAINING, PARENT, TOUCHED, BUCKETS, SLOTS, WIDTH = range(6)
-"""Places in a row of a search memory's table: addresses, and the shape of the buckets."""
+"""Indices into a row of a search memory's table.
+
+Addresses, and the shape of the buckets.
+"""
 
 BUCKET_WIDTH = 4096
 """Cells for which a bucket has room at first.
@@ -125,7 +130,10 @@ def _memory_of(pieces: int, cells: int, slots: int) -> SearchMemory:
 
 @kernel
 def budget_of(maximum_cost: float, resolution: float) -> int:
-    """Return what may be spent for a cost of at most ``maximum_cost`` [m], in units of searches (kernel)."""
+    """Return the budget for a cost of at most ``maximum_cost`` [m] (kernel).
+
+    In units of searches.
+    """
     largest = maximum_cost * STRAIGHT / resolution
     return LARGEST_BUDGET if largest > LARGEST_BUDGET - 1 else max(int(largest), 0) + 1
 
@@ -216,7 +224,9 @@ def search_at(
     task: Array,
     targets: Lookout,
 ) -> tuple[int, int, int]:
-    """Search a belief given by its address, so that arrays that may not be written need no kernels of their own (kernel).
+    """Search a belief given by its address (kernel).
+
+    Read-only arrays then need no kernels of their own.
 
     Returns
     -------
@@ -279,7 +289,9 @@ def find_path(
     goal_column: int,
     budget: int,
 ) -> tuple[int, Array]:
-    """Cheapest path between two cells of a grid, by A* with the octile distance (kernel).
+    """Return the cheapest path between two cells of a grid (kernel).
+
+    By A* with the octile distance.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""Short cuts: a path of cells becomes few waypoints, joined by straight lines that a body can drive.
+"""Short cuts in a path of cells.
+
+They reduce it to few waypoints, joined by straight lines that a body can drive.
 
 A straight line may replace a piece of a path if every cell it crosses is known to be free and its exact
 distance to all occupied squares is at least what the replaced piece has, though no more than is preferred.
@@ -93,7 +95,10 @@ def line_keeps_clearance(
     clearance: ClearanceField,
     distance: float,
 ) -> bool:
-    """Whether the straight line between the centres of two cells is known free and keeps ``distance`` [m] from what is occupied."""
+    """Whether the line between two cells is known free and keeps ``distance`` [m].
+
+    The line is straight between their centres; the distance is from occupied cells.
+    """
     if distance > clearance.maximum:
         raise ValueError(f"distance is {distance} m; this field knows clearances up to {clearance.maximum} m")
     ends = np.array([from_cell, to_cell], dtype=np.int64)
@@ -180,7 +185,10 @@ def _can_replace(
     preferred: float,
     discs: Array,
 ) -> bool:
-    """Whether the line between two cells of a path is as good as the piece between them, whose greatest closeness is ``nearest``."""
+    """Whether a straight line is as good as the piece of a path it replaces.
+
+    It joins two cells of the path. The piece's greatest closeness is ``nearest``.
+    """
     own = (
         math.sqrt(max(limit - nearest - 2.0, 0.0)) * 0.5
     )  # diagonal steps lose at most 2 squared half cells on the way
@@ -218,7 +226,10 @@ def _distance_to_square(row: float, column: float, centre_row: int, centre_colum
 def _piece_is_clear(
     log_odds: Array, row_a: float, column_a: float, row_b: float, column_b: float, needed: float
 ) -> bool:
-    """Whether a piece of a line, crossing free cells only, keeps ``needed`` cells from every occupied square around it."""
+    """Whether a piece of a line keeps ``needed`` cells from occupied squares.
+
+    It crosses free cells only; every occupied square around it counts.
+    """
     rows, columns = log_odds.shape
     row_low = max(math.floor(min(row_a, row_b) - needed), 0)
     row_high = min(math.ceil(max(row_a, row_b) + needed) + 1, rows)
@@ -256,7 +267,10 @@ def line_is_clear(
     to_column: int,
     needed: float,
 ) -> bool:
-    """Whether a line between two cells crosses only known free cells and keeps ``needed`` cells from all that is occupied (kernel)."""
+    """Whether a line between two cells is free and keeps its clearance (kernel).
+
+    It crosses only known free cells and keeps ``needed`` cells from all that is occupied.
+    """
     if not line_is_free(log_odds, row, column, to_row, to_column):
         return False
     rise = float(to_row - row)

@@ -1,4 +1,7 @@
-"""What a search looks for: cells of a mask, each within a disc around where the body stands."""
+"""Targets of a search: cells of a mask near the body.
+
+Each is within a disc around where the body stands.
+"""
 
 import math
 from collections.abc import Iterable
@@ -14,7 +17,9 @@ from lidarium.mapping.planning.grid_search import TILE_SHIFT
 
 @dataclass(frozen=True, slots=True)
 class Targets:
-    """Cells that a search looks for: it is there once it can see one of them within reach.
+    """Target cells of a search.
+
+    The search ends once it can see one of them within reach.
 
     Attributes
     ----------
@@ -54,7 +59,10 @@ class Targets:
 
 @lru_cache(maxsize=64)
 def disc_spans(reach: float) -> NDArray[np.int64]:
-    """Half widths of the rows of a disc of ``reach`` cells around the centre of a cell."""
+    """Return half widths of the rows of a disc of ``reach`` cells.
+
+    Around the centre of a cell.
+    """
     squared = reach * reach + 1e-9
     steps = np.arange(-math.floor(math.sqrt(squared)), math.floor(math.sqrt(squared)) + 1)
     spans: NDArray[np.int64] = np.floor(np.sqrt(squared - steps * steps)).astype(np.int64)
@@ -63,7 +71,10 @@ def disc_spans(reach: float) -> NDArray[np.int64]:
 
 
 def near_tiles(counts: NDArray[np.int32], reach: float) -> NDArray[np.uint8]:
-    """Tiles whose cells may be within ``reach`` cells of a cell counted in ``counts`` (one number per tile)."""
+    """Return the tiles within ``reach`` cells of a cell counted in ``counts``.
+
+    Some cell of the tile may be that near; ``counts`` has one number per tile.
+    """
     return np.asarray(_grown(counts, math.ceil(reach / (1 << TILE_SHIFT))))
 
 

@@ -1,4 +1,7 @@
-"""The shortest way past all places that are left to see: which of them comes first."""
+"""The shortest tour of all places that are left to see.
+
+It determines which of them comes first.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +19,9 @@ _LESS = 1e-9
 
 @kernel
 def shortest_tour(first: NDArray[np.float64], between: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the order in which an open tour visits all places, about the shortest one.
+    """Return the order in which an open tour visits all places.
+
+    The tour is approximately the shortest one.
 
     Tours go on to the nearest place from each of the nearest beginnings, and are improved by turning pieces
     round (2-opt; Croes 1958) and by moving pieces elsewhere (Or 1976) until neither helps. Explorers that

@@ -48,7 +48,10 @@ class Overlap:
 
 
 def are_near(seen: NDArray[np.float64], known: NDArray[np.float64], distance: float) -> bool:
-    """Return whether any of the control points (n, 2) of one curve is within a distance of one of another (m, 2) [m]."""
+    """Return whether two curves have control points within a distance [m].
+
+    Any of (n, 2) of one from any of (m, 2) of the other.
+    """
     return bool(_are_near(seen, known, distance))
 
 
@@ -101,7 +104,10 @@ def _are_near(seen: Array, known: Array, distance: float) -> bool:
 
 @kernel
 def closest_place(way: Array, x: float, y: float) -> tuple[float, float]:
-    """Return the place of a way of points (n, 2), n >= 2, that is nearest to a point, counted in its points, and the distance [m]."""
+    """Return the nearest place on a polyline (n, 2) to a point, and its distance.
+
+    The place is counted in points of the polyline, n >= 2; the distance is in metres [m].
+    """
     place, nearest = 0.0, math.inf
     for k in range(way.shape[0] - 1):
         ax, ay = way[k, 0], way[k, 1]
@@ -117,7 +123,9 @@ def closest_place(way: Array, x: float, y: float) -> tuple[float, float]:
 
 @kernel
 def mark_along(points: Array, way: Array, distance: float, is_along: Array) -> None:
-    """Mark the points of one way (m, 2) that run along another (n, 2) within a distance [m]; others keep their marks (m,).
+    """Mark the points of one polyline (m, 2) that run along another (n, 2).
+
+    Within a distance [m]; other points keep their marks (m,).
 
     The two faces of a thin wall run opposite ways.
     """

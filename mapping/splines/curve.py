@@ -1,4 +1,7 @@
-"""A curve of the map: a spline, how much is known of each part of it, and what is derived of it once."""
+"""A curve of the map.
+
+A spline, how well each part of it is known, and quantities derived from it once.
+"""
 
 import math
 from dataclasses import dataclass
@@ -69,7 +72,8 @@ def make_curve(
     """
     if np.shape(weights) != (len(spline.control_points),):
         raise ValueError(
-            f"weights have shape {np.shape(weights)}; the curve has {len(spline.control_points)} control points"
+            f"weights have shape {np.shape(weights)}; the curve has {len(spline.control_points)} control "
+            "points"
         )
     parameters = spline.sample_parameters(spacing)
     points = spline.evaluate(parameters)
@@ -122,7 +126,10 @@ def curves_in(curves: list[Curve], box: Box) -> list[int]:
 
 
 def control_parameters(knots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return at which parameter each control point acts most: the mean of its three inner knots (Greville), shape (n,) [m]."""
+    """Return the parameter at which each control point acts most, (n,) [m].
+
+    The mean of its three inner knots (Greville).
+    """
     count = len(knots) - ORDER
     return np.asarray((knots[1 : count + 1] + knots[2 : count + 2] + knots[3 : count + 3]) / 3.0)
 

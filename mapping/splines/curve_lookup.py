@@ -1,4 +1,7 @@
-"""Tells fast which piece of a curve is nearest to a place: a grid of cells around the robot, each with its nearest piece."""
+"""Fast lookup of the piece of a curve nearest to a place.
+
+A grid of cells around the robot holds the nearest piece of each.
+"""
 
 import math
 
@@ -12,7 +15,10 @@ CELL = 0.05
 """Side of a cell [m]."""
 
 PIECE, STRAIGHT = 0.5, 0.001
-"""Curves are looked up as straight pieces of about this length at most, from which they stray no farther than this [m]."""
+"""Largest length of straight pieces, and their deviation from the curve [m].
+
+Curves are looked up as such pieces; the length is approximate.
+"""
 
 
 class CurveLookup:
@@ -65,7 +71,10 @@ class CurveLookup:
         _stamp(self.pieces, self.frame, self.nearest, self._gaps)
 
     def look_up(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return the nearest pieces of points (m, 2), -1 for none, and the distances from them [m], inf for none, each (m,)."""
+        """Return the nearest pieces of points (m, 2), and the distances [m].
+
+        Each is (m,). Without a piece: -1, and inf as its distance.
+        """
         pieces, gaps = np.empty(len(points), np.int64), np.empty(len(points))
         _look_up(
             np.ascontiguousarray(points, np.float64), self.pieces, self.nearest, self.frame, pieces, gaps
@@ -75,7 +84,10 @@ class CurveLookup:
 
 @kernel
 def _pieces_of(points: Array, ends: Array) -> Array:
-    """Return the straight pieces of ways that lie one after another in ``points``, each up to its number of ``ends``."""
+    """Return the straight pieces of polylines stored one after another.
+
+    They lie in ``points``, each up to its number of ``ends``.
+    """
     pieces = np.empty((points.shape[0], 5))
     count, first = 0, 0
     for way in range(ends.shape[0]):
@@ -96,7 +108,10 @@ def _pieces_of(points: Array, ends: Array) -> Array:
 
 @kernel
 def _is_straight(points: Array, first: int, last: int) -> bool:
-    """Return whether a way is short and straight enough between two of its points to be one piece."""
+    """Return whether a polyline is straight and short enough to be one piece.
+
+    Between two of its points.
+    """
     x, y = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
     squared = x * x + y * y
     if squared > PIECE * PIECE:

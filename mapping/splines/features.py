@@ -1,4 +1,6 @@
-"""What is seen in a scan: curves of walls, and as features corners, free ends of walls (peaks) and straight lines.
+"""Curves of walls and features that are seen in a scan.
+
+Features are corners, free ends of walls (peaks) and straight lines.
 
 A corner is where two smooth pieces of one cluster meet. A peak is where a surface ends because it ends: the
 scan goes on farther away. Where it goes on nearer, something stands in front; where it does not go on, the
@@ -24,7 +26,10 @@ PEAK_JUMP = 0.3
 """What follows a peak lies at least so much farther away [m]."""
 
 PEAK_INCIDENCE = math.radians(15.0)
-"""A surface seen at a smaller angle does not end where the scan of it does: a round post, or a wall too slanted to be one cluster."""
+"""Least angle of incidence at which a surface ends where its scan does.
+
+Below it may be a round post, or a wall too slanted to be one cluster.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +137,9 @@ def curves_of(
 def match_points(
     seen: NDArray[np.float64], known: NDArray[np.float64], most_distance: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Match each seen point (n, 2) to the nearest known one (m, 2) that is nearer than a distance [m]; returns indices of both.
+    """Match each seen point (n, 2) to the nearest known one (m, 2).
+
+    Only within a distance [m]. Returns indices of both.
 
     A known point is matched once, by the seen point that is nearest to it.
     """
@@ -156,7 +163,10 @@ def _are_lines(cut: Cut, sigmas: NDArray[np.float64], settings: SplineSettings) 
 
 
 def _is_peak(points: ScanPoints, end: int, step: int) -> bool:
-    """Return whether a cluster ends at a point, going by steps of 1 or -1, because its surface does."""
+    """Return whether a cluster ends at a point because its surface does.
+
+    Points are followed in steps of 1 or -1.
+    """
     beam = int(points.beams[end]) + step
     geometry = points.geometry
     if geometry.is_full_circle:
@@ -171,7 +181,10 @@ def _is_peak(points: ScanPoints, end: int, step: int) -> bool:
 
 @kernel
 def _incidence(points: Array, end: int, step: int) -> float:
-    """Return the angle between the beam at an end and the wall behind it, told from the four points there [rad]."""
+    """Return the angle between the beam at an end and the wall behind it [rad].
+
+    Estimated from the four points there.
+    """
     x, y = points[end, 0], points[end, 1]
     dx, dy = points[end + 3 * step, 0] - x, points[end + 3 * step, 1] - y
     return abs(math.atan2(abs(x * dy - y * dx), abs(x * dx + y * dy)))

@@ -1,4 +1,6 @@
-"""Joins two curves of one wall: their weighted mean where both run, and each of them where it runs alone.
+"""Joint curve of two curves of one wall.
+
+Their weighted mean where both run, and each of them where it runs alone.
 
 Curves are joined as ways, points along them with weights. A weight is a number of observations with a
 standard deviation of 1 cm.
@@ -58,7 +60,10 @@ def common_places(seen: Way, known: Way, settings: AssociationSettings) -> Place
 
 
 def join(seen: Way, known: Way, places: Places, settings: MapSettings) -> tuple[Way, bool]:
-    """Return the way along both, and whether the seen one goes beyond an end of the known one."""
+    """Return the joint polyline of both, and whether it extends the known one.
+
+    It does where the seen one goes beyond an end of the known one.
+    """
     most = len(seen.points) + len(known.points) + 4
     points, weights = np.empty((most, 2)), np.empty(most)
     numbers = np.array([places.seen_from, places.seen_to, places.known_from, places.known_to])
@@ -171,7 +176,10 @@ def _join(
 
 @kernel
 def _ramp(length: float, blend: float) -> float:
-    """Return by what share a seen way counts so far from its end: where the known one goes on alone, there shall be no step."""
+    """Return the weight share of a seen polyline at a distance from its end.
+
+    It avoids a step where the known one goes on alone.
+    """
     return min((length + 1e-3) / blend, 1.0)
 
 

@@ -1,4 +1,7 @@
-"""The points of a scan in the frame of the robot, each where it was seen at its own time."""
+"""The points of a scan in the frame of the robot.
+
+Each is placed where it was seen at its own time.
+"""
 
 from dataclasses import dataclass
 
@@ -89,7 +92,10 @@ def scan_points(
 
 @kernel
 def _undo_motion(points: Array, shares: Array, x: float, y: float, theta: float) -> None:
-    """Bring each point, seen a share of the motion ago, into the robot's present frame; ``x, y, theta`` is the former pose in it."""
+    """Bring each point, seen a share of the motion ago, into the present frame.
+
+    The frame is the robot's; ``x, y, theta`` is the former pose in it.
+    """
     for k in range(points.shape[0]):
         cosine, sine = np.cos(shares[k] * theta), np.sin(shares[k] * theta)
         px, py = points[k, 0], points[k, 1]

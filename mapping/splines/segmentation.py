@@ -1,4 +1,6 @@
-"""Cuts clusters of points at their corners: split, merge, and a look at the directions on both sides.
+"""Segmentation of clusters of points at their corners.
+
+Split, merge, and a comparison of the directions on both sides.
 
 Points are split where one lies too far from the line through the ends, again and again; neighbouring parts
 that fit one line are merged. What remains are straight leaves. Where the wall turns sharply between two of
@@ -114,7 +116,10 @@ def split_merge(
 
 
 def _pairs(ends: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return each of the numbers (n + 1,) but the last with the one after it, shape (n, 2)."""
+    """Return pairs (n, 2) of consecutive numbers of (n + 1,).
+
+    Each number but the last with the one after it.
+    """
     pairs = np.empty((len(ends) - 1, 2), np.int64)
     pairs[:, 0], pairs[:, 1] = ends[:-1], ends[1:]
     return pairs
@@ -122,7 +127,10 @@ def _pairs(ends: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @kernel
 def fit_line(points: Array, first: int, last: int) -> tuple[float, float, float, float, float]:
-    """Fit a line to points first .. last by total least squares: middle x, y, direction along the points [rad], half length, rms [m]."""
+    """Fit a line to points first .. last by total least squares.
+
+    Returns middle x, y, direction along the points [rad], half length, rms [m].
+    """
     count = last - first + 1
     x, y = 0.0, 0.0
     for k in range(first, last + 1):
@@ -155,7 +163,10 @@ def fit_line(points: Array, first: int, last: int) -> tuple[float, float, float,
 
 @kernel
 def _farthest(points: Array, sigmas: Array, first: int, last: int, limit: float, noise_sigmas: float) -> int:
-    """Return the point farthest from the line through the ends, if it is too far, else -1."""
+    """Return the point farthest from the line through the ends.
+
+    If it is too far, else -1.
+    """
     x, y = points[first, 0], points[first, 1]
     dx, dy = points[last, 0] - x, points[last, 1] - y
     length = np.sqrt(dx * dx + dy * dy)
@@ -196,7 +207,10 @@ def _split(points: Array, sigmas: Array, limit: float, noise_sigmas: float, ends
 def _merge(
     points: Array, sigmas: Array, limit: float, noise_sigmas: float, collinear: float, ends: Array, count: int
 ) -> int:
-    """Join neighbouring leaves of about one direction whose points fit one line, until none do; return the number of leaves."""
+    """Join neighbouring leaves until no two fit one line; return their number.
+
+    Joined leaves have about one direction, and their points fit one line.
+    """
     is_changed = True
     while is_changed and count > 1:
         is_changed = False
@@ -238,7 +252,9 @@ def _reach(points: Array, at: int, step: int, length: float) -> int:
 def _is_round(
     points: Array, first: int, low: int, high: int, last: int, reach: float, least: int, turn: float
 ) -> bool:
-    """Return whether a wall goes on turning beyond the parts low .. high from which a turn [rad] was told, as a round one does.
+    """Return whether a wall goes on turning beyond a corner, as a round one does.
+
+    The turn [rad] was estimated from the parts low .. high.
 
     Directions a reach farther on differ no more than those at a corner do, and three times as much on an arc.
     Only slight turns are in doubt; leaves first .. last bound where it is looked.

@@ -49,7 +49,10 @@ class Landmarks:
         most_distance: float,
         settings: MapSettings,
     ) -> "Landmarks":
-        """Return the landmarks with seen points (m, 2) of standard deviations (m,) taken in, and without those that were but noise [m]."""
+        """Return the landmarks updated by seen points (m, 2), without noise.
+
+        The points have standard deviations (m,) [m]. Landmarks that were only noise are removed.
+        """
         weights = (0.01 / sigmas) ** 2
         which, known = match_points(seen, self.points, most_distance)
         points, all_weights, counts, last_seen = (
@@ -127,7 +130,10 @@ class SplineMap:
 
     @property
     def lines(self) -> NDArray[np.float64]:
-        """Middle x, y, direction and half length of the curves that are lines, shape (n, 4) [m, m, rad, m]."""
+        """Middle x, y, direction and half length of the curves that are lines.
+
+        Shape (n, 4) [m, m, rad, m].
+        """
         lines = [curve.line for curve in self.curves if curve.line is not None]
         return np.array(lines).reshape(-1, 4)
 
@@ -141,7 +147,10 @@ class SplineMap:
         return np.concatenate([np.empty((0, 2)), *(curve.spline.sample(spacing) for curve in self.curves)])
 
     def ray(self, origin: NDArray[np.float64], direction: float) -> float:
-        """Return the range that a laser at a point (2,) would measure along a direction [rad], inf where no curve is met [m]."""
+        """Return the range that a laser at a point (2,) would measure [m].
+
+        Along a direction [rad]; inf where no curve is met.
+        """
         return min((curve.spline.ray(origin, direction) for curve in self.curves), default=math.inf)
 
     def _forget(self) -> None:
@@ -157,7 +166,7 @@ class SplineMap:
         ]
 
     def _take_in(self, spline: Spline, sigmas: NDArray[np.float64]) -> None:
-        """Join a seen curve with the map's curves along which it runs, or add it as a new one."""
+        """Join a seen curve with the map's curves along it, or add it as a new one."""
         settings = self.settings.map
         parameters = spline.sample_parameters(settings.sample_spacing)
         places = np.arange(len(parameters)) * ((len(sigmas) - 1) / (len(parameters) - 1))
@@ -183,7 +192,10 @@ class SplineMap:
             self.curves.append(fit_curve(way, count, self.updates, self.settings.fit, self.settings.map))
 
     def _is_new(self, way: Way) -> bool:
-        """Return whether a way is long against its noise, and not one more view of what the map holds."""
+        """Return whether a polyline is long against its noise, and new to the map.
+
+        New means that it is not one more view of what the map holds.
+        """
         settings = self.settings.map
         sigma = 0.01 / math.sqrt(float(way.weights.min()))
         if way.length < settings.least_sigmas * sigma:

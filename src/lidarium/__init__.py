@@ -5,12 +5,14 @@
 ``lidarium/Exploration-v0``, ``lidarium/WaypointExploration-v0`` and ``lidarium/FrontierExploration-v0``.
 """
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import pettingzoo
 
 if TYPE_CHECKING:
+    from importlib.machinery import ModuleSpec
     from pathlib import Path
 
     from pettingzoo import AECEnv, ParallelEnv
@@ -22,6 +24,23 @@ if TYPE_CHECKING:
     from lidarium.envs.settings.exploration import ExplorationSettings
 
 __version__ = "0.1.0"
+
+
+class _MovedModules:
+    """Asks ``lidarium.moved`` for modules of the package that no other finder has."""
+
+    @staticmethod
+    def find_spec(name: str, path: object = None, target: object = None) -> "ModuleSpec | None":
+        """Return the spec of a module by its old name, None for any other."""
+        if not name.startswith("lidarium.") or name == "lidarium.moved":
+            return None
+        from lidarium.moved import MovedModules
+
+        return MovedModules().find_spec(name, path, target)
+
+
+if not any(getattr(finder, "__name__", "") == _MovedModules.__name__ for finder in sys.meta_path):
+    sys.meta_path.append(_MovedModules)
 
 _LEVELS = {"Exploration": "velocity", "WaypointExploration": "waypoint", "FrontierExploration": "frontier"}
 
@@ -105,7 +124,9 @@ def vector_env(
     floor: "str | Path | Floor" = "apartment",
     **options: Any,  # noqa: ANN401
 ) -> "ExplorationVectorEnv":
-    """Make many episodes as one Gymnasium vector environment, stepped by one kernel call; a row for every robot.
+    """Make many episodes as one Gymnasium vector environment.
+
+    It is stepped by one kernel call and has a row for every robot.
 
     Parameters
     ----------
@@ -132,7 +153,9 @@ def sb3_vec_env(
     floor: "str | Path | Floor" = "apartment",
     **options: Any,  # noqa: ANN401
 ) -> "ExplorationVecEnv":
-    """Make the same rows as ``vector_env`` for stable-baselines3, which resets in the step that ends an episode; needs ``lidarium[rl]``.
+    """Make the same rows as ``vector_env`` for stable-baselines3.
+
+    It resets in the step that ends an episode, and needs ``lidarium[rl]``.
 
     Raises
     ------

@@ -106,7 +106,8 @@ def test_the_team_shares_its_frontiers_out():
 @pytest.mark.parametrize("robots", [1, 3])
 @pytest.mark.parametrize("cost_weight", [0.05, 0.4])
 def test_frontiers_far_away_are_left_out_only_where_they_change_no_choice(robots, cost_weight, monkeypatch):
-    """Looking over the whole floor at once, or ever further where it matters, gives the same run to the bit."""
+    """Looking over the whole floor at once, or ever further where it matters, gives the same run to the
+    bit."""
 
     def choices(first_slack):
         monkeypatch.setattr("lidarium.agents.frontier.FIRST_SLACK", first_slack)

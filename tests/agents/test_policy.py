@@ -1,4 +1,5 @@
-"""The contract of policies: registered by name, one object a team or one a robot, and every robot says why it ended."""
+"""The contract of policies: registered by name, one object a team or one a robot, and every robot says why
+it ended."""
 
 import signal
 from contextlib import contextmanager
@@ -214,7 +215,8 @@ class PressesControlC(Recorder):
 
 @contextmanager
 def interrupts_handled_by(handler):
-    """A process that was begun in the background may ignore SIGINT from its first moment on; these tests do not depend on it."""
+    """A process that was begun in the background may ignore SIGINT from its first moment on; these tests
+    do not depend on it."""
     before = signal.signal(signal.SIGINT, handler)
     try:
         yield

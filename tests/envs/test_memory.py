@@ -1,4 +1,5 @@
-"""What is dropped is gone at once: of objects that hold each other, Python collects many small ones sooner than few large maps."""
+"""What is dropped is gone at once: of objects that hold each other, Python collects many small ones sooner
+than few large maps."""
 
 import gc
 import weakref

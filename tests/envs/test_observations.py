@@ -1,4 +1,5 @@
-"""Observations: what is chosen and nothing else, written where the caller wants it, the same however it is asked for."""
+"""Observations: what is chosen and nothing else, written where the caller wants it, the same however it is
+asked for."""
 
 import copy
 import math

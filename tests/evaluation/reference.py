@@ -155,7 +155,8 @@ class Reference:
         return ranges
 
     def area(self, pose, ranges):
-        """Cells whose centre the scan has seen: each lies in one fan, and is seen if it lies before the fan's far edge."""
+        """Cells whose centre the scan has seen: each lies in one fan, and is seen if it lies before the
+        fan's far edge."""
         rows, columns = self.counted.shape
         lengths = np.minimum(ranges, self.reach)
         low_x, low_y = (np.floor((pose[:2] - self.reach - self.origin) / self.resolution).astype(int)).clip(0)
@@ -196,7 +197,8 @@ class Reference:
         return cells
 
     def settled(self, believed, pose, ranges):
-        """Ranges of beams that end at most three deviations and a cell behind an occupied cell, and beside no free one, end in it."""
+        """Ranges of beams that end at most three deviations and a cell behind an occupied cell, and beside
+        no free one, end in it."""
         lidar, known = (
             self.env.settings.lidar,
             {tuple(cell): believed[tuple(cell)] for cell in np.argwhere(believed).tolist()},
@@ -220,7 +222,8 @@ class Reference:
         return settled
 
     def look(self):
-        """Go through the steps: masks of what each robot saw, maps, coverage over time, and what is seen at once."""
+        """Go through the steps: masks of what each robot saw, maps, coverage over time, and what is seen
+        at once."""
         robots, is_noisy = self.env.settings.robots, self.env.settings.lidar.is_noisy
         self.seen = np.zeros((robots, *self.counted.shape), bool)
         self.maps = np.zeros((robots, *self.counted.shape), int)

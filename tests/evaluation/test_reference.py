@@ -86,7 +86,8 @@ def drawn_starts(generator, env):
 
 
 def drawn_episode(seed):
-    """An episode with its history and notes; a floor or starts that have no room for the team are drawn anew."""
+    """An episode with its history and notes; a floor or starts that have no room for the team are drawn
+    anew."""
     generator = np.random.default_rng(seed)
     apartment = load_floor("apartment").raster(0.05, 0.3, 0.3)
     while True:

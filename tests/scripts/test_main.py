@@ -32,7 +32,8 @@ def floor(tmp_path):
 
 
 def refused(arguments, capsys, tmp_path, *words):
-    """Assert exit code 2, one clear line on standard error, nothing on standard output and nothing written."""
+    """Assert exit code 2, one clear line on standard error, nothing on standard output and nothing
+    written."""
     out = tmp_path / "out"
     assert main([*arguments, *([] if "--out" in arguments else ["--out", str(out)])]) == 2
     told = capsys.readouterr()
@@ -67,7 +68,10 @@ def test_help_names_the_commands(capsys):
 
 def test_help_comes_without_loading_the_kernels():
     slow = ("numba", "cv2", "matplotlib")
-    code = f"import sys; from lidarium.scripts.main import main; main(['--help']); print([name for name in {slow} if name in sys.modules])"
+    code = (
+        "import sys; from lidarium.scripts.main import main; main(['--help']); print([name for name in "
+        f"{slow} if name in sys.modules])"
+    )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert told.splitlines()[-1] == "[]"
 
@@ -477,7 +481,10 @@ def test_a_run_interrupted_before_it_begins_writes_nothing(tmp_path, capsys, mon
 
 
 def test_a_reader_who_leaves_is_no_error(tmp_path):
-    code = "import sys, time; from lidarium.scripts.main import main; time.sleep(0.3); sys.exit(main(['show', 'settings']))"
+    code = (
+        "import sys, time; from lidarium.scripts.main import main; time.sleep(0.3); sys.exit(main(['show', "
+        "'settings']))"
+    )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.close()
     errors = process.stderr.read()

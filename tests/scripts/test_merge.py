@@ -16,7 +16,8 @@ ORIGINS = {"west": (-3.0, 2.0, 0.5), "east": (10.0, -4.0, 0.0)}
 
 @pytest.fixture
 def maps(tmp_path):
-    """Two parts of one apartment as ROS maps with origins of their own, and the true transform between their ROS frames."""
+    """Two parts of one apartment as ROS maps with origins of their own, and the true transform between
+    their ROS frames."""
     truth = about_middle(2.0, apartment())
     levels = {
         "west": kept(apartment(), slice(0, 180), slice(0, 150)),

@@ -1,4 +1,6 @@
-"""Whole steps of a batch on two threads, beside one thread and beside the kernel alone.
+"""Whole steps of a batch on two threads.
+
+They stand beside one thread and beside the kernel alone.
 
 Three batches are in the same state and take the same steps, some at a time in turn: one takes whole steps on
 two threads, one on one thread, and of the third the kernel alone runs on two threads.
@@ -20,16 +22,23 @@ CORES = 2
 LEAST_GAIN, ALLOWED, LEAST_RATE = 1.8, 1.3, 30_000.0
 
 NOTES = (
-    f"*Batch*: `lidarium.vector_env` with {EPISODES} episodes of {ROBOTS} robots on the straight 512 x 512 floor: 720 noisy beams over 240 "
-    "deg to 5.6 m, maps at 2.5 cm; a whole step has rewards, endings, infos and observations (scan, pose, velocity, bumper, and "
-    "egocentric maps of 64 x 64 cells at the scales 1 and 4). Three such batches are in the same state and take the same steps, 20 at a "
-    "time in turn; every round begins with blank maps at other places. *Kernel alone* is the kernel of that step with motion, scans, "
+    f"*Batch*: `lidarium.vector_env` with {EPISODES} episodes of {ROBOTS} robots on the straight 512 x 512 "
+    "floor: 720 noisy beams over 240 "
+    "deg to 5.6 m, maps at 2.5 cm; a whole step has rewards, endings, infos and observations (scan, pose, "
+    "velocity, bumper, and "
+    "egocentric maps of 64 x 64 cells at the scales 1 and 4). Three such batches are in the same state and "
+    "take the same steps, 20 at a "
+    "time in turn; every round begins with blank maps at other places. *Kernel alone* is the kernel of that "
+    "step with motion, scans, "
     "scorer, maps and rewards, on as many threads.",
 )
 
 
 def run_in_turn(steps: dict[str, Callable[[], None]], seconds: float) -> dict[str, float]:
-    """Let each take the same number of steps, ``HOLD`` at a time in turn, for about so long each; seconds per step of each."""
+    """Run the same number of steps of each, alternately, and time them.
+
+    Blocks of ``HOLD`` steps alternate, for about so long each; returned are the seconds per step of each.
+    """
     spent = dict.fromkeys(steps, 0.0)
     count = 0
     while count == 0 or sum(spent.values()) < seconds * len(steps):

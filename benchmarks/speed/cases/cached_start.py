@@ -1,4 +1,7 @@
-"""How long a start takes when the kernels are compiled, and that a second start compiles nothing, wherever lidarium lies."""
+"""Time of a start when the kernels are compiled.
+
+It also checks that a second start compiles nothing, wherever lidarium lies.
+"""
 
 import importlib
 import json
@@ -21,9 +24,12 @@ CORES = 1
 ALLOWED_S = 1.5
 
 NOTES = (
-    "*Cached start*: `import lidarium`, `lidarium.parallel_env()` and its first reset in a fresh process, after one that has compiled the "
-    "kernels. *Kernels compiled* counts those of the reset and three steps that were not loaded from the cache. *Read-only* is a start "
-    "from a copy of the package that cannot be written to, with a home that cannot be written to either: the kernels are kept in the "
+    "*Cached start*: `import lidarium`, `lidarium.parallel_env()` and its first reset in a fresh process, "
+    "after one that has compiled the "
+    "kernels. *Kernels compiled* counts those of the reset and three steps that were not loaded from the "
+    "cache. *Read-only* is a start "
+    "from a copy of the package that cannot be written to, with a home that cannot be written to either: the "
+    "kernels are kept in the "
     "temporary folder; a first start there compiles them.",
 )
 
@@ -63,7 +69,9 @@ def start(environment: Mapping[str, str] | None = None) -> Start:
 
 
 def read_only_environment(folder: Path) -> dict[str, str]:
-    """Copy the package to a folder, and return an environment in which the copy is used and only the temporary folder takes files.
+    """Copy the package to a folder, and return an environment that uses it.
+
+    Only the temporary folder can be written to in that environment.
 
     Nothing is refused to the administrator: files in the way keep folders from being made even then.
     """
@@ -97,7 +105,10 @@ def read_only_environment(folder: Path) -> dict[str, str]:
 
 
 def read_only_start() -> Start:
-    """Start twice where only the temporary folder can be written to, and return what the second start told."""
+    """Start twice with a writable temporary folder only.
+
+    Returned is what the second start reported.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         environment = read_only_environment(folder)

@@ -23,14 +23,19 @@ _HOLD, _DRAWS = 20, 50
 CORES = 1
 
 NOTES = (
-    "*Whole step*: `ExplorationEnv.step` of 3 robots with observations (each with a 256 x 256 crop of the map), rewards, endings "
-    "and infos, beside `KinematicWorld.step` of a second environment in the same state under the same commands, 20 steps at a "
-    "time in turn; 720 noisy beams, maps at 2.5 cm. The ratio is the time of the whole step over that of the kernel.",
+    "*Whole step*: `ExplorationEnv.step` of 3 robots with observations (each with a 256 x 256 crop of the "
+    "map), rewards, endings "
+    "and infos, beside `KinematicWorld.step` of a second environment in the same state under the same "
+    "commands, 20 steps at a "
+    "time in turn; 720 noisy beams, maps at 2.5 cm. The ratio is the time of the whole step over that of "
+    "the kernel.",
 )
 
 
 class Twins:
-    """Two environments in the same state: one takes whole steps, of the other the kernel alone is called, some steps at a time in turn.
+    """Two environments in the same state, stepped alternately.
+
+    One takes whole steps; of the other the kernel alone is called, some steps at a time.
 
     Parameters
     ----------
@@ -55,7 +60,10 @@ class Twins:
         self._resets = 0
 
     def run(self, seconds: float) -> tuple[float, float]:
-        """Start anew, run for about so long and return the seconds per agent step of the whole and of the kernel."""
+        """Start anew, run for about so long and return the two step times.
+
+        They are the seconds per agent step of the whole and of the kernel.
+        """
         for env in (self._whole, self._kernel):
             env.reset(seed=self._resets % 8)
         self._resets += 1

@@ -1,4 +1,7 @@
-"""The same short drives, run in batches of any size: what differs between sizes is how much memory is in use, and nothing else."""
+"""The same short drives, run in batches of any size.
+
+Sizes differ in how much memory is in use, and in nothing else.
+"""
 
 import time
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Map update of a noisy scan, beside cv2.fillPoly with numpy and beside walking along the beams."""
+"""Map update of a noisy scan, beside two alternatives.
+
+They are cv2.fillPoly with numpy, and walking along the beams.
+"""
 
 import itertools
 
@@ -18,9 +21,12 @@ ROBOTS = 16
 CORES = 1
 
 NOTES = (
-    "*Map update*: the same 16 noisy scans of 720 beams into int8 log-odds of 2.5 cm cells on the straight floor. Ours is "
-    "`KinematicWorld.perceive`, one call for 16 maps, hits on teammates taken out; the line *called scan by scan* is "
-    "`OccupancyGrid.integrate`, which checks its arguments each time. *fillPoly and numpy* and *ray traversal* (numba) update one map "
+    "*Map update*: the same 16 noisy scans of 720 beams into int8 log-odds of 2.5 cm cells on the straight "
+    "floor. Ours is "
+    "`KinematicWorld.perceive`, one call for 16 maps, hits on teammates taken out; the line *called scan by "
+    "scan* is "
+    "`OccupancyGrid.integrate`, which checks its arguments each time. *fillPoly and numpy* and *ray "
+    "traversal* (numba) update one map "
     "scan by scan.",
 )
 

@@ -27,15 +27,20 @@ ALLOWED_MM = 0.1
 CORES = 1
 
 NOTES = (
-    "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the nearest entry point into any "
-    "solid cell, computed by intersecting each beam with every such cell in reach; 12 poses of 720 beams on each of the four floors. The "
+    "*Range error*: the greatest difference between our ranges (as the sensor returns them, float32) and the "
+    "nearest entry point into any "
+    "solid cell, computed by intersecting each beam with every such cell in reach; 12 poses of 720 beams on "
+    "each of the four floors. The "
     "other column has the mean error of sphere tracing on the same beams.",
 )
 
 
 @numba.njit
 def _exact(x: float, y: float, cosine: float, sine: float, cells: Array, reach: float) -> float:
-    """Return the distance to the nearest of the cells (N, 2: column, row) along a beam, all in cells."""
+    """Return the distance along a beam to the nearest of the cells, in cells.
+
+    The cells are (N, 2: column, row); all lengths are in cells.
+    """
     nearest = reach
     for k in range(cells.shape[0]):
         enter_x, leave_x = -math.inf, math.inf
@@ -66,7 +71,10 @@ def _exact_scan(pose: Array, angles: Array, cells: Array, reach: float) -> Array
 
 
 def exact_ranges(floor: BenchFloor, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the ranges at poses (N, 3) [m, rad] by the reference, shape (N, beams) [m]; ``RANGE_MAX`` for no return."""
+    """Return the reference ranges at poses (N, 3) [m, rad], shape (N, beams) [m].
+
+    A range is ``RANGE_MAX`` for no return.
+    """
     solid = floor.solid != 0
     surface = solid & ndimage.binary_dilation(~solid, np.ones((3, 3), np.bool_))
     rows, columns = np.nonzero(surface)

@@ -1,4 +1,6 @@
-"""The program that ``cached_start`` runs in fresh processes: it imports lidarium, resets an environment and takes some steps.
+"""The program that ``cached_start`` runs in fresh processes.
+
+It imports lidarium, resets an environment and takes some steps.
 
 It prints one line of JSON: the seconds of import and reset, how many kernels were compiled and how many
 loaded, and the folder of the compiled code.

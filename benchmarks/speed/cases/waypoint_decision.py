@@ -1,4 +1,6 @@
-"""Decisions by waypoints of a batch, planning included, beside as many bare steps of the same robots.
+"""Decisions by waypoints of a batch, planning included.
+
+They stand beside as many bare steps of the same robots.
 
 One batch takes decisions. Before each, the robots of a second batch are put where those of the first are, and
 after it their kernel takes as many steps as each decision took, at the speeds and turn rates that the robots
@@ -30,17 +32,24 @@ _TRIALS, _LONGEST, _FREE = 64, 10, 255
 _WITHOUT_WORK = (DriveState.IDLE, DriveState.ARRIVED, DriveState.NO_PATH)
 
 NOTES = (
-    f"*Waypoint decision*: `lidarium.vector_env` with level `waypoint`, {EPISODES} episodes of {ROBOTS} robots, floor, laser, maps and "
-    "observations as in the *batch*, decisions of 2 s (20 steps; less where a robot arrives or finds no way). Each robot gets a cell "
-    f"{NEAREST:g} to {FARTHEST:g} m off that is free in its own map and keeps it until it arrives, finds no way, or has tried for 20 s; "
-    "as an action tells a place from where the robot is now, every robot plans anew in every decision. *Bare steps* are calls of "
-    "`KinematicWorld.step` for robots at the same places, as many as each decision took, at the mean speed and turn rate of the "
+    f"*Waypoint decision*: `lidarium.vector_env` with level `waypoint`, {EPISODES} episodes of {ROBOTS} "
+    "robots, floor, laser, maps and "
+    "observations as in the *batch*, decisions of 2 s (20 steps; less where a robot arrives or finds no "
+    "way). Each robot gets a cell "
+    f"{NEAREST:g} to {FARTHEST:g} m off that is free in its own map and keeps it until it arrives, finds no "
+    "way, or has tried for 20 s; "
+    "as an action tells a place from where the robot is now, every robot plans anew in every decision. *Bare "
+    "steps* are calls of "
+    "`KinematicWorld.step` for robots at the same places, as many as each decision took, at the mean speed "
+    "and turn rate of the "
     "decision, on as many threads. Times are per robot and step.",
 )
 
 
 class Deciders:
-    """A batch that drives from waypoint to waypoint, and its shadow that takes the same steps bare.
+    """A batch that drives between waypoints, and its shadow of bare steps.
+
+    The shadow takes the same steps.
 
     Parameters
     ----------
@@ -119,7 +128,10 @@ class Deciders:
         return deciding / agent_steps, stepping / agent_steps
 
     def _actions(self) -> NDArray[np.float32]:
-        """Give robots without a waypoint another one, and return all as shares of half the observed map's side."""
+        """Give robots without a waypoint another one, and return all waypoints.
+
+        They are shares of half the observed map's side.
+        """
         simulation = self._deciding.batch.simulation
         places = simulation.beliefs.believed[:, :2]
         self._ages += 1

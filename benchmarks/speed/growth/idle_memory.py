@@ -45,7 +45,10 @@ class IdleMemory:
 
 
 def own_bytes(simulation: Simulation) -> float:
-    """Return the size of the arrays that belong to a robot: the mean of those over rows, and of its map and mask."""
+    """Return the mean size of the arrays that belong to a robot.
+
+    It counts arrays over rows, and the robot's map and mask.
+    """
     rows = simulation.robots * simulation.episodes
     over_rows = sum(
         array.nbytes
@@ -60,7 +63,10 @@ def own_bytes(simulation: Simulation) -> float:
 
 
 def array_bytes(thing: Any) -> int:  # noqa: ANN401
-    """Return the size of all arrays that an object holds, directly or through what it is made of; each counts once."""
+    """Return the size of all arrays that an object holds.
+
+    Arrays count once, held directly or through what the object is made of.
+    """
     seen: set[int] = set()
     pending: list[Any] = [thing]
     total = 0
@@ -91,7 +97,10 @@ def resident() -> int | None:
 
 
 def standing(robots: int) -> ExplorationVectorEnv:
-    """Return an environment in which so many robots have stood still for a second, in teams on the straight floor."""
+    """Return an environment in which so many robots stood still for a second.
+
+    They are in teams on the straight floor.
+    """
     floor = straight_floor()
     env = ExplorationVectorEnv(
         robots // ROBOTS,

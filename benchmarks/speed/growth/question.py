@@ -1,4 +1,6 @@
-"""How the time of an agent step and the memory of a robot grow with the robots of a batch and with the size of the floor.
+"""Growth of an agent step's time and a robot's memory.
+
+They grow with the robots of a batch and with the size of the floor.
 
     python benchmarks/speed/growth/question.py                      # prints the tables
     python benchmarks/speed/growth/question.py --out docs/results   # and writes growth.md and growth.json
@@ -32,7 +34,10 @@ REPEATS = 15
 SIZES = (4, 16, 64, 256, 1024)
 TEAM, ROBOT_STEPS = 2, 10
 SIDES, ALONE, FLOOR_DRIVES, FLOOR_STEPS = (512, 1000, 2000, 4000), 4, 256, 50
-"""Sides of the floors [cells of 2.5 cm], and how many robots drive there, each alone on the floor."""
+"""Sides of the floors [cells of 2.5 cm], and how many robots drive there.
+
+Each robot is alone on the floor.
+"""
 
 ALLOWED_TO_64, ALLOWED_TO_1024, ALLOWED_FLOORS = 1.25, {0.025: 1.8, 0.05: 1.4}, 1.25
 
@@ -58,7 +63,10 @@ def growth_with_robots(
     repeats: int = REPEATS,
     allowed: dict[int, float] | None = None,
 ) -> list[Growth]:
-    """Measure batches of different sizes, and the largest once more with all its robots on the maps of the smallest one."""
+    """Measure batches of different sizes.
+
+    The largest is measured once more with all its robots on the maps of the smallest one.
+    """
     histories = {f"{size:,} robots": Histories(drives, size, resolution) for size in sizes}
     shared = f"{sizes[-1]:,} robots on the maps of {sizes[0]}"
     histories[shared] = Histories(drives, sizes[-1], resolution, maps=sizes[0])

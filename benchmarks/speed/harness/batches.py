@@ -1,4 +1,7 @@
-"""Our side of the comparisons of batches: many teams in one vector environment, driven by drawn commands."""
+"""Our side of the comparisons of batches.
+
+Many teams in one vector environment are driven by drawn commands.
+"""
 
 from typing import Any
 
@@ -26,7 +29,9 @@ def can_use(threads: int) -> bool:
 
 
 class DrivenBatch:
-    """64 episodes of 2 robots that drive at drawn speeds and turn rates, each held for 2 s.
+    """A batch of 64 episodes of 2 robots that drive at drawn commands.
+
+    Each speed and turn rate is held for 2 s.
 
     Parameters
     ----------
@@ -73,7 +78,10 @@ class DrivenBatch:
         self._count = 0
 
     def step(self) -> None:
-        """Take a whole step: motion, scans, scorer, maps, observations, rewards, endings and infos."""
+        """Take a whole step of the batch.
+
+        It consists of motion, scans, scorer, maps, observations, rewards, endings and infos.
+        """
         self.env.step(self._actions[self._draw()])
 
     def step_kernel(self) -> None:

@@ -1,4 +1,4 @@
-"""The lines of the table of speed: one comparison each, with what was to be reached."""
+"""The lines of the speed table: one comparison each, with its target."""
 
 import statistics
 from collections.abc import Sequence
@@ -56,7 +56,10 @@ class Line:
 
     @property
     def cells(self) -> tuple[str, str, str, str, str, str]:
-        """What stands in the table: name, ours, peer, ratio with its range, what was to be reached, and whether it is."""
+        """The cells of the line in the table.
+
+        They are name, ours, peer, ratio with its range, the target, and whether it is reached.
+        """
         judged = "-" if self.judged is None else f"{shown(self.judged)} {self.unit}"
         if self.ratio is not None:
             judged = (
@@ -116,7 +119,10 @@ def within(
     allowed: float,
     unit: str = "agent steps/s",
 ) -> Line:
-    """Make the line of a whole that may take so many times as long as a part of it, both in seconds per unit."""
+    """Make the line of a whole that may take so many times as long as a part.
+
+    Both are in seconds per unit.
+    """
     own, other = f"{shown(rate(ours))} {unit}", f"{part_name}: {shown(rate(part))}"
     return Line(
         f"{name} (time over that of the {part_name})",
@@ -129,7 +135,10 @@ def within(
 
 
 def needs_threads(name: str, to_reach: float, is_upper_bound: bool = False) -> Line:
-    """Make the line of what cannot be measured here, because only one thread can run at a time."""
+    """Make the line of a quantity that cannot be measured here.
+
+    Only one thread can run at a time.
+    """
     return Line(name, "needs two cores", "-", None, to_reach, is_upper_bound=is_upper_bound)
 
 

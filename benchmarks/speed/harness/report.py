@@ -1,4 +1,7 @@
-"""What the speed benchmarks write: pages of tables with the command, the machine and the versions, and the same as JSON."""
+"""The output of the speed benchmarks: tables, and the same as JSON.
+
+Tables come with the command, the machine and the versions.
+"""
 
 import argparse
 import datetime
@@ -76,7 +79,8 @@ def speed_page(result: Mapping[str, Any], lines: Sequence[Line]) -> str:
     return "\n".join(
         [
             *heading("Speed", result),
-            f"Each line is the median of {rounds} rounds in which all its contenders run in turn for {block_s:g} s each; ratios are taken "
+            f"Each line is the median of {rounds} rounds in which all its contenders run in turn for "
+            f"{block_s:g} s each; ratios are taken "
             "round by round, with their least and greatest. One core, and two where a line says two threads.",
             "",
             table(lines),

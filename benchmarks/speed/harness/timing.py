@@ -1,4 +1,7 @@
-"""Interleaved timing: in every round each contender runs for a moment, so that what disturbs the machine disturbs all."""
+"""Interleaved timing: in every round each contender runs for a moment.
+
+What disturbs the machine thus disturbs all of them.
+"""
 
 import math
 import os
@@ -10,7 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 Contender = Callable[[float], float]
-"""Runs for about so many seconds and returns the seconds that one unit of work took."""
+"""A contender, which runs for about so many seconds.
+
+It returns the seconds that one unit of work took.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +39,10 @@ class Effort:
 
 
 EFFORTS = {"quick": Effort(3, 0.1), "moderate": Effort(5, 0.2), "full": Effort(is_full=True)}
-"""Efforts by name: coarse figures in the time that setting up takes, figures to look at, and those that are published."""
+"""Efforts by name.
+
+They give coarse figures in the time that setting up takes, figures to inspect, and those that are published.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +65,10 @@ def cores() -> list[int]:
 
 @contextmanager
 def on_cores(count: int) -> Iterator[None]:
-    """Keep this process, and those that it starts, on so many cores (where the system allows it), and let go at the end."""
+    """Keep this process, and those that it starts, on so many cores.
+
+    It applies where the system allows it, and is undone at the end.
+    """
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -69,7 +81,10 @@ def on_cores(count: int) -> Iterator[None]:
 
 
 def _keep_threads_on(chosen: list[int]) -> None:
-    """Move all threads: those of a pool once started would stay where their starter was then."""
+    """Move all threads of the process.
+
+    Those of a pool once started would stay where their starter was then.
+    """
     tasks = Path("/proc/self/task")
     threads = [int(path.name) for path in tasks.iterdir()] if tasks.is_dir() else [0]
     for thread in threads:
@@ -102,7 +117,10 @@ def repeated(
 
 
 def interleaved(contenders: Mapping[str, Contender], effort: Effort) -> dict[str, list[float]]:
-    """Return the seconds per unit of each contender in each round, after a round to warm up."""
+    """Return the seconds per unit of each contender in each round.
+
+    A round to warm up comes first.
+    """
     for contender in contenders.values():
         contender(0.25 * effort.block_s)
     seconds: dict[str, list[float]] = {name: [] for name in contenders}
@@ -128,7 +146,9 @@ class Interval:
 
 
 def median_interval(values: Sequence[float], confidence: float = 0.95) -> Interval:
-    """Return the median of values and an interval that holds the true one with at least this confidence.
+    """Return the median of values and an interval for the true one.
+
+    The interval holds the true one with at least this confidence.
 
     The bounds are values themselves, those of equal rank from both ends: whatever the distribution, each
     value lies below the true median with probability one half. Too few values for the confidence give the

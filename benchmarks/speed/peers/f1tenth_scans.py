@@ -1,4 +1,6 @@
-"""f1tenth's scan simulator as a peer: an outside module, loaded from where the user has put it.
+"""f1tenth's scan simulator as a peer.
+
+It is an outside module, loaded from where the user has put it.
 
 It is not on PyPI. LIDARIUM_F1TENTH names its file, ``gym/f110_gym/envs/laser_models.py`` of the repository
 f1tenth/f1tenth_gym.

@@ -1,4 +1,7 @@
-"""IR-SIM as a peer: one robot with a lidar2d, on a floor of rectangles or on its grid map."""
+"""IR-SIM as a peer: one robot with a lidar2d.
+
+It is on a floor of rectangles or on its grid map.
+"""
 
 import contextlib
 import importlib
@@ -22,7 +25,9 @@ from lidarium.benchmarks.speed.scenes.floors import BenchFloor
 def fastest_irsim_step(
     floor: BenchFloor, poses: NDArray[np.float64], shape: str, beams: int, reach: float
 ) -> Callable[[], object] | None:
-    """Return a function that steps IR-SIM with one robot, at the pose where it is fastest; None where it is not installed.
+    """Return a function that steps IR-SIM with one robot.
+
+    The robot is at the pose where IR-SIM is fastest; None where it is not installed.
 
     Its time depends on what is in the robot's reach, several times over on a grid map.
 

@@ -1,4 +1,7 @@
-"""Two usual ways to put a scan into a map of log-odds: fill its polygon with OpenCV, or walk along every beam."""
+"""Two usual methods to put a scan into a map of log-odds.
+
+They fill its polygon with OpenCV, or walk along every beam.
+"""
 
 import math
 
@@ -11,7 +14,9 @@ from lidarium.mapping.kernels.compilation import Array
 
 
 class PolygonUpdate:
-    """Fills the polygon of the beams' ends with ``cv2.fillPoly`` and changes the map with numpy, in the scan's window.
+    """A map update that fills the polygon of the beams' ends.
+
+    It uses ``cv2.fillPoly`` and changes the map with numpy, in the scan's window.
 
     Parameters
     ----------
@@ -33,7 +38,10 @@ class PolygonUpdate:
         lengths: NDArray[np.float64],
         is_hit: NDArray[np.bool_],
     ) -> None:
-        """Put in a scan from x, y with beams of these directions (2, beams) and lengths [cells]."""
+        """Put in a scan from x, y with beams of these directions and lengths.
+
+        Directions are (2, beams), lengths in cells.
+        """
         rows, columns = self.log_odds.shape
         ends = np.floor(np.stack([x, y]) + (directions * lengths).T).astype(np.int32)
         np.clip(ends, 0, (columns - 1, rows - 1), out=ends)
@@ -58,7 +66,10 @@ class PolygonUpdate:
 def update_by_rays(
     log_odds: Array, x: float, y: float, directions: Array, lengths: Array, is_hit: Array, increments: Array
 ) -> None:
-    """Put in a scan by walking along every beam: each cell on the way is lowered, the last one is raised."""
+    """Put in a scan by walking along every beam.
+
+    Each cell on the beam is lowered, the last one is raised.
+    """
     hit, miss, least, greatest = increments[0], increments[1], increments[2], increments[3]
     rows, columns = log_odds.shape
     for beam in range(lengths.shape[0]):

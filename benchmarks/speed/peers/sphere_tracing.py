@@ -1,4 +1,6 @@
-"""Sphere tracing on a distance transform, in the manner of f1tenth's scan simulator.
+"""Sphere tracing on a distance transform.
+
+It follows the manner of f1tenth's scan simulator.
 
 This is code of our own after its published method, a second yardstick beside the original: directions from a
 table of 2000 angles, and along each beam steps of the distance that the transform of the cell tells, until
@@ -36,7 +38,10 @@ def _distance_at(
     resolution: float,
     distances: Array,
 ) -> float:
-    """Look the distance of a point up in the transform, whose grid may be shifted and turned."""
+    """Look up the distance of a point in the transform.
+
+    The transform's grid may be shifted and turned.
+    """
     rows, columns = distances.shape
     shifted_x, shifted_y = x - origin_x, y - origin_y
     grid_x = shifted_x * cosine + shifted_y * sine

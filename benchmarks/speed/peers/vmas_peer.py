@@ -1,4 +1,7 @@
-"""VMAS as a peer: an outside program, started in an interpreter that has it, and asked for one block of steps at a time."""
+"""VMAS as a peer: an outside program.
+
+It is started in an interpreter that has it, and asked for one block of steps at a time.
+"""
 
 import importlib.util
 import json
@@ -26,7 +29,10 @@ MEMORY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": "20000000000"}
 
 
 def interpreter() -> str | None:
-    """Return the Python that runs VMAS: the one that the environment names, else this one if it has VMAS."""
+    """Return the Python that runs VMAS.
+
+    It is the one that the environment names, else this one if it has VMAS.
+    """
     named = os.environ.get(INTERPRETER)
     if named:
         return named

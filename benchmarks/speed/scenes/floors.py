@@ -1,4 +1,6 @@
-"""Floors of the speed benchmarks: rooms with doors and boxes, the same turned by 17 degrees, and poses to scan from.
+"""Floors of the speed benchmarks, and poses to scan from.
+
+They are rooms with doors and boxes, and the same turned by 17 degrees.
 
 The floors are made of cells, so that every contender works on the same walls; the boxes that the cells were
 drawn from go to the contenders that want shapes.
@@ -68,7 +70,10 @@ class BenchFloor:
 def straight_floor(
     rows: int = 512, columns: int = 512, seed: int = 1, resolution: float = RESOLUTION
 ) -> BenchFloor:
-    """Draw rooms of 3 to 6 m (at 2.5 cm a cell) with a door in every wall between two of them, and boxes in them."""
+    """Draw rooms of 3 to 6 m (at 2.5 cm a cell) with boxes in them.
+
+    There is a door in every wall between two rooms.
+    """
     generator = np.random.default_rng(seed)
     low, top, right = _MARGIN, rows - _MARGIN, columns - _MARGIN
     boxes: list[Rectangle] = [
@@ -94,7 +99,10 @@ def straight_floor(
 
 
 def turned_floor(floor: BenchFloor, angle: float = TURN) -> BenchFloor:
-    """Turn a floor about its middle at the same scale: a cell is solid if its centre was in a solid cell."""
+    """Turn a floor about its middle at the same scale.
+
+    A cell is solid if its centre was in a solid cell.
+    """
     rows, columns = floor.solid.shape
     cosine, sine = math.cos(angle), math.sin(angle)
     new_columns = math.ceil(columns * cosine + rows * sine)
@@ -118,7 +126,10 @@ def turned_floor(floor: BenchFloor, angle: float = TURN) -> BenchFloor:
 
 
 def free_poses(floor: BenchFloor, count: int, clearance: float = 0.3, seed: int = 1) -> NDArray[np.float64]:
-    """Draw poses x, y, theta [m, rad] inside the building, this far off everything and twice that off each other."""
+    """Draw poses x, y, theta [m, rad] inside the building.
+
+    They are this far off everything and twice that off each other.
+    """
     generator = np.random.default_rng(seed)
     roomy = _roomy_places(floor, clearance)
     places: list[NDArray[np.float64]] = []
@@ -136,7 +147,10 @@ def free_poses(floor: BenchFloor, count: int, clearance: float = 0.3, seed: int 
 def team_poses(
     floor: BenchFloor, teams: int, robots: int, clearance: float = 0.3, seed: int = 1
 ) -> NDArray[np.float64]:
-    """Draw poses as ``free_poses`` for many teams that do not see each other, (teams * robots, 3) [m, rad]."""
+    """Draw poses for many teams, (teams * robots, 3) [m, rad].
+
+    They are drawn as by ``free_poses``; the teams do not see each other.
+    """
     generator = np.random.default_rng(seed)
     roomy = _roomy_places(floor, clearance)
     places = np.empty((teams, robots, 2))
@@ -150,7 +164,10 @@ def team_poses(
 
 
 def _roomy_places(floor: BenchFloor, clearance: float) -> NDArray[np.float64]:
-    """Return the middles of cells inside the building that are this far off everything, (N, 2) [m]."""
+    """Return the middles of cells inside the building, (N, 2) [m].
+
+    They are this far off everything.
+    """
     distance = ndimage.distance_transform_edt(floor.solid == 0) * floor.resolution
     parts, _ = ndimage.label(floor.solid == 0)
     inside = parts == 1 + int(np.argmax(np.bincount(parts[parts > 0])[1:]))

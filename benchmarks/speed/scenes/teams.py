@@ -21,7 +21,10 @@ DRAWS = 50
 
 
 def drawn_commands(robots: int, seed: int) -> NDArray[np.float64]:
-    """Draw speeds and turn rates, each to be held for ``HOLD`` steps, shape (DRAWS, robots, 2) [m/s, rad/s]."""
+    """Draw speeds and turn rates, shape (DRAWS, robots, 2) [m/s, rad/s].
+
+    Each is to be held for ``HOLD`` steps.
+    """
     generator = np.random.default_rng(seed)
     speeds = generator.uniform(0.2, 0.7, (DRAWS, robots))
     turns = generator.uniform(-1.0, 1.0, (DRAWS, robots))
@@ -29,7 +32,9 @@ def drawn_commands(robots: int, seed: int) -> NDArray[np.float64]:
 
 
 class DrivenTeam:
-    """Robots that drive at drawn speeds and turn rates, each pair held for 2 s, into walls and each other as it comes.
+    """Robots that drive at drawn speeds and turn rates.
+
+    Each pair is held for 2 s; robots may drive into walls and each other.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""The leaderboard: all policies on the floors of the test set and on real floors, 1, 2 and 3 robots that know where they start."""
+"""The leaderboard: all policies on the test set and on real floors.
+
+Teams have 1, 2 and 3 robots that know where they start.
+"""
 
 import json
 import platform
@@ -90,19 +93,28 @@ def real_floors(data: Path) -> dict[str, list[Path]]:
 
 
 def page(folder: Path, command: str) -> str:
-    """Write the report of each suite into its folder, and return the leaderboard as markdown."""
+    """Write the report of each suite, and return the leaderboard as markdown.
+
+    Each report goes into the folder of its suite.
+    """
     parts = [
         "# Leaderboard",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python {platform.python_version()}. "
-        "Simulated time; perfect poses, no noise, the URG laser (240 deg, 5.6 m), maps of 2.5 cm, known starts, cut at 1,800 s. "
-        "Starts are drawn by the seed, the same for every policy. An entry of time is the median with its 95 % interval; "
-        "runs that did not get there count as never. The difference is that of the restricted means to `nearest_frontier`, pair by "
-        "pair, with its 95 % interval; in bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm).",
+        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
+        f"{platform.python_version()}. "
+        "Simulated time; perfect poses, no noise, the URG laser (240 deg, 5.6 m), maps of 2.5 cm, known "
+        "starts, cut at 1,800 s. "
+        "Starts are drawn by the seed, the same for every policy. An entry of time is the median with its 95 "
+        "% interval; "
+        "runs that did not get there count as never. The difference is that of the restricted means to "
+        "`nearest_frontier`, pair by "
+        "pair, with its 95 % interval; in bold where Wilcoxon's signed rank test says that it is beyond "
+        "chance (5 %, Holm).",
     ]
     is_run = {kind: (folder / kind / "episodes.jsonl").exists() for kind in KINDS}
     if "--every" in command:
         parts.append(
-            "A part of the floors of each kind, too few for firm words: the intervals say so. Without `--every` the command runs all."
+            "A part of the floors of each kind, too few for firm words: the intervals say so. Without "
+            "`--every` the command runs all."
         )
     if not all(is_run.values()):
         parts.append(f"Not in it: {', '.join(about for kind, about in KINDS.items() if not is_run[kind])}.")
@@ -114,7 +126,8 @@ def page(folder: Path, command: str) -> str:
         parts += [f"## {about[0].upper()}{about[1:]} ({len(floors)})", _table(numbers["groups"])]
         if any("fewer than" in warning for warning in numbers["warnings"]):
             parts.append(
-                "Fewer than 50 runs or pairs: intervals may hold the truth less often than they say ([how often](interval_coverage.md))."
+                "Fewer than 50 runs or pairs: intervals may hold the truth less often than they say ([how "
+                "often](interval_coverage.md))."
             )
     return "\n\n".join(parts) + "\n"
 
@@ -124,7 +137,8 @@ def _table(groups: Iterable[Mapping[str, Any]]) -> str:
     for group in groups:
         by_team.setdefault(group["robots"], []).append(group)
     lines = [
-        "| robots | policy | runs | reached 99 % | time to 90 % [s] | time to 99 % [s] | less the baseline [s] | path of all [m] | "
+        "| robots | policy | runs | reached 99 % | time to 90 % [s] | time to 99 % [s] | less the baseline "
+        "[s] | path of all [m] | "
         "overlap [%] |",
         "|---:|---|---:|---:|---:|---:|---:|---:|---:|",
     ]

@@ -1,1 +1,4 @@
-"""How well maps are merged: a bank of partial maps that robots made, what is true of their pairs, and the methods tried on them."""
+"""The quality of map merging on a bank of partial maps.
+
+Robots made the maps; it holds what is true of their pairs, and the methods tried on them.
+"""

@@ -1,4 +1,7 @@
-"""Detectors, descriptors and methods of matching side by side, each as the thesis compared them, beside those of OpenCV."""
+"""Detectors, descriptors and methods of matching side by side.
+
+They are compared as in the thesis, beside those of OpenCV.
+"""
 
 import math
 import time
@@ -25,10 +28,16 @@ from lidarium.mapping.merging.pair import described
 from lidarium.mapping.merging.settings import MergeSettings
 
 REPEATS, BURST = 20, 3
-"""How often each kind of work has its turn, and how often it is done then: after another's turn, caches hold nothing of it."""
+"""Rounds of each kind of work, and its repeats in each round.
+
+After another's round, caches hold nothing of it.
+"""
 
 RIGHT_M, VOTED_M = 0.15, 0.5
-"""Distances within which a match, and a transform that matches vote for, is right [m]."""
+"""Distances within which a match and a voted transform are right [m].
+
+The transform is one that matches vote for.
+"""
 
 
 def images(maps: dict[str, BankMap]) -> dict[str, NDArray[np.uint8]]:
@@ -62,7 +71,10 @@ def compare_detectors(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
 
 
 def compare_descriptors(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
-    """Return the least time of each descriptor on each image [us], for the points of its own detector."""
+    """Return the least time of each descriptor on each image [us].
+
+    It is for the points of the descriptor's own detector.
+    """
     cv2.setNumThreads(1)
     return [_timed(name, image, _describers(image)) for name, image in images(maps).items()]
 
@@ -89,7 +101,10 @@ def _count_computed(finder: Any, points: Any, image: NDArray[np.uint8]) -> int: 
 
 
 def compare_methods(maps: dict[str, BankMap], pairs: list[Pair]) -> list[dict[str, Any]]:
-    """Return for each method of matching what it finds on positives: matches, right ones, pairs with two right ones or more, time [ms]."""
+    """Return what each method of matching finds on positives.
+
+    It is matches, right ones, pairs with two right ones or more, and time [ms].
+    """
     settings = MergeSettings()
     chosen = [pair for pair in pairs if pair.category == "positive" and pair.overlap >= PLENTY][:60]
     if not chosen:
@@ -126,7 +141,11 @@ def _matched(
     correspondence: CorrespondenceSettings,
     alignment: AlignmentSettings,
 ) -> tuple[int, int, bool, float]:
-    """Return the number of matches, of right ones, whether the transform with most inliers is about right, and the time [ms]."""
+    """Return the figures of one matching, with its time [ms].
+
+    They are the number of matches, of right ones, and whether the transform with most inliers is about
+    right.
+    """
     true = pair.a_from_b
     assert true is not None
     began = time.process_time()
@@ -146,7 +165,10 @@ def _matched(
 def _timed(
     name: str, image: NDArray[np.uint8], work: dict[str, Callable[[NDArray[np.uint8]], int]]
 ) -> dict[str, Any]:
-    """Do each kind of work on an image, all in turn, and return how many points there were and the least time of each."""
+    """Do each kind of work on an image, and time it.
+
+    The kinds alternate; returned are how many points there were and the least time of each.
+    """
     least = dict.fromkeys(work, math.inf)
     points = {one: function(image) for one, function in work.items()}
     for _ in range(REPEATS):
@@ -164,7 +186,10 @@ def _timed(
 
 
 def _shown(maps: dict[str, BankMap]) -> list[str]:
-    """Return the last maps of some floors of the test half that fit into a standard map."""
+    """Return the last maps of some test floors that fit into a standard map.
+
+    The floors are of the test half.
+    """
     keys = [
         key
         for key, one in maps.items()

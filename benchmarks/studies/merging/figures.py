@@ -1,4 +1,7 @@
-"""What the outcomes on the bank amount to: recall, false accepts, errors and times, with intervals."""
+"""The figures of the outcomes on the bank, with intervals.
+
+They are recall, false accepts, errors and times.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -43,7 +46,10 @@ class Share:
     def __str__(self) -> str:
         if not self.total:
             return "-"
-        return f"{100 * self.value:.1f} % ({self.hits} of {self.total}; {100 * self.low:.1f} to {100 * self.high:.1f})"
+        return (
+            f"{100 * self.value:.1f} % ({self.hits} of {self.total}; {100 * self.low:.1f} to "
+            f"{100 * self.high:.1f})"
+        )
 
 
 def is_plenty(pair: Pair) -> bool:
@@ -57,7 +63,10 @@ def is_little(pair: Pair) -> bool:
 
 
 def recall(tried: Tried, of: Callable[[Pair], bool], above: float = -math.inf) -> Share:
-    """Return the share of some positives that are joined where they belong, accepted by a confidence above a threshold."""
+    """Return the share of some positives that are joined where they belong.
+
+    They are accepted by a confidence above a threshold.
+    """
     chosen = [outcome for pair, outcome in tried if of(pair)]
     return Share(
         sum(one.is_accepted and one.is_exact and one.confidence > above for one in chosen), len(chosen)
@@ -65,7 +74,10 @@ def recall(tried: Tried, of: Callable[[Pair], bool], above: float = -math.inf) -
 
 
 def accepted(tried: Tried, categories: Sequence[str], above: float = -math.inf) -> Share:
-    """Return the share of the pairs of some categories that are accepted by a confidence above a threshold."""
+    """Return the share of the pairs of some categories that are accepted.
+
+    They are accepted by a confidence above a threshold.
+    """
     chosen = [outcome for pair, outcome in tried if pair.category in categories]
     return Share(sum(one.is_accepted and one.confidence > above for one in chosen), len(chosen))
 
@@ -77,7 +89,10 @@ def refused(tried: Tried, categories: Sequence[str]) -> Share:
 
 
 def wrong_positives(tried: Tried) -> Share:
-    """Return the share of positives that are joined by a transform more than 0.5 m or 5 degrees off."""
+    """Return the share of positives that are joined by a wrong transform.
+
+    It is more than 0.5 m or 5 degrees off.
+    """
     chosen = [outcome for pair, outcome in tried if pair.category == "positive"]
     return Share(sum(one.is_accepted and not _is_near(one) for one in chosen), len(chosen))
 
@@ -91,7 +106,10 @@ def safe_threshold(tried: Tried, categories: Sequence[str] = NEGATIVE) -> float:
 
 
 def errors(tried: Tried) -> tuple[float, float, float]:
-    """Return the median and the 95th percentile of the distance [m] and the median angle [rad] of positives that were accepted."""
+    """Return the errors of positives that were accepted.
+
+    They are the median and the 95th percentile of the distance [m], and the median angle [rad].
+    """
     found = [
         (one.distance_m, one.angle)
         for pair, one in tried

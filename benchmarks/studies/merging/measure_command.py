@@ -1,4 +1,6 @@
-"""The figures of a method on one half of a bank: recall, false accepts, refusals, errors and times.
+"""The figures of a method on one half of a bank.
+
+They are recall, false accepts, refusals, errors and times.
 
 Limits are tuned with ``--half tuning``; figures are quoted of the other half (docs/results/merging.md).
 """

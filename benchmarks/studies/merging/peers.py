@@ -1,4 +1,6 @@
-"""The pipeline by which ROS map_merge joins maps, from OpenCV's stitching: features, their best of two nearest, an affine motion by RANSAC.
+"""The pipeline by which ROS map_merge joins maps, from OpenCV's stitching.
+
+It has features, their best of two nearest, and an affine motion by RANSAC.
 
 References
 ----------

@@ -22,7 +22,10 @@ FIRST, SECOND, BOTH = (
 
 
 def draw_pairs(path: Path, maps: dict[str, BankMap], pairs: list[Pair], outcomes: list[Outcome]) -> None:
-    """Draw five pairs laid over each other as they truly lie: two that are joined, one missed, a look-alike and a symmetric one."""
+    """Draw five pairs of maps, overlaid as they truly lie.
+
+    Two are joined, one is missed, one is a look-alike and one is symmetric.
+    """
     chosen = _chosen(pairs, outcomes)
     figure = Figure(figsize=(3.4 * len(chosen), 4.4), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
@@ -72,7 +75,10 @@ def _draw(axes: Axes, title: str, a: BankMap, b: BankMap) -> None:
 
 
 def _coloured(fused: FusedMap) -> NDArray[np.uint8]:
-    """Return walls and free space in the colour of who knows them, shape (rows, columns, 3)."""
+    """Return walls and free space coloured by which map knows them.
+
+    The shape is (rows, columns, 3).
+    """
     sources = fused.sources.astype(np.int64)
     picture = np.full((*sources.shape, 3), 240.0)
     for bits, colour in ((1, FIRST), (2, SECOND), (3, BOTH)):

@@ -36,10 +36,14 @@ def bank_table(tried: dict[str, figures.Tried]) -> str:
 
 
 def peers(tried: dict[str, figures.Tried]) -> str:
-    """Return what the pipeline of ROS map_merge makes of the bank, its threshold swept."""
+    """Return the results of the ROS map_merge pipeline on the bank.
+
+    They are for a range of its thresholds.
+    """
     thresholds = ("any", "its own, 1.0", "no stranger accepted", "no negative accepted")
     lines = [
-        "| features | threshold of confidence | recall, overlap 30 % and more | strangers accepted | look-alikes accepted | time [ms] |",
+        "| features | threshold of confidence | recall, overlap 30 % and more | strangers accepted | "
+        "look-alikes accepted | time [ms] |",
         "|---|---|---|---:|---:|---:|",
     ]
     for method in FEATURES:
@@ -56,10 +60,13 @@ def peers(tried: dict[str, figures.Tried]) -> str:
             ]
             lines.append(f"| {method.upper()} | {' | '.join(str(cell) for cell in cells)} |")
     return (
-        "The pipeline of ROS map_merge (features, the best of two nearest, an affine motion without shear by RANSAC, from OpenCV's "
-        "stitching) says how sure it is, and its users set from where on they believe it. OpenCV 5 has no AKAZE any more; SIFT stands in "
+        "The pipeline of ROS map_merge (features, the best of two nearest, an affine motion without shear by "
+        "RANSAC, from OpenCV's "
+        "stitching) says how sure it is, and its users set from where on they believe it. OpenCV 5 has no "
+        "AKAZE any more; SIFT stands in "
         "its place.\n\n" + "\n".join(lines) + "\n\n"
-        "A floor and its copy are nearly the same image, so no threshold tells look-alikes from positives: nothing in it asks what "
+        "A floor and its copy are nearly the same image, so no threshold tells look-alikes from positives: "
+        "nothing in it asks what "
         "contradicts."
     )
 
@@ -85,19 +92,28 @@ def reading(tried: dict[str, figures.Tried]) -> str:
     refused = sum(one.is_exact for one in plenty)
     inexact = sum(one.is_accepted for one in plenty)
     return (
-        f"- Without the fallback a pair of 512 x 512 cells takes {without.median:.0f} ms (median, both maps described). The fallback ran "
-        f"on {100 * (1 - without.count / max(every.count, 1)):.0f} % of these pairs, most of which are negatives: who is refused has been "
-        f"searched for everywhere. Of all pairs 95 % are done in {every.p95:.0f} ms; of those that are joined, half in "
+        f"- Without the fallback a pair of 512 x 512 cells takes {without.median:.0f} ms (median, both maps "
+        "described). The fallback ran "
+        f"on {100 * (1 - without.count / max(every.count, 1)):.0f} % of these pairs, most of which are "
+        "negatives: who is refused has been "
+        f"searched for everywhere. Of all pairs 95 % are done in {every.p95:.0f} ms; of those that are "
+        "joined, half in "
         f"{joined.median:.0f} ms.\n"
-        f"- {negatives.hits} of {negatives.total} negatives are accepted, so the rate is below {100 * negatives.high:.2f} % (95 %).\n"
-        f"- Of the {len(plenty)} pairs with 30 % and more that are missed, {refused} were found in the right place and refused, because "
+        f"- {negatives.hits} of {negatives.total} negatives are accepted, so the rate is below "
+        f"{100 * negatives.high:.2f} % (95 %).\n"
+        f"- Of the {len(plenty)} pairs with 30 % and more that are missed, {refused} were found in the right "
+        "place and refused, because "
         "too little wall speaks for it or more for a place that looks like it, and "
         f"{inexact} joined less exactly than is counted as right.\n"
-        f"- Of the {len(missed)} pairs with 15 to 30 % of overlap that are missed, {poor} have less than {POOR_M:g} m of wall in "
-        "common under the best transform: what both know is open floor, on which any two rooms agree. Whoever accepts on less accepts "
+        f"- Of the {len(missed)} pairs with 15 to 30 % of overlap that are missed, {poor} have less than "
+        f"{POOR_M:g} m of wall in "
+        "common under the best transform: what both know is open floor, on which any two rooms agree. "
+        "Whoever accepts on less accepts "
         "strangers too.\n"
-        "- Indistinct negatives are maps of a floor and its copy whose difference neither robot has seen, or less than 1 m of it: they are "
-        "the same as maps of one floor, so whoever joins those joins them. To refuse them all is to refuse every pair. Symmetric positives "
+        "- Indistinct negatives are maps of a floor and its copy whose difference neither robot has seen, or "
+        "less than 1 m of it: they are "
+        "the same as maps of one floor, so whoever joins those joins them. To refuse them all is to refuse "
+        "every pair. Symmetric positives "
         "that are accepted are like rooms whose wrong overlay shows more walls than the true one."
     )
 
@@ -133,7 +149,8 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
     lines = [
         "| | pairs that overlap | joined | negatives accepted | time a pair |",
         "|---|---:|---|---|---|",
-        f"| thesis, an apartment of 65 m2 (errors never measured) | {known.total} | {100 * known.value:.0f} % ({known.hits} of "
+        f"| thesis, an apartment of 65 m2 (errors never measured) | {known.total} | {100 * known.value:.0f} "
+        f"% ({known.hits} of "
         f"{known.total}) | 0 of {strangers.total} (the rate may be up to {100 * strangers.high:.0f} %) | "
         f"{sum(spent) / len(spent):.0f} ms mean, {max(spent):.0f} ms worst |",
     ]
@@ -142,7 +159,8 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
         times = figures.times(tried[method])
         negatives = figures.accepted(tried[method], figures.NEGATIVE)
         lines.append(
-            f"| {name}, this bank | {positives.total} | {positives} | {negatives} | {times.median:.0f} ms median, {times.p95:.0f} ms 95 % |"
+            f"| {name}, this bank | {positives.total} | {positives} | {negatives} | {times.median:.0f} ms "
+            f"median, {times.p95:.0f} ms 95 % |"
         )
     return (
         "\n".join(lines)
@@ -169,7 +187,8 @@ def detectors(rows: list[dict[str, Any]]) -> str:
         + "\n".join(lines)
         + "\n\n"
         "The thesis, C++ on 2.2 GHz, on maps of 146 x 144, 113 x 113 and 398 x 402 cells [us]: "
-        f"{_printed(thesis.DETECTORS_US)}; 2.8 to 3.9 times faster than Shi-Tomasi. Its rows of Harris and Shi-Tomasi are the same in six "
+        f"{_printed(thesis.DETECTORS_US)}; 2.8 to 3.9 times faster than Shi-Tomasi. Its rows of Harris and "
+        "Shi-Tomasi are the same in six "
         "of eight columns; one was copied."
     )
 
@@ -182,9 +201,8 @@ def descriptors(rows: list[dict[str, Any]]) -> str:
         cells = [f"{row['time_us'][one]:.0f} ({row['points'][one]})" for one in names]
         lines.append(f"| {row['image']} | {' | '.join(cells)} |")
     return (
-        f"Least time of {REPEATS} turns of {BURST} runs each [us] and number of descriptors; each for the points of its own detector.\n\n"
-        + "\n".join(lines)
-        + "\n\n"
+        f"Least time of {REPEATS} turns of {BURST} runs each [us] and number of descriptors; each for the "
+        "points of its own detector.\n\n" + "\n".join(lines) + "\n\n"
         f"The thesis on its three maps [us]: {_printed(thesis.DESCRIPTORS_US)}."
     )
 
@@ -198,7 +216,8 @@ def methods(rows: list[dict[str, Any]]) -> str:
         "|---|---:|---:|---:|---:|---:|",
     ]
     lines += [
-        f"| {row['method']} | {row['matches']:.0f} | {row['right']:.0f} | {100 * row['two_right']:.0f} % | {100 * row['voted']:.0f} % | "
+        f"| {row['method']} | {row['matches']:.0f} | {row['right']:.0f} | {100 * row['two_right']:.0f} % | "
+        f"{100 * row['voted']:.0f} % | "
         f"{row['time_ms']:.1f} |"
         for row in rows
     ]
@@ -206,7 +225,8 @@ def methods(rows: list[dict[str, Any]]) -> str:
         f"Medians over {rows[0]['pairs']} positives with 30 % of overlap and more.\n\n"
         + "\n".join(lines)
         + "\n\n"
-        "The thesis [ms]: distances 3.0, triplets 1.5, descriptors 208 and 85; with descriptors two right matches in more than 85 % of its "
+        "The thesis [ms]: distances 3.0, triplets 1.5, descriptors 208 and 85; with descriptors two right "
+        "matches in more than 85 % of its "
         "pairs."
     )
 
@@ -225,8 +245,8 @@ def teams(rows: list[dict[str, Any]]) -> str:
         )
     whole = sum(row["joined"] == row["robots"] for row in rows)
     return (
-        f"The last maps of five drives of a floor, merged at once: all joined on {whole} of {len(rows)} floors.\n\n"
-        + "\n".join(lines)
+        f"The last maps of five drives of a floor, merged at once: all joined on {whole} of {len(rows)} "
+        "floors.\n\n" + "\n".join(lines)
     )
 
 
@@ -247,7 +267,8 @@ def real_maps(rows: list[dict[str, Any]]) -> str:
         lines.append(f"| {row['pair']} | {result} | {error[0]} | {error[1]} | {row['time_ms']:.0f} |")
     joined = sum(row["is_accepted"] for row in rows)
     return (
-        f"Parts of logs of real robots, rendered with one trajectory's estimate: {joined} of {len(rows)} are joined. The error is that of "
+        f"Parts of logs of real robots, rendered with one trajectory's estimate: {joined} of {len(rows)} are "
+        "joined. The error is that of "
         "the best transform, also where it is refused.\n\n" + "\n".join(lines)
     )
 

@@ -4,7 +4,11 @@ from typing import NamedTuple
 
 
 class PrintedPair(NamedTuple):
-    """A pair of its bank: names of the maps, matches, inliers of RANSAC, agreement in discs [%], time [us], whether it was accepted."""
+    """A pair of the thesis's bank, as printed.
+
+    It has names of the maps, matches, RANSAC inliers, agreement in discs [%], time [us], and whether it
+    was accepted.
+    """
 
     a: str
     b: str
@@ -53,12 +57,18 @@ DESCRIPTORS_US = {
 
 
 def pair_ms(pair: PrintedPair) -> float:
-    """Return the time of a pair with detection and description of both of its maps [ms]."""
+    """Return the time of a pair [ms].
+
+    Detection and description of both of its maps are included.
+    """
     return (pair.time_us + sum(DETECTION_US[name] + DESCRIPTION_US[name] for name in (pair.a, pair.b))) / 1e3
 
 
 def claimed_ms() -> float:
-    """Return the sum that is claimed as the most that a pair takes: the longest time of each stage, once [ms]."""
+    """Return the sum claimed as the most that a pair takes [ms].
+
+    It is the longest time of each stage, once.
+    """
     return (
         max(DETECTION_US.values()) + max(DESCRIPTION_US.values()) + max(pair.time_us for pair in PAIRS)
     ) / 1e3

@@ -1,4 +1,7 @@
-"""Methods tried on the pairs of the bank: what each says of every pair, and the time that it takes."""
+"""Methods tried on the pairs of the bank.
+
+Each result is what the method says of every pair, and the time that it takes.
+"""
 
 import json
 import math
@@ -77,7 +80,10 @@ class Outcome:
 
     @property
     def needed_fallback(self) -> bool:
-        """Whether all rotations and translations were tried: corners gave nothing that passes on its own."""
+        """Whether all rotations and translations were tried.
+
+        Corners then gave nothing that passes on its own.
+        """
         return not (self.found_by == "corners" and (self.is_accepted or ": moved by" in self.reason))
 
     @property
@@ -151,7 +157,10 @@ def read_outcomes(folder: Path, pairs: list[Pair], method: str) -> list[Outcome]
 
 
 def padded(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a map with unknown cells at its upper ends, `SIDE` rows and columns at least."""
+    """Return a map padded to `SIDE` rows and columns at least.
+
+    Unknown cells are added at its upper ends.
+    """
     rows, columns = (max(side, SIDE) for side in levels.shape)
     grown = np.full((rows, columns), UNKNOWN, np.uint8)
     grown[: levels.shape[0], : levels.shape[1]] = levels
@@ -226,7 +235,10 @@ def _both(
 
 @lru_cache
 def _warm_up(method: str, settings: MergeSettings | None) -> None:
-    """Let kernels be compiled before anything is timed, and everything run on one thread."""
+    """Compile the kernels before anything is timed, and use one thread.
+
+    Everything runs on that one thread.
+    """
     from lidarium.benchmarks.studies.merging.bank.floors import BankFloor
 
     cv2.setNumThreads(1)

@@ -1,1 +1,4 @@
-"""The worlds of the thesis on the sensor-based random tree, driven again and compared with what was published."""
+"""The worlds of the thesis on the sensor-based random tree, driven again.
+
+They are compared with what was published.
+"""

@@ -1,4 +1,7 @@
-"""What the parts of localization on curves are worth: the same ways, followed with one part changed."""
+"""The value of the parts of localization on curves.
+
+The same paths are followed with one part changed.
+"""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -87,7 +90,10 @@ def measure_variants(task: FollowedWay) -> dict[str, Any]:
 
 
 def _followed(localizer: SplineFilter, way: Way, time_step: float) -> tuple[np.ndarray[Any, Any], int]:
-    """Return the poses (times, 3) that a localizer believes on a way, and the end points that its map took in."""
+    """Return the poses (times, 3) that a localizer believes on a path.
+
+    The end points that its map took in are returned, too.
+    """
     believed, returns = [], 0
     for k, (ranges, odometry) in enumerate(zip(way.ranges, way.odometry, strict=True)):
         updates = localizer.map.updates

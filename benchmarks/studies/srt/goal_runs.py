@@ -42,7 +42,10 @@ SETTINGS: dict[str, Any] = {
     "observe": ("scan", "pose", "bumper"),
     "map_cells": 2,
 }
-"""A Pioneer with the laser of the thesis, its range noise, and wheels that tell 5 % too much or too little."""
+"""Settings of a Pioneer with the laser of the thesis.
+
+It has the laser's range noise, and wheels that report 5 % too much or too little.
+"""
 
 CURVE_PERIOD = 10
 """Steps between the points of a curve of coverage."""

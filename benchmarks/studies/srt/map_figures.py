@@ -1,4 +1,7 @@
-"""How well a localizer on a spline map did on a way: its poses, its map, and how small that is."""
+"""The quality of a localizer on a spline map along a path.
+
+Figures are its poses, its map, and how small that is.
+"""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Pictures of the worlds: the tree, its safe regions and the map of curves over the truth; curves of coverage."""
+"""Pictures of the worlds, and curves of coverage.
+
+They show the tree, its safe regions and the map of curves over the truth.
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

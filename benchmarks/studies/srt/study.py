@@ -1,4 +1,7 @@
-"""The sensor-based random tree: its worlds in the thesis's mode and the default one, full exploration, and what its parts are worth."""
+"""The sensor-based random tree study.
+
+It has the worlds in the thesis's mode and the default one, full exploration, and what its parts are worth.
+"""
 
 import platform
 from collections.abc import Callable, Iterator
@@ -20,8 +23,11 @@ Progress = Iterator[tuple[str, int, int]]
 Task = GoalRun | FollowedWay
 
 SEEDS, STARTS, FOLLOWED = range(200, 230), range(100, 105), range(200, 203)
-"""Seeds of the runs of each world and mode, of the starts on each floor that is explored, and of the ways
-that variants follow; none of them had a part in any choice."""
+"""Seeds of the runs, of the starts, and of the paths of variants.
+
+Runs are of each world and mode, starts of each explored floor, paths those that variants follow. None of the
+seeds had a part in any choice.
+"""
 
 POLICIES = ("srt", "nearest_frontier", "explore_lite")
 SCENES = (
@@ -37,9 +43,12 @@ GOALS_FILE, ABLATIONS_FILE = "goals.jsonl", "ablations.jsonl"
 PICTURE_SEED = SEEDS[0]
 
 TUNED_ON = (
-    f"Seeds are {SEEDS[0]} and on; choices were made on others of the same worlds: what the thesis never printed (free rays of 0.9 m, "
-    "step, least distance) among about twenty settings with seeds 0 to 19, for goals that are reached, slower and with more nodes than "
-    "others that were tried, which flatters the ratios to it; the default mode with seeds 0 to 5, and its localization with seeds 0 to 3, "
+    f"Seeds are {SEEDS[0]} and on; choices were made on others of the same worlds: what the thesis never "
+    "printed (free rays of 0.9 m, "
+    "step, least distance) among about twenty settings with seeds 0 to 19, for goals that are reached, "
+    "slower and with more nodes than "
+    "others that were tried, which flatters the ratios to it; the default mode with seeds 0 to 5, and its "
+    "localization with seeds 0 to 3, "
     "with a look at 100 to 102."
 )
 """What the runs towards goals owe to choices that were made on the same worlds."""
@@ -99,23 +108,30 @@ def page(folder: Path, command: str) -> str:
     episodes = read_episodes(folder / EXPLORATION / "episodes.jsonl")
     parts = [
         "# Sensor-based random tree",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python {platform.python_version()}. "
+        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
+        f"{platform.python_version()}. "
         "What the tree does is told in [the reference](../reference/srt.md).",
         "## Towards goals",
-        "A Pioneer P3-DX with the URG-04LX (noise of its data sheet) looks for the goal of each world; wheels tell 5 % too much or too "
+        "A Pioneer P3-DX with the URG-04LX (noise of its data sheet) looks for the goal of each world; "
+        "wheels tell 5 % too much or too "
         'little of ways and turns, drift and slip (`odometry="typical"`); it localizes on the map of curves that it makes '
         '(`localization="splines"`). A goal is reached within 0.2 m. The world\'s raster is 1 cm. Entries are medians, least and '
-        "greatest; the area covered is the least, the distance from the start the greatest. *Printed* is what the thesis tells of its own "
-        "worlds, of which only descriptions are left: ours are drawn after these, so its figures are no target. In `srt_cluttered` the "
+        "greatest; the area covered is the least, the distance from the start the greatest. *Printed* is "
+        "what the thesis tells of its own "
+        "worlds, of which only descriptions are left: ours are drawn after these, so its figures are no "
+        "target. In `srt_cluttered` the "
         "goal is enclosed: `unreachable`, all covered and back at the start is right.",
         tables.goals(runs),
         TUNED_ON,
-        "The default mode over the thesis's mode on the same seeds: of the sums, and least and greatest of single runs.",
+        "The default mode over the thesis's mode on the same seeds: of the sums, and least and greatest of "
+        "single runs.",
         tables.against_thesis_mode(runs),
         "![Covered area over time](srt_coverage.png)",
         "## Poses and maps",
-        "Means, in brackets the worst of the runs. *Walls found* counts walls within 5 cm of which true beams end, *curves right* the "
-        "curves' length within 5 cm of a wall. Bytes are those of the compact form; end points are those of the scans that went into the "
+        "Means, in brackets the worst of the runs. *Walls found* counts walls within 5 cm of which true "
+        "beams end, *curves right* the "
+        "curves' length within 5 cm of a wall. Bytes are those of the compact form; end points are those of "
+        "the scans that went into the "
         "map, as two float32 each; a grid has one byte a cell of 5 cm over the floor's bounds.",
         tables.maps(runs),
         "\n".join(
@@ -123,14 +139,19 @@ def page(folder: Path, command: str) -> str:
             for world in WORLDS
         ),
         "## Full exploration",
-        "One robot with perfect poses explores until 99 % is covered, maps of 2.5 cm, starts drawn by the seed, the same for every policy. "
-        "The six scenes had a part in the choices, with other starts; the generated floors, ten of the validation set, had none, but "
-        "that two faults showed on them and were mended: robots that stood still beside a wall (`office:2000006`), and one that turned "
-        "between two targets for ever (`office:2000009`). Means over the starts; the last columns are our mean over that of the better of "
+        "One robot with perfect poses explores until 99 % is covered, maps of 2.5 cm, starts drawn by the "
+        "seed, the same for every policy. "
+        "The six scenes had a part in the choices, with other starts; the generated floors, ten of the "
+        "validation set, had none, but "
+        "that two faults showed on them and were mended: robots that stood still beside a wall "
+        "(`office:2000006`), and one that turned "
+        "between two targets for ever (`office:2000009`). Means over the starts; the last columns are our "
+        "mean over that of the better of "
         "the others.",
         tables.exploration(episodes, POLICIES),
         "## What parts are worth",
-        f"The ways of the default mode, {len(FOLLOWED)} a world at most, followed by the particle filter with one part changed. Means over "
+        f"The ways of the default mode, {len(FOLLOWED)} a world at most, followed by the particle filter "
+        "with one part changed. Means over "
         "all worlds, in brackets the worst.",
         tables.ablations(followed),
     ]

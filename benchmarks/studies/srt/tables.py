@@ -17,7 +17,10 @@ PUBLISHED: dict[str, tuple[str, str, str]] = {
     "srt_lab": ("14 (14 to 16)", "55", "19 (19 to 23)"),
     "srt_t_junction": ("74 (68 to 74)", "84", "97 (to 106)"),
 }
-"""What the thesis printed of one run, and of an unknown number of runs: nodes, segments, time [s]."""
+"""Results printed in the thesis: nodes, segments and time [s].
+
+They are of one run, and of an unknown number of runs.
+"""
 
 UNHINDERED = WORLDS[:3]
 """Worlds of which the way is compared with the shortest one."""
@@ -26,7 +29,8 @@ UNHINDERED = WORLDS[:3]
 def goals(lines: Sequence[Line]) -> str:
     """Return the endings, times, nodes and ways of both modes beside the thesis's."""
     rows = [
-        "| world | mode | runs | ended | nodes | curves | time [s] | path [m] | of the shortest | area covered | from the start [m] | "
+        "| world | mode | runs | ended | nodes | curves | time [s] | path [m] | of the shortest | area "
+        "covered | from the start [m] | "
         "contacts |",
         "|---|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
@@ -52,15 +56,20 @@ def _goal_row(world: str, mode: str, runs: Sequence[Line]) -> str:
     ]
     shortest = f"{statistics.median(ratios):.2f} (to {max(ratios):.2f})" if ratios else "-"
     return (
-        f"| {world} | {mode} | {len(runs)} | {endings} | {_spread(runs, 'nodes', 0)} | {_spread(runs, 'curves', 0)} | "
+        f"| {world} | {mode} | {len(runs)} | {endings} | {_spread(runs, 'nodes', 0)} | "
+        f"{_spread(runs, 'curves', 0)} | "
         f"{_spread(runs, 'time_s', 0)} | {_spread(runs, 'path_m', 1)} | {shortest} | "
-        f"{100 * min(run['coverage'] for run in runs):.1f} % | {max(run['from_start_m'] for run in runs):.2f} | "
+        f"{100 * min(run['coverage'] for run in runs):.1f} % | "
+        f"{max(run['from_start_m'] for run in runs):.2f} | "
         f"{sum(run['collisions'] for run in runs)} |"
     )
 
 
 def against_thesis_mode(lines: Sequence[Line]) -> str:
-    """Return the default mode's time, nodes and path over the thesis mode's, seed by seed."""
+    """Return the default mode's time, nodes and path over the thesis mode's.
+
+    The ratios are taken seed by seed.
+    """
     rows = ["| world | time | nodes | path |", "|---|---:|---:|---:|"]
     for world in WORLDS:
         pairs = _pairs(_of(lines, world, "thesis"), _of(lines, world, "default"))
@@ -84,7 +93,8 @@ def _ratio(pairs: Sequence[tuple[Line, Line]], key: str) -> str:
 def maps(lines: Sequence[Line]) -> str:
     """Return the errors of poses and maps, and the maps' sizes."""
     rows = [
-        "| world | mode | ATE [mm] | end [mm] | end [deg] | odometry's ATE over ours | wall error [mm] | its 95 % [mm] | walls found | "
+        "| world | mode | ATE [mm] | end [mm] | end [deg] | odometry's ATE over ours | wall error [mm] | its "
+        "95 % [mm] | walls found | "
         "curves right | bytes | of end points | of a grid |",
         "|---|---|" + "---:|" * 11,
     ]
@@ -118,7 +128,8 @@ def _map_cells(runs: Sequence[Line]) -> str:
 def ablations(lines: Sequence[Line]) -> str:
     """Return what each change of a part does to poses and maps, over all worlds."""
     rows = [
-        "| variant | about | ATE [mm] | end [mm] | wall error [mm] | its 95 % [mm] | walls found | curves right | control points | bytes |",
+        "| variant | about | ATE [mm] | end [mm] | wall error [mm] | its 95 % [mm] | walls found | curves "
+        "right | control points | bytes |",
         "|---|---|" + "---:|" * 8,
     ]
     for name, (about, _) in VARIANTS.items():
@@ -138,7 +149,10 @@ def ablations(lines: Sequence[Line]) -> str:
 
 
 def exploration(episodes: Sequence[Line], policies: Sequence[str]) -> str:
-    """Return times and ways to 99 % by floor: means over the starts, and the first policy's over the better of the others."""
+    """Return times and paths to 99 % by floor.
+
+    They are means over the starts, and the first policy's over the better of the others.
+    """
     rows = [
         f"| floor | {' | '.join(f'`{name}` [s], [m]' for name in policies)} | time | path |",
         "|---|" + "---:|" * (len(policies) + 2),
@@ -154,7 +168,8 @@ def exploration(episodes: Sequence[Line], policies: Sequence[str]) -> str:
     if all_ratios:
         means = [_geometric_mean([ratios[k] for ratios in all_ratios]) for k in (0, 1)]
         rows.append(
-            f"| all, geometric mean | {' | '.join('' for _ in policies)} | {_shown(means[0])} | {_shown(means[1])} |"
+            f"| all, geometric mean | {' | '.join('' for _ in policies)} | {_shown(means[0])} | "
+            f"{_shown(means[1])} |"
         )
     return "\n".join(rows)
 

@@ -1,1 +1,4 @@
-"""The experiments of supervised teams: what is run, the figures of runs, and the tables of the page."""
+"""The experiments of supervised teams.
+
+They are what is run, the figures of runs, and the tables of the report.
+"""

@@ -1,4 +1,7 @@
-"""Figures of supervised teams: runs beside those of one robot and of teams that are told their starts, on the same floors and seeds."""
+"""Figures of supervised teams.
+
+Runs stand beside those of one robot and of teams that know their starts, on the same floors and seeds.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -26,7 +29,10 @@ def chosen(
     is_floor: Callable[[str], bool] = lambda _: True,
     variant: str | None = None,
 ) -> list[Row]:
-    """Return the runs of a policy: of teams of a size, on floors and of a variant of settings, in the order of their keys; None for all."""
+    """Return the runs of a policy, in the order of their keys.
+
+    They are of teams of a size, on floors and of a variant of settings; None for all.
+    """
     found = [
         row
         for row in rows
@@ -39,13 +45,18 @@ def chosen(
 
 
 def partners(rows: Sequence[Row], others: Iterable[Row]) -> list[Pair]:
-    """Return each run with the one of others that has its floor, starts, seed and settings; those without one are left out."""
+    """Return each run with the matching one of others.
+
+    It has the same floor, starts, seed and settings; runs without one are left out.
+    """
     by_case = {_case(row): row for row in others}
     return [(row, by_case[_case(row)]) for row in rows if _case(row) in by_case]
 
 
 def with_alone(rows: Sequence[Row], alone: Iterable[Row]) -> list[tuple[Row, list[Row]]]:
-    """Return each run with those of one robot from the starts of its robots, of which some at least were run; others are left out.
+    """Return each run with those of one robot from its robots' starts.
+
+    Some of those at least were run; runs without any are left out.
 
     Drawn starts of a seed begin with that of one robot, so that there is one such run; of the scenarios there
     are all of each start.
@@ -116,7 +127,10 @@ def has_wrong_merge(row: Row) -> bool:
 
 
 def has_off_merge(row: Row) -> bool:
-    """Whether a run used a merge that errs by as much from what the starts say, drift included."""
+    """Whether a run used a merge that is off against the starts.
+
+    It errs by as much as a wrong one from what the starts say, drift included.
+    """
     return bool(row["merges"]["off"])
 
 

@@ -131,13 +131,19 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
 
 
 def covered_by_others(row: Row) -> float:
-    """Return the share that the robots that have not failed covered of what the others' bodies leave in reach."""
+    """Return the share of the reachable area that robots not failed covered.
+
+    The area is what the others' bodies leave in reach.
+    """
     covered = row["c_others_final"]
     return float(row["coverage_final"] if covered is None else covered)
 
 
 def is_covered(row: Row) -> bool:
-    """Whether the robots that have not failed covered 99 % of what the others' bodies leave in reach."""
+    """Whether the robots that have not failed covered 99 % of what is in reach.
+
+    It is what the others' bodies leave in reach.
+    """
     return covered_by_others(row) >= 0.99
 
 

@@ -1,4 +1,7 @@
-"""Supervised teams: the thesis's experiments, the same on generated and real floors, a robot that fails, and each extension alone."""
+"""Supervised teams: the thesis's experiments and further ones.
+
+The further ones are the same on generated and real floors, a robot that fails, and each extension alone.
+"""
 
 import json
 import platform
@@ -48,7 +51,9 @@ SECONDS_PER_HOUR = 3600.0
 
 
 def work(folder: Path, data: Path | None, every: int, workers: int) -> Iterator[tuple[str, int, int]]:
-    """Run what depends on the suites: teams of which a robot fails at half time, and typical runs of which the log is kept.
+    """Run what depends on the suites.
+
+    It is teams of which a robot fails at half time, and typical runs of which the log is kept.
 
     Yields what is being done, how much of it is, and of how much; what the folder has is not done again.
     """
@@ -86,7 +91,9 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Iterator[
 
 
 def failing_suite(rows: Sequence[Row], teams: Suite) -> tuple[Suite | None, list[Trial]]:
-    """Return a suite of teams whose first robot dies at half the time that the whole team took, and its trials; None without any.
+    """Return a suite of teams whose first robot dies halfway, and its trials.
+
+    It dies at half the time that the whole team took; None without any.
 
     Parameters
     ----------
@@ -152,7 +159,8 @@ def page(folder: Path, command: str) -> str:
     alone = rows["one"]
     parts = [
         "# Supervised teams",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python {platform.python_version()}; "
+        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
+        f"{platform.python_version()}; "
         f"{len(every)} runs, {hours:.2f} hours of one core, {hours / 2.0:.2f} of two.",
         _about(alone),
         "## What was to be reached\n\n" + tables.goals_table(goals),
@@ -221,15 +229,22 @@ def _wrong_section(rows: Sequence[Row]) -> list[str]:
     if not wrong:
         return []
     words = (
-        "Runs with a merge that is wrong: how far off it is where the maps meet, how far by what the starts say, and the error of each "
+        "Runs with a merge that is wrong: how far off it is where the maps meet, how far by what the starts "
+        "say, and the error of each "
         "robot's own trajectory."
     )
     return ["### Wrong merges\n\n" + words + "\n\n" + tables.wrong_table(wrong)]
 
 
 def _left_section(failing: Sequence[Row]) -> list[str]:
-    """Return the runs in which the others did not cover what a dead robot leaves, beside those of the other policies."""
-    words = "Runs in which a supervised team covered less than 99 % of that, and what the others covered of it at the same death."
+    """Return the runs in which the others left a dead robot's area uncovered.
+
+    They did not cover what the robot leaves; the other policies' runs stand beside them.
+    """
+    words = (
+        "Runs in which a supervised team covered less than 99 % of that, and what the others covered of it "
+        "at the same death."
+    )
     is_left = not all(is_covered(row) for row in chosen(failing, SUPERVISED))
     return ["### Runs that left more\n\n" + words + "\n\n" + tables.left_table(failing)] if is_left else []
 
@@ -239,7 +254,8 @@ def _logs_section(logs: Mapping[str, Any]) -> list[str]:
     if not logs:
         return []
     parts = [
-        "### Typical runs\n\nWhere a figure was missed, what the station noted and ordered: for a size of teams in the run whose share "
+        "### Typical runs\n\nWhere a figure was missed, what the station noted and ordered: for a size of "
+        "teams in the run whose share "
         "of one robot's time is the median, where runs are counted in the middle one of those that missed it."
     ]
     for name, log in logs.items():
@@ -263,7 +279,8 @@ def _told(entry: Mapping[str, Any]) -> str:
     inputs = entry["inputs"]
     return (
         f"{entry['time_s']:6.1f} s  rule {entry['rule']}, {entry['agent']} {entry['order']}: {entry['why']} "
-        f"(d_rest {inputs['remaining_m'] or 0.0:.2f} m, map_kno {inputs['map_known']:.2f}, d_trav {inputs['travelled_m']:.1f} m)"
+        f"(d_rest {inputs['remaining_m'] or 0.0:.2f} m, map_kno {inputs['map_known']:.2f}, d_trav "
+        f"{inputs['travelled_m']:.1f} m)"
     )
 
 
@@ -286,40 +303,57 @@ def _about(alone: Sequence[Row]) -> str:
         else " No folder of real floors was given: generated offices and corridors stand in for them."
     )
     return (
-        "Kobuki robots with the URG-04LX laser, noise as of its data sheet, typical wheel odometry, SLAM, starts that nobody knows, maps "
-        f"of 5 cm, cut at {SETTINGS['horizon_s']:.0f} s. Scenario 1 is `apartment`, scenario 2 `clinic`; Jade, Luna and Mars start at A, B "
-        f"and C. The others are {len(floors)} floors, {len(large)} of them over 300 m2; starts are drawn by the seed, the same for every "
-        f"policy, and that of one robot is that of a team's first.{stand_ins} `independent` merges nothing, `oracle_starts` is told how "
-        "the robots stand to each other ([supervisor](../reference/supervisor.md)). Entries are medians over runs, ratios and differences "
-        "those of paired runs, with intervals of 95 %; what was not done by the horizon counts as never, and as done then where others are "
-        "divided by it. Where a team starts at starts that robots tried alone, as in the scenarios, one robot's figure is the mean of "
+        "Kobuki robots with the URG-04LX laser, noise as of its data sheet, typical wheel odometry, SLAM, "
+        "starts that nobody knows, maps "
+        f"of 5 cm, cut at {SETTINGS['horizon_s']:.0f} s. Scenario 1 is `apartment`, scenario 2 `clinic`; "
+        "Jade, Luna and Mars start at A, B "
+        f"and C. The others are {len(floors)} floors, {len(large)} of them over 300 m2; starts are drawn by "
+        "the seed, the same for every "
+        f"policy, and that of one robot is that of a team's first.{stand_ins} `independent` merges nothing, "
+        "`oracle_starts` is told how "
+        "the robots stand to each other ([supervisor](../reference/supervisor.md)). Entries are medians over "
+        "runs, ratios and differences "
+        "those of paired runs, with intervals of 95 %; what was not done by the horizon counts as never, and "
+        "as done then where others are "
+        "divided by it. Where a team starts at starts that robots tried alone, as in the scenarios, one "
+        "robot's figure is the mean of "
         "theirs."
     )
 
 
 def _notes() -> str:
     return (
-        "A merge is wrong where the transform that was found is off by more than 0.3 m or 3 degrees at the centroid of what both maps "
-        "know, from how the maps truly lie to each other there: a robot's map lies as its pose did when it was nearest to there. Maps "
-        "that SLAM draws drift, and no merger can know by how much. Where a third robot's map lies between two, its drift and the lever "
-        "of small angles come to what is between them, and the merges that join them are judged themselves. So what the starts say of all "
-        "joined robots is counted beside it, within the same bounds and within those of `result.json`, 2 cells and 0.01 rad. "
-        "A tick is a look at the tree every 10 s, with its merge and what robots are told, on one core of a machine that others share."
+        "A merge is wrong where the transform that was found is off by more than 0.3 m or 3 degrees at the "
+        "centroid of what both maps "
+        "know, from how the maps truly lie to each other there: a robot's map lies as its pose did when it "
+        "was nearest to there. Maps "
+        "that SLAM draws drift, and no merger can know by how much. Where a third robot's map lies between "
+        "two, its drift and the lever "
+        "of small angles come to what is between them, and the merges that join them are judged themselves. "
+        "So what the starts say of all "
+        "joined robots is counted beside it, within the same bounds and within those of `result.json`, 2 "
+        "cells and 0.01 rad. "
+        "A tick is a look at the tree every 10 s, with its merge and what robots are told, on one core of a "
+        "machine that others share."
     )
 
 
 def _about_failing() -> str:
     return (
-        "`robot_0` dies at half the time in which the whole supervised team of that floor and seed saw 99 %. Its body stands where it is. "
-        "Its map is used no more, so the others cover its part, too: counted is what they have seen themselves, of what the body "
+        "`robot_0` dies at half the time in which the whole supervised team of that floor and seed saw 99 %. "
+        "Its body stands where it is. "
+        "Its map is used no more, so the others cover its part, too: counted is what they have seen "
+        "themselves, of what the body "
         "leaves in reach."
     )
 
 
 def _about_extensions() -> str:
     return (
-        f"Three robots, {FEWEST_SEEDS} seeds on each of two floors; runs are not ended at 99 %, since what robots do then counts, too. "
-        f"`energy budget` turns back at {MARGIN:g} times what the way home costs. `all together` is every one at once, with `utility`."
+        f"Three robots, {FEWEST_SEEDS} seeds on each of two floors; runs are not ended at 99 %, since what "
+        "robots do then counts, too. "
+        f"`energy budget` turns back at {MARGIN:g} times what the way home costs. `all together` is every "
+        "one at once, with `utility`."
     )
 
 

@@ -1,4 +1,7 @@
-"""What the experiments of supervised teams run: the thesis's scenarios, generated and real floors, and each extension by itself."""
+"""The runs of the experiments of supervised teams.
+
+They are the thesis's scenarios, generated and real floors, and each extension by itself.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -33,7 +36,10 @@ SETTINGS: Mapping[str, Any] = {
 """Reports tell the true starts to whoever trusts in them, ``oracle_starts`` alone."""
 
 TO_THE_END: Mapping[str, Any] = {"stop_coverage": None, "horizon_s": 900.0}
-"""In place of these settings, where it is of interest what robots do when all is seen."""
+"""Settings for studying robots after all is seen.
+
+They take the place of the usual settings where that is of interest.
+"""
 
 GENERATED: Mapping[str, float] = {
     "building:3000003": 72.0,
@@ -56,7 +62,10 @@ REAL: Mapping[str, float] = {
     "kth/xml/A0043020__0510032199_A_40_1_107.xml.gz": 232.0,
     "kth/xml/A0093002__50025630.xml.gz": 319.0,
 }
-"""Files below ``floorplans`` of the folder of real data, with what the robot sweeps of them [m2]."""
+"""Real floor files with the area of the robot's footprint on them [m2].
+
+The files are below ``floorplans`` of the folder of real data; the area is what it covers of them.
+"""
 
 STAND_INS: Mapping[str, float] = {
     "office:7": 0.0,
@@ -71,10 +80,16 @@ LARGE_M2 = 300.0
 """From this area on a floor is large."""
 
 FIVE_FLOORS = 5
-"""Floors on which five robots work, and on which robots fail: every third of the others'."""
+"""Number of floors on which five robots work, and on which robots fail.
+
+They are every third of the others' floors.
+"""
 
 EXTENDED = ("building:3000010", "building:3000009")
-"""Floors on which each extension is switched on, one of them large: what helps on the one may not on the other."""
+"""Floors on which each extension is switched on, one of them large.
+
+What helps on the one may not on the other.
+"""
 
 EXTENSIONS: Mapping[str, Mapping[str, Any]] = {
     "hungarian": {"assignment": "hungarian"},
@@ -114,7 +129,10 @@ def floors_of(data: Path | None) -> dict[str, tuple[str, ...]]:
 
 
 def area_m2(floor: str) -> float:
-    """Return what a robot sweeps of a floor of these experiments [m2], 0 where that is not known."""
+    """Return the area that a robot's footprint covers of a floor [m2].
+
+    It is for floors of these experiments; 0 where that is not known.
+    """
     known = {**GENERATED, **{Path(name).name: area for name, area in REAL.items()}}
     return known.get(floor, known.get(Path(floor).name, 0.0))
 

@@ -66,7 +66,10 @@ def alone_table(rows: Sequence[Row], names: Sequence[str] = ("A", "B", "C")) -> 
 
 
 def team_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
-    """Return the teams of each size, policy by policy, beside one robot and the told team."""
+    """Return the teams of each size, policy by policy.
+
+    They stand beside one robot and the team that knows its starts.
+    """
     lines = []
     for robots in sorted({int(row["robots"]) for row in rows}):
         for policy in POLICIES:
@@ -170,7 +173,10 @@ def failing_table(rows: Sequence[Row]) -> str:
 
 
 def left_table(rows: Sequence[Row]) -> str:
-    """Return the runs in which a supervised team did not cover what a dead robot leaves, beside the other policies' of the same death."""
+    """Return the runs in which a supervised team left a dead robot's area uncovered.
+
+    The other policies' runs of the same death stand beside them.
+    """
     lines = []
     for row in chosen(rows, SUPERVISED):
         if not is_covered(row):
@@ -195,7 +201,10 @@ def left_table(rows: Sequence[Row]) -> str:
 
 
 def extension_table(rows: Sequence[Row]) -> str:
-    """Return runs with extensions switched on, beside `supervised` on the same floors and seeds."""
+    """Return runs with extensions switched on, beside `supervised`.
+
+    The floors and seeds are the same.
+    """
     lines = []
     for variant, policy in dict.fromkeys((str(row["variant"]), str(row["policy"])) for row in rows):
         runs = chosen(rows, policy, variant=variant)

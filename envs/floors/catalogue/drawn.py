@@ -103,7 +103,10 @@ def load_drawn(path: Path) -> Floor:
 
 
 def _wall(wall: list[float], doors: list[list[float]]) -> list[Solid]:
-    """Build a straight wall less the doors in it, half its thickness longer at both ends so that corners close."""
+    """Build a straight wall less the doors in it.
+
+    It is half its thickness longer at both ends so that corners close.
+    """
     start, end = np.array(wall[:2], dtype=np.float64), np.array(wall[2:4], dtype=np.float64)
     thickness = wall[4] if len(wall) > 4 else INNER_WALL
     length = math.hypot(*(end - start))

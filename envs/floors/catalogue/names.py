@@ -1,4 +1,7 @@
-"""The catalogue: floors by name, generated floors by seed, and the sets for training and testing."""
+"""The catalogue of floors.
+
+It has floors by name, generated floors by seed, and the sets for training and testing.
+"""
 
 import difflib
 import hashlib
@@ -27,7 +30,10 @@ Its floors are ``building:SEED`` with the generator's default settings.
 """
 
 HASHED_FLOORS = 20
-"""Floors of a set whose hashes are kept, so that a change of the generator cannot pass unseen."""
+"""Number of floors of a set whose hashes are kept.
+
+A change of the generator thus cannot pass unseen.
+"""
 
 GENERATORS = ("building", *KINDS)
 """Prefixes of generated floors: of any kind, or of one kind."""
@@ -102,7 +108,10 @@ def is_file_name(spec: str | Path) -> bool:
 
 
 def is_generated(spec: str) -> bool:
-    """Return whether a floor is named by a generator and a seed, so that there is one without looking."""
+    """Return whether a floor is named by a generator and a seed.
+
+    Such a floor exists without a look-up.
+    """
     prefix, colon, rest = spec.partition(":")
     return bool(colon) and prefix in GENERATORS and rest.isascii() and rest.isdigit()
 
@@ -130,7 +139,8 @@ def set_floors(name: str) -> tuple[str, ...]:
     if colon:
         if not (wanted.isascii() and wanted.isdigit() and 1 <= int(wanted) <= count):
             raise ValueError(
-                f"{name!r} wants {wanted!r} floors; the set {short} has {count}, as in set:{short}:{min(count, 40)}"
+                f"{name!r} wants {wanted!r} floors; the set {short} has {count}, as in "
+                f"set:{short}:{min(count, 40)}"
             )
         count = int(wanted)
     return tuple(f"building:{seed}" for seed in range(first, first + count))
@@ -204,7 +214,8 @@ def _load_named(spec: str) -> Floor:
     prefix, colon, rest = spec.partition(":")
     if prefix == "set" and colon:
         raise ValueError(
-            f"{spec!r} is a set of many floors, not one; use set_floors({rest!r}) or one of them, such as {_example(rest)!r}"
+            f"{spec!r} is a set of many floors, not one; use set_floors({rest!r}) or one of them, such as "
+            f"{_example(rest)!r}"
         )
     if prefix in GENERATORS and colon:
         if not (rest.isascii() and rest.isdigit()):
@@ -231,7 +242,8 @@ def _set_name(name: str) -> str:
     if short not in SETS:
         nearest = difflib.get_close_matches(short, SETS, n=1)
         raise ValueError(
-            f"no set called {short!r}{f', did you mean {nearest[0]!r}?' if nearest else ''}; there are {', '.join(SETS)}"
+            f"no set called {short!r}{f', did you mean {nearest[0]!r}?' if nearest else ''}; there are "
+            f"{', '.join(SETS)}"
         )
     return short
 
@@ -245,4 +257,7 @@ def _unknown(name: str) -> str:
     forms = [f"{generator}:SEED" for generator in GENERATORS]
     nearest = difflib.get_close_matches(name, [*drawn_names(), *forms], n=1, cutoff=0.5)
     guess = f", did you mean {nearest[0]!r}?" if nearest else ""
-    return f"no floor called {name!r}{guess}; there are {', '.join([*drawn_names(), *forms])}, and paths to files"
+    return (
+        f"no floor called {name!r}{guess}; there are {', '.join([*drawn_names(), *forms])}, and paths to "
+        "files"
+    )

@@ -1,4 +1,6 @@
-"""A store on disk that all processes share: arrays that are dear to make and small to keep, found by what determines them.
+"""A store on disk that all processes share.
+
+It has arrays that are expensive to make and small to keep, found by what determines them.
 
 An entry is one file of compressed arrays. It is written beside and renamed, so that it appears whole; it
 carries a hash of its key and content, so that one that is damaged, cut short or another's is seen and made
@@ -42,7 +44,10 @@ DEFAULT_MIB = 1024.0
 """The most that the store takes on disk where nothing is said [MiB]."""
 
 PARTS = 16
-"""Folders that the entries are spread over, by the first digit of the hash of their keys."""
+"""Number of folders that the entries are spread over.
+
+They are chosen by the first digit of the hash of their keys.
+"""
 
 _MAGIC = b"lidarium"
 _DIGEST_BYTES = 32
@@ -66,7 +71,10 @@ class Store:
         self.folder, self.max_bytes = folder, max_bytes
 
     def load(self, key: str) -> Arrays | None:
-        """Return the arrays of a key, read-only, or None where there are none that are whole."""
+        """Return the arrays of a key, read-only.
+
+        None where there are none that are whole.
+        """
         if self.folder is None:
             return None
         path = self._path(key)
@@ -156,7 +164,10 @@ def mebibytes(variable: str, default: float) -> int:
 
 @lru_cache(maxsize=8)
 def hash_of_code(*sources: str) -> str:
-    """Hash what makes an entry's arrays: sources of the package, files or whole folders, with the libraries and the processor's kind."""
+    """Hash what makes an entry's arrays.
+
+    These are sources of the package, files or whole folders, with the libraries and the processor's kind.
+    """
     libraries = (platform.machine(), np.__version__, scipy.__version__, cv2.__version__)
     digest = hashlib.blake2b(" ".join(libraries).encode(), digest_size=16)
     for source in sources:
@@ -173,7 +184,10 @@ def _digest(key: str, packed: bytes) -> bytes:
 
 
 def _packed(arrays: Arrays) -> bytes:
-    """Return a line of JSON (name, type, shape and length of each array), then the arrays, each compressed by itself."""
+    """Return a line of JSON, then the arrays, each compressed by itself.
+
+    The line has name, type, shape and length of each array.
+    """
     streams = [zlib.compress(np.ascontiguousarray(array).tobytes()) for array in arrays.values()]
     table = [
         (name, array.dtype.str, array.shape, len(stream))
@@ -197,7 +211,10 @@ def _on_disk(length: int) -> int:
 
 
 def _files(folder: Path) -> list[tuple[float, int, Path]]:
-    """Return time of last use, size and path of what lies in a folder, unfinished writes of broken processes too."""
+    """Return time of last use, size and path of the files of a folder.
+
+    Unfinished writes of broken processes are included.
+    """
     files = []
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:

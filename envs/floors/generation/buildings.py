@@ -1,4 +1,6 @@
-"""Generated buildings: apartments, offices and corridor networks, drawn by seed from a few settings.
+"""Generated buildings: apartments, offices and corridor networks.
+
+They are drawn by seed from a few settings.
 
 A layout (rooms on a lattice) gives walls and doors; furniture is set into the rooms; then a disc of the
 service robot's radius is tried in all of it, and furniture that cuts off a part is left out. The same seed
@@ -126,7 +128,8 @@ class BuildingSettings:
         small, large = self.room_size
         if not (small >= 2.0 and 1.5 * small <= large <= 20.0):
             raise ValueError(
-                f"room_size is {self.room_size}; want 2 m or more and a largest of at least 1.5 times that, 20 m at most"
+                f"room_size is {self.room_size}; want 2 m or more and a largest of at least 1.5 times that, "
+                "20 m at most"
             )
         if not math.isfinite(self.rotation):
             raise ValueError(f"rotation is {self.rotation}; want a finite angle in radians")
@@ -166,7 +169,8 @@ def generate_building(seed: int, settings: BuildingSettings | None = None) -> Fl
         if floor is not None:
             return _rotated(floor, settings.rotation)
     raise ValueError(
-        f"no passable {kind} came out of seed {seed} and {settings}; try another seed, wider corridors or larger rooms"
+        f"no passable {kind} came out of seed {seed} and {settings}; try another seed, wider corridors or "
+        "larger rooms"
     )
 
 
@@ -178,7 +182,10 @@ def _attempt(
     settings: BuildingSettings,
     stages: list[np.random.SeedSequence],
 ) -> Floor | None:
-    """Draw one floor; None where its plan has a room without a door or a neck too narrow for the robot."""
+    """Draw one floor, or return None where its plan fails.
+
+    A plan fails where a room has no door or a neck is too narrow for the robot.
+    """
     layout, openings, pieces, places = stages
     labels = _layout(kind, proportions, settings, layout)
     doors = choose_doors(labels, settings.door_width, proportions.loops, np.random.default_rng(openings))
@@ -224,7 +231,10 @@ def _drawn(settings: BuildingSettings, generator: np.random.Generator) -> tuple[
 def _layout(
     kind: str, proportions: Proportions, settings: BuildingSettings, seed: np.random.SeedSequence
 ) -> Labels:
-    """Draw a layout, then again with its area corrected for what walls and cut corners took; outer walls around it."""
+    """Draw a layout of the wanted area, with outer walls around it.
+
+    It is drawn again with its area corrected for what walls and cut corners took.
+    """
     wanted = proportions.area_m2
     margin = cells(settings.outer_wall_thickness)
     best: tuple[float, Labels] | None = None
@@ -283,7 +293,11 @@ def _space(raster: Raster, radius: float) -> tuple[NDArray[np.bool_], NDArray[np
 def _guilty(
     furniture: list[Furnished], stray: NDArray[np.bool_], missed: set[int], origin: tuple[float, float]
 ) -> int:
-    """Return the index of the last piece beside a part cut off or in a room that is not reached, else of the last piece."""
+    """Return the index of the last piece of furniture that obstructs the floor.
+
+    Such a piece is beside a part cut off or in a room that is not reached. Without one, the last piece is
+    returned.
+    """
     reach = ROBOT_RADIUS + 3 * MARGIN
     corner = np.tile(origin, 2) + np.array([reach, reach, -reach, -reach])
     for k in range(len(furniture) - 1, -1, -1):

@@ -1,4 +1,6 @@
-"""Furnishing: pieces set against the walls of rooms or free in them, doors and passages kept clear.
+"""Furnishing: pieces against the walls of rooms or free-standing in them.
+
+Doors and passages are kept clear.
 
 Rooms get their main pieces first (bed, sofa, desks), then more and more small ones, until the wanted share of
 the floor is covered. Two pieces stand side by side along one wall or leave room for a robot between them,
@@ -26,7 +28,10 @@ from lidarium.envs.floors.generation.plans import (
 )
 
 PASSAGE = 0.75
-"""Clear width before a piece and between two pieces that do not stand side by side [m]."""
+"""Clear width before a piece and between two separate pieces [m].
+
+Pieces are separate where they do not stand side by side.
+"""
 
 DOOR_DEPTH = 0.95
 """Depth of the clear rectangle at both sides of a door [m]."""
@@ -127,7 +132,7 @@ CORRIDORS = {
 
 @dataclass(frozen=True, slots=True)
 class Furnished:
-    """A piece of furniture in its room: the label of the room, the footprint and the solids."""
+    """A piece of furniture in its room: room label, footprint and solids."""
 
     room: int
     footprint: Rectangle
@@ -302,7 +307,11 @@ class _Places:
         return rectangle, math.pi * side if boundary.vertical else math.pi * (0.5 - side), boundary
 
     def _is_free(self, room: int, rectangle: Rectangle, wall: Boundary | None) -> bool:
-        """Inside the room with a passage before it, off the doors, and beside or well away from all other pieces."""
+        """Whether a rectangle is free for a piece in a room.
+
+        It is inside the room with a passage before it, off the doors, and beside or well away from
+        all other pieces.
+        """
         if not self._is_inside(room, _with_passage(rectangle, wall, room, self._half_wall)):
             return False
         if any(_gap(rectangle, clear) <= 0.0 for clear in self._clear.get(room, [])):
@@ -328,7 +337,10 @@ def _snapped(value: float) -> float:
 
 
 def _with_passage(rectangle: Rectangle, wall: Boundary | None, room: int, half_wall: float) -> Rectangle:
-    """Return the footprint and the passage that must lie in the room: before a piece at a wall, all around a free one."""
+    """Return the footprint and the passage that must lie in the room.
+
+    The passage is before a piece at a wall, and all around a free-standing one.
+    """
     x_low, y_low, x_high, y_high = rectangle
     more = PASSAGE + half_wall
     if wall is None:

@@ -1,4 +1,6 @@
-"""Furniture: pieces as solids with heights, so that a laser sees the legs of a table and a tall body meets its top.
+"""Furniture: pieces as solids with heights.
+
+A laser thus sees the legs of a table, and a tall body meets its top.
 
 A piece is described in its own frame: x to the right of who looks at it, y from its front (0) to its back
 (depth), which stands against a wall. Seats and low tables are closed down to the floor: what a low robot

@@ -16,7 +16,10 @@ from lidarium.envs.floors.generation.plans import HALL, OUTSIDE, Labels, cells, 
 LatticeEdge = tuple[tuple[int, int], tuple[int, int]]
 
 LOBBY_CHANCE = 0.12
-"""Share of office rooms that are open bays of the corridor: waiting areas, kitchenettes, lift lobbies."""
+"""Share of office rooms that are open bays of the corridor.
+
+Such bays are waiting areas, kitchenettes and lift lobbies.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +86,10 @@ def apartment_layout(proportions: Proportions, generator: np.random.Generator) -
 
 
 def office_layout(proportions: Proportions, generator: np.random.Generator) -> Labels:
-    """Corridors with rooms at both sides: one corridor, or two joined by cross corridors around blocks of rooms."""
+    """Draw corridors with rooms at both sides.
+
+    There is one corridor, or two joined by cross corridors around blocks of rooms.
+    """
     area, corridor = proportions.area_m2, proportions.corridor_width
     depths = [generator.uniform(3.6, 5.4) for _ in range(2)]
     core = generator.uniform(4.0, 5.6) if generator.random() < 0.5 else generator.uniform(7.4, 9.6)
@@ -109,7 +115,10 @@ def office_layout(proportions: Proportions, generator: np.random.Generator) -> L
 
 
 def corridor_layout(proportions: Proportions, generator: np.random.Generator) -> Labels:
-    """Corridors along the edges of an irregular lattice: a tree and a share of the other edges, some crossings widened to halls."""
+    """Draw corridors along the edges of an irregular lattice.
+
+    The edges are a tree and a share of the others; some crossings are widened to halls.
+    """
     corridor = proportions.corridor_width
     spacing = max(generator.uniform(4.5, 6.5), 2.2 * corridor)
     aspect = generator.uniform(1.0, 1.8)
@@ -184,7 +193,10 @@ def _blocks(length: int, corridor: int, generator: np.random.Generator) -> list[
 
 
 def _carve_rooms(labels: Labels, chance: float, least_m2: float, generator: np.random.Generator) -> None:
-    """Cut a small room (bath, store) out of the hall-side corner of larger rooms, which become L-shaped."""
+    """Cut a small room (bath, store) out of the hall-side corner of larger rooms.
+
+    The larger rooms become L-shaped.
+    """
     for room in range(1, int(labels.max()) + 1):
         draw, side = generator.random(), generator.random() < 0.5
         rows, columns = np.nonzero(labels == room)
@@ -207,12 +219,18 @@ def _carve_rooms(labels: Labels, chance: float, least_m2: float, generator: np.r
 
 
 def _crossings(gaps: NDArray[np.float64], corridor: float) -> list[int]:
-    """Lower edges of parallel corridors with blocks of these depths between them, 1.2 m at least."""
+    """Return the lower edges of parallel corridors with blocks between them.
+
+    The blocks have the given depths, 1.2 m at least.
+    """
     return [cells(edge) for edge in np.concatenate([[0.0], np.cumsum(np.maximum(gaps, 1.2) + corridor)])]
 
 
 def _widened(edges: list[int], k: int, wide: int, more: float) -> tuple[int, int]:
-    """Range of a hall on the k-th corridor, so that blocks stay at least 0.8 m thick between it and its neighbours."""
+    """Return the range of a hall on the k-th corridor.
+
+    Blocks between the hall and its neighbours stay at least 0.8 m thick.
+    """
     below = edges[k] - edges[k - 1] - wide if k > 0 else 0
     above = edges[k + 1] - edges[k] - wide if k + 1 < len(edges) else 0
     low, high = (max(min(cells(more), gap // 2 - cells(0.4)), 0) for gap in (below, above))

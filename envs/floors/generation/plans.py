@@ -1,4 +1,4 @@
-"""Plans: which room each lattice cell belongs to, and the walls and doors that follow from it.
+"""Plans: the room of each lattice cell, and the walls and doors that follow.
 
 A plan is an integer image, one value per room, on a lattice of 0.1 m; rooms of any shape are drawn by
 painting rectangles. Walls stand where two rooms meet, doors are gaps in them, and all that is no room is
@@ -58,7 +58,10 @@ class Boundary:
         return self.end - self.start
 
     def rectangle(self, start: float, end: float, below: float, above: float) -> Rectangle:
-        """Rectangle over part of the line that reaches `below` and `above` metres to its two sides."""
+        """Return a rectangle over part of the line.
+
+        It reaches `below` and `above` metres to the two sides of the line.
+        """
         if self.vertical:
             return (self.position - below, start, self.position + above, end)
         return (start, self.position - below, end, self.position + above)
@@ -84,7 +87,9 @@ def metres(count: float) -> float:
 
 
 def boundaries(labels: Labels) -> list[Boundary]:
-    """All maximal straight boundaries between different labels, those with the outside included.
+    """Return all maximal straight boundaries between different labels.
+
+    Boundaries with the outside are included.
 
     Parameters
     ----------
@@ -128,7 +133,9 @@ def room_areas(labels: Labels) -> NDArray[np.float64]:
 def choose_doors(
     labels: Labels, door_width: float, loops: float, generator: np.random.Generator
 ) -> list[Door] | None:
-    """Doors that join all rooms, from the hall where possible, and a share of the further possible ones.
+    """Choose doors that join all rooms, and a share of the further possible ones.
+
+    Rooms are joined from the hall where possible.
 
     Parameters
     ----------
@@ -215,7 +222,10 @@ def wall_rectangles(labels: Labels, doors: list[Door], thickness: float) -> list
 
 
 def outside_rectangles(labels: Labels) -> list[Rectangle]:
-    """Everything outside the rooms, cut into few rectangles: runs of cells of a row, joined over rows that have the same run."""
+    """Cut everything outside the rooms into few rectangles.
+
+    These are runs of cells of a row, joined over rows that have the same run.
+    """
     open_runs: dict[tuple[int, int], int] = {}
     rectangles = []
     empty = np.zeros((1, labels.shape[1]), dtype=bool)

@@ -53,7 +53,9 @@ FORMATS.register("image", Format(images.SUFFIXES, _always, images.load_image), "
 
 
 def load_file(path: Path, resolution: float | None = None) -> Floor:
-    """Read a floor from a file of any known format, recognised by its name and content.
+    """Read a floor from a file of any known format.
+
+    The format is recognised by the file's name and content.
 
     Parameters
     ----------

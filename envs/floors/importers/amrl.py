@@ -1,4 +1,7 @@
-"""Vector maps of the AMRL group: wall lines in metres, one ``x1, y1, x2, y2`` per line of text."""
+"""Vector maps of the AMRL group: wall lines in metres.
+
+Each line of text is one wall line ``x1, y1, x2, y2``.
+"""
 
 from pathlib import Path
 
@@ -9,7 +12,10 @@ from lidarium.envs.floors.importers.common import floor_of_lines, read_text, ref
 
 
 def matches(path: Path) -> bool:
-    """Return whether the name says so, or the first line of text is four numbers with commas."""
+    """Return whether a file is an AMRL vector map.
+
+    Its name says so, or its first line of text is four numbers with commas.
+    """
     if ".vectormap." in path.name.lower():
         return True
     first = read_text(path).lstrip().split("\n", 1)[0].split(",")

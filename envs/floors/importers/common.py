@@ -1,4 +1,7 @@
-"""What several importers share: reading text, free areas of pixel floors, walls around line drawings."""
+"""Shared parts of several importers.
+
+They read text, find the free areas of pixel floors and put walls around line drawings.
+"""
 
 import gzip
 import itertools
@@ -139,7 +142,9 @@ def _box(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.floa
 def _enclosed(
     path: Path, lines: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return the outlines of what the lines enclose, along the middle of the outer walls.
+    """Return the outlines of what the lines enclose.
+
+    The outlines run along the middle of the outer walls.
 
     Drawings have gaps in the outer wall. They are closed by widening the lines, step by step, until nearly as
     much is enclosed as with the widest. What a smaller widening encloses keeps its finer outline.
@@ -172,7 +177,10 @@ def _enclosed(
 
 
 def _inside(distance: NDArray[np.float32], widening: float, resolution: float) -> NDArray[np.uint8]:
-    """Return what cannot be reached from the border between the widened lines, less half of the wall."""
+    """Return the area enclosed between the widened lines.
+
+    It cannot be reached from the border; half of the wall is taken off it.
+    """
     passable = (distance > widening).astype(np.uint8)
     _, labels = cv2.connectedComponents(passable, connectivity=4, ltype=cv2.CV_32S)
     kept = (labels != labels[0, 0]).astype(np.uint8)

@@ -26,7 +26,10 @@ _MAP_SERVER_LEVELS = (0, 205, 254)
 
 
 def is_dungeon(path: Path) -> bool:
-    """Return whether an image is a dungeon: a start mark, a grey for walls and a grey for free space."""
+    """Return whether an image is a dungeon.
+
+    A dungeon has a start mark, a grey for walls and a grey for free space.
+    """
     pixels = read_image(path)
     mark = _mark(pixels)
     levels = np.unique(_grey(pixels)[~mark])
@@ -69,7 +72,10 @@ def _grey(pixels: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _mark(pixels: NDArray[Any]) -> NDArray[np.bool_]:
-    """Return the pixels of the start mark: yellow, or grey 208 in an image without colours."""
+    """Return the pixels of the start mark.
+
+    The mark is yellow, or grey 208 in an image without colours.
+    """
     if pixels.ndim == 3 and pixels.shape[2] >= 3:
         blue, green, red = (pixels[..., channel].astype(np.int64) for channel in range(3))
         yellow = (blue < 100) & (green > 150) & (red > 150)

@@ -44,7 +44,10 @@ class _Space:
 
 
 def load(path: Path, resolution: float | None) -> Floor:
-    """Read a floor: free are the rooms and the doorways between them, in cells of 0.025 m."""
+    """Read a floor, in cells of 0.025 m.
+
+    Free are the rooms and the doorways between them.
+    """
     refuse_resolution(path, resolution)
     spaces = _spaces(path)
     points = np.concatenate([space.segments for space in spaces]).reshape(-1, 2)
@@ -52,7 +55,8 @@ def load(path: Path, resolution: float | None) -> Floor:
     columns, rows = (int(size) + 1 for size in (points.max(axis=0) + _MARGIN - low) / RESOLUTION)
     if rows * columns > MAX_RASTER_CELLS:
         raise ValueError(
-            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_RASTER_CELLS}; check its scale"
+            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_RASTER_CELLS}; check its "
+            "scale"
         )
     origin = (float(low[0]), float(low[1]))
     free = np.zeros((rows, columns), dtype=np.uint8)
@@ -122,7 +126,9 @@ def _space(path: Path, element: ElementTree.Element, scale: float) -> _Space:
 def _doorways(
     spaces: list[_Space], is_free: Callable[[NDArray[np.float64]], bool]
 ) -> list[NDArray[np.float64]]:
-    """Return the polygons between facing portals, and through the wall in front of portals that face none.
+    """Return the polygons of doorways between facing portals.
+
+    For portals that face none, the polygon goes through the wall in front of them.
 
     Portals are paired by place: the names of their targets are often those of rooms elsewhere, or of none.
     """

@@ -1,4 +1,6 @@
-"""LIFULL apartments: walls, openings and rooms as tab-separated lines ``x1 y1 x2 y2 label ...`` in pixels, y down.
+"""LIFULL apartments: walls, openings and rooms as tab-separated lines.
+
+The lines are ``x1 y1 x2 y2 label ...`` in pixels, y down.
 
 The annotation has no scale: its median opening is taken as 0.8 m wide.
 
@@ -22,7 +24,10 @@ _SLIP = 0.02
 
 
 def load(path: Path, resolution: float | None) -> Floor:
-    """Read an annotation: walls stand, doors are open, outside of the outer walls is solid."""
+    """Read an annotation of an apartment as a floor.
+
+    Walls stand, doors are open, and everything outside the outer walls is solid.
+    """
     refuse_resolution(path, resolution)
     lines = _lines(path)
     walls, doors = (np.array(lines[label], dtype=np.float64).reshape(-1, 4) for label in ("wall", "door"))

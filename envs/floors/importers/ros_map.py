@@ -12,7 +12,10 @@ from lidarium.mapping.files.map_files import FREE, MapImage, read_ros_map
 
 
 def load(path: Path, resolution: float | None) -> Floor:
-    """Read a ROS map; a map turned by the yaw of its origin is drawn anew along the axes."""
+    """Read a ROS map as a floor.
+
+    A map turned by the yaw of its origin is redrawn along the axes.
+    """
     refuse_resolution(path, resolution)
     image = read_ros_map(path)
     free = image.levels == FREE

@@ -20,7 +20,10 @@ FAULT_STREAM = 0x66617565
 """Sets the draws of faults apart from others of the same seed."""
 
 FAULT_NUMBERS = 6
-"""Numbers of a fault: kind, first step, step after the last, and what the kind needs."""
+"""Numbers of a fault: kind, first step, end step and parameters.
+
+The end step is the one after the last; the parameters are what the kind needs.
+"""
 
 LONGEST_DRAWN_S = 24 * 3600.0
 """Faults are drawn for this long where an episode has no horizon [s]."""
@@ -133,7 +136,10 @@ def has_fault(faults: Array, kind: int, step: int) -> bool:
 
 @kernel(borrowing=True)
 def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) -> None:
-    """Change a robot's speed and turn rate (2,) to what is left of them where a wheel does not turn."""
+    """Reduce a robot's speed and turn rate (2,) where a wheel does not turn.
+
+    The command becomes what is left of it.
+    """
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
         if _is_active(faults, k, STUCK_WHEEL, step):
             side = 0.5 * command[1] * wheel_base
@@ -167,7 +173,10 @@ def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) ->
 def blind_beams(
     faults: Array, step: int, angle_first: float, increment: float, ranges: Array, lengths: Array
 ) -> None:
-    """Make beams invalid that a dropout, a blind sector or death takes away: ``ranges`` nan, ``lengths`` 0."""
+    """Make beams invalid that a fault takes away: ``ranges`` nan, ``lengths`` 0.
+
+    The fault is a dropout, a blind sector or death.
+    """
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
         is_out = _is_active(faults, k, LASER_DROPOUT, step) or _is_active(faults, k, DEAD_ROBOT, step)
         is_sector = _is_active(faults, k, BLIND_SECTOR, step)

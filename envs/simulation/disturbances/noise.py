@@ -1,4 +1,6 @@
-"""Noise from a counter: the same draw for the same (key, robot, step, beam), whatever the order of threads or rows.
+"""Noise from a counter: one draw for each (key, robot, step, beam).
+
+It is the same whatever the order of threads or rows.
 
 A 32-bit hash of the counter picks one entry from each of two tables; the sum of the two entries is Gaussian.
 """
@@ -53,6 +55,9 @@ def gaussian_at(key: np.uint32, table: Array, k: int) -> np.float32:
 
 @kernel(borrowing=True)
 def fill_gaussian(key: np.uint32, table: Array, values: Array) -> None:
-    """Fill ``values`` (count,) float32 with standard Gaussian draws of the stream ``key``."""
+    """Fill ``values`` (count,) float32 with standard Gaussian draws.
+
+    They come from the stream ``key``.
+    """
     for k in range(values.shape[0]):
         values[k] = gaussian_at(key, table, k)

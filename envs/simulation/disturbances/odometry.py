@@ -21,7 +21,10 @@ ENCODER_STREAM, DRIVE_STREAM = 0x6F646F6D, 0x64726976
 """Set the draws of encoders and drives apart from those of the laser."""
 
 DISTANCE_SCALE, TURN_SCALE, DRIFT, LEFT_TRAVEL, RIGHT_TRAVEL, LEFT_TICKS, RIGHT_TICKS = range(7)
-"""Places in a robot's row of wheel numbers: its biases, the travel that its wheels feign [m], and the ticks read of it."""
+"""Places in a robot's row of wheel numbers.
+
+They are its biases, the false travel of its wheels [m], and the ticks read from it.
+"""
 
 (
     RADIUS,
@@ -45,7 +48,10 @@ def within_half_turns(angle: float) -> float:
 
 
 def begin_wheels(settings: OdometrySettings, robots: int, seed: int) -> NDArray[np.float64]:
-    """Return the wheel numbers of a team at the beginning of an episode, with the signs of the biases drawn from ``seed``."""
+    """Return the wheel numbers of a team at the beginning of an episode.
+
+    The signs of the biases are drawn from ``seed``.
+    """
     signs = np.random.default_rng([seed, ENCODER_STREAM]).choice([-1.0, 1.0], (robots, 3))
     wheels = np.zeros((robots, WHEEL_NUMBERS))
     wheels[:, DISTANCE_SCALE] = 1.0 + settings.distance_bias * signs[:, 0]
@@ -56,7 +62,7 @@ def begin_wheels(settings: OdometrySettings, robots: int, seed: int) -> NDArray[
 
 @kernel(borrowing=True)
 def disturb_commands(numbers: Array, noise_table: Array, seed: np.uint64, step: int, commands: Array) -> None:
-    """Change the speeds and turn rates (robots, 2) of a team to what its drives make of them."""
+    """Disturb a team's speeds and turn rates (robots, 2) as its drives do."""
     for robot in range(commands.shape[0]):
         key = mix(stream_key(seed, robot, step) ^ np.uint32(DRIVE_STREAM))
         commands[robot, 0] *= 1.0 + numbers[5] * gaussian_at(key, noise_table, 0)

@@ -1,4 +1,6 @@
-"""Radio: which robots reach each other, by distance, by line of sight, or by signal strength through walls.
+"""Radio: which robots reach each other.
+
+Reach is by distance, by line of sight, or by signal strength through walls.
 
 References
 ----------
@@ -20,7 +22,10 @@ RADIO_STREAM = 0x72616469
 """Sets the draws of the radio apart from others of the same seed."""
 
 OBSTACLE_UNIT = 0.1
-"""Length of wall that costs nothing beside the fixed loss of a wall, the unit of the formula's obstacle length [m]."""
+"""Unit of the obstacle length in the path-loss formula [m].
+
+It is the length of wall that costs nothing beside the fixed loss of a wall.
+"""
 
 
 @kernel
@@ -63,7 +68,10 @@ def solid_length(solid: Array, x: float, y: float, to_x: float, to_y: float) -> 
 
 @kernel
 def _wall_lengths(solid: Array, places: Array, lengths: Array) -> None:
-    """Fill ``lengths`` (robots, robots) with how much of the line between any two places (robots, 2) is solid, all in cells."""
+    """Fill ``lengths`` (robots, robots) with the solid part of each line [cells].
+
+    The lines join any two of the places (robots, 2), also in cells.
+    """
     for i in range(places.shape[0]):
         lengths[i, i] = 0.0
         for j in range(i):
@@ -102,7 +110,10 @@ def _reached(
     walls: NDArray[np.float64],
     chance: NDArray[np.float64] | None,
 ) -> NDArray[np.bool_]:
-    """Return over which ways a message comes, by their lengths and what of them is solid [m], and the draws for the shadowing."""
+    """Return over which links a message arrives.
+
+    Inputs are their lengths and solid lengths [m], and the draws for the shadowing.
+    """
     if settings.kind in ("all", "none"):
         return np.full(distance.shape, settings.kind == "all")
     if settings.kind == "range":

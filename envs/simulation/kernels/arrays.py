@@ -1,4 +1,6 @@
-"""The arrays of a world, as its kernels take them: one table of addresses in place of thirty arguments.
+"""The arrays of a world, as its kernels take them.
+
+They are one table of addresses in place of thirty arguments.
 
 A kernel views the arrays where they lie. Arrays handed over as arguments would be counted as references at
 every use, by all threads in the same places of memory; views are not.
@@ -14,9 +16,12 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import arrays_at, table_of
 
 TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME, DEAD_RECKONING, SOME_MATES = 1, 2, 4, 8, 16, 32
-"""Flags of a row: the localizer knows the true pose; teammates' poses are known; the robot has ended (its
-body stands there, its sensors are off); it believes in the frame of its own start; its localizer reckons from
-its odometry alone; the poses of those teammates are known that the radio told of."""
+"""Flags of a row: what the robot knows of poses, and whether it has ended.
+
+In order: the localizer knows the true pose; teammates' poses are known; the robot has ended (its body stands
+there, its sensors are off). Then: it believes in the frame of its own start; its localizer uses its odometry
+alone; poses of teammates that the radio reported are known.
+"""
 
 (
     ANGLE_FIRST,
@@ -183,7 +188,8 @@ def table_of_owners(*owners: object) -> NDArray[np.int64]:
         array = np.zeros((0,) * dimensions, dtype) if owner is None else getattr(owner, name)
         if array.dtype != dtype or array.ndim != dimensions or not array.flags.c_contiguous:
             raise TypeError(
-                f"{name} is {array.dtype} with {array.ndim} dimensions; want {np.dtype(dtype)} with {dimensions}, "
+                f"{name} is {array.dtype} with {array.ndim} dimensions; want {np.dtype(dtype)} with "
+                f"{dimensions}, "
                 f"contiguous"
             )
         arrays.append(array)

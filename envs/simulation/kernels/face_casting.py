@@ -1,4 +1,6 @@
-"""Laser scans by drawing the wall faces in reach into the beams: the nearest face that a beam meets is its range.
+"""Laser scans by drawing the wall faces in reach into the beams.
+
+The nearest face that a beam meets is its range.
 
 Which beams a face can meet is found by a fast angle and rounded up to whole lanes of eight; whether each of
 them meets it, and where, is exact.
@@ -18,7 +20,10 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_grid, vector_at
 
 CORNER_OVERLAP = 1e-9
-"""Faces reach this far beyond their corners, so that rounding leaves no gap between two of them [cells]."""
+"""Overlap of faces beyond their corners [cells].
+
+It makes rounding leave no gap between two faces.
+"""
 
 LANES = 8
 """Beams into which a face is drawn at once."""
@@ -30,8 +35,15 @@ _BEAMS = ir.VectorType(ir.DoubleType(), LANES)
 
 
 def _lower_lanes(
-    typing_context: Any, inverses: Any, directions: Any, ranges: Any, distance: Any, run: Any, low: Any, high: Any  # noqa: ANN401
-) -> Any:  # fmt: skip  # noqa: ANN401
+    typing_context: Any,  # noqa: ANN401
+    inverses: Any,  # noqa: ANN401
+    directions: Any,  # noqa: ANN401
+    ranges: Any,  # noqa: ANN401
+    distance: Any,  # noqa: ANN401
+    run: Any,  # noqa: ANN401
+    low: Any,  # noqa: ANN401
+    high: Any,  # noqa: ANN401
+) -> Any:  # noqa: ANN401
     """Lower the ranges of the beams in the lanes that meet a face."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
@@ -76,7 +88,9 @@ def _draw_face(
     direction: int,
     ranges: int,
 ) -> None:
-    """Lower the ranges of those beams from ``first`` to ``last``, and of some beside them, that meet a face.
+    """Lower the ranges of the beams that meet a face.
+
+    The beams are those from ``first`` to ``last`` and some beside them.
 
     The face spans low to high along its run. Inverses and directions of the beams, and the ranges, are given
     by their addresses.
@@ -109,7 +123,9 @@ def _list_faces(
     reach: float,
     listed: Array,
 ) -> int:
-    """List the faces of a direction that look at the laser and are in reach: distance, low and high end of each; tells how many.
+    """List the faces of a direction that are in reach; return their number.
+
+    They face the laser. For each, distance, low and high end are listed.
 
     Most branches on a single face could not be foreseen, so each is written down and counted if it is one.
     """
@@ -144,7 +160,9 @@ def _find_spans(
     beams: int,
     spans: Array,
 ) -> None:
-    """Tell which beams may meet each of the listed faces: the first, the last, and the last from 0 on where they go on there (or -1).
+    """Find the beams that may meet each of the listed faces.
+
+    These are the first, the last, and the last from 0 on where they go on there (or -1).
 
     The fast angle is good to a hundredth of a beam: one more beam on each side holds all that meet the face.
     """

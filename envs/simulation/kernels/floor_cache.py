@@ -1,4 +1,6 @@
-"""Tables of floors, shared: in memory by the environments of a process, on disk by all processes.
+"""Tables of floors, shared by processes and environments.
+
+The environments of a process share them in memory, all processes on disk.
 
 On disk lies what is dear to make and small: the rasters as bits and the distance bound
 (`FloorTables.packed`), some 20 kB a floor. The tables of the rays, four bytes a cell, are made from them in
@@ -16,7 +18,10 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 
 SIZE_VARIABLE = "LIDARIUM_FLOOR_CACHE_MIB"
-"""Environment variable: the most that tables no episode uses take in a process [MiB]."""
+"""Environment variable: the limit of unused tables in a process [MiB].
+
+Unused tables are those that no episode uses.
+"""
 
 DEFAULT_MIB = 256.0
 """The most that they take where nothing is said [MiB]."""
@@ -77,7 +82,9 @@ class TablesCache:
 def floor_tables(
     floor: Floor, raster_resolution: float, laser_height: float, body_height: float
 ) -> FloorTables:
-    """Return the kernels' tables of a floor: those of this process, else those of the store, else new ones.
+    """Return the kernels' tables of a floor.
+
+    They are those of this process, else those of the store, else new ones.
 
     Parameters
     ----------

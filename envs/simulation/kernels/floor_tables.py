@@ -73,7 +73,10 @@ class FloorTables:
         return cls(rasters[-1], rasters[0], RayTables(rasters[-1].solid), arrays["bound"])._frozen()
 
     def packed(self) -> dict[str, NDArray[Any]]:
-        """Return what is dear to make: the rasters as bits (``laser`` where it is not the body's), the bound and the frame."""
+        """Return the parts that are expensive to make: rasters, bound and frame.
+
+        Rasters are packed as bits, ``laser`` where it is not the body's.
+        """
         arrays: dict[str, NDArray[Any]] = {
             "frame": self.frame,
             "bound": self.bound,
@@ -107,7 +110,10 @@ class FloorTables:
 
     @property
     def row(self) -> NDArray[np.int64]:
-        """Row of the kernels' table of floors, shape (10,): the rays' 8 numbers, the bound's and the solid cells' addresses."""
+        """Row of the kernels' table of floors, shape (10,).
+
+        It holds the rays' 8 numbers and the addresses of the bound and of the solid cells.
+        """
         return np.concatenate(
             [self.rays.addresses, [self.bound.ctypes.data, self.body.solid.ctypes.data]]
         ).astype(np.int64)

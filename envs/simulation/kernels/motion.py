@@ -1,4 +1,6 @@
-"""Bodies: differential drive with limits, exact contact of discs with solid cells and with each other.
+"""Bodies: differential drive with limits, and contact of discs.
+
+Contact with solid cells and with each other is exact.
 
 Far from everything a robot drives its arc in one piece. Near contact the arc is cut into short pieces, and
 after each the disc is pushed out of what it entered along the shortest way, so that it slides along walls;
@@ -35,11 +37,16 @@ _AT_ONCE = 8
 """Cells of a row that are looked at together: most around a body are free."""
 
 CENTRE_BUMPER, SIDE_BUMPER = math.radians(30.0), math.radians(90.0)
-"""Bearings of a contact up to which it presses the centre bumper, and the one on its side [rad]."""
+"""Bearings of a contact up to which it presses a bumper [rad].
+
+The first is for the centre bumper, the second for the one on the contact's side.
+"""
 
 
 def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a lower bound of the distance from any point of each cell to the nearest solid cell, in whole cells.
+    """Return a lower bound of the distance to the nearest solid cell.
+
+    It holds from any point of each cell, in whole cells.
 
     Parameters
     ----------

@@ -38,7 +38,10 @@ time at about 550 faces with 180 beams and at 1,300 with 720, over drawn, genera
 the same ranges. """
 
 BUNDLE, INNER_BUNDLE = 32, 8
-"""Neighbouring beams that travel together for as long as free squares hold them all, first the more, then the fewer."""
+"""Numbers of neighbouring beams that travel together, outer and inner.
+
+They do so for as long as free squares hold them all, first the larger bundle, then the smaller.
+"""
 
 INSIDE = 1e-7
 """Beams that travel together stop this far before the border of a square [cells]."""
@@ -64,7 +67,10 @@ def _travel(
     beam: int,
     reach: float,
 ) -> float:
-    """Distance at which one beam enters a solid cell, from a cell and a distance on its way [cells]."""
+    """Return the distance at which one beam enters a solid cell [cells].
+
+    The beam begins at a cell and at a distance along its path.
+    """
     direction_x, direction_y = directions[0, beam], directions[1, beam]
     inverse_x, inverse_y = directions[2, beam], directions[3, beam]
     step_x = -1 if direction_x < 0.0 else 1
@@ -114,7 +120,9 @@ def _travel_together(
     distance: float,
     reach: float,
 ) -> float:
-    """Distance, from one on, up to which the beams ``first`` to ``last``, of one quadrant, run through squares that hold them all.
+    """Return the distance up to which beams run through squares that hold them all.
+
+    The beams ``first`` to ``last``, of one quadrant, begin at a given distance.
 
     The beams between the two outer ones lie within the box of these two at every distance. A square that
     opens from the box's nearest corner and holds the box is free for all, up to where the first of the outer

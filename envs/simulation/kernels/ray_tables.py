@@ -1,4 +1,7 @@
-"""What the ray casters look up for one floor: the largest free squares, and the faces of the walls."""
+"""Tables of the ray casters for one floor.
+
+They hold the largest free squares and the faces of the walls.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +37,10 @@ def _fill_squares(solid: Array, squares: Array) -> None:
 def _faces(
     solid: NDArray[np.uint8], direction: int, tile_columns: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the group (tile * 4 + direction) of each wall face that is met along +x, -x, +y or -y, and the faces (F, 3)."""
+    """Return the group of each wall face and the faces (F, 3).
+
+    The group is tile * 4 + direction, for faces met along +x, -x, +y or -y.
+    """
     # Faces lie along lines; of those that run along y, the transposed raster holds the cells side by side.
     is_free = np.ascontiguousarray((solid.T if direction < 2 else solid) == 0)
     looks_up = direction % 2 == 0

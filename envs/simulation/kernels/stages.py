@@ -55,13 +55,22 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_grid_at, scratch_grid, scratch_vector, word_grid_at
 
 MATE_MARGIN = 1.5
-"""A beam that ends within this of a teammate's body is taken to have met it [map cells]."""
+"""Distance within which a beam's end counts as a teammate's body [map cells].
+
+It is measured to the body of the teammate.
+"""
 
 RANGE_GAP = 1e-3
-"""A hit tells at least this much less than the longest range [m], which in an observation means no return."""
+"""Least difference between the range of a hit and the longest range [m].
+
+The longest range means no return in an observation.
+"""
 
 ROUND_UP = 1.0 + 1.2e-7
-"""Ranges are rounded up to float32, so that the end of a beam lies in the cell that it met."""
+"""Factor by which ranges are rounded up to float32.
+
+The end of a beam then lies in the cell that it met.
+"""
 
 
 class ScanScratch(NamedTuple):
@@ -85,7 +94,10 @@ class ScanScratch(NamedTuple):
 def _measure(
     world: WorldArrays, row: int, first: int, robots: int, directions: Array, ranges: Array, lengths: Array
 ) -> None:
-    """Take the scan of one robot without noise: ``ranges`` [m], inf for no return, and ``lengths`` of the beams [map cells]."""
+    """Take the scan of one robot without noise.
+
+    It fills ``ranges`` [m], inf for no return, and ``lengths`` of the beams [map cells].
+    """
     robot, episode = row - first, first // robots
     sensor, frame, poses = world.sensor, world.frames[episode], world.poses
     resolution = frame[FRAME_RESOLUTION]
@@ -137,7 +149,10 @@ def _add_noise(world: WorldArrays, row: int, first: int, robots: int) -> None:
 
 @kernel(borrowing=True)
 def _sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
-    """Take the scan of one robot: ranges as the sensor measures, and ``lengths`` of the true beams [map cells]."""
+    """Take the scan of one robot: measured ranges, and ``lengths`` of true beams [cells].
+
+    Lengths are in map cells.
+    """
     _measure(world, row, first, robots, directions, world.ranges[row], lengths)
     if _is_noisy(world.sensor):
         _add_noise(world, row, first, robots)
@@ -177,7 +192,10 @@ def _is_noisy(sensor: Array) -> bool:
 
 @kernel(spliced=True)
 def _window_corner(x: float, y: float, reach: float) -> tuple[int, int]:
-    """Row and column of the map at which the window of a scan from x, y begins [cells]; the column is a multiple of 64."""
+    """Return the row and column of the map at which a scan's window begins [cells].
+
+    The scan is from x, y; the column is a multiple of 64.
+    """
     margin = int(reach) + 3
     return int(math.floor(y)) - margin, ((int(math.floor(x)) - margin) >> 6) << 6
 
@@ -235,7 +253,9 @@ def _score(
 def footprint(
     world: WorldArrays, row: int, first: int, robots: int, bits: Array
 ) -> tuple[tuple[int, int, int, int], int, int]:
-    """Fill the area that a robot's true beams see from where it stands now, and change nothing in the world.
+    """Fill the area that a robot's true beams see from where it stands now.
+
+    Nothing in the world changes.
 
     Parameters
     ----------
@@ -268,7 +288,10 @@ def footprint(
 def _filter_mates(
     world: WorldArrays, row: int, first: int, robots: int, x: float, y: float, ends: Array, is_hit: Array
 ) -> None:
-    """Take out the hits on teammates, whose believed poses are known: they are no part of the floor."""
+    """Remove the hits on teammates whose believed poses are known.
+
+    They are no part of the floor.
+    """
     sensor, believed = world.sensor, world.believed
     beams = is_hit.shape[0]
     scale = 1.0 / sensor[MAP_RESOLUTION]
@@ -299,7 +322,10 @@ def _filter_mates(
 
 @kernel
 def invalidate_mates(world: WorldArrays, row: int, first: int, robots: int, ranges: Array) -> None:
-    """Make the beams of a scan (beams,) invalid that met teammates, as far as the robot knows where these are."""
+    """Make the beams of a scan (beams,) invalid that met teammates.
+
+    This holds as far as the robot knows where they are.
+    """
     beams, scale = ranges.shape[0], 1.0 / world.sensor[MAP_RESOLUTION]
     directions, ends, is_hit = np.empty((4, beams)), np.empty((2, beams)), np.empty(beams, np.bool_)
     lengths = np.empty(beams)
@@ -389,7 +415,10 @@ def _update_map(
 
 @kernel(spliced=True)
 def scan_scratch(world: WorldArrays) -> ScanScratch:
-    """Return scratch for the scans of a world, that is gone when the kernel that asks for it returns; not within a loop."""
+    """Return scratch arrays for the scans of a world.
+
+    They are freed when the kernel that asks for them returns. Do not call this within a loop.
+    """
     beams, reach = world.ranges.shape[1], world.sensor[RANGE_MAX] / world.sensor[MAP_RESOLUTION]
     # The windows of a laser that reaches far on a fine map are too large for the stack.
     windows = np.empty((2, window_rows(reach), window_words(reach)), np.uint64)
@@ -403,7 +432,10 @@ def scan_scratch(world: WorldArrays) -> ScanScratch:
 
 @kernel(spliced=True)
 def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
-    """Run stage two alone: update one robot's map from its ranges at its believed pose."""
+    """Run stage two alone: update one robot's map from its ranges.
+
+    The ranges are taken at its believed pose.
+    """
     scratch.windows[:] = np.uint64(0)
     beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
     _update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)

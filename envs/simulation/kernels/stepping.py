@@ -66,7 +66,10 @@ def _believe_truth(pose: Array, start: Array, is_relative: bool, believed: Array
 
 @kernel(spliced=True)
 def _believe_odometry(odometry: Array, start: Array, is_relative: bool, believed: Array) -> None:
-    """Localize by dead reckoning from the start: in the floor's axes, or in the frame of the start."""
+    """Localize by dead reckoning from the start.
+
+    The pose is in the floor's axes, or in the frame of the start.
+    """
     if is_relative:
         believed[0], believed[1], believed[2] = odometry[0], odometry[1], odometry[2]
         return
@@ -78,7 +81,10 @@ def _believe_odometry(odometry: Array, start: Array, is_relative: bool, believed
 
 @kernel(borrowing=True)
 def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> None:
-    """Let the faults of the episode's robots happen, and write into ``world.driven`` what drives make of ``commands`` (rows, 2)."""
+    """Apply faults and write what the drives make of ``commands`` (rows, 2).
+
+    The faults are those of the episode's robots; the result is written to ``world.driven``.
+    """
     first, step = episode * robots, world.steps[episode]
     last = first + robots
     for row in range(first, last):
@@ -153,7 +159,10 @@ def _localize(world: WorldArrays, episode: int, robots: int) -> None:
 
 @kernel(spliced=True)
 def _share(world: WorldArrays, episode: int, robots: int) -> None:
-    """Credit the episode's robots with what they saw first, reward them, and count the step."""
+    """Credit the episode's robots with cells they saw first, and reward them.
+
+    The step is counted.
+    """
     first, last = episode * robots, (episode + 1) * robots
     team = word_grid_at(
         world.mask_rows[first, TEAM_MASK],
@@ -248,7 +257,10 @@ def score_and_localize(table: Array, robots: int, runs: Array) -> None:
 
 @kernel
 def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array) -> None:
-    """Update a robot's map from scans (scans, beams) taken at poses (scans, 3), and nothing else."""
+    """Update a robot's map from scans (scans, beams) taken at poses (scans, 3).
+
+    Nothing else is updated.
+    """
     world = world_at(table)
     flags, pose, scan = world.flags[row], world.believed[row].copy(), world.ranges[row].copy()
     # Where teammates were at the time is not known any more.
@@ -269,7 +281,10 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
 
 @kernel
 def ranges_without_mates(table: Array, row: int, robots: int, ranges: Array) -> None:
-    """Copy a robot's scan into ``ranges`` (beams,), beams that met teammates where it knows them made invalid."""
+    """Copy a robot's scan into ``ranges`` (beams,), without teammates.
+
+    Beams that met teammates are made invalid where the robot knows these.
+    """
     world = world_at(table)
     ranges[:] = world.ranges[row]
     if world.flags[row] & (KNOWN_MATES | SOME_MATES):

@@ -32,7 +32,7 @@ class Sensing:
 
 @dataclass(frozen=True, slots=True)
 class KeyScans:
-    """Scans at the poses where they are now believed to have been taken, of which a map is rendered.
+    """Scans at their presently estimated poses, from which a map is rendered.
 
     Attributes
     ----------
@@ -70,5 +70,8 @@ class Localizer(Protocol):
         ...
 
     def take_correction(self) -> KeyScans | None:
-        """Return what the whole map is to be rendered of anew, once after each time the past was corrected; else None."""
+        """Return the scans for rendering the whole map anew; else None.
+
+        Once after each correction of past poses.
+        """
         ...

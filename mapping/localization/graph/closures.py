@@ -1,4 +1,4 @@
-"""Recognises places: lays a scan on local maps of long ago, and doubts what it finds.
+"""Place recognition: matches of a scan with old local maps, and their checks.
 
 A closure counts where its scan agrees with the local map, does not lie in its free space, has no second place
 that agrees nearly as well, and where it would move the robot far, or farther than it can have erred since,
@@ -116,7 +116,10 @@ class ClosureFinder:
     def _nearest(
         self, poses: NDArray[np.float64], path: float, within: float
     ) -> list[tuple[_Remembered, int]]:
-        """Return local maps of long enough ago with a node as near as that, the nearest first, and which of their nodes that is."""
+        """Return old enough local maps near the last pose, the nearest first.
+
+        Each has a node within a given distance; that node's index comes with it.
+        """
         found = []
         for number, old in enumerate(self._maps):
             if path - old.path >= self._settings.path_m:

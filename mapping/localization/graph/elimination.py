@@ -1,4 +1,6 @@
-"""Cholesky's factor of a sparse symmetric matrix of 3 x 3 blocks, one row and column of blocks per pose of a graph.
+"""Cholesky factor of a sparse symmetric matrix of 3 x 3 blocks.
+
+It has one row and column of blocks per pose of a graph.
 
 In which order poses are best eliminated, and which blocks the factor then fills, depends on who is joined
 with whom only. It is found once for all steps of a least-squares problem, by SuperLU's minimum degree; the
@@ -46,7 +48,9 @@ class Elimination(NamedTuple):
 
 
 def elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> Elimination:
-    """Return the blocks of the factor where poses are joined by pairs, in an order of elimination that fills few of them.
+    """Return the factor's blocks where poses are joined by pairs.
+
+    The order of elimination fills few of them.
 
     Parameters
     ----------
@@ -77,7 +81,9 @@ def elimination(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> Elimi
 
 @kernel
 def factorise(places: Elimination, blocks: Array) -> bool:
-    """Turn the lower triangle of a matrix into that of its factor L, of which L L^T is the matrix.
+    """Replace the lower triangle of a matrix by that of its factor L.
+
+    The matrix is L L^T.
 
     Parameters
     ----------
@@ -113,7 +119,10 @@ def factorise(places: Elimination, blocks: Array) -> bool:
 
 @kernel
 def solve(places: Elimination, factor: Array, right: Array) -> Array:
-    """Return the solution (poses, 3) float64 of a matrix, of its factor, for a right side (poses, 3) float64; both in the poses' order."""
+    """Return the solution (poses, 3) of a factorised matrix for a right side.
+
+    The right side is (poses, 3), both float64 and in the poses' order.
+    """
     starts, rows = places.starts, places.rows
     count = len(starts) - 1
     solution = np.empty((count, 3))
@@ -170,7 +179,7 @@ def _factorise_block(block: Array, factor: Array) -> bool:
 
 @kernel(inline=True)
 def _divide(block: Array, diagonal: Array, quotient: Array) -> None:
-    """Write the block that the diagonal's factor, transposed, multiplies to a given one."""
+    """Write the block that, times the diagonal's transposed factor, gives a block."""
     for i in range(3):
         for k in range(3):
             rest = block[i, k]

@@ -1,4 +1,4 @@
-"""Nodes along the way of a robot, what was measured between them, and where they are believed to be."""
+"""Nodes along a robot's path, the measurements between them, and their poses."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,10 @@ class NodeGraph:
         self._waiting = 0
 
     def add(self, since: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
-        """Set a node so far (3,) from the last one [m, rad], in its frame, and so well known (3, 3)."""
+        """Add a node at a motion (3,) from the last one, with its covariance (3, 3).
+
+        The motion is in the last node's frame [m, rad].
+        """
         last, number = self.nodes[-1], len(self.nodes)
         self._motions.append(since)
         self._covariances.append(covariance)
@@ -63,13 +66,19 @@ class NodeGraph:
         self.nodes = np.vstack([self.nodes, pose])
 
     def begin_at(self, since: NDArray[np.float64]) -> None:
-        """Move all nodes after the first, so that the second lies at x, y, theta (3,) in its frame [m, rad]."""
+        """Move all nodes after the first, so that the second has a given pose.
+
+        The pose is x, y, theta (3,) in the first node's frame [m, rad].
+        """
         self._motions.rows[0] = since
         before, begin = self.nodes[1], composed(self.nodes[0], since)
         self.nodes = np.vstack([self.nodes[:1], composed(begin, relative(before, self.nodes[1:]))])
 
     def covariance_since(self, node: int) -> NDArray[np.float64]:
-        """Return how well the last node is known as seen from another, in its frame, by the motions between, (3, 3) [m^2, m rad, rad^2]."""
+        """Return the covariance (3, 3) of the last node relative to another.
+
+        In that node's frame, by the motions between [m^2, m rad, rad^2].
+        """
         poses = relative(self.nodes[node], self.nodes[node:])
         cosine, sine = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
         rest = poses[-1, :2] - poses[1:, :2]

@@ -1,4 +1,6 @@
-"""Poses that agree best with what was measured between them, by least squares on sparse matrices.
+"""Poses that agree best with the measurements between them.
+
+They are found by least squares on sparse matrices.
 
 Minimises the sum over the edges of ``rho(e^T W e)``, e the difference of the pose of b as seen from a from
 what was measured, W its information; rho is the identity for motions, and Cauchy's for closures, of which one
@@ -44,7 +46,9 @@ class Edges(NamedTuple):
 def optimised(
     poses: NDArray[np.float64], edges: Edges, robust_scale: float, iterations: int, newest: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the poses that agree best with the edges, the first kept, and the covariance of the last.
+    """Return the poses that agree best with the edges, and the last's covariance.
+
+    The first pose is kept.
 
     Parameters
     ----------
@@ -87,7 +91,10 @@ def optimised(
 
 @kernel
 def residuals(poses: Array, edges: Edges) -> Array:
-    """Return by how much b, as seen from a, differs from what was measured, (edges, 3) float64 [m, rad]; poses are (poses, 3) float64."""
+    """Return the residuals of the edges, (edges, 3) float64 [m, rad].
+
+    By how much b relative to a differs from the measurement; poses are (poses, 3) float64.
+    """
     rest = np.empty((len(edges.a), 3))
     for k in range(len(edges.a)):
         a, b = poses[edges.a[k]], poses[edges.b[k]]
@@ -124,7 +131,10 @@ def _cost(poses: Array, edges: Edges, robust_scale: float) -> float:
 def _settled(
     poses: Array, edges: Edges, robust_scale: float, iterations: int, places: Elimination, factor: Array
 ) -> Array:
-    """Return the poses of least cost near given ones (Levenberg and Marquardt), and write the factor of the last Hessian."""
+    """Return the poses of least cost near given ones.
+
+    By Levenberg and Marquardt's method. The factor of the last Hessian is written.
+    """
     best, cost = poses, _cost(poses, edges, robust_scale)
     damping, step = 1e-9, 0
     while True:
@@ -152,7 +162,10 @@ def _settled(
 def _normal_equations(
     poses: Array, edges: Edges, robust_scale: float, places: Elimination, hessian: Array
 ) -> Array:
-    """Return the gradient (poses - 1, 3) float64 for all poses but the first, and write the Hessian's lower triangle of blocks."""
+    """Return the gradient (poses - 1, 3) and write the Hessian's lower triangle.
+
+    The gradient is float64, for all poses but the first. The Hessian is written in blocks.
+    """
     rest, squares = residuals(poses, edges), _squares(poses, edges)
     gradient = np.zeros((len(poses) - 1, 3))
     hessian[:] = 0.0
@@ -188,7 +201,7 @@ def _normal_equations(
 
 @kernel(inline=True)
 def _write_jacobians(a: Array, b: Array, jacobians: Array) -> None:
-    """Write the derivatives (2, 3, 3) of the residual of an edge by pose a and by pose b."""
+    """Write the derivatives (2, 3, 3) of an edge's residual by poses a and b."""
     cosine, sine = math.cos(a[2]), math.sin(a[2])
     x, y = b[0] - a[0], b[1] - a[1]
     before, after = jacobians[0], jacobians[1]

@@ -1,4 +1,6 @@
-"""The best placement of a scan on a local map within a wide window, found without looking at most of it.
+"""The best placement of a scan on a local map within a wide window.
+
+It is found without evaluating most of the window.
 
 A coarse map holds for each block of cells the most that a point in it could agree by, so the sum over the
 points bounds what any placement within a block of placements can reach; blocks that cannot beat the best
@@ -164,7 +166,10 @@ def place(
 def _bound(
     maxima: Array, begin: int, rows: int, columns: int, level: int, cells: Array, column: int, row: int
 ) -> int:
-    """Sum over the points of the most that each can agree by in a block of placements that begins at (column, row)."""
+    """Return an upper bound of the agreement of a block of placements.
+
+    It sums over points the most each can agree by. The block begins at (column, row).
+    """
     total = 0
     shift = 1 if level > 0 else 0
     for k in range(cells.shape[0]):
@@ -198,7 +203,10 @@ def _place(
     avoided: Array,
     found: Array,
 ) -> bool:
-    """Note column, row, number of the heading and sum of the best placement of at least a sum; return whether all were decided."""
+    """Find the best placement whose sum is at least a given one.
+
+    Notes its column, row, heading index and sum; returns whether all placements were decided.
+    """
     count, turns = points.shape[0], headings.shape[0]
     top = 0
     while top < shapes.shape[0] - 1 and (1 << top) < width:

@@ -1,4 +1,7 @@
-"""Where a robot is in its neighbourhood: scans are matched with local maps, and local maps begin and end on the way."""
+"""A robot's local pose, by matching scans with local maps.
+
+Local maps begin and end along the path.
+"""
 
 import math
 from dataclasses import dataclass
@@ -174,7 +177,10 @@ class LocalMapper:
         return match
 
     def _is_new_ground(self, match: Match, points: int) -> bool:
-        """Whether a scan hardly sees anything that the local map has observed, or hardly anything at all."""
+        """Whether a scan sees hardly anything that the local map has observed.
+
+        Also true where it sees hardly anything at all.
+        """
         settings = self._matching
         is_sparse = points < min(settings.least_points, self._geometry.beams // 8)
         return is_sparse or (
@@ -222,7 +228,10 @@ class LocalMapper:
         )
 
     def laid_again(self, points: NDArray[np.float64]) -> Match | None:
-        """Return where the points (n, 2) [m] of the older local map's first scan lie on what it has become; None if they do not match."""
+        """Return where the older local map's first scan now lies on that map.
+
+        Its points are (n, 2) [m]. None if they do not match.
+        """
         settings, nowhere = self._matching, np.zeros(3)
         grid = self._active[0].submap.grid
         weight = settings.weight(len(points))
@@ -232,7 +241,9 @@ class LocalMapper:
         return match if self._is_good(match) and not self._is_new_ground(match, len(points)) else None
 
     def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:
-        """Take in a scan at x, y, theta (3,) in the older local map's frame, so much way [m] after the last one.
+        """Insert a scan at x, y, theta (3,) in the older local map's frame.
+
+        The robot has driven a given distance [m] since the last scan.
 
         Returns
         -------
@@ -264,7 +275,10 @@ class LocalMapper:
         return len(self._active) == 1 and is_full
 
     def add(self, node: int, pose: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
-        """Begin another local map at a node that lies at x, y, theta (3,) in the older one's frame, by the scan taken there."""
+        """Begin another local map at a node, by the scan taken there.
+
+        The node lies at x, y, theta (3,) in the older local map's frame.
+        """
         self._add(node, pose, ranges)
 
     def hand_over(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[Finished]]:
@@ -291,7 +305,9 @@ class LocalMapper:
 
 
 def outweighs(far: Match, near: Match, better_by: float) -> bool:
-    """Return whether a match against odometry is so much better than one with it that odometry has to be wrong.
+    """Return whether a match outweighs odometry, which then has to be wrong.
+
+    The match against odometry must be better than one with it by enough.
 
     Where nearly all of a scan lies near known walls, and elsewhere only a part of it, that part may agree
     better by chance, as on the other side of a wall: all points together must not agree less.
@@ -307,12 +323,18 @@ def outweighs(far: Match, near: Match, better_by: float) -> bool:
 
 
 def turned(matrix: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
-    """Return a covariance or an information (3, 3) of x, y, theta in a frame in which its own is turned by an angle [rad]."""
+    """Return a (3, 3) covariance or information of x, y, theta in another frame.
+
+    Its own frame is rotated by an angle [rad] in that frame.
+    """
     cosine, sine = math.cos(angle), math.sin(angle)
     turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     return np.asarray(turn @ matrix @ turn.T, np.float64)
 
 
 def way(motion: NDArray[np.float64]) -> float:
-    """Return how much of a way a motion x, y, theta (3,) is, turns counted with a metre a radian [m]."""
+    """Return the length of a motion x, y, theta (3,) [m].
+
+    Turns count as a metre per radian.
+    """
     return math.hypot(float(motion[0]), float(motion[1])) + abs(float(motion[2]))

@@ -1,4 +1,6 @@
-"""Lays a scan on a local map, from near where it lies, by Gauss and Newton's method.
+"""Match of a scan with a local map, from a nearby pose.
+
+By Gauss and Newton's method.
 
 The agreement of a point is the map's, smoothed by a cubic B-spline, which has a gradient everywhere and is
 not drawn to cells.
@@ -19,16 +21,24 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.matching.submaps import UNSEEN, AgreementGrid
 
 FULL_AGREEMENT = 2.0 / 3.0
-"""Smoothed agreement in the middle of a wall that lies along a row of cells: the most that there is.
+"""Greatest smoothed agreement that a point can have.
+
+It occurs in the middle of a wall that lies along a row of cells.
 
 With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
 """
 
 SURFACE_GAP = 0.3
-"""Neighbouring points lie on one surface where they are nearer to each other than this share of their distance, or so many metres."""
+"""Largest gap between neighbouring points on one surface.
+
+As a share of their distance, or in metres.
+"""
 
 MOST_BEND = 0.15
-"""Where the variance of those points across the surface is more than this share of that along it, there is a corner."""
+"""Largest ratio of the points' variance across the surface to that along it.
+
+Above this there is a corner.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,7 +140,10 @@ def refine(
 
 @kernel(inline=True)
 def _spline_weights(t: float) -> tuple[float, float, float, float]:
-    """Weights of four neighbouring cells in a cubic B-spline, t from 0 to 1 between the middle two."""
+    """Return the weights of four neighbouring cells in a cubic B-spline.
+
+    t runs from 0 to 1 between the middle two.
+    """
     u, square, cube = 1.0 - t, t * t, t * t * t
     return (
         u * u * u / 6.0,
@@ -188,7 +201,9 @@ def _is_one_surface(points: Array, k: int) -> bool:
 
 @kernel
 def _find_normals(points: Array, reach: float, normals: Array) -> None:
-    """Fill ``normals`` (n, 2) with unit vectors across the surface on which each point and its neighbours lie; zero for a point alone.
+    """Fill ``normals`` (n, 2) with unit normals of the surface at each point.
+
+    The surface is that of the point and its neighbours; zero for a point alone.
 
     Two neighbours tell it where the surface bends; elsewhere all within reach do, since noise turns what lies
     between two near points.
@@ -217,7 +232,11 @@ def _is_near(points: Array, k: int, m: int, reach: float) -> bool:
 
 @kernel
 def _axis(points: Array) -> tuple[float, float, bool]:
-    """Return the axis along which points vary most, not of unit length, and whether they do not lie along it, or are too few to tell."""
+    """Return the axis of largest variance of points, and whether it is unclear.
+
+    The axis is of unit length, zero for fewer than three points. Unclear where points do not lie along
+    it, or are too few.
+    """
     count = points.shape[0]
     if count < 3:
         return 0.0, 0.0, True
@@ -372,7 +391,10 @@ def _refine(
 def _judge(
     levels: Array, first_column: int, first_row: int, side: float, points: Array, pose: Array, told: Array
 ) -> None:
-    """Tell the mean agreement of the points near observed cells, the share of points that are, and that of those in free space."""
+    """Compute agreement and shares of points that are known or in free space.
+
+    Mean agreement of the points near observed cells, their share, and the share of points in free space.
+    """
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     agreeing, known, contradicting = 0.0, 0, 0
     for k in range(points.shape[0]):

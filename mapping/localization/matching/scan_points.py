@@ -1,4 +1,7 @@
-"""What a scan says: the points in which beams ended, motion within the scan undone, and few of them that stand for all."""
+"""Representative points in which a scan's beams ended.
+
+They are few, and free of the distortion by motion within the scan.
+"""
 
 import math
 
@@ -91,7 +94,9 @@ def scan_points(
     spacing: float,
     limit: int,
 ) -> NDArray[np.float64]:
-    """Return points in which beams ended, in the robot's frame, shape (points, 2) [m]: few that stand for all.
+    """Return representative points in which beams ended, shape (points, 2) [m].
+
+    In the robot's frame, thinned to few.
 
     Parameters
     ----------

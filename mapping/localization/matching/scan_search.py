@@ -1,4 +1,6 @@
-"""Where a scan lies on a local map, in steps of a cell, of all places around where odometry says the robot is.
+"""Search for a scan's pose on a local map, in steps of a cell.
+
+It covers all places around the pose by odometry.
 
 References
 ----------
@@ -24,7 +26,9 @@ def search(
     weight: float,
     unseen: float,
 ) -> NDArray[np.float64]:
-    """Return the pose (3,) of least cost (that of ``refine``, without smoothing) of all within reach, in steps of a cell.
+    """Return the pose (3,) of least cost of all within reach, in steps of a cell.
+
+    The cost is that of ``refine``, without smoothing.
 
     Parameters
     ----------

@@ -52,13 +52,19 @@ class OdometryUncertainty:
             raise ValueError(f"fading of OdometryUncertainty is {self.fading}; want a share below 1")
 
     def covariance(self, distance: float, turn: float) -> NDArray[np.float64]:
-        """Return the covariance (3, 3) of a motion by so much, in the frame in which it began [m, rad]."""
+        """Return the covariance (3, 3) of a motion of a given size.
+
+        In the frame in which the motion began [m, rad].
+        """
         along = (self.distance_share * distance + self.distance_floor) ** 2
         heading = (self.turn_share * abs(turn) + self.turn_per_metre * distance + self.turn_floor) ** 2
         return np.diag([along, along, heading])
 
     def noise(self, distance: float, turn: float) -> NDArray[np.float64]:
-        """Return the covariance (3, 3) of what is different each time in a motion by so much [m, rad]."""
+        """Return the covariance (3, 3) of the random errors of a motion [m, rad].
+
+        Random errors differ each time, for motions of the same size.
+        """
         along = self.distance_noise**2 * abs(distance) + self.distance_floor**2
         heading = (
             self.turn_noise**2 * abs(turn)
@@ -184,7 +190,9 @@ class MatchingSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SubmapSettings:
-    """Local maps: each scan goes into two that overlap by half, and is matched with the older one.
+    """Settings of local maps.
+
+    Each scan enters two local maps that overlap by half, and is matched with the older one.
 
     Attributes
     ----------
@@ -336,7 +344,9 @@ class GraphSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CompassSettings:
-    """How walls, which in most buildings run in two directions, keep headings from drifting.
+    """Settings for correcting drift of headings by the directions of walls.
+
+    Walls run in two directions in most buildings.
 
     Attributes
     ----------

@@ -29,7 +29,10 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.matching.settings import SubmapSettings
 
 UNSEEN, FREE_LEVEL, FULL_LEVEL = 0, 1, 255
-"""Levels of agreement: not observed, nothing there, and a beam ended in the middle of the cell each time."""
+"""Levels of agreement: unobserved, free, and full.
+
+Full means that a beam ended in the middle of the cell each time.
+"""
 
 MOST_BETWEEN = 10
 """Points of a surface between two ends of neighbouring beams.
@@ -204,7 +207,10 @@ def _insert(
 def _surface_points(
     lengths: Array, ends: Array, is_hit: Array, increment: float, is_full_circle: bool
 ) -> Array:
-    """Return the ends of beams, and points a cell apart between neighbouring ends on one surface, shape (points, 2) [cells]."""
+    """Return beam ends and points between them, shape (points, 2) [cells].
+
+    Points lie a cell apart between neighbouring ends on one surface.
+    """
     beams = lengths.shape[0]
     points = np.empty((beams * (MOST_BETWEEN + 1), 2))
     count = 0
@@ -246,7 +252,10 @@ def _look_behind(
     row_offset: int,
     column_offset: int,
 ) -> tuple[int, int, int, int]:
-    """Set the bits of cells a little behind points of a surface in which beams have ended before; return the rows and words with bits."""
+    """Set the bits of cells a little behind points of a surface.
+
+    Only cells in which beams have ended before. Returns the rows and words with bits.
+    """
     first_row, end_row, first_word, end_word = seen
     for k in range(points.shape[0]):
         x, y = points[k, 0] - laser[0], points[k, 1] - laser[1]

@@ -1,4 +1,7 @@
-"""A compass that shows where the walls of a building run: it keeps headings from drifting."""
+"""A compass from the directions of a building's walls.
+
+It keeps headings from drifting.
+"""
 
 from dataclasses import dataclass
 
@@ -29,7 +32,9 @@ class Bearing:
 
 
 class WallCompass:
-    """Collects directions of walls between nodes, and estimates where the walls of the building run and how far headings have drifted.
+    """Estimator of wall directions and of the drift of headings.
+
+    It collects directions of walls between nodes. The walls are those of the building.
 
     Where walls run is surveyed once, over the first local map. From then on both are estimated together, by a
     Kalman filter: what the next nodes show tells more of the building, what later ones show more of the
@@ -97,7 +102,9 @@ class WallCompass:
         self._points = []
 
     def turn(self, node: int, since: float, variance: float, heading: float) -> tuple[float, float]:
-        """Set a new node; return by how much its heading is to be turned [rad], and its variance then [rad^2].
+        """Add a node; return its heading correction [rad] and its variance [rad^2].
+
+        The variance is that after the correction.
 
         Parameters
         ----------
@@ -158,7 +165,10 @@ class WallCompass:
     def edges(
         self, nodes: NDArray[np.float64]
     ) -> list[tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]]:
-        """Return what the bearings tell of the turns (poses, 3) between the first node and others, as edges that may be wrong."""
+        """Return the bearings as edges between the first node and others.
+
+        Each measures the turn (poses, 3) between the two, and may be wrong.
+        """
         told, share = [], self._settings.drift**2
         for bearing in self.bearings:
             heading = float(nodes[bearing.node, 2])
@@ -175,5 +185,8 @@ class WallCompass:
         return told
 
     def rest(self, bearing: Bearing, heading: float) -> float:
-        """Return by how much a heading of the bearing's node would have to turn for walls to run where they do [rad]."""
+        """Return the turn of a heading that would align its walls with the building's.
+
+        The heading is that of the bearing's node; the turn is in radians [rad].
+        """
         return float(within_quarter((self._walls or 0.0) - bearing.direction - heading))

@@ -28,13 +28,21 @@ COARSE_POINTS = 600
 """At most so many points are looked at in all directions."""
 
 COARSE_CELL_M, COARSE_STEPS = 0.05, 180
-"""Side of the cells in which points are counted then [m], and in how many directions in a quarter turn."""
+"""Side of the coarse counting cells [m], and steps per quarter turn.
+
+Steps are the directions in which points are then counted.
+"""
 
 LEAST_GAIN, APART = 0.2, math.radians(10.0)
-"""By how much less the entropy has to be along walls than in all directions that differ from theirs by more than an angle [nats, rad]."""
+"""Least gain in entropy along walls, and the least angle to rivals [nats, rad].
+
+Entropy has to be less by this than in all directions that differ from theirs by more than the angle.
+"""
 
 FINE_CELLS_M = (0.04, 0.01, 0.005)
-"""Sides of the cells by which the direction is then found, one after the other [m].
+"""Sides of the cells of the fine search for the direction [m].
+
+They are used one after the other.
 
 In coarse cells two walls that run side by side, a few centimetres apart, would pass for one that slants.
 """
@@ -46,7 +54,10 @@ MOST_MOVES = 3
 """At most so often a finer search follows its best direction."""
 
 DEPENDENCE = 3.0
-"""The bend of the entropy promises so many times the information that there is: points are placed by the walls that they tell of."""
+"""Factor by which the curvature of the entropy overstates the information.
+
+The points are not independent: they are placed by the walls whose direction they measure.
+"""
 
 
 @kernel
@@ -116,7 +127,10 @@ def wall_direction(points: Array) -> tuple[float, float]:
 
 @kernel
 def _coarse_direction(points: Array, reach: float, counts: Array) -> tuple[float, bool]:
-    """Return the direction in which entropy is least, and whether it is clearly less than far from there."""
+    """Return the direction of least entropy, and whether it is clearly least.
+
+    Clearly least means clearly less than far from there.
+    """
     every = (len(points) - 1) // COARSE_POINTS + 1
     used = (len(points) - 1) // every + 1
     table = np.zeros(used + 1)
@@ -148,7 +162,10 @@ def _coarse_direction(points: Array, reach: float, counts: Array) -> tuple[float
 
 @kernel
 def _fine_order(points: Array, direction: float, cell: float, reach: float, counts: Array) -> float:
-    """Return the negative entropy, but for a constant [nats], of projections along and across a direction, shared out among cells."""
+    """Return the negative entropy of projections, up to a constant [nats].
+
+    Points are projected along and across a direction, and each is shared out among cells.
+    """
     scale = 1.0 / cell
     middle = int(reach * scale) + 3
     cosine, sine = math.cos(direction) * scale, math.sin(direction) * scale

@@ -1,4 +1,6 @@
-"""The extended Kalman filter on a map of curves: one Gaussian over the pose and all corners and peaks that it trusts.
+"""The extended Kalman filter on a map of curves.
+
+One Gaussian over the pose and all corners and peaks that it trusts.
 
 A landmark enters when the map has seen it often enough, with the pose's uncertainty carried over; the cost of
 a correction grows with the square of their number. Curves are measured too: how far the ends of rays lie
@@ -46,7 +48,10 @@ class SplineEkfSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Measured:
-    """Measurements, linearised: what they miss by (m,), how that changes with the first n numbers of the state (m, n), variances (m,)."""
+    """Linearised measurements: residuals (m,), Jacobian (m, n), variances (m,).
+
+    The Jacobian is by the first n numbers of the state.
+    """
 
     misses: NDArray[np.float64]
     jacobian: NDArray[np.float64]
@@ -134,7 +139,10 @@ class SplineEkf(SplineTracker):
         return self.pose
 
     def _gated(self, measured: _Measured) -> _Measured:
-        """Leave out what misses by more than its own variance and that of the state explain."""
+        """Return the measurements without those that exceed their expected deviation.
+
+        Expected from the measurement's own variance and that of the state.
+        """
         columns = measured.jacobian.shape[1]
         spread = measured.jacobian @ self.state_covariance[:columns, :columns]
         expected = (spread * measured.jacobian).sum(axis=1) + measured.variances
@@ -159,7 +167,10 @@ class SplineEkf(SplineTracker):
     def _landmarks_measured(
         self, seen: NDArray[np.float64], known: NDArray[np.int64], sigmas: NDArray[np.float64]
     ) -> _Measured:
-        """Measure seen points (m, 2) of the robot's frame, which are landmarks: both coordinates of each in that frame."""
+        """Return seen points (m, 2) that are landmarks, as measurements.
+
+        Both coordinates of each are measured in the robot's frame.
+        """
         count = len(seen)
         back = _rotation(float(self.pose[2])).T
         offsets = self.landmarks[known] - self.pose[:2]
@@ -202,7 +213,10 @@ class SplineEkf(SplineTracker):
         return _Measured(misses, jacobian, np.full(len(found), variance))
 
     def _add_landmarks(self, matches: Matches) -> None:
-        """Append what the map knows well and the state does not have, with the covariance that the pose and the measurement give it."""
+        """Append landmarks that the map knows well and the state lacks.
+
+        Their covariance follows from the pose and the measurement.
+        """
         distance = self.tracking.splines.association.point_distance
         for seen, sigma in zip(matches.points, matches.point_sigmas, strict=True):
             rotation = _rotation(float(self.pose[2]))
@@ -238,7 +252,10 @@ def _stacked(parts: list[_Measured]) -> _Measured:
 
 
 def _condensed(measured: _Measured) -> _Measured:
-    """Return at most three measurements that tell of the pose what many do: the triangle of their QR decomposition."""
+    """Return at most three measurements equivalent to many for the pose.
+
+    They are the triangle of the QR decomposition.
+    """
     if len(measured.misses) <= 3:
         return measured
     scales = 1.0 / np.sqrt(measured.variances)

@@ -1,4 +1,6 @@
-"""The particle filter on a map of curves: each particle is a pose, weighed by how well features and rays fit the map from there.
+"""The particle filter on a map of curves.
+
+Each particle is a pose, weighted by how well features and rays fit the map from there.
 
 A particle also has an opinion of the wheels: by what share they tell ways and turns too long or too short.
 What fits the walls survives, and carries the robot past where walls tell nothing, as along a corridor.
@@ -202,7 +204,9 @@ class SplineFilter(SplineTracker):
         self.resamplings += 1
 
     def _recover(self, likelihood: float, pose: NDArray[np.float64]) -> None:
-        """Draw some particles around the pose where rays have not fitted for a while, then in ever smaller boxes.
+        """Draw some particles around the pose where rays have not fitted for a while.
+
+        Afterwards they are drawn in ever smaller boxes.
 
         The nearest of those that were drawn fits well enough to take all, and a robot that stands spreads
         them no more.
@@ -222,7 +226,10 @@ class SplineFilter(SplineTracker):
 
 
 def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:
-    """Return logarithm and value of the likelihood of a ray by the distance of its end from a curve, shape (entries, 2)."""
+    """Return log-likelihood and likelihood of a ray, shape (entries, 2).
+
+    By the distance of the ray's end from a curve.
+    """
     gaps = (np.arange(round(_FARTHEST * _ENTRIES_PER_METRE)) + 0.5) / _ENTRIES_PER_METRE
     likelihoods = _HIT_SHARE * np.exp(-0.5 * (gaps / sigma) ** 2) + 1.0 - _HIT_SHARE
     likelihoods[-1] = 1.0 - _HIT_SHARE
@@ -241,7 +248,7 @@ def _weigh_features(
     angle_sigma: float,
     logarithms: Array,
 ) -> None:
-    """Add to each particle's logarithm of the likelihood (particles,) how well features fit."""
+    """Add to each particle's log-likelihood (particles,) how well features fit."""
     cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
     for k in range(points.shape[0]):
         for i in range(particles.shape[0]):
@@ -269,7 +276,10 @@ def _weigh_rays(
     logarithms: Array,
     fits: Array,
 ) -> None:
-    """Add how far the ends of rays (k, 2) lie beside the pieces (k, 5) that they were matched to; write how well they fit, 0.05 to 1."""
+    """Weigh particles by the distances of ray ends from their matched pieces.
+
+    Rays are (k, 2), pieces (k, 5). Writes how well the rays fit, from 0.05 to 1.
+    """
     last_entry = ray_table.shape[0] - 1
     cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
     for k in range(rays.shape[0]):

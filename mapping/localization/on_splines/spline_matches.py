@@ -1,4 +1,7 @@
-"""What of a scan is matched to a map of curves: points, lines and rays, as arrays that filters weigh."""
+"""Matches of a scan's points, lines and rays with a map of curves.
+
+They are arrays that filters weigh.
+"""
 
 from dataclasses import dataclass
 
@@ -107,7 +110,10 @@ def _matched_points(
     most_distance: float,
     least_sightings: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return seen points in the robot's frame, the map's points that they are, and which of the seen points they are."""
+    """Return seen points, their matched map points, and the indices of the seen.
+
+    The seen points are in the robot's frame.
+    """
     trusted = known.points[known.counts >= least_sightings]
     which, of_map = match_points(placed, trusted, most_distance)
     return own[which], trusted[of_map], which
@@ -116,7 +122,10 @@ def _matched_points(
 def _matched_lines(
     seen: NDArray[np.float64], known: NDArray[np.float64], pose: Transform, settings: AssociationSettings
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return which seen lines (n, 4) are lines of the map, about which points they are compared (m, 2), and the map's lines (m, 3)."""
+    """Return indices of matched lines, reference points, and the map's lines.
+
+    Seen lines are (n, 4). The matched are compared about points (m, 2); the map's lines are (m, 3).
+    """
     if len(seen) == 0 or len(known) == 0:
         return np.empty(0, np.int64), np.empty((0, 2)), np.empty((0, 3))
     if settings.line_origin == "segment":

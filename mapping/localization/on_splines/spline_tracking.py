@@ -1,4 +1,7 @@
-"""What both localizers on spline maps share: odometry, the map that they make as they go, and what of a scan they match to it."""
+"""Common base of both localizers on spline maps.
+
+Odometry, the map that they build on the path, and what they match of a scan to it.
+"""
 
 import math
 from abc import ABC, abstractmethod
@@ -213,7 +216,10 @@ class SplineTracker(ABC):
 
 
 def steps_of(motion: Transform) -> tuple[float, float, float]:
-    """Split a motion into a turn, a way straight on (or back) and a turn [rad, m, rad]."""
+    """Split a motion into a turn, a straight segment and a turn [rad, m, rad].
+
+    The segment leads ahead or back.
+    """
     distance = math.hypot(motion.x, motion.y)
     if distance < 0.001:
         return 0.0, distance, motion.theta

@@ -1,4 +1,6 @@
-"""What a robot learns of its odometry's own errors while it drives: wheels are not as large, nor as far apart, as it takes them to be.
+"""Online calibration of odometry's systematic errors.
+
+Wheels differ in size and spacing from their assumed values.
 
 Matches tell how far the robot really went, wherever walls show it; where they do not, as along a bare
 corridor, odometry that knows its errors goes on without them. The errors are the scales of distance and turn,
@@ -46,7 +48,10 @@ class OdometryCalibration:
         return np.diag([settings.distance_share**2, settings.turn_share**2, settings.turn_per_metre**2])
 
     def corrected(self, motion: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a small motion x, y, theta (3,) that odometry tells, without its systematic errors [m, rad]."""
+        """Return a small odometry motion without its systematic errors [m, rad].
+
+        The motion is x, y, theta (3,).
+        """
         along, turn = self.errors[0], self.errors[1] * motion[2] + self.errors[2] * motion[0]
         half = 0.5 * turn
         x, y = (1.0 + along) * motion[0], (1.0 + along) * motion[1]
@@ -54,7 +59,10 @@ class OdometryCalibration:
         return np.array([cosine * x - sine * y, sine * x + cosine * y, motion[2] + turn])
 
     def uncertainty(self, distance: float, turn: float) -> NDArray[np.float64]:
-        """Return the covariance (3, 3) of a corrected motion over a distance (negative backwards) and a turn, at its end [m, rad]."""
+        """Return the covariance (3, 3) of a corrected motion, at its end [m, rad].
+
+        The motion consists of a distance (negative backwards) and a turn.
+        """
         lever = _lever(distance, turn)
         return np.asarray(self._settings.noise(distance, turn) + lever @ self.covariance @ lever.T)
 
@@ -98,6 +106,9 @@ class OdometryCalibration:
 
 
 def _lever(distance: float, turn: float) -> NDArray[np.float64]:
-    """Return how the errors show at the end of a motion, (3, 3): in x, y [m] and heading [rad]."""
+    """Return the effect of the errors at the end of a motion, (3, 3).
+
+    In x, y [m] and heading [rad].
+    """
     half = 0.5 * distance
     return np.array([[distance, 0.0, 0.0], [0.0, half * turn, half * distance], [0.0, turn, distance]])

@@ -37,13 +37,15 @@ LOG_SETTINGS = SlamSettings(
     graph=GraphSettings(deviation_m=0.01, deviation_per_metre=0.02, deviation_angle=math.radians(0.3)),
     compass=CompassSettings(deviation_angle=math.radians(0.3), drift=0.2),
 )
-"""Of a recorded log nearly every scan is matched: odometry between scans is often worse than in a robot, and
-time is plenty. Lasers of logs reach far, so that a local map of a shorter way holds enough, places are
-recognised by more of them, and few returns tell as much as many. Where scans are a metre apart much of each
-is new, and what is new must not outweigh what agrees; headings between them are less sure. Normals are told
-best by the nearest two returns. Walls that were built deviate more from each other than walls that were
-drawn, and scans that reach far let headings drift less; over the ways of logs robots err by more than walls
-are thick."""
+"""SLAM settings for recorded logs, in which nearly every scan is matched.
+
+Odometry between scans is often worse than in a robot, and time is plenty. Lasers of logs reach far: a local
+map of a shorter path holds enough, and more of the local maps serve to recognise places. Few returns then
+hold as much information as many, and headings drift less. Where scans are a metre apart, much of each is new,
+which must not outweigh what agrees; headings between them are less certain. Normals are estimated best from
+the nearest two returns. Built walls deviate more from each other than drawn walls. Over the paths of logs,
+robots err by more than walls are thick.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

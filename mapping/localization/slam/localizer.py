@@ -139,7 +139,10 @@ class Slam:
 
     @property
     def place(self) -> tuple[int, NDArray[np.float64]]:
-        """The last node, and x, y, theta (3,) of the robot in its frame: later corrections of the node are the robot's as well."""
+        """The last node, and the robot's pose x, y, theta (3,) in its frame.
+
+        Later corrections of the node apply to the robot as well.
+        """
         return self._last_node, relative(self._at_node, self._local)
 
     @property
@@ -195,18 +198,28 @@ class Slam:
         self._correct(np.inf)
 
     def _points(self, ranges: NDArray[np.float32], spacing_m: float, limit: int) -> NDArray[np.float64]:
-        """Return points in which beams ended, (n, 2) in the robot's frame [m]: few that stand for all."""
+        """Return representative points in which beams ended, (n, 2) [m].
+
+        In the robot's frame, thinned to few.
+        """
         longest = min(self._settings.matching.range_m, self._geometry.range_max)
         return scan_points(
             ranges, self._unit_vectors, self._geometry.angle_increment, longest, spacing_m, limit
         )
 
     def _all_points(self, ranges: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return nearly all points in which beams ended: what is found once for all runs, such as where walls run, gains from each."""
+        """Return nearly all points in which beams ended.
+
+        They serve what is found once per run and gains from each point, such as the direction of
+        walls.
+        """
         return self._points(ranges, self._settings.compass.spacing_m, self._geometry.beams)
 
     def _motion(self, sensing: Sensing) -> NDArray[np.float64]:
-        """Return the motion since the last sensing, as odometry or else the last motion says."""
+        """Return the motion since the last sensing, by odometry or the last motion.
+
+        The last motion is used where odometry is not.
+        """
         if self._last is None:
             return np.zeros(3)
         if not self._settings.uses_odometry:
@@ -219,7 +232,10 @@ class Slam:
         return self._calibration.corrected(motion)
 
     def _growth(self) -> NDArray[np.float64]:
-        """Return how far the robot may be from where odometry has led since the last match, in its frame now."""
+        """Return the covariance of the motion by odometry since the last match.
+
+        It is in the robot's present frame.
+        """
         return self._calibration.uncertainty(float(self._told[0]), float(self._told[1]))
 
     def _take(
@@ -275,7 +291,10 @@ class Slam:
         self._finder_takes(ended)
 
     def _begin(self, ranges: NDArray[np.float32]) -> None:
-        """Begin the first map, at a node of its own: where the robot began lies in it as well as one scan could tell."""
+        """Begin the first map, at a node of its own.
+
+        The start's pose in the map is known as well as one scan allows.
+        """
         self._has_begun = True
         self._note_key(ranges)
         self._first = self._all_points(ranges), self._local.copy()
@@ -284,7 +303,10 @@ class Slam:
         self._begin_maps(ranges, self._motion_covariance(growth, self._local))
 
     def _find_start(self, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
-        """Lay the first scan on the map: it was begun by few scans, and lies by their errors beside where the robot began."""
+        """Match the first scan with the map to correct the start.
+
+        The map was begun by few scans, whose errors displace the scan from the robot's start.
+        """
         self._first = None
         match = self._mapper.laid_again(points) if self._mapper.node == 1 else None
         if match is not None:
@@ -343,7 +365,10 @@ class Slam:
         self._note_key(ranges)
 
     def _begin_maps(self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]) -> None:
-        """Begin new local maps by a scan, at a new node where the robot is, its motion since the last node so well known."""
+        """Begin new local maps by a scan, at a new node at the robot's pose.
+
+        The covariance of its motion since the last node is given.
+        """
         self._add_node(relative(self._at_node, self._local), covariance)
         self._finder_takes(self._mapper.begin(self._last_node, ranges))
         self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)

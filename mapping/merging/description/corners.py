@@ -1,4 +1,6 @@
-"""Corners of occupancy maps: one look at the eight neighbours of a free cell tells whether it lies in a corner, and which way that opens.
+"""Corners of occupancy maps, from the eight neighbours of a free cell.
+
+One lookup decides whether the cell lies in a corner, and the direction of its opening.
 
 The neighbours' occupancy is a code of eight bits; bit i is the cell at 45 i degrees, counter-clockwise from
 +x. Sixteen of the 256 codes are concave corners and jogs of walls as seen from free space; convex corners
@@ -64,7 +66,8 @@ class CornerSettings:
             raise ValueError(f"limit of corners is {self.limit}; want zero (none) or more")
         if not 0 < self.occupied_below <= self.free_above < 255:
             raise ValueError(
-                f"greys are {self.occupied_below} and {self.free_above}; want 0 < occupied_below <= free_above < 255"
+                f"greys are {self.occupied_below} and {self.free_above}; want 0 < occupied_below <= "
+                "free_above < 255"
             )
 
 
@@ -143,7 +146,10 @@ def detect_corners(
 
 @lru_cache
 def orientation_table(rule: str = "table", neighbours: tuple[int, ...] = (4, 5, 6)) -> NDArray[np.uint8]:
-    """Return for each of the 256 codes the angle of its opening in units of ``STEP`` plus one, 0 where it is no corner, shape (256,)."""
+    """Return the opening angle of each of the 256 codes plus one, shape (256,).
+
+    Angles are in units of ``STEP``; 0 where the code is no corner.
+    """
     table = np.zeros(256, np.uint8)
     for code in range(256):
         opening = _literal_opening(code) if rule == "literal" else _opening(code)
@@ -154,7 +160,10 @@ def orientation_table(rule: str = "table", neighbours: tuple[int, ...] = (4, 5, 
 
 
 def _opening(code: int) -> int | None:
-    """Return which way a code opens [STEP], None where its free cells are not the one run that a corner has."""
+    """Return the direction in which a code opens [STEP], None for no corner.
+
+    None where its free cells are not the single run that a corner has.
+    """
     free = [i for i in range(8) if not code >> i & 1]
     if len(free) not in (1, 2, 3, 4):
         return None
@@ -170,7 +179,10 @@ def _opening(code: int) -> int | None:
 
 
 def _literal_opening(code: int) -> int | None:
-    """Return which way a code opens [STEP] by the rules of parity as they were printed, modulus 2."""
+    """Return the opening direction of a code by the printed parity rules [STEP].
+
+    The rules are as they were printed, modulus 2.
+    """
     a, p, b, q, a_, p_, b_, q_ = (code >> i & 1 for i in range(8))
     r = code.bit_count()
     direct, main, other = a + a_ + b + b_, p + p_, q + q_
@@ -198,7 +210,9 @@ def _levels_of_greys(occupied_below: int, free_above: int) -> NDArray[np.uint8]:
 
 @kernel
 def _is_three_level(words: Array) -> bool:
-    """Return whether the bytes of words are the three levels alone, 0x00, 0x7f and 0xff.
+    """Return whether the bytes of words are the three levels alone.
+
+    The levels are 0x00, 0x7f and 0xff.
 
     These are the bytes whose seven low bits are the same, but for 0x80.
     """
@@ -213,13 +227,19 @@ def _is_three_level(words: Array) -> bool:
 
 @kernel(inline=True)
 def _gathered(word: np.uint64) -> np.int64:
-    """Return the lowest bits of the eight bytes of a word as one byte, the first cell's lowest."""
+    """Return the lowest bits of the eight bytes of a word as one byte.
+
+    The first cell's bit is the lowest.
+    """
     return np.int64(((word & np.uint64(0x0101010101010101)) * np.uint64(0x0102040810204080)) >> np.uint64(56))
 
 
 @kernel(inline=True)
 def _occupied_around(words: Array, row: int, word: int) -> np.int64:
-    """Return which cells of a word are occupied, the last of the word before it in bit 0 and the first of the word after it in bit 9."""
+    """Return which cells of a word and its two neighbours are occupied.
+
+    Bit 0 is the last cell of the word before, bit 9 the first of the word after.
+    """
     before, after = words[row, word - 1] >> np.uint64(56), words[row, word + 1]
     here = _gathered(~words[row, word])
     around: np.int64 = np.int64(~before & np.uint64(1)) | here << 1 | np.int64(~after & np.uint64(1)) << 9
@@ -299,7 +319,10 @@ def _keep_apart(points: Array, squared: float, order: Array, is_kept: Array) -> 
 
 
 def _limited(corners: Corners, limit: int) -> Corners:
-    """Keep at most so many: corners by their rank, and from the last rank that fits in part every so many-th."""
+    """Return at most so many corners, by their rank.
+
+    From the last rank, which fits only in part, evenly spaced corners are kept.
+    """
     if limit == 0 or len(corners) <= limit:
         return corners
     ranks = _PRIORITY[corners.neighbours]

@@ -17,7 +17,10 @@ _FACING_REACH = 3
 _FAR = 1e6
 
 OPEN_DISTANCE_M = 0.1
-"""How far from all that is not free a cell lies in the open [m]: a wall that two maps of 4 cm error lay at the rim of free space is not."""
+"""Least distance of a cell in the open from all that is not free [m].
+
+A wall that an error of 4 cm of two maps puts at the rim of free space is not open.
+"""
 
 FACING_DISTANCE_M = 0.075
 """How far before and behind a wall is looked to tell its side [m].
@@ -169,7 +172,10 @@ def _walls(levels: NDArray[np.uint8]) -> tuple[NDArray[np.int32], NDArray[np.flo
 
 
 def _open(levels: NDArray[np.uint8], resolution: float) -> NDArray[np.uint8]:
-    """Return 1 where a cell and all within `OPEN_DISTANCE_M` along the axes, a cell at least, are free."""
+    """Return 1 where a cell and all within `OPEN_DISTANCE_M` are free.
+
+    The distance is along the axes, and at least a cell.
+    """
     reach = max(round(OPEN_DISTANCE_M / resolution), 1)
     is_free = np.asarray(levels == FREE, np.uint8)
     return np.asarray(
@@ -190,7 +196,10 @@ def _distance(shape: tuple[int, ...], cells: NDArray[np.int32], resolution: floa
 
 @kernel
 def _find_walls(levels: Array, cells: Array) -> int:
-    """Write column and row of each occupied cell that has a free one beside it, and return their number."""
+    """Write column and row of each occupied cell beside a free one.
+
+    Returns their number.
+    """
     rows, columns = levels.shape
     count = 0
     for row in range(rows):
@@ -224,7 +233,9 @@ def _face(levels: Array, cells: Array, reach: int, normals: Array) -> None:
 
 @kernel(inline=True)
 def faces_away(levels: Array, column: float, row: float, ahead_x: float, ahead_y: float) -> bool:
-    """Return whether a wall at a place [cells] that looks ahead would look into a wall of this map, and have its free space behind.
+    """Return whether this map's wall at a place [cells] faces the opposite side.
+
+    A given direction ahead leads into a wall of this map, and its free space lies behind.
 
     Then it is the other side of a wall that is being compared, a wall's thickness away from where it belongs.
     """

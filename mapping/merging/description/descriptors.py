@@ -1,4 +1,6 @@
-"""What a map looks like around its corners: samples on rings, as arrays of radius by angle that a rotation of the map merely shifts.
+"""Descriptors of a map around its corners.
+
+Samples on rings form arrays of radius by angle, which a rotation of the map merely shifts.
 
 Column 0 looks where the corner opens to, so that descriptors of one corner in two maps differ by the error of
 that angle alone.
@@ -62,7 +64,8 @@ class DescriptorSettings:
         for name, low, high, step in bands:
             if not (0.0 < low < high < math.inf and 0.0 < step <= high - low):
                 raise ValueError(
-                    f"{name}_min, _max and _step are {low}, {high} and {step} m; want 0 < min < max and 0 < step <= max - min"
+                    f"{name}_min, _max and _step are {low}, {high} and {step} m; want 0 < min < max and 0 < "
+                    "step <= max - min"
                 )
         if self.columns < 8:
             raise ValueError(f"columns of descriptors are {self.columns}; want 8 or more")
@@ -181,7 +184,10 @@ def _sample(
     values: Array,
     known: Array,
 ) -> None:
-    """Fill values and known from the shares of occupied and free cells [of 255] at the nearest cell of each sample."""
+    """Fill ``values`` and ``known`` at the nearest cell of each sample.
+
+    From its shares of occupied and free cells [of 255].
+    """
     rows, columns = occupied.shape
     samples = values.shape[2]
     for column in range(samples):

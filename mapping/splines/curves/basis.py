@@ -36,7 +36,8 @@ def basis_matrix(knots: ArrayLike, parameters: ArrayLike) -> NDArray[np.float64]
         wanted.size and not (all_knots[ORDER - 1] <= wanted.min() and wanted.max() <= all_knots[count])
     ):
         raise ValueError(
-            f"{len(all_knots)} knots, or parameters outside of the domain; want 8 knots or more and parameters within"
+            f"{len(all_knots)} knots, or parameters outside of the domain; want 8 knots or more and "
+            "parameters within"
         )
     matrix = np.zeros((len(wanted), count))
     _fill_basis(all_knots, wanted, matrix)
@@ -66,7 +67,9 @@ def find_span(knots: Array, count: int, parameter: float) -> int:
 
 @kernel
 def basis_of_span(knots: Array, span: int, parameter: float, order: int, values: Array) -> None:
-    """Write the basis functions span - 3 .. span that do not vanish, or their derivatives (order 1 or 2), to ``values`` (4,).
+    """Write the basis functions of a span, or their derivatives, to ``values`` (4,).
+
+    Functions span - 3 .. span, which do not vanish; derivatives of order 1 or 2.
 
     Cox and de Boor's recursion; a derivative is a difference of functions of a lower degree.
     """
@@ -95,7 +98,10 @@ def basis_of_span(knots: Array, span: int, parameter: float, order: int, values:
 def point_at(
     knots: Array, control_points: Array, parameter: float, order: int, values: Array
 ) -> tuple[float, float]:
-    """Return the curve or a derivative at a parameter, which is brought into the domain; ``values`` (4,) is scratch."""
+    """Return the curve or a derivative at a parameter, clipped to the domain.
+
+    ``values`` (4,) is scratch.
+    """
     count = control_points.shape[0]
     within = min(max(parameter, knots[ORDER - 1]), knots[count])
     span = find_span(knots, count, within)

@@ -1,4 +1,6 @@
-"""Cubic B-spline curves in the plane: points, derivatives, length, nearest points, and where rays meet them.
+"""Cubic B-spline curves in the plane.
+
+Points, derivatives, length, nearest points, and intersections with rays.
 
 Knots here are four-fold at both ends, so that curves begin and end in control points, and run along the curve
 in metres.
@@ -17,7 +19,10 @@ _NEWTON_STEPS = 20
 _PIECES = 8
 """Into so many pieces a span is cut where a curve is searched."""
 _FINE_PIECES = 32
-"""The same where its nearest point is searched: a curve may turn back on itself within a piece, and only one of its ways is found then."""
+"""Pieces per span in the search for the nearest point.
+
+A curve may turn back on itself within a piece, and then only one of its branches is found.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +49,8 @@ class Spline:
             )
         if knots.shape != (len(control_points) + ORDER,):
             raise ValueError(
-                f"knots have shape {knots.shape}; want {len(control_points) + ORDER}, {ORDER} more than control points"
+                f"knots have shape {knots.shape}; want {len(control_points) + ORDER}, {ORDER} more than "
+                "control points"
             )
         if not _is_sound(knots, control_points):
             raise ValueError("knots decrease or span nothing, or knots or control points are not finite")
@@ -75,7 +81,10 @@ class Spline:
         return np.asarray(along / np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None], np.float64)
 
     def curvature(self, parameters: ArrayLike) -> NDArray[np.float64]:
-        """Return the signed curvature at parameters (m,), positive where the curve turns left [1/m]."""
+        """Return the signed curvature at parameters (m,) [1/m].
+
+        Positive where the curve turns left.
+        """
         first, second = self.derivative(parameters), self.derivative(parameters, 2)
         speed = np.maximum(np.linalg.norm(first, axis=1), 1e-12)
         return np.asarray((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3, np.float64)
@@ -85,7 +94,10 @@ class Spline:
         return float(curve_length(self.knots, self.control_points))
 
     def sample(self, spacing: float) -> NDArray[np.float64]:
-        """Return points evenly spaced in the parameter, both ends included, at most about ``spacing`` apart, shape (m, 2) [m]."""
+        """Return points evenly spaced in the parameter, shape (m, 2) [m].
+
+        Both ends are included; points are at most about ``spacing`` apart.
+        """
         return self.evaluate(self.sample_parameters(spacing))
 
     def sample_parameters(self, spacing: float) -> NDArray[np.float64]:
@@ -95,14 +107,20 @@ class Spline:
         return np.asarray(first + np.arange(gaps + 1) * ((last - first) / gaps), np.float64)
 
     def closest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return parameters (m,) of the nearest points of the curve to points (m, 2), and the distances (m,) [m]."""
+        """Return parameters (m,) of the nearest points, and the distances (m,) [m].
+
+        The nearest points of the curve to points (m, 2).
+        """
         places = np.ascontiguousarray(np.reshape(np.asarray(points, np.float64), (-1, 2)))
         parameters, distances = np.empty(len(places)), np.empty(len(places))
         _closest(self.knots, self.control_points, places, parameters, distances)
         return parameters, distances
 
     def ray(self, origin: ArrayLike, direction: float) -> float:
-        """Return the distance from a point (2,) along a direction [rad] at which a ray first meets the curve [m]; inf where it does not."""
+        """Return the distance at which a ray first meets the curve [m].
+
+        From a point (2,) along a direction [rad]; inf where it does not.
+        """
         x, y = (float(value) for value in np.asarray(origin, np.float64))
         return float(_ray(self.knots, self.control_points, x, y, math.cos(direction), math.sin(direction)))
 
@@ -118,7 +136,10 @@ _GAUSS_PLACES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 @kernel
 def _is_sound(knots: Array, control_points: Array) -> bool:
-    """Return whether all numbers are finite, and knots do not decrease and span something."""
+    """Return whether all numbers are finite and the knots are valid.
+
+    Knots must not decrease, and must span something.
+    """
     for k in range(1, knots.shape[0]):
         if not knots[k] >= knots[k - 1]:
             return False
@@ -158,7 +179,10 @@ def curve_length(knots: Array, control_points: Array) -> float:
 
 @kernel
 def _closest(knots: Array, control_points: Array, points: Array, parameters: Array, distances: Array) -> None:
-    """Newton's method in each piece that may hold the nearest point: none is longer than its control points' differences allow."""
+    """Find nearest points by Newton's method in each piece that may hold one.
+
+    The control points' differences bound the length of each piece.
+    """
     count = control_points.shape[0]
     most = (count - ORDER + 1) * _FINE_PIECES
     places, widths, reaches, used = np.empty(most + 1), np.empty(most), np.empty(most), 0
@@ -210,7 +234,9 @@ def _descend(
     high: float,
     values: Array,
 ) -> tuple[float, float]:
-    """Return the parameter near a given one, between two others, at which the curve is nearest to a point, and the squared distance.
+    """Return the parameter nearest to a point, and the squared distance.
+
+    Near a given parameter, between two others.
 
     Newton's method; where a step leads farther away, as it does beside cusps, half of it is tried.
     """
@@ -246,7 +272,10 @@ def _descend(
 
 @kernel
 def _ray(knots: Array, control_points: Array, x: float, y: float, cosine: float, sine: float) -> float:
-    """Spans whose control polygon lies on one side of the ray's line, or behind it, are passed over: a curve lies in its polygon's hull."""
+    """Find where a ray meets the curve, skipping spans it cannot meet.
+
+    Their control polygon lies on one side of its line, or behind it: a curve lies in its polygon's hull.
+    """
     values = np.empty(ORDER)
     nearest = math.inf
     for span in range(ORDER - 1, control_points.shape[0]):
@@ -296,7 +325,10 @@ def _crossing(
     sine: float,
     values: Array,
 ) -> float:
-    """Return how far ahead the curve crosses the ray's line between two parameters: Newton's method, halving where it would leave them."""
+    """Return how far ahead the curve crosses the ray's line.
+
+    Between two parameters, by Newton's method, with bisection where it would leave them.
+    """
     px, py = point_at(knots, control_points, low, 0, values)
     aside_low = cosine * (py - y) - sine * (px - x)
     parameter = (low + high) / 2.0

@@ -39,7 +39,10 @@ class Fit:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance of either coordinate of the control points, shape (n, n) [m2]: the inverse of the normal matrix."""
+        """Covariance (n, n) [m2] of either coordinate of the control points.
+
+        The inverse of the normal matrix.
+        """
         count = len(self.normal)
         inverse = np.empty((count, count))
         factor = self.normal.copy()
@@ -122,7 +125,10 @@ def fit_bspline(
 
 
 def averaged_knots(parameters: ArrayLike, count: int) -> NDArray[np.float64]:
-    """Return knots (count + 4,) for so many control points, such that every span has its share of the parameters (m,)."""
+    """Return knots (count + 4,) for so many control points.
+
+    Every span has its share of the parameters (m,).
+    """
     knots = np.empty(count + ORDER)
     _average_knots(np.ascontiguousarray(parameters, np.float64), count, knots)
     return knots
@@ -222,7 +228,10 @@ def _fit(
 
 @kernel
 def _fit_straight(points: Array, sigmas: Array) -> Array:
-    """Return the control points, evenly along a line, of the straight curve nearest to the points by total least squares."""
+    """Return control points of the straight curve nearest to the points.
+
+    They lie evenly along a line fitted by total least squares.
+    """
     total, x, y = 0.0, 0.0, 0.0
     for k in range(points.shape[0]):
         weight = 1.0 / (sigmas[k] * sigmas[k])
@@ -258,7 +267,10 @@ def _accumulate(
     normal: Array,
     right: Array,
 ) -> None:
-    """Add up the lower band of the normal matrix, (n, 4): row i holds columns i .. i - 3, and the right side, (n, 2)."""
+    """Sum up the normal matrix's lower band (n, 4) and the right side (n, 2).
+
+    Row i holds columns i .. i - 3.
+    """
     count = normal.shape[0]
     values = np.empty(ORDER)
     total = 0.0

@@ -1,4 +1,4 @@
-"""All settings of spline maps in one place, and the two sets of them that have names."""
+"""All settings of spline maps in one place, and the two named sets of them."""
 
 import math
 from dataclasses import dataclass, field
@@ -97,7 +97,8 @@ class SegmentationSettings:
         _check_name(self.corner_rule, "rule of corners", CORNER_RULES)
         if not 0.0 < self.incidence < math.pi / 2.0:
             raise ValueError(
-                f"incidence of segmentation is {self.incidence} rad; want more than 0 and less than a right angle"
+                f"incidence of segmentation is {self.incidence} rad; want more than 0 and less than a right "
+                "angle"
             )
         check_from_zero(
             self,
@@ -111,7 +112,8 @@ class SegmentationSettings:
         )
         if self.least_points < 4 or self.line_points < 2:
             raise ValueError(
-                f"least_points is {self.least_points} and line_points is {self.line_points}; want at least 4 (a cubic curve) and 2"
+                f"least_points is {self.least_points} and line_points is {self.line_points}; want at least 4 "
+                "(a cubic curve) and 2"
             )
 
 
@@ -248,7 +250,8 @@ class MapSettings:
         )
         if self.trusted_count < 1 or self.trial_updates < 1:
             raise ValueError(
-                f"trusted_count is {self.trusted_count} and trial_updates is {self.trial_updates}; want at least 1 each"
+                f"trusted_count is {self.trusted_count} and trial_updates is {self.trial_updates}; want at "
+                "least 1 each"
             )
 
 

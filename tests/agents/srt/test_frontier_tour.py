@@ -65,7 +65,8 @@ def test_what_lies_on_the_shorter_side_is_visited_first_though_another_place_is_
 
 
 def hall(openings):
-    """Return the map of a hall of 12 x 4 m whose walls were seen, but for stretches (x from, x to) of the upper one."""
+    """Return the map of a hall of 12 x 4 m whose walls were seen, but for stretches (x from, x to) of the
+    upper one."""
     log_odds = np.zeros((120, 320), np.int8)
     log_odds[20:100, 20:260] = -40
     log_odds[19], log_odds[:, 19], log_odds[:, 260], log_odds[100] = 40, 40, 40, 40

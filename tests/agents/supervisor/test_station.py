@@ -1,4 +1,5 @@
-"""The station joins what it has found twice, drops what contradicts, and fuses maps without the bodies of robots."""
+"""The station joins what it has found twice, drops what contradicts, and fuses maps without the bodies of
+robots."""
 
 import math
 
@@ -54,7 +55,8 @@ def test_a_join_that_maps_contradict_is_dropped_at_once_and_noted(station):
 
 
 def test_a_map_frame_that_jumps_is_followed(station):
-    """After a closure a robot's map may lie elsewhere in its frame: the old transform is refused, and the new one has to be confirmed."""
+    """After a closure a robot's map may lie elsewhere in its frame: the old transform is refused, and the
+    new one has to be confirmed."""
     for time_s, columns in ((8.0, 170), (10.0, 180), (12.0, 190)):
         jumped = GrowingMap(part(slice(60, 220), SECOND, 1).levels, (2.0, -1.0))
         station.receive(

@@ -1,4 +1,5 @@
-"""What becomes of reports made by hand: goals, rivals, robots that know little, failed and silent ones, and batteries."""
+"""What becomes of reports made by hand: goals, rivals, robots that know little, failed and silent ones,
+and batteries."""
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ WEST, EAST, NORTH = (0.0, 2.0), (7.95, 2.0), (4.0, 3.95)
 
 
 def looked(reports, time_s=10.0, given_up=None, agents=None, **settings):
-    """The supervisor after one look at reports of robots whose frames are known, and its commands by robot."""
+    """The supervisor after one look at reports of robots whose frames are known, and its commands by
+    robot."""
     chosen = SupervisorSettings(trusts_starts=True, **settings)
     station = MergeStation(agents or list(reports), RESOLUTION, RADIUS, chosen)
     for agent, one in reports.items():

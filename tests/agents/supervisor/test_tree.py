@@ -1,4 +1,5 @@
-"""The decision tree: every combination of states, the rules one by one, and the run whose report contradicts rule 3."""
+"""The decision tree: every combination of states, the rules one by one, and the run whose report
+contradicts rule 3."""
 
 import json
 from dataclasses import replace

@@ -79,7 +79,8 @@ def test_nothing_but_the_temporary_folder_takes_files_in_the_read_only_environme
     environment = cached_start.read_only_environment(tmp_path)
     program = (
         "import lidarium, os; from lidarium.mapping import files, kernels; from pathlib import Path; "
-        "print(lidarium.__file__, kernels._FOLDER, files.is_writable(files.user_cache_folder()), sep=os.linesep)"
+        "print(lidarium.__file__, kernels._FOLDER, files.is_writable(files.user_cache_folder()), "
+        "sep=os.linesep)"
     )
     told = subprocess.run(
         [sys.executable, "-c", program],

@@ -20,7 +20,8 @@ def draw_actions(generator, level, rows, observations):
 
 
 class Alone:
-    """The same episodes one by one: the first ones on floors of their own, the later ones on that of the batch."""
+    """The same episodes one by one: the first ones on floors of their own, the later ones on that of the
+    batch."""
 
     def __init__(self, floors, level, options):
         self.floors = floors
@@ -60,7 +61,8 @@ def check_info(infos, row, wanted):
 
 
 def compare_rows(level, threads, steps, floors, robots=2, seed=11, **options):
-    """Step a batch and the same episodes one by one, assert that all they tell is equal, and return how many robots have ended."""
+    """Step a batch and the same episodes one by one, assert that all they tell is equal, and return how
+    many robots have ended."""
     options = {**SMALL, **options, "robots": robots}
     batch = ExplorationVectorEnv(len(floors), floors[0], level, threads=threads, **options)
     alone = Alone(floors, level, options)

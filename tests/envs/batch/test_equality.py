@@ -1,4 +1,5 @@
-"""Every row of a batch is the robot of a ``ParallelEnv`` with the same seed, to the bit, whatever the level and the threads."""
+"""Every row of a batch is the robot of a ``ParallelEnv`` with the same seed, to the bit, whatever the
+level and the threads."""
 
 import pytest
 

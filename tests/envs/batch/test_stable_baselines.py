@@ -1,4 +1,5 @@
-"""The rows for stable-baselines3: resets in the step that ends, terminal observations, truncation, masks, and training."""
+"""The rows for stable-baselines3: resets in the step that ends, terminal observations, truncation, masks,
+and training."""
 
 import math
 

@@ -1,4 +1,5 @@
-"""The rows as one Gymnasium vector environment: spaces, resets, masks, seeds, options, copies, and what is refused."""
+"""The rows as one Gymnasium vector environment: spaces, resets, masks, seeds, options, copies, and what is
+refused."""
 
 import copy
 import dataclasses
@@ -108,7 +109,8 @@ def test_later_episodes_draw_from_the_generator_of_their_episode():
 
 
 def masked_run():
-    """A robot that runs into the wall ahead of it beside one that stands still, until the horizon and a step beyond."""
+    """A robot that runs into the wall ahead of it beside one that stands still, until the horizon and a
+    step beyond."""
     options = {**FEW, "robots": 2, "stop_on_contact": True, "horizon_s": 3.0, "stop_coverage": None}
     batch = lidarium.vector_env(2, ROOM, **options)
     near, far = (4.2, 3.0, 0.0), (1.0, 1.0, math.pi / 2)

@@ -151,14 +151,20 @@ def test_houseexpo_without_a_polygon_is_refused(tmp_path, content):
 KTH_XML = """<?xml version="1.0" encoding="UTF-8"?>
 <floor><Scale PixelDistance="100" RealDistance="1"/>
 <space name="a"><contour>
-<linesegment x1="0" y1="0" x2="400" y2="0" type="Wall" target=""/><linesegment x1="400" y1="0" x2="400" y2="100" type="Wall" target=""/>
-<linesegment x1="400" y1="100" x2="400" y2="200" type="{kind}" target="x"/><linesegment x1="400" y1="200" x2="400" y2="400" type="Wall"/>
-<linesegment x1="400" y1="400" x2="0" y2="400" type="Window"/><linesegment x1="0" y1="400" x2="0" y2="0" type="Wall" target=""/>
+<linesegment x1="0" y1="0" x2="400" y2="0" type="Wall" target=""/>
+<linesegment x1="400" y1="0" x2="400" y2="100" type="Wall" target=""/>
+<linesegment x1="400" y1="100" x2="400" y2="200" type="{kind}" target="x"/>
+<linesegment x1="400" y1="200" x2="400" y2="400" type="Wall"/>
+<linesegment x1="400" y1="400" x2="0" y2="400" type="Window"/>
+<linesegment x1="0" y1="400" x2="0" y2="0" type="Wall" target=""/>
 </contour></space>
 <space name="b"><contour>
-<linesegment x1="420" y1="0" x2="820" y2="0" type="Wall" target=""/><linesegment x1="820" y1="0" x2="820" y2="400" type="Wall" target=""/>
-<linesegment x1="820" y1="400" x2="420" y2="400" type="Wall" target=""/><linesegment x1="420" y1="400" x2="420" y2="200" type="Wall"/>
-<linesegment x1="420" y1="200" x2="420" y2="100" type="{other}" target="y"/><linesegment x1="420" y1="100" x2="420" y2="0" type="Wall"/>
+<linesegment x1="420" y1="0" x2="820" y2="0" type="Wall" target=""/>
+<linesegment x1="820" y1="0" x2="820" y2="400" type="Wall" target=""/>
+<linesegment x1="820" y1="400" x2="420" y2="400" type="Wall" target=""/>
+<linesegment x1="420" y1="400" x2="420" y2="200" type="Wall"/>
+<linesegment x1="420" y1="200" x2="420" y2="100" type="{other}" target="y"/>
+<linesegment x1="420" y1="100" x2="420" y2="0" type="Wall"/>
 </contour></space></floor>"""
 
 
@@ -188,7 +194,8 @@ def test_y_of_a_kth_drawing_points_down(tmp_path):
         ("<floor><Scale PixelDistance='0' RealDistance='1'/><space/></floor>", "has Scale"),
         ("<floor>", "not XML"),
         (
-            "<floor><Scale PixelDistance='1' RealDistance='1'/><space name='a'><linesegment x1='1'/></space></floor>",
+            "<floor><Scale PixelDistance='1' RealDistance='1'/><space name='a'><linesegment "
+            "x1='1'/></space></floor>",
             "space 'a'",
         ),
         (KTH_XML.format(kind="Wall", other="Wall").replace("820", "nan"), "space 'b'"),

@@ -1,4 +1,5 @@
-"""Robots that do not know their starts are told what others know: they plan and explore on that as on their own map."""
+"""Robots that do not know their starts are told what others know: they plan and explore on that as on
+their own map."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,5 @@
-"""Reports: the station knows what has reached it, no more and no less, and its orders go no farther than its links."""
+"""Reports: the station knows what has reached it, no more and no less, and its orders go no farther than
+its links."""
 
 import numpy as np
 import pytest

@@ -22,7 +22,8 @@ def test_a_last_line_that_breaks_off_is_dropped_with_a_warning(rows, directory_o
     episodes = read_episodes(folder)
     assert list(episodes.rows) == rows[:2]
     assert episodes.warnings == (
-        f"Line 3 of episodes.jsonl breaks off ({bytes_left} bytes) and was left out: its episode was not finished.",
+        f"Line 3 of episodes.jsonl breaks off ({bytes_left} bytes) and was left out: its episode was not "
+        "finished.",
     )
 
 
@@ -41,8 +42,8 @@ def test_an_episode_that_is_there_twice_is_counted_once_and_told(rows, directory
     episodes = read_episodes(directory_of([rows[0], rows[1], changed(rows[0], steps_per_s=1.0)]))
     assert list(episodes.rows) == rows[:2]
     assert (
-        "Lines 1 and 3 of episodes.jsonl are the same episode (nearest_frontier on apartment, 2 robots, seed 0)"
-        in episodes.warnings[0]
+        "Lines 1 and 3 of episodes.jsonl are the same episode (nearest_frontier on apartment, 2 robots, seed "
+        "0)" in episodes.warnings[0]
     )
 
 

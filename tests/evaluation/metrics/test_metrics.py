@@ -116,7 +116,8 @@ def test_balance_is_the_spread_of_the_shares():
 
 
 def test_overlap_of_maps_and_balance_are_what_explore_bench_prints():
-    """Its script: np.std of the robots' rates, and their sum less 1, a rate being known cells over cells that are not 205."""
+    """Its script: np.std of the robots' rates, and their sum less 1, a rate being known cells over cells
+    that are not 205."""
     truth = np.array([[0, 254, 254, 254, 205], [0, 254, 254, 254, 205]])
     scans = np.array([[[100, 0, 0, -1, -1], [-1, 0, 0, 0, -1]], [[-1, -1, 0, 0, -1], [-1, 0, 0, 0, -1]]])
     rates = [(scan != -1).sum() / (truth != 205).sum() for scan in scans]
@@ -297,7 +298,8 @@ def test_the_error_of_a_merge_is_that_where_the_maps_meet():
 
 
 def test_a_merge_is_judged_by_how_the_drifted_maps_lie_where_they_meet():
-    """Robot b's map has slipped by 0.5 m in x from 4 s on; a merger that lays it where its walls are is right, though not by the starts."""
+    """Robot b's map has slipped by 0.5 m in x from 4 s on; a merger that lays it where its walls are is
+    right, though not by the starts."""
     times = np.arange(0.0, 10.0)
     true = np.zeros((10, 2, 3))
     true[:, 0, 0], true[:, 1, 0], true[:, 1, 1] = times, times, 1.0
@@ -319,7 +321,8 @@ def test_a_merge_is_judged_by_how_the_drifted_maps_lie_where_they_meet():
 
 
 def test_robots_that_others_join_are_judged_by_the_merges_that_join_them():
-    """Robot c lies right on b, and b on a; what b's map has drifted in between puts c off a, and is nobody's wrong merge."""
+    """Robot c lies right on b, and b on a; what b's map has drifted in between puts c off a, and is
+    nobody's wrong merge."""
     nowhere = (0.0, 0.0, 0.0)
     over = MergeEvent(9.0, "a", "c", (0.5, 0.0, 0.0), nowhere, (0.0, 0.0), is_direct=False)
     told = merges.merge_figures([MergeEvent(5.0, "a", "b", nowhere, nowhere, (0.0, 0.0)), over], 0.05)

@@ -83,7 +83,8 @@ def test_the_absolute_error_is_that_of_evo(tmp_path):
     program = Path(os.environ.get("LIDARIUM_EVO", "")) / "evo_ape"
     if not os.environ.get("LIDARIUM_EVO") or not program.exists():
         pytest.skip(
-            "evo is not there; install it in an environment of its own and set LIDARIUM_EVO to the folder of its programs"
+            "evo is not there; install it in an environment of its own and set LIDARIUM_EVO to the folder of "
+            "its programs"
         )
     true = some_poses()
     believed = composed(

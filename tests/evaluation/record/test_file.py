@@ -63,7 +63,8 @@ def test_numpy_opens_it_without_pickles(apartment_record, path):
 
 
 def test_ten_minutes_with_three_robots_take_less_than_a_megabyte(recorded, tmp_path):
-    """The first 100 seconds, the most eventful ones, with noise and fine maps: in less than a sixth of a megabyte."""
+    """The first 100 seconds, the most eventful ones, with noise and fine maps: in less than a sixth of a
+    megabyte."""
     record, _ = recorded(
         floor="building:23", robots=3, resolution=0.025, noise="thesis", horizon_s=100.0, stop_coverage=None
     )

@@ -1,4 +1,5 @@
-"""A directory of episodes as `lidarium evaluate` writes it: a few short real runs, with records in a form of their own."""
+"""A directory of episodes as `lidarium evaluate` writes it: a few short real runs, with records in a form
+of their own."""
 
 import json
 from dataclasses import dataclass

@@ -110,7 +110,9 @@ def test_a_policy_that_is_gone_is_reported_all_the_same(rows, directory_of, tmp_
 def test_a_baseline_without_episodes_is_refused_and_nothing_written(rows, directory_of, tmp_path):
     with pytest.raises(
         ValueError,
-        match="--baseline is 'best', of which there are no episodes; want one of nearest_frontier, random_walk",
+        match=(
+            "--baseline is 'best', of which there are no episodes; want one of nearest_frontier, random_walk"
+        ),
     ):
         write_report(directory_of(rows), tmp_path / "out", baseline="best")
     assert not (tmp_path / "out").exists()

@@ -1,4 +1,5 @@
-"""A quick look at whether intervals hold known truths; benchmarks/studies/interval_coverage.py is the thorough one."""
+"""A quick look at whether intervals hold known truths; benchmarks/studies/interval_coverage.py is the
+thorough one."""
 
 import numpy as np
 import pytest

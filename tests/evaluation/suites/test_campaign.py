@@ -1,4 +1,5 @@
-"""A campaign keeps what is finished, goes on where it stopped, and gives the same lines whoever does the work."""
+"""A campaign keeps what is finished, goes on where it stopped, and gives the same lines whoever does the
+work."""
 
 import json
 import shutil

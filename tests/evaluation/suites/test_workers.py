@@ -64,6 +64,7 @@ HAS_TRIM = sys.platform.startswith("linux") and hasattr(ctypes.CDLL(None), "mall
 
 @pytest.mark.skipif(not HAS_TRIM, reason="this system's C library cannot be told to give freed memory back")
 def test_what_a_task_has_freed_is_given_back():
-    """Each task fills 150 MB and frees them, but for small arrays in between, which keep the heap from shrinking by itself."""
+    """Each task fills 150 MB and frees them, but for small arrays in between, which keep the heap from
+    shrinking by itself."""
     found = subprocess.run([sys.executable, "-c", HOLES], capture_output=True, text=True, check=True)
     assert float(found.stdout) < 60.0

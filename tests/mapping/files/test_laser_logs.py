@@ -20,7 +20,10 @@ def odom(stamp, x=0.0, y=0.0, theta=0.0):
 
 def robotlaser(stamp, ranges, laser=(0.1, 0.0, 0.0), robot=(0.0, 0.0, 0.0), max_range=8.0):
     step = math.pi / (len(ranges) - 1)
-    head = f"ROBOTLASER1 0 {-math.pi / 2} {math.pi} {step} {max_range} 0.01 0 {len(ranges)} {' '.join(map(str, ranges))}"
+    head = (
+        f"ROBOTLASER1 0 {-math.pi / 2} {math.pi} {step} {max_range} 0.01 0 {len(ranges)} "
+        f"{' '.join(map(str, ranges))}"
+    )
     return f"{head} 0 {' '.join(map(str, (*laser, *robot)))} 0 0 0.1 0.1 0 {stamp} host {stamp}\n"
 
 

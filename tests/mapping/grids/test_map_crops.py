@@ -26,7 +26,8 @@ def random_map(seed, rows=40, columns=128):
 
 
 def pooled_levels(log_odds, scale):
-    """Levels of the pooled cells; the least level of their cells wins, and what lies beyond the map is unknown."""
+    """Levels of the pooled cells; the least level of their cells wins, and what lies beyond the map is
+    unknown."""
     rows, columns = (-(-size // scale) for size in log_odds.shape)
     padded = np.zeros((rows * scale, columns * scale), np.int8)
     padded[: log_odds.shape[0], : log_odds.shape[1]] = log_odds
@@ -34,7 +35,8 @@ def pooled_levels(log_odds, scale):
 
 
 def levels_around(log_odds, row, column, scale, half):
-    """Levels of 2 * half pooled cells a side around the corner of pooled cells that is nearest to a corner of cells."""
+    """Levels of 2 * half pooled cells a side around the corner of pooled cells that is nearest to a corner
+    of cells."""
     padding = 2 * half + 400
     around = np.pad(pooled_levels(log_odds, scale), padding, constant_values=UNKNOWN)
     row, column = (
@@ -45,7 +47,8 @@ def levels_around(log_odds, row, column, scale, half):
 
 
 def turned(log_odds, row, column, heading, scale, cells):
-    """The crop by whole numbers of half steps of 2**-15 cells: each centre is looked up in the pooled cell in which it lies."""
+    """The crop by whole numbers of half steps of 2**-15 cells: each centre is looked up in the pooled cell
+    in which it lies."""
     half = cells
     pooled = levels_around(log_odds, row, column, scale, half)
     step_x, step_y = round(math.cos(heading) * 2**15), round(math.sin(heading) * 2**15)
@@ -156,10 +159,13 @@ def test_crops_of_whole_blocks_are_those_looked_up_cell_by_cell(row, column, hea
 
 def test_a_processor_that_cannot_look_up_in_registers_turns_the_same_crops(tmp_path):
     code = (
-        "import sys, numpy as np; from lidarium.mapping.grids.map_crops import CAN_LOOK_UP_IN_REGISTERS, crop_turned;"
+        "import sys, numpy as np; from lidarium.mapping.grids.map_crops import CAN_LOOK_UP_IN_REGISTERS, "
+        "crop_turned;"
         "cells = np.random.default_rng(4).integers(-1, 2, (100, 128)).astype(np.int8);"
-        "crops = np.zeros((1, 64, 64), np.uint8); pools = np.array([(cells.ctypes.data, 100, 128)], np.int64);"
-        "crop_turned(pools, 70.0, 30.0, 0.7, np.array([1]), crops); assert not CAN_LOOK_UP_IN_REGISTERS; np.save(sys.argv[1], crops)"
+        "crops = np.zeros((1, 64, 64), np.uint8); pools = np.array([(cells.ctypes.data, 100, 128)], "
+        "np.int64);"
+        "crop_turned(pools, 70.0, 30.0, 0.7, np.array([1]), crops); assert not CAN_LOOK_UP_IN_REGISTERS; "
+        "np.save(sys.argv[1], crops)"
     )
     without = {"NUMBA_ENABLE_AVX": "0", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     subprocess.run(

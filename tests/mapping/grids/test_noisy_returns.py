@@ -1,4 +1,5 @@
-"""Returns with noise: those that end just behind a known wall are the wall's; all others stay what they are."""
+"""Returns with noise: those that end just behind a known wall are the wall's; all others stay what they
+are."""
 
 import math
 

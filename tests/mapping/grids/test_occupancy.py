@@ -33,7 +33,8 @@ def rooms(generator, rows=70, columns=90):
 
 
 def exact_ranges(solid, x, y, angles, range_max):
-    """Ranges to the nearest solid square along each beam by intersection with all squares [m], inf where none is in reach."""
+    """Ranges to the nearest solid square along each beam by intersection with all squares [m], inf where
+    none is in reach."""
     rows, columns = np.nonzero(solid)
     low, high = (
         np.stack([columns, rows]) - np.array([[x], [y]]) / RESOLUTION,

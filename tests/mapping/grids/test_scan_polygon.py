@@ -1,4 +1,5 @@
-"""The seen area against its definition, cell by cell: fans between neighbouring beams, cut at the nearer range at edges."""
+"""The seen area against its definition, cell by cell: fans between neighbouring beams, cut at the nearer
+range at edges."""
 
 import math
 
@@ -31,7 +32,8 @@ def fill(ranges, geometry, heading, x, y, reach):
 
 
 def outline(ranges, geometry, directions, x, y):
-    """Corners of the seen polygon, as the module describes it: where no surface can join two ends, the fan ends at the nearer range."""
+    """Corners of the seen polygon, as the module describes it: where no surface can join two ends, the fan
+    ends at the nearer range."""
     beams = len(ranges)
     corners = [] if geometry.is_full_circle else [(x, y)]
     for k in range(beams):
@@ -45,7 +47,8 @@ def outline(ranges, geometry, directions, x, y):
 
 
 def inside_by_rows(shape, corners):
-    """Which cell centres lie inside by the even-odd rule, and which lie on the outline as far as rounding can tell."""
+    """Which cell centres lie inside by the even-odd rule, and which lie on the outline as far as rounding
+    can tell."""
     (ax, ay), (bx, by) = corners.T, np.roll(corners, -1, axis=0).T
     inside, unsure = np.zeros(shape, bool), np.zeros(shape, bool)
     centres = np.arange(shape[1]) + 0.5

@@ -236,7 +236,8 @@ def test_the_serial_and_the_parallel_form_of_a_function_keep_their_code_apart(tm
         "values = np.zeros(64, np.int64)\n"
         "serial(values)\n"
         "parallel(values)\n"
-        "print(values.sum(), sum(serial.stats.cache_hits.values()), sum(parallel.stats.cache_hits.values()))\n"
+        "print(values.sum(), sum(serial.stats.cache_hits.values()), "
+        "sum(parallel.stats.cache_hits.values()))\n"
     )
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     # The parallel form finds nothing that the serial one has left, and the next program finds both.

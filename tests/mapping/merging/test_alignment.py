@@ -184,7 +184,8 @@ def test_nothing_matches_where_there_are_no_corners():
 
 
 def test_the_two_sides_of_a_thin_wall_are_not_laid_on_each_other():
-    """Two robots know a hall, and the room on either side of a wall of 10 cm, whose faces noise has left full of holes."""
+    """Two robots know a hall, and the room on either side of a wall of 10 cm, whose faces noise has left
+    full of holes."""
     side, floor = 0.025, blank(140, 200)
     floor[18:122, 18:182] = 0
     floor[20:50, 20:180] = 255

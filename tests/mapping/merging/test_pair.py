@@ -226,7 +226,8 @@ def test_what_drift_explains_is_excused_where_both_maps_know_a_building():
 
 
 def test_rooms_that_look_alike_are_refused_where_the_building_has_changed():
-    """Moved by a room, one room lies on another and nothing contradicts; but much more speaks for the place that is contradicted."""
+    """Moved by a room, one room lies on another and nothing contradicts; but much more speaks for the
+    place that is contradicted."""
 
     def building():
         levels = blank(140, 300)

@@ -163,7 +163,8 @@ def test_a_path_costs_what_was_said_and_a_disc_driven_along_it_touches_nothing(s
 
 
 def touches_nothing(line, belief, radius):
-    """Whether finely spaced points on a polyline keep ``radius`` cells from all occupied squares and lie in free cells."""
+    """Whether finely spaced points on a polyline keep ``radius`` cells from all occupied squares and lie
+    in free cells."""
     obstacles = np.argwhere(belief > 0)
     for tail, head in pairwise(line):
         steps = np.linspace(0, 1, 8 * int(np.abs(head - tail).max()) + 1)[:, None]

@@ -1,4 +1,6 @@
-"""The program that times VMAS, in an interpreter of its own: it needs vmas and torch, not lidarium.
+"""The program that times VMAS, in an interpreter of its own.
+
+It needs vmas and torch, not lidarium.
 
 VMAS is under the GPL: this file is run as a separate process and nothing of lidarium imports it. It reads one
 line of JSON (boxes, poses, rays, reach, field_of_view, threads, batches) and answers with its version and the

@@ -1,4 +1,6 @@
-"""The bank in a folder: the maps of every drive, each made once, and the pairs of them with what is true of each.
+"""The bank in a folder: the maps of every drive, and pairs of them.
+
+Each map is made once; each pair has what is true of it.
 
 ``maps/`` holds a file for each drive; what is there is not driven again. ``pairs.json`` holds the pairs that
 are asked of a merger.
@@ -24,7 +26,10 @@ from lidarium.mapping.geometry.rigid import Transform
 MAPS_FOLDER, PAIRS_FILE = "maps", "pairs.json"
 
 LIKE_ROOMS_SHARES = (0.12, 0.35, 0.9)
-"""Shares of the floor at which maps are kept in buildings of like rooms: first while the robot has seen little but its own room."""
+"""Shares of the floor at which maps are kept in buildings of like rooms.
+
+At the first share the robot has seen little but its own room.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +127,10 @@ def missing_drives(folder: Path, floors: list[BankFloor]) -> list[Drive]:
 
 
 def fill(folder: Path, floors: list[BankFloor], workers: int) -> Iterator[tuple[Drive, Exception | None]]:
-    """Drive what the bank has not yet, and yield each drive when its maps are on the disk, or the error that it ended with."""
+    """Drive what the bank lacks, and yield each drive once its maps are saved.
+
+    A drive that fails is yielded with the error that it ended with.
+    """
     for done, result in shared_out(partial(_drive_into, folder), missing_drives(folder, floors), workers):
         yield done, result if isinstance(result, Exception) else None
 

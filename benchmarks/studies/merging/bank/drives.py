@@ -1,4 +1,7 @@
-"""Partial maps of robots that really drive: noisy scans, drawn into a map at poses that err a little, as those of a localizer do."""
+"""Partial maps of robots that really drive.
+
+Noisy scans are drawn into a map at poses that err a little, as those of a localizer do.
+"""
 
 import math
 from dataclasses import dataclass
@@ -133,7 +136,10 @@ class _Waves:
 
 
 def bank_settings() -> ExplorationSettings:
-    """Return the settings of the bank's drives: one robot, its laser with 3 cm of noise, maps of 2.5 cm."""
+    """Return the settings of the bank's drives.
+
+    They are one robot, its laser with 3 cm of noise, and maps of 2.5 cm.
+    """
     return make_settings(
         robots=1,
         known_starts=False,
@@ -145,7 +151,10 @@ def bank_settings() -> ExplorationSettings:
 
 
 def bank_starts(floor: Floor, seed: int) -> NDArray[np.float64]:
-    """Return where robots start on a floor, (STARTS, 3) [m, rad]: where the floor proposes, else drawn."""
+    """Return where robots start on a floor, shape (STARTS, 3) [m, rad].
+
+    Starts are those that the floor proposes, else drawn ones.
+    """
     settings = bank_settings()
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     return draw_starts(tables.body, settings.robot.radius, STARTS, np.random.default_rng(seed), floor.starts)

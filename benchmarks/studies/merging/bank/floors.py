@@ -1,4 +1,6 @@
-"""The floors of the bank: generated, drawn and real ones, buildings of like rooms, and copies from which furniture was taken away.
+"""The floors of the bank.
+
+They are generated, drawn and real ones, buildings of like rooms, and copies from which furniture was removed.
 
 Each floor belongs to one half: limits are tuned on the one, figures are quoted on the other. A copy belongs
 to the half of its original.
@@ -118,7 +120,10 @@ def bank_floors(data: Path | None, every: int = 1) -> list[BankFloor]:
 
 
 def without_some_furniture(floor: Floor, seed: int) -> Floor:
-    """Return a floor from which one to three pieces of furniture were taken away that a laser sees and that measure 0.35 m at least."""
+    """Return a floor without one to three of its pieces of furniture.
+
+    Those are pieces that a laser sees and that measure 0.35 m at least.
+    """
     pieces = [
         index
         for index, solid in enumerate(floor.solids)
@@ -138,7 +143,7 @@ def without_some_furniture(floor: Floor, seed: int) -> Floor:
 
 
 def _real_floors(data: Path, least_m2: float, most_m2: float) -> list[Path]:
-    """Return the files of LIFULL apartments that are connected and of some free area [m2].
+    """Return the files of connected LIFULL apartments of some free area [m2].
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Many maps at once: five robots' maps of one floor, and pairs of maps that real robots made."""
+"""Many maps at once, and pairs of real maps.
+
+The many are five robots' maps of one floor; real robots made the pairs.
+"""
 
 import json
 import math
@@ -99,7 +102,10 @@ def _merge_real(folder: Path, truth: dict[str, Any]) -> dict[str, Any]:
 
 
 def transform_of_pixels(pixel: dict[str, float], resolution: float, rows_a: int, rows_b: int) -> Transform:
-    """Return the transform from map b into a of a pair whose truth is q_a = R q_b + t in pixels whose y runs down."""
+    """Return the transform from map b into a of a pair given in pixels.
+
+    Its truth is q_a = R q_b + t in pixels whose y runs down.
+    """
     theta = math.radians(pixel["theta_deg"])
     corner = Transform(pixel["tx"], pixel["ty"], theta).apply((0.0, rows_b))
     return Transform(float(corner[0]) * resolution, (rows_a - float(corner[1])) * resolution, -theta)

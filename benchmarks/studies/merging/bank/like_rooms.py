@@ -1,4 +1,7 @@
-"""Buildings in which rooms look alike: a corridor with equal rooms at both sides, furnished alike but for one piece."""
+"""Buildings in which rooms look alike.
+
+A corridor has equal rooms at both sides, furnished alike but for one piece.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +17,9 @@ SLOTS = 4
 
 
 def like_rooms(seed: int) -> Floor:
-    """Return a corridor with rooms of one size and furniture, which differ by where one piece stands; some do not differ.
+    """Return a corridor with rooms of one size and furniture.
+
+    Rooms differ by where one piece stands; some do not differ.
 
     Parameters
     ----------

@@ -28,19 +28,31 @@ from lidarium.mapping.merging.validation import Agreement, ValidationSettings, c
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
 OVERLAPPING, PLENTY, APART = 0.15, 0.30, 0.02
-"""Overlaps from which maps are positives, from which they overlap plenty, and below which they are of different places."""
+"""Overlaps of positive pairs, of plentiful overlap, and of different places.
+
+From the first on maps are positives, from the second they overlap plenty; below the third they are apart.
+"""
 
 DIFFERENT_M = 1.0
 """Length of walls by which look-alikes differ at least [m]."""
 
 ALIKE_M, ALIKE_SHARE = 5.0, 0.7
-"""What looks alike: so much wall that agrees in truth [m], and such a share of the walls in the overlap."""
+"""Length of agreeing wall [m] and its share from which places look alike.
+
+The wall agrees in truth; the share is of the walls in the overlap.
+"""
 
 AS_WELL = 0.9
-"""A positive is symmetric where another transform lets this share of its walls agree and less than `DIFFERENT_M` differs."""
+"""Share of walls from which another transform makes a positive symmetric.
+
+This share of its walls agrees under the transform, and less than `DIFFERENT_M` differs.
+"""
 
 _SLIDES = [Transform(0.3 * x, 0.3 * y, 0.0) for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-"""Along a corridor of which both maps know no end, every shift explains them as well."""
+"""Shifts tested along a corridor of which both maps know no end.
+
+Every such shift explains them as well.
+"""
 
 _QUARTERS = np.arange(4) * (math.pi / 2.0)
 _TRUTH = ValidationSettings(hit_distance_m=0.05, miss_distance_m=0.1)
@@ -61,7 +73,10 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """A map with the truth of what it knows, in the floor's frame less the raster's origin."""
+    """A map with the truth of what it knows.
+
+    The truth is in the floor's frame less the raster's origin.
+    """
 
     map: BankMap
 
@@ -121,7 +136,10 @@ def choose_pairs(maps: dict[str, BankMap], seed: int = 0, wanted: Wanted | None 
 def overlap_of(
     a: BankMap, b: BankMap, a_from_b: Transform, stride: int = 3
 ) -> tuple[float, tuple[float, float]]:
-    """Return the share of the smaller known area that both maps know, and the centroid of that in map b [m]."""
+    """Return the overlap of two maps, and its centroid in map b [m].
+
+    The overlap is what both maps know, as a share of the smaller known area.
+    """
     rows, columns = np.nonzero(b.levels[::stride, ::stride] != UNKNOWN)
     places = (np.stack([columns, rows], axis=1) * stride + 0.5) * RESOLUTION
     cells = np.floor(a_from_b.apply(places) / RESOLUTION).astype(np.int64)
@@ -178,7 +196,10 @@ def _within_floors(
 
 
 def _copies(known: list[_Known], half: str, wanted: Wanted, generator: np.random.Generator) -> Iterator[Pair]:
-    """Yield pairs of a floor's and its copy's maps: what was taken away between them was seen by both."""
+    """Yield pairs of a floor's and its copy's maps.
+
+    What was removed between them was seen by both.
+    """
     room = {"look_alike": wanted.copies, "indistinct": wanted.indistinct}
     originals = [one for one in known if not one.map.floor.is_copy]
     copies = [one for one in known if one.map.floor.is_copy]
@@ -211,7 +232,10 @@ def _across_floors(
 
 
 def _judged_negative(pair: Pair, a: _Known, b: _Known) -> Pair:
-    """Return a pair of two places as what it looks like: it can be decided where every overlay that looks alike differs somewhere."""
+    """Return a pair of two places in the category of what it looks like.
+
+    It can be decided where every overlay that looks alike differs somewhere.
+    """
     looks = [one for _, one in _alignments(a, b) if one.agreeing_m >= ALIKE_M and one.hit_rate >= ALIKE_SHARE]
     if not looks:
         return replace(pair, category="negative")
@@ -222,7 +246,10 @@ def _judged_negative(pair: Pair, a: _Known, b: _Known) -> Pair:
 
 
 def _is_symmetric(a: _Known, b: _Known) -> bool:
-    """Return whether another transform explains what is true of two maps of one floor as well as the true one."""
+    """Return whether another transform explains two maps as well as the true one.
+
+    The maps are of one floor; what is true of them is compared.
+    """
     truth = compare(a.truth, b.truth, Transform(), _TRUTH)
     slides = [(slide, compare(a.truth, b.truth, slide, _TRUTH)) for slide in _SLIDES]
     for transform, agreement in [*slides, *_alignments(a, b)]:
@@ -238,7 +265,10 @@ def _is_symmetric(a: _Known, b: _Known) -> bool:
 
 
 def _alignments(a: _Known, b: _Known) -> list[tuple[Transform, Agreement]]:
-    """Return the transforms under which the truth of two maps looks most alike, and how much."""
+    """Return the transforms under which the truth of two maps looks most alike.
+
+    How alike it looks is returned, too.
+    """
     transforms, values = best_translations(a.truth, b.truth, _QUARTERS, _SEARCH)
     order = np.argsort(-values, kind="stable")
     middle: NDArray[np.float64] = b.truth.walls.mean(axis=0) if len(b.truth.walls) else np.zeros(2)

@@ -1,4 +1,5 @@
-"""The store: arrays by key that are whole or not there, bounded on disk, shared by processes, never needed."""
+"""The store: arrays by key that are whole or not there, bounded on disk, shared by processes, never
+needed."""
 
 import ast
 import os

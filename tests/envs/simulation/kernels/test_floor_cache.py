@@ -1,4 +1,5 @@
-"""Tables of floors are the same from the cache, the store and made anew; the cache is bounded and never makes twice."""
+"""Tables of floors are the same from the cache, the store and made anew; the cache is bounded and never
+makes twice."""
 
 import copy
 import gc
@@ -248,7 +249,8 @@ def test_another_process_finds_what_this_one_made(own_store, tmp_path):
         "from lidarium.envs.simulation.kernels.floor_tables import FloorTables\n"
         "catalogue.generate_building = FloorTables.of_floor = None\n"
         f"tables = floor_tables(catalogue.load_floor('building:5'), *{HEIGHTS})\n"
-        "np.savez(sys.argv[1], squares=tables.rays.squares, faces=tables.rays.faces, bound=tables.bound, solid=tables.laser.solid)\n"
+        "np.savez(sys.argv[1], squares=tables.rays.squares, faces=tables.rays.faces, bound=tables.bound, "
+        "solid=tables.laser.solid)\n"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "found.npz")], check=True)
     found = np.load(tmp_path / "found.npz")

@@ -1,4 +1,5 @@
-"""Bodies against a slow reference: arcs by tiny steps, contact of discs with squares and discs by plain geometry."""
+"""Bodies against a slow reference: arcs by tiny steps, contact of discs with squares and discs by plain
+geometry."""
 
 import math
 

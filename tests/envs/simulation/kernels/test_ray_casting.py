@@ -1,4 +1,5 @@
-"""Both ray casters against a slow traversal of the cells, on every kind of floor and in every awkward direction."""
+"""Both ray casters against a slow traversal of the cells, on every kind of floor and in every awkward
+direction."""
 
 import math
 
@@ -26,7 +27,8 @@ CORNER = 5e-9
 
 
 def reach_bounds(solid, x, y, dx, dy, reach):
-    """Least and greatest range [cells] that a ray may have, cell by cell: they differ where it runs along or through a corner."""
+    """Least and greatest range [cells] that a ray may have, cell by cell: they differ where it runs along
+    or through a corner."""
     lower = math.inf
     columns, rows = _lanes(x, dx), _lanes(y, dy)
     step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
@@ -61,7 +63,8 @@ def reach_bounds(solid, x, y, dx, dy, reach):
 
 
 def _lanes(position, direction):
-    """Cells beside each other in which the ray begins: two where it runs along a lattice line, or starts on one."""
+    """Cells beside each other in which the ray begins: two where it runs along a lattice line, or starts
+    on one."""
     cell = math.floor(position)
     if abs(position - round(position)) < 1e-9 and abs(direction) < 1e-12:
         return [round(position) - 1, round(position)]

@@ -153,7 +153,8 @@ def test_odometry_holds_the_pose_where_walls_do_not():
 
 
 def test_a_wall_that_goes_on_beyond_the_map_holds_no_one_back():
-    """The map ends soon ahead of where it was made; a scan farther on sees more of the walls than the map has."""
+    """The map ends soon ahead of where it was made; a scan farther on sees more of the walls than the map
+    has."""
     walls = np.array([(-30, -1, 30, -1), (-30, 1, 30, 1)], float)
     submap = Submap(SUBMAPS, 14.0)
     submap.insert(np.zeros(3), cast(walls, np.zeros(3)), GEOMETRY, 3.0)

@@ -27,7 +27,8 @@ def surveyed():
 
 
 def led(compass, nodes, drift, turns=0.0, seed=0):
-    """Lead a robot through a room while its heading drifts at each node; return by how much it is off, and its variance."""
+    """Lead a robot through a room while its heading drifts at each node; return by how much it is off, and
+    its variance."""
     generator = np.random.default_rng(seed)
     true, believed, variance = 0.0, 0.0, 0.0
     for node in range(1, nodes + 1):

@@ -76,7 +76,8 @@ def test_wheels_that_do_not_err_are_not_corrected(distance, turn):
 
 
 def test_a_robot_that_knows_its_wheels_keeps_its_way_along_a_bare_corridor():
-    """Doors show the way at first; then 12 m of two bare walls follow, and wheels tell 6 % too little all the time."""
+    """Doors show the way at first; then 12 m of two bare walls follow, and wheels tell 6 % too little all
+    the time."""
     door = [(x, 1.0, x, 1.6) for x in (1.0, 1.9, 4.0, 4.9, 6.5, 7.4)] + [
         (1.0, 1.6, 1.9, 1.6),
         (4.0, 1.6, 4.9, 1.6),

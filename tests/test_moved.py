@@ -1,0 +1,59 @@
+"""Old names of modules still work for one release, and warn."""
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+from lidarium.moved import MOVED, MOVED_NAMES
+
+
+@pytest.mark.parametrize("old", sorted(MOVED))
+def test_a_module_that_has_moved_is_found_by_its_old_name(old):
+    sys.modules.pop(f"lidarium.{old}", None)
+    with pytest.warns(DeprecationWarning, match=f"lidarium.{old} has moved to lidarium.{MOVED[old][0]}"):
+        module = importlib.import_module(f"lidarium.{old}")
+    for place in MOVED[old]:
+        new = importlib.import_module(f"lidarium.{place}")
+        names = [
+            name for name, thing in vars(new).items() if getattr(thing, "__module__", "") == new.__name__
+        ]
+        for name in names:
+            assert getattr(module, name) is getattr(new, name)
+    sys.modules.pop(f"lidarium.{old}", None)
+
+
+@pytest.mark.parametrize(
+    ("old", "name", "new"),
+    [
+        ("agents.policy", "make_policy", "agents.catalogue"),
+        ("envs.floors.catalogue", "load_floor", "envs.floors.catalogue.names"),
+        ("envs.settings", "LIDARS", "envs.settings.lidar"),
+        ("evaluation.truth", "truth_of", "evaluation.truth.true_map"),
+        ("mapping.files", "write_whole", "mapping.files.output"),
+        ("mapping.kernels", "vector_at", "mapping.kernels.views"),
+        ("mapping.localization.slam", "Slam", "mapping.localization.slam.localizer"),
+    ],
+)
+def test_a_name_that_has_moved_is_found_where_it_was(old, name, new):
+    assert f"{new}" in MOVED_NAMES[old]
+    with pytest.warns(DeprecationWarning, match=f"lidarium.{old}.{name} has moved"):
+        found = getattr(importlib.import_module(f"lidarium.{old}"), name)
+    assert found is getattr(importlib.import_module(f"lidarium.{new}"), name)
+
+
+def test_what_never_was_is_still_not_found():
+    with pytest.raises(ModuleNotFoundError, match="lidarium.nothing"):
+        importlib.import_module("lidarium.nothing")
+    with pytest.raises(ImportError, match="cannot import name 'nothing'"):
+        exec("from lidarium.mapping.kernels import nothing")
+
+
+def test_the_warning_names_the_line_that_imports(tmp_path):
+    script = tmp_path / "old.py"
+    script.write_text("import lidarium\nfrom lidarium.mapping.rigid import Transform\nprint(Transform())\n")
+    result = subprocess.run(
+        [sys.executable, "-W", "always", str(script)], capture_output=True, text=True, check=True
+    )
+    assert f"{script}:2: DeprecationWarning: lidarium.mapping.rigid has moved" in result.stderr
