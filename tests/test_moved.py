@@ -44,7 +44,7 @@ def test_a_name_that_has_moved_is_found_where_it_was(old, name, new):
 
 
 def test_what_never_was_is_still_not_found():
-    with pytest.raises(ModuleNotFoundError, match="lidarium.nothing"):
+    with pytest.raises(ModuleNotFoundError, match=r"lidarium\.nothing"):
         importlib.import_module("lidarium.nothing")
     with pytest.raises(ImportError, match="cannot import name 'nothing'"):
         exec("from lidarium.mapping.kernels import nothing")

@@ -1,17 +1,14 @@
 #!/usr/bin/env bash
-# Check types with mypy and pyright. The package's folders lie at the root of the repository, so both look at build/types: the
-# package as it is installed, made of links to the sources. Links to files, not to folders: pyright skips linked folders.
+# Check types with mypy and pyright. Both look at src/lidarium, where an editable install links the root folders.
 # Usage: scripts/dev/typecheck.sh [bin folder of the virtual environment, with a slash at its end]
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 tools="${1:-}"
 
-rm -rf build/types
-mkdir -p build/types/lidarium
-cp -rs "$PWD/src/lidarium/." build/types/lidarium/
-for folder in envs agents mapping evaluation benchmarks scripts; do
-    cp -rs "$PWD/$folder" build/types/lidarium/
-done
+if [ ! -e src/lidarium/envs ]; then
+    echo "src/lidarium/envs is missing; run pip install -e . first" >&2
+    exit 2
+fi
 
 # The node of the system, where there is one; else pyright fetches its own.
 if command -v node > /dev/null; then

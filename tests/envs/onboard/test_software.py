@@ -170,7 +170,7 @@ def test_realism_is_what_its_preset_says_but_for_what_is_given():
 
 
 def test_unknown_names_are_refused_with_those_that_are_known():
-    with pytest.raises(ValueError, match="unknown realism 'moon'.*ideal, lab, field"):
+    with pytest.raises(ValueError, match=r"unknown realism 'moon'.*ideal, lab, field"):
         make_settings(realism="moon")
     with pytest.raises(ValueError, match="unknown odometry 'rusty'"):
         make_settings(odometry="rusty")

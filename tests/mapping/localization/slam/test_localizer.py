@@ -304,7 +304,7 @@ def test_localizers_are_made_by_name(name):
 
 
 def test_names_without_localizer_are_refused():
-    with pytest.raises(ValueError, match="unknown localizer 'gps'.*known: odometry, slam"):
+    with pytest.raises(ValueError, match=r"unknown localizer 'gps'.*known: odometry, slam"):
         make_localizer("gps", GEOMETRY)
 
 
