@@ -7,7 +7,7 @@ import copy
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
@@ -17,16 +17,21 @@ from pettingzoo import ParallelEnv
 from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
+from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
-from lidarium.envs.outcome.scorer import Scorer, is_near
+from lidarium.envs.outcome.endings import COVERED, HORIZON, REASONS, make_rules, note_endings
+from lidarium.envs.outcome.scorer import Scorer
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, read_options
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.station.reports import Station
 from lidarium.mapping.kernels.compilation import Array, kernel
+
+if TYPE_CHECKING:
+    from lidarium.envs.drawing.rendering import Scene
 
 Observation = dict[str, NDArray[Any]]
 
@@ -115,7 +120,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self.simulation.score,
         )
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
-        self._horizon = self.settings.horizon_steps
+        self._rules = make_rules(self.simulation, self.settings)
+        self._reasons = np.zeros(self.settings.robots, np.int8)
         self._generator: np.random.Generator | None = None
         self._offsets = np.zeros((self.settings.robots, 2))
         self._goals = np.full((self.settings.robots, 2), np.nan)
@@ -133,11 +139,15 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a
         # tenth of a step.
         self._step = self._software.step if self._software.is_staged else self.simulation.step
-        self._may_fail, self._is_battery_limited = self.settings.may_fail, self.settings.battery.is_limited
+        self._is_battery_limited = self.settings.battery.is_limited
         self._meters = self.perception.meters = Meters(self.world, self.settings)
         self.station = Station(self.perception, self._meters)
         self.operating = self.station.operating
         self._stopping = self.operating.stopping
+
+    def belief(self, agent: str) -> Belief:
+        """Return the handle on what an agent's onboard software knows."""
+        return Belief(self.perception, self._rows[agent])
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations, the same object at each call."""
@@ -179,6 +189,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._goals[:] = goal_of_robots(beginning, self.settings)
         self._commands[:] = 0.0
         self.agents = self.possible_agents[:]
+        self._rules.live[:], self._rules.is_empty[:] = True, False
+        self._rules.goals[0] = np.nan if self.goal is None else self.goal
         self.perception.start(self.goal)
         self._software.start(0, beginning.seed)
         self._meters.start()
@@ -301,6 +313,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                     )
                     self.world.moves[rows[agent]] = 0
                     self.world.flags[rows[agent]] |= ENDED
+                    self._rules.live[rows[agent]] = False
                     self._note_ending(agent, infos[agent])
             self.agents = [] if is_truncated else [agent for agent in live if agent not in endings]
         if self.render_mode == "human":
@@ -318,37 +331,15 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         if info["ended_because"] == "battery":
             self.world.failed[row] = 1
 
-    def is_over(self) -> bool:
-        """Whether the next outcome ends all agents (covered or at the horizon)."""
-        horizon, cover = self._horizon, self.settings.stop_coverage
-        steps = int(self.world.steps[0])
-        return (horizon is not None and steps >= horizon) or (
-            cover is not None and self.scorer.coverage >= cover
-        )
+    def ends_now(self) -> bool:
+        """Whether the next outcome ends an agent, or a robot has paused by itself."""
+        self._note_energy()
+        count = note_endings(self.simulation.table, self.settings.robots, self._rules, self._reasons)
+        return bool(count) or self.operating.is_interrupting
 
-    def has_event(self) -> bool:
-        """Whether something happened to an agent.
-
-        It is the goal reached, a collision, a fault, no energy left, or a pause by itself.
-        """
-        settings = self.settings
-        is_at_goal = self.goal is not None and any(
-            self._is_at_goal(self._rows[agent]) for agent in self.agents
-        )
-        has_failed = self._may_fail and self._is_any_live(self.world.failed)
-        is_empty = self._meters.is_active and self._is_any_live(self._meters.is_empty)
-        has_touched = settings.stop_on_contact and bool(self.scorer.touched.any())
-        return is_at_goal or has_failed or is_empty or has_touched or self.operating.is_interrupting
-
-    def _is_any_live(self, mask: NDArray[Any]) -> bool:
-        """Whether any live agent's row of a mask (robots,) is set."""
-        return any(mask[self._rows[agent]] for agent in self.agents)
-
-    def _is_at_goal(self, row: int) -> bool:
-        assert self.goal is not None
-        return bool(
-            is_near(self.world.poses[row, 0], self.world.poses[row, 1], *self.goal, self.settings.goal_radius)
-        )
+    def _note_energy(self) -> None:
+        if self._is_battery_limited:
+            self._rules.is_empty[:] = self._meters.is_empty
 
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason.
@@ -379,26 +370,20 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def _endings(self, live: Sequence[str]) -> tuple[dict[str, str], bool]:
         """Return why agents end now, and whether the horizon cuts the episode."""
-        settings = self.settings
-        if settings.stop_coverage is not None and self.scorer.coverage >= settings.stop_coverage:
-            return dict.fromkeys(live, "covered"), False
-        endings = (
-            {agent: reason for agent, reason in self._stopping.items() if agent in live}
-            if self._stopping
-            else {}
-        )
-        self._stopping.clear()
-        if self.goal is not None:
-            for agent in live:
-                if self._is_at_goal(self._rows[agent]):
-                    endings[agent] = "reached"
-        if settings.stop_on_contact and self.scorer.touched.any():
-            endings |= {agent: "collision" for agent in live if self.scorer.touched[self._rows[agent]]}
-        if self._meters.is_active and self._meters.is_empty.any():
-            endings |= {agent: "battery" for agent in live if self._meters.is_empty[self._rows[agent]]}
-        if self._may_fail and self.world.failed.any():
-            endings |= {agent: "failed" for agent in live if self.world.failed[self._rows[agent]]}
-        return endings, self._horizon is not None and int(self.world.steps[0]) >= self._horizon
+        self._note_energy()
+        count = note_endings(self.simulation.table, self.settings.robots, self._rules, self._reasons)
+        if not count and not self._stopping:
+            return {}, False
+        endings = {agent: reason for agent, reason in self._stopping.items() if agent in live}
+        is_truncated = False
+        for agent in live:
+            number = int(self._reasons[self._rows[agent]])
+            is_truncated |= number == HORIZON
+            if number not in (0, HORIZON):
+                endings[agent] = REASONS[number]
+        if COVERED not in self._reasons:
+            self._stopping.clear()
+        return endings, is_truncated
 
     def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:
         arrays = self._writer.write()
@@ -451,13 +436,21 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             return None
         if self.floor is None:
             raise RuntimeError("the environment was not reset; call reset() before render()")
-        frame = draw_frame(self)
+        frame = draw_frame(self.scene())
         if self.render_mode == "rgb_array":
             return frame
         if self._window is None:
             self._window = FrameWindow(f"lidarium: {self.floor.name}")
         self._window.show(frame)
         return None
+
+    def scene(self) -> "Scene":
+        """Return what a frame shows of the environment."""
+        from lidarium.envs.drawing.rendering import Scene
+
+        has_ended = [agent not in self.agents for agent in self.possible_agents]
+        name = "" if self.floor is None else self.floor.name
+        return Scene(self.simulation, self.scorer, self.settings, name, has_ended)
 
     def close(self) -> None:
         """Close the window, if there is one; closing again does nothing."""

@@ -19,7 +19,6 @@ from lidarium.envs.batch.running import (
     LOOKS,
     STEPS,
     WAITS,
-    Tally,
     begin_decisions,
     follow_some,
     note_ends,
@@ -31,7 +30,7 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, observation_space
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
-from lidarium.envs.outcome.endings import HORIZON, REASONS, endings
+from lidarium.envs.outcome.endings import HORIZON, REASONS, make_rules, note_endings
 from lidarium.envs.outcome.reward_terms import ExtraTerms
 from lidarium.envs.radio.messages import OperatingState
 from lidarium.envs.scoring.rewards import TERMS
@@ -138,26 +137,14 @@ class EpisodeBatch:
         self._copy = copy
         self._buffers = [self._new_buffers(), self._new_buffers()]
         self.observations = self._buffers[0]
-        self.live, self.acted = np.zeros(self.rows, np.bool_), np.zeros(self.rows, np.bool_)
+        self.acted = np.zeros(self.rows, np.bool_)
         self.reasons = np.zeros(self.rows, np.int8)
         self.infos: dict[str, Any] = {}
-        self.is_whole, self.has_endings, self._has_goals = False, False, False
+        self.is_whole, self.has_endings = False, False
         self.floors: list[Floor | None] = [None] * self.episodes
         self._generators: list[np.random.Generator | None] = [None] * self.episodes
-        horizon, cover = settings.horizon_steps, settings.stop_coverage
-        bounds = (
-            np.inf if horizon is None else horizon,
-            np.inf if cover is None else cover,
-            settings.goal_radius,
-            settings.stop_on_contact,
-        )
-        self._tally = Tally(
-            self.score.counted,
-            np.full((self.episodes, 2), np.nan),
-            np.array(bounds, np.float64),
-            self.live,
-            np.zeros(self.rows, np.bool_),
-        )
+        self._rules, self._waiting = make_rules(self.simulation, settings), np.zeros(self.rows, np.bool_)
+        self.live = self._rules.live
         self._commands = np.zeros((self.rows, 2))
         # What is told of all rows alike at most steps is one array that cannot be written to, not a new one
         # each time.
@@ -226,10 +213,7 @@ class EpisodeBatch:
         if begins:
             for episode, start in self._draw(beginning, seeds, options or {}).items():
                 self._place(episode, start)
-            self.is_whole, self._has_goals = (
-                bool(self.live.all()),
-                not bool(np.isnan(self._tally.goals[:, 0]).all()),
-            )
+            self.is_whole = bool(self.live.all())
             self._note_states(
                 np.repeat(np.isin(np.arange(self.episodes), beginning), robots),
                 OperatingState.OPERATING.value,
@@ -249,10 +233,7 @@ class EpisodeBatch:
             self.score.rewards[~acted], self.score.reward_terms[~acted] = 0.0, 0.0
             earned = {name: np.where(acted, amounts, 0.0) for name, amounts in earned.items()}
         self.acted = acted
-        self.reasons = endings(
-            self.simulation, self.settings, self._tally.goals if self._has_goals else None, acted, stopping
-        )
-        self.has_endings = bool(self.reasons.any())
+        self._note_endings(acted, stopping)
         if self.has_endings:
             ended = self.reasons != 0
             self.is_whole = False
@@ -261,6 +242,17 @@ class EpisodeBatch:
             self.world.flags[ended] |= ENDED
         terms = dict(zip(TERMS, self.score.reward_terms.T.copy(), strict=True))
         self._tell(seen, {**terms, **earned})
+
+    def _note_endings(self, acted: NDArray[np.bool_], stopping: NDArray[np.int8] | None) -> None:
+        """Note why robots that took part in the step end; what happens to them counts before their own reasons."""
+        self.reasons = np.zeros(self.rows, np.int8)
+        count = note_endings(self.simulation.table, self.robots, self._rules, self.reasons)
+        if count:
+            self.reasons[~acted] = 0
+        if stopping is not None:
+            own = acted & (stopping != 0) & ((self.reasons == 0) | (self.reasons == HORIZON))
+            self.reasons[own] = stopping[own]
+        self.has_endings = bool(self.reasons.any())
 
     def run_kernel(
         self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]
@@ -293,7 +285,8 @@ class EpisodeBatch:
             commands,
             self.level.drives,
             self.level.following,
-            self._tally,
+            self._rules,
+            self._waiting,
             self.settings.decision_steps,
             seen,
             *self._writer.arguments(self.observations),
@@ -311,7 +304,7 @@ class EpisodeBatch:
         """
         decides = modes == DECIDES
         left = np.where(decides, self.settings.decision_steps, 1)
-        begin_decisions(decides, self.robots, self.level.drives, self._tally)
+        begin_decisions(decides, self.robots, self.level.drives, self._waiting)
         looks = modes == LOOKS
         if looks.any():
             self._software.step(commands, moves_bodies=False, runs=looks)
@@ -326,7 +319,9 @@ class EpisodeBatch:
                 commands,
             )
             self._software.step(commands, runs=runs)
-            note_ends(modes, self.robots, self.simulation.table, self.level.drives, self._tally)
+            note_ends(
+                modes, self.robots, self.simulation.table, self.level.drives, self._rules, self._waiting
+            )
             left[runs] -= 1
             modes[left == 0] = WAITS
         self._writer.write(self.observations, seen)
@@ -359,7 +354,7 @@ class EpisodeBatch:
         self.floors[episode] = start.floor
         self._offsets[rows] = map_frames(start, self.settings)
         self._goals[rows] = goal_of_robots(start, self.settings)
-        self._tally.goals[episode] = np.nan if start.goal is None else start.goal
+        self._rules.goals[episode] = np.nan if start.goal is None else start.goal
         self._commands[rows], self.live[rows] = 0.0, True
         self._extra.start(self.world, episode)
         self.perception.start(start.goal, episode)

@@ -5,7 +5,8 @@ They show what is explored, the robots and what their lasers see.
 
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -30,18 +31,42 @@ from lidarium.envs.drawing.frame_parts import (
     view_around,
     with_header,
 )
-from lidarium.envs.outcome.scorer import TRACK_PERIOD_S
+from lidarium.envs.outcome.scorer import TRACK_PERIOD_S, Scorer
 from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
-
-if TYPE_CHECKING:
-    from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.simulation.simulation import Simulation
 
 _NEAR = 0.125
 _FAN_OPACITY = 0.22
 _SOLID, _WALL, _UNEXPLORED, _NOT_COUNTED, _EXPLORED = range(5)
 PALETTE = np.array([BACKGROUND, WALL, UNEXPLORED, NOT_COUNTED, EXPLORED], np.uint8)
 """Colours of what `classify` returns."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What a frame shows.
+
+    Attributes
+    ----------
+    simulation : Simulation
+        Whose first episode.
+    scorer : Scorer
+        Its tally.
+    settings : ExplorationSettings
+        The team.
+    name : str
+        The floor's.
+    has_ended : list of bool
+        Which robots have ended.
+    """
+
+    simulation: Simulation
+    scorer: Scorer
+    settings: ExplorationSettings
+    name: str
+    has_ended: list[bool]
 
 
 def view_of(tables: FloorTables, size: int) -> View:
@@ -54,7 +79,7 @@ def view_of(tables: FloorTables, size: int) -> View:
 
 
 def draw_frame(
-    env: "ExplorationEnv", size: int = SIZE, draw_over: Callable[[Frame, View], None] | None = None
+    scene: Scene, size: int = SIZE, draw_over: Callable[[Frame, View], None] | None = None
 ) -> Frame:
     """Draw an environment from above.
 
@@ -64,8 +89,8 @@ def draw_frame(
 
     Parameters
     ----------
-    env : ExplorationEnv
-        After ``reset``.
+    scene : Scene
+        After a ``reset``.
     size : int
         Longer side of the floor in the frame [pixels], at least 64.
     draw_over : callable or None
@@ -83,33 +108,35 @@ def draw_frame(
     """
     if size < 64:
         raise ValueError(f"size of the frame is {size} pixels; want at least 64")
-    tables = env.world.floors[0]
+    tables = scene.simulation.world.floors[0]
     if tables is None:
         raise ValueError("the environment was not reset, there is nothing to draw; call reset() first")
     view = view_of(tables, size)
-    frame = _draw_floor(env, tables, view)
-    colours = team_colours(env.settings.robots)
-    _draw_fans(frame, env, view, colours)
-    recent = env.scorer.track[-round(RECENT_S / TRACK_PERIOD_S) :]
+    frame = _draw_floor(scene, tables, view)
+    colours = team_colours(scene.settings.robots)
+    _draw_fans(frame, scene, view, colours)
+    recent = scene.scorer.track[-round(RECENT_S / TRACK_PERIOD_S) :]
     draw_paths(
-        frame, view, np.stack([poses[:, :2] for _, poses in recent] + [env.world.poses[:, :2]]), colours
+        frame,
+        view,
+        np.stack([poses[:, :2] for _, poses in recent] + [scene.simulation.world.poses[:, :2]]),
+        colours,
     )
-    has_ended = [agent not in env.agents for agent in env.possible_agents]
-    draw_robots(frame, view, env.world.poses, env.settings.robot.radius, has_ended, colours)
+    draw_robots(
+        frame, view, scene.simulation.world.poses, scene.settings.robot.radius, scene.has_ended, colours
+    )
     if draw_over is not None:
         draw_over(frame, view)
-    return with_header(
-        frame, "" if env.floor is None else env.floor.name, env.scorer.coverage, env.scorer.time
-    )
+    return with_header(frame, scene.name, scene.scorer.coverage, scene.scorer.time)
 
 
-def _draw_floor(env: "ExplorationEnv", tables: FloorTables, view: View) -> Frame:
+def _draw_floor(scene: Scene, tables: FloorTables, view: View) -> Frame:
     raster = tables.laser
-    multiple = round(env.settings.occupancy.resolution / raster.resolution)
+    multiple = round(scene.settings.occupancy.resolution / raster.resolution)
     solid = _shrunk(raster.solid[view.rows, view.columns], view.block)
     seen, counted = (
         _shrunk(_on_raster(mask, raster.solid.shape, multiple)[view.rows, view.columns], view.block)
-        for mask in (env.score.team_masks[0], env.score.counted_masks[0])
+        for mask in (scene.simulation.score.team_masks[0], scene.simulation.score.counted_masks[0])
     )
     picture = PALETTE[classify(solid, seen, counted, raster.resolution * view.block)]
     return enlarged(picture, view)
@@ -165,14 +192,14 @@ def classify(
     return classes
 
 
-def _draw_fans(frame: Frame, env: "ExplorationEnv", view: View, colours: list[Colour]) -> None:
-    lidar, world = env.settings.lidar, env.world
+def _draw_fans(frame: Frame, scene: Scene, view: View, colours: list[Colour]) -> None:
+    lidar, world = scene.settings.lidar, scene.simulation.world
     tinted = frame.copy()
     for robot, colour in enumerate(colours):
         x, y, theta = world.poses[robot]
         # No return is drawn to the greatest range, an invalid beam not at all.
         lengths = np.clip(
-            np.nan_to_num(env.simulation.ranges[robot].astype(np.float64), nan=0.0, posinf=lidar.range_max),
+            np.nan_to_num(scene.simulation.ranges[robot].astype(np.float64), nan=0.0, posinf=lidar.range_max),
             0.0,
             lidar.range_max,
         )

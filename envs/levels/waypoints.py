@@ -106,11 +106,7 @@ class WaypointExploration(DecisionWrapper):
             waiting = {row for row in rows.values() if driver.is_done(row)}
             for _ in range(env.settings.decision_steps):
                 env.drive_at(driver.commands())
-                if (
-                    env.is_over()
-                    or env.has_event()
-                    or any(driver.is_done(row) and row not in waiting for row in rows.values())
-                ):
+                if env.ends_now() or any(driver.is_done(row) and row not in waiting for row in rows.values()):
                     break
         else:
             env.drive_at(np.zeros((env.settings.robots, 2)))

@@ -1,39 +1,13 @@
 """What a policy may look at of what one robot knows."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.teammate import Teammate
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
-
-if TYPE_CHECKING:
-    from lidarium.envs.onboard.perception import Perception
-
-
-@dataclass(frozen=True, slots=True)
-class Teammate:
-    """What a robot knows of another.
-
-    Attributes
-    ----------
-    pose : (3,) float64
-        x, y, theta in the knowing robot's map frame [m, rad].
-    age_s : float
-        Age of the news [s].
-    radius : float
-        Radius of the body [m].
-    has_ended : bool
-        Whether it has ended and stands where it is.
-    """
-
-    pose: NDArray[np.float64]
-    age_s: float
-    radius: float
-    has_ended: bool
 
 
 class Belief:
@@ -52,7 +26,7 @@ class Belief:
         Which robot: episode * robots + robot.
     """
 
-    def __init__(self, perception: "Perception", row: int) -> None:
+    def __init__(self, perception: Perception, row: int) -> None:
         self._perception, self._row = perception, row
 
     @property

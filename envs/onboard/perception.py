@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.onboard.belief import Belief as Belief
-from lidarium.envs.onboard.belief import Teammate as Teammate
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.navigation import (
     CLEARANCE_LIMIT,
@@ -29,6 +27,7 @@ from lidarium.envs.onboard.navigation import (
     sum_maps,
     sum_team,
 )
+from lidarium.envs.onboard.teammate import Teammate
 from lidarium.envs.radio.exchange import NEVER, Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
@@ -161,10 +160,6 @@ class Perception:
         if threads > 1:
             use_threads(self._threads)
         return threads
-
-    def belief(self, agent: str, episode: int = 0) -> Belief:
-        """Return the handle on what an agent knows."""
-        return Belief(self, episode * self._robots + self.settings.agents.index(agent))
 
     def episode_of(self, row: int) -> int:
         """Return the episode of a row."""
@@ -497,3 +492,10 @@ class Perception:
             for navigation, record in zip(maps, records, strict=True):
                 if navigation is not None:
                     navigation.keep_record_in(record)
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -1,63 +1,117 @@
-"""Reasons of the robots' ends, for all rows at once.
+"""Why robots end: one rule for each reason, for kernels and for whole batches."""
 
-They follow the rules of ``ExplorationEnv``, to the letter.
-"""
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.kernels.arrays import WorldArrays, world_at
 from lidarium.envs.simulation.simulation import Simulation
+from lidarium.mapping.kernels.compilation import Array, kernel
 
-REASONS = ("", "covered", "reached", "collision", "horizon", "no_frontier", "frontier_unreachable", "failed")
-"""Why a robot ended, by number; 0 where it has not."""
+REASONS = (
+    "",
+    "covered",
+    "failed",
+    "battery",
+    "collision",
+    "reached",
+    "horizon",
+    "no_frontier",
+    "frontier_unreachable",
+)
+"""Why a robot ended, by number; 0 where it has not. Of several of the first six the first counts."""
 
-COVERED, REACHED, COLLISION, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE, FAILED = range(1, len(REASONS))
+_, COVERED, FAILED, BATTERY, COLLISION, REACHED, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE = range(
+    len(REASONS)
+)
 
 
-def endings(
-    simulation: Simulation,
-    settings: ExplorationSettings,
-    goals: NDArray[np.float64] | None,
-    live: NDArray[np.bool_],
-    stopping: NDArray[np.int8] | None,
-) -> NDArray[np.int8]:
-    """Return why live robots end now, by number in ``REASONS``, shape (rows,).
+class Rules(NamedTuple):
+    """What ends the robots of all episodes.
 
-    Parameters
+    Attributes
     ----------
-    simulation : Simulation
-        What has happened.
-    settings : ExplorationSettings
-        What ends an episode.
-    goals : (episodes, 2) float64 or None
-        Goals in the floor's frame [m], nan for none; None where no episode has one.
+    counted : (episodes,) int64
+        Size of F.
+    goals : (episodes, 2) float64
+        Goal in the floor's frame [m], nan for none.
+    bounds : (4,) float64
+        Steps of the horizon and coverage at which all end (inf for none), radius of the goal [m], and whether
+        a contact ends: see ``HORIZON_STEPS`` and the following.
     live : (rows,) bool
-        Who has not ended and took part in the step.
-    stopping : (rows,) int8 or None
-        Why robots end of themselves, 0 where they do not; None where nobody does.
+        Which robots have not ended.
+    is_empty : (rows,) bool
+        Which robots have no energy left.
     """
-    robots, world = settings.robots, simulation.world
-    reasons = np.zeros(len(live), np.int8) if stopping is None else np.where(live, stopping, np.int8(0))
-    if goals is not None:
-        away = world.poses[:, :2] - np.repeat(goals, robots, axis=0)
-        with np.errstate(invalid="ignore"):
-            is_there = (
-                away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1]
-                <= settings.goal_radius * settings.goal_radius
-            )
-        reasons[live & is_there] = REACHED
-    if settings.stop_on_contact:
-        reasons[live & (world.contacts != 0)] = COLLISION
-    if settings.may_fail:
-        reasons[live & (world.failed != 0)] = FAILED
-    horizon = settings.horizon_steps
-    if horizon is not None:
-        is_late = world.steps >= horizon
-        if is_late.any():
-            reasons[live & (reasons == 0) & np.repeat(is_late, robots)] = HORIZON
-    if settings.stop_coverage is not None:
-        is_covered = simulation.score.coverages() >= settings.stop_coverage
-        if is_covered.any():
-            reasons[live & np.repeat(is_covered, robots)] = COVERED
-    return reasons
+
+    counted: NDArray[np.int64]
+    goals: NDArray[np.float64]
+    bounds: NDArray[np.float64]
+    live: NDArray[np.bool_]
+    is_empty: NDArray[np.bool_]
+
+
+HORIZON_STEPS, STOP_COVERAGE, GOAL_RADIUS, STOPS_ON_CONTACT = range(4)
+"""Places in ``Rules.bounds``."""
+
+
+def make_rules(simulation: Simulation, settings: ExplorationSettings) -> Rules:
+    """Return the rules of a simulation's episodes, with no goals and no live robots yet."""
+    bounds = np.zeros(4)
+    horizon, cover = settings.horizon_steps, settings.stop_coverage
+    bounds[HORIZON_STEPS] = math.inf if horizon is None else horizon
+    bounds[STOP_COVERAGE] = math.inf if cover is None else cover
+    bounds[GOAL_RADIUS], bounds[STOPS_ON_CONTACT] = settings.goal_radius, settings.stop_on_contact
+    rows = simulation.robots * simulation.episodes
+    return Rules(
+        simulation.score.counted,
+        np.full((simulation.episodes, 2), np.nan),
+        bounds,
+        np.zeros(rows, np.bool_),
+        np.zeros(rows, np.bool_),
+    )
+
+
+@kernel(inline=True)
+def is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> bool:
+    """Whether a place is within a radius of the goal [m]; never of a goal that is nan."""
+    return bool((x - goal_x) * (x - goal_x) + (y - goal_y) * (y - goal_y) <= radius * radius)
+
+
+@kernel(borrowing=True)
+def ending_of(world: WorldArrays, row: int, episode: int, rules: Rules) -> int:
+    """Return why a robot ends now, by number in ``REASONS``; 0 where it goes on or has ended."""
+    if not rules.live[row]:
+        return 0
+    bounds = rules.bounds
+    if world.team_seen[episode] / max(rules.counted[episode], 1) >= bounds[STOP_COVERAGE]:
+        return COVERED
+    if world.failed[row] != 0:
+        return FAILED
+    if rules.is_empty[row]:
+        return BATTERY
+    if bounds[STOPS_ON_CONTACT] != 0.0 and world.contacts[row] != 0:
+        return COLLISION
+    goal = rules.goals[episode]
+    if is_near(world.poses[row, 0], world.poses[row, 1], goal[0], goal[1], bounds[GOAL_RADIUS]):
+        return REACHED
+    if world.steps[episode] >= bounds[HORIZON_STEPS]:
+        return HORIZON
+    return 0
+
+
+@kernel
+def note_endings(table: Array, robots: int, rules: Rules, reasons: Array) -> int:
+    """Write why each robot ends now into ``reasons`` (rows,) int8.
+
+    Returns how many end.
+    """
+    world = world_at(table)
+    count = 0
+    for row in range(reasons.shape[0]):
+        reasons[row] = ending_of(world, row, row // robots, rules)
+        count += reasons[row] != 0
+    return count

@@ -11,19 +11,12 @@ from lidarium.envs.scoring.rewards import TERMS
 from lidarium.envs.scoring.score import Score
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.backend import World
-from lidarium.mapping.kernels.compilation import kernel
 
 THRESHOLDS = (0.85, 0.90, 0.95, 0.99)
 """Shares of F of which the time is noted."""
 
 TRACK_PERIOD_S = 0.2
 """Time between two poses of the track [s]."""
-
-
-@kernel(inline=True)
-def is_near(x: float, y: float, goal_x: float, goal_y: float, radius: float) -> bool:
-    """Whether a place is within a radius of the goal [m]; never of a goal that is nan."""
-    return bool((x - goal_x) * (x - goal_x) + (y - goal_y) * (y - goal_y) <= radius * radius)
 
 
 class Scorer:

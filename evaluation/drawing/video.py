@@ -66,7 +66,9 @@ class Film(Watcher):
             self._writer.append_data(frame)
 
     def _frame(self, env: ExplorationEnv) -> NDArray[np.uint8]:
-        return draw_frame(env, self._size, None if self._draw_over is None else partial(self._draw_over, env))
+        return draw_frame(
+            env.scene(), self._size, None if self._draw_over is None else partial(self._draw_over, env)
+        )
 
 
 @contextmanager

@@ -80,7 +80,7 @@ class RunningTeam:
 
     def belief(self, agent: str) -> Belief:
         """Return what an agent's onboard software knows."""
-        return self._env.perception.belief(agent)
+        return self._env.belief(agent)
 
     def drive_state(self, agent: str) -> DriveState:
         """Return what its driving is about."""

@@ -192,6 +192,7 @@ MOVED_NAMES: dict[str, tuple[str, ...]] = {
         "agents.report",
     ),
     "envs.floors.catalogue": ("envs.floors.catalogue.names",),
+    "envs.onboard.perception": ("envs.onboard.belief",),
     "envs.settings": (
         "envs.settings.exploration",
         "envs.settings.lidar",

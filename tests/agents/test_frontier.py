@@ -126,7 +126,7 @@ def test_policies_read_beliefs_and_never_the_truth():
     """With noise in the map, what a policy may ask for is the believed pose and the noisy map."""
     env = lidarium.parallel_env(TWO_ROOMS, robots=2, noise="thesis", map_cells=32)
     env.reset(seed=0)
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     public = {name for name in dir(belief) if not name.startswith("_")}
     assert public == {
         "pose",

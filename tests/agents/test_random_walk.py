@@ -31,7 +31,7 @@ def test_it_turns_away_where_something_is_near_ahead():
 
         @staticmethod
         def belief(agent):
-            return env.perception.belief(agent)
+            return env.belief(agent)
 
     env.reset(seed=0)
     walk.reset(Team(), 0)
@@ -61,7 +61,7 @@ def test_it_drives_straight_on_in_the_open():
 
         @staticmethod
         def belief(agent):
-            return env.perception.belief(agent)
+            return env.belief(agent)
 
     walk = RandomWalk(speed=0.6)
     walk.reset(Team(), 1)

@@ -80,7 +80,7 @@ def test_with_unknown_starts_the_first_pose_is_zero_and_nobody_is_told_the_frame
     observations, _ = env.reset(seed=0)
     for agent, observation in observations.items():
         assert observation["pose"].tolist() == [0.0, 0.0, 0.0]
-        belief = env.perception.belief(agent)
+        belief = env.belief(agent)
         assert belief.shared_map is None
         assert belief.teammates == {}
     for _ in range(10):

@@ -33,9 +33,7 @@ def draw_world(path: Path, world: str, seed: int) -> None:
     assert env.floor is not None
     agent = env.possible_agents[0]
     origin = (
-        np.array(env.perception.belief(agent).map_origin)
-        + np.array(way.believed[-1][:2])
-        - env.perception.belief(agent).pose[:2]
+        np.array(env.belief(agent).map_origin) + np.array(way.believed[-1][:2]) - env.belief(agent).pose[:2]
     )
     places = [node.place + origin for node in tree.nodes]
     edges = [

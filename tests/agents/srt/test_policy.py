@@ -111,7 +111,7 @@ def test_every_chain_of_parents_ends_at_the_first_node():
 def test_no_edge_of_the_tree_crosses_what_stands_there():
     episode = finished("scene_room", robot="kobuki")
     env, tree = episode.env, episode.policy.tree
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     origin = np.array(belief.map_origin) + env.world.poses[0, :2] - belief.pose[:2]
     raster = env.floor.raster(0.01, 0.3, 0.3)
     edges = [(tree.nodes[node.parent].place, node.place) for node in tree.nodes if node.parent is not None]

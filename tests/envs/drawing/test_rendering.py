@@ -27,7 +27,7 @@ def started(floor=None, **options):
 
 @pytest.mark.parametrize(("width", "height"), [(4.0, 3.0), (3.0, 5.0), (12.0, 2.0)])
 def test_a_frame_is_a_picture_of_the_asked_size_with_even_sides(width, height):
-    frame = draw_frame(started(small_floor(width, height)), 320)
+    frame = draw_frame(started(small_floor(width, height)).scene(), 320)
     assert frame.dtype == np.uint8
     assert frame.ndim == 3
     assert frame.shape[2] == 3
@@ -37,22 +37,22 @@ def test_a_frame_is_a_picture_of_the_asked_size_with_even_sides(width, height):
 
 def test_rgb_array_renders_what_draw_frame_draws():
     env = started()
-    assert np.array_equal(env.render(), draw_frame(env))
+    assert np.array_equal(env.render(), draw_frame(env.scene()))
 
 
 def test_a_frame_belongs_to_the_caller():
     env = started()
-    frame = draw_frame(env)
+    frame = draw_frame(env.scene())
     frame[:] = 7
-    assert (draw_frame(env) != 7).any()
+    assert (draw_frame(env.scene()) != 7).any()
 
 
 def test_exploring_turns_floor_white():
     env = started("apartment", robots=1)
-    before = (draw_frame(env) == EXPLORED).all(axis=2).sum()
+    before = (draw_frame(env.scene()) == EXPLORED).all(axis=2).sum()
     for _ in range(60):
         env.step({"robot_0": np.array([0.0, 0.4], np.float32)})
-    assert (draw_frame(env) == EXPLORED).all(axis=2).sum() > before
+    assert (draw_frame(env.scene()) == EXPLORED).all(axis=2).sum() > before
 
 
 def test_cells_are_drawn_by_what_they_are_and_what_is_seen():
@@ -69,14 +69,14 @@ def test_cells_are_drawn_by_what_they_are_and_what_is_seen():
 
 
 def test_maps_of_coarser_cells_lie_on_the_same_floor():
-    fine, coarse = (draw_frame(started(resolution=resolution), 400) for resolution in (0.025, 0.1))
+    fine, coarse = (draw_frame(started(resolution=resolution).scene(), 400) for resolution in (0.025, 0.1))
     assert fine.shape == coarse.shape
     assert np.abs(fine.astype(int) - coarse).mean() < 12.0
 
 
 def test_a_floor_of_more_cells_than_pixels_keeps_its_walls_and_what_is_explored():
     env = started("apartment")
-    small, large = (draw_frame(env, size)[60:] for size in (150, 900))
+    small, large = (draw_frame(env.scene(), size)[60:] for size in (150, 900))
     for colour in PALETTE:
         shares = [(np.abs(frame.astype(int) - colour).sum(axis=2) < 12).mean() for frame in (small, large)]
         assert shares[0] > 0.0
@@ -91,9 +91,9 @@ def test_the_whole_team_has_colours_of_its_own():
 
 def test_a_frame_needs_a_reset_and_room():
     with pytest.raises(ValueError, match="reset"):
-        draw_frame(ExplorationEnv(small_floor(), make_settings(robots=1)))
+        draw_frame(ExplorationEnv(small_floor(), make_settings(robots=1)).scene())
     with pytest.raises(ValueError, match="size of the frame is 10"):
-        draw_frame(started(), 10)
+        draw_frame(started().scene(), 10)
 
 
 def test_a_window_without_a_display_says_so_once():

@@ -25,7 +25,7 @@ def centres(belief, cells):
 
 
 def test_walls_along_the_trail_become_unknown_and_nothing_else_changes(env):
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     before = belief.map.log_odds.copy()
     walls = np.argwhere(before > 0)
     middle = centres(belief, walls[len(walls) // 2][None])[0]
@@ -39,7 +39,7 @@ def test_walls_along_the_trail_become_unknown_and_nothing_else_changes(env):
 
 
 def test_what_stands_at_the_end_of_the_trail_stays(env):
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     before = belief.map.log_odds.copy()
     walls = np.argwhere(before > 0)
     places = centres(belief, walls)
@@ -50,7 +50,7 @@ def test_what_stands_at_the_end_of_the_trail_stays(env):
 
 
 def test_frontiers_open_where_walls_were_forgotten(env):
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     count = len(belief.map.frontiers.cells())
     walls = centres(belief, np.argwhere(belief.map.log_odds > 0))
     corner = walls[np.argmin(walls.sum(axis=1))]
@@ -59,7 +59,7 @@ def test_frontiers_open_where_walls_were_forgotten(env):
 
 
 def test_a_wall_that_is_one_is_drawn_again_when_it_is_seen_again(env):
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     before = belief.map.log_odds > 0
     places = centres(belief, np.argwhere(before))
     env.perception.forget_walls(0, np.array([*places, (50.0, 50.0)]))
@@ -70,7 +70,7 @@ def test_a_wall_that_is_one_is_drawn_again_when_it_is_seen_again(env):
 
 
 def test_a_map_that_is_rendered_anew_forgets_them_again_until_the_next_episode(env):
-    perception, belief = env.perception, env.perception.belief("robot_0")
+    perception, belief = env.perception, env.belief("robot_0")
     localizer, pose = perception.localizers[0], env.beliefs.believed[0]
     assert localizer is not None
     scan, poses = env.simulation.ranges[0][None].copy(), pose[None].copy()
@@ -83,11 +83,11 @@ def test_a_map_that_is_rendered_anew_forgets_them_again_until_the_next_episode(e
     assert belief.map.log_odds[tuple(middle)] == 0
     env.reset(seed=0)
     perception.forget_again(0)
-    assert env.perception.belief("robot_0").map.log_odds[tuple(middle)] > 0
+    assert env.belief("robot_0").map.log_odds[tuple(middle)] > 0
 
 
 def test_a_trail_beyond_the_map_or_of_one_place_changes_nothing(env):
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     before = belief.map.log_odds.copy()
     for trail in ([[500.0, 500.0], [501.0, 500.0]], [[-500.0, 0.0]], [belief.pose[:2].tolist()]):
         env.perception.forget_walls(0, np.array(trail))
@@ -103,7 +103,7 @@ def test_what_is_no_trail_is_refused(env, trail):
 
 
 def test_a_wall_beside_the_trail_stays(env):
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     before = belief.map.log_odds.copy()
     walls = centres(belief, np.argwhere(before > 0))
     corner = walls[np.argmin(walls.sum(axis=1))]

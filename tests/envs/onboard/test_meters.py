@@ -32,7 +32,7 @@ def test_standing_costs_time_alone():
     env = hall(battery=SIMPLE)
     infos = drive(env, 50, (0.0, 0.0))[4]
     assert infos["robot_0"]["energy_j"] == pytest.approx(2.0 * 5.0)
-    assert env.perception.belief("robot_0").energy_left_j == pytest.approx(990.0)
+    assert env.belief("robot_0").energy_left_j == pytest.approx(990.0)
 
 
 def test_driving_costs_its_way_beside_the_time():
@@ -87,7 +87,7 @@ def test_without_a_limit_nothing_is_reckoned():
     infos = drive(env, 5)[4]
     assert "energy_j" not in infos["robot_0"]
     assert env.energy_j.tolist() == [0.0]
-    assert env.perception.belief("robot_0").energy_left_j is None
+    assert env.belief("robot_0").energy_left_j is None
     assert not env.perception.meters.is_active
 
 

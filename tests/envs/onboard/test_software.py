@@ -116,7 +116,7 @@ def test_pooled_and_navigation_maps_follow_a_rendering(localizers):
 
 def test_the_spread_of_a_belief_is_what_the_localizer_tells(localizers):
     env, _ = explored(5, localization="reckoner")
-    assert env.perception.belief("robot_1").spread == pytest.approx([0.2, 0.3, 0.1])
+    assert env.belief("robot_1").spread == pytest.approx([0.2, 0.3, 0.1])
     assert explored(5)[0].perception.belief("robot_1").spread.tolist() == [0.0, 0.0, 0.0]
 
 

@@ -38,7 +38,7 @@ def cell(belief, x, y):
 
 
 def test_a_robot_that_was_told_has_the_sum_of_both_maps_and_its_mate_its_own(env):
-    perception, belief = env.perception, env.perception.belief("robot_0")
+    perception, belief = env.perception, env.belief("robot_0")
     assert belief.shared_map is None
     perception.tell(0, known(20, 30, (9.0, -9.0)))
     assert belief.shared_map.log_odds[cell(belief, 9.5, -8.5)] < 0
@@ -47,11 +47,11 @@ def test_a_robot_that_was_told_has_the_sum_of_both_maps_and_its_mate_its_own(env
     row, column = cell(belief, 9.0 + 1e-6, -9.0 + 1e-6)
     beside[row : row + 20, column : column + 30] = False
     assert (belief.shared_map.log_odds[beside] == belief.map.log_odds[beside]).all()
-    assert env.perception.belief("robot_1").shared_map is None
+    assert env.belief("robot_1").shared_map is None
 
 
 def test_what_is_told_takes_the_place_of_what_was_told_before_and_can_be_taken_back(env):
-    perception, belief = env.perception, env.perception.belief("robot_0")
+    perception, belief = env.perception, env.belief("robot_0")
     perception.tell(0, known(20, 30, (9.0, -9.0)))
     shared = belief.shared_map
     assert shared.frontiers.flags[cell(belief, 9.0 + 1e-6, -8.5)] == FRONTIER
@@ -63,7 +63,7 @@ def test_what_is_told_takes_the_place_of_what_was_told_before_and_can_be_taken_b
 
 
 def test_the_own_scans_go_on_to_change_the_sum(env):
-    perception, belief = env.perception, env.perception.belief("robot_0")
+    perception, belief = env.perception, env.belief("robot_0")
     perception.tell(0, known(20, 30, (9.0, -9.0), 0))
     _ = belief.shared_map
     for _ in range(30):
@@ -79,7 +79,7 @@ def test_a_robot_drives_over_what_it_only_knows_from_others():
     world.reset(seed=0)
     log_odds = env.perception.own_map(0).log_odds
     free = np.argwhere(log_odds < 0)
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     origin, pose = belief.map_origin, belief.pose
     # A lane of free cells from where the robot stands towards the unknown at its back.
     env.perception.tell(
@@ -96,7 +96,7 @@ def test_a_robot_drives_over_what_it_only_knows_from_others():
 
 
 def test_frontiers_that_were_given_up_stay_given_up_when_a_robot_is_told_of_more(env):
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     frontiers = belief.map.frontiers
     first = frontiers.cells()[0]
     frontiers.ignore(first[None])

@@ -49,7 +49,7 @@ def test_the_ideal_radio_needs_no_exchange():
 def test_without_a_radio_robots_know_nothing_of_each_other():
     env = started(radio="none")
     wander(env, 30)
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     assert belief.teammates == {}
     assert np.array_equal(belief.shared_map.log_odds, belief.map.log_odds)
     assert exchange_of(env).bytes_sent.tolist() == [0, 0, 0]
@@ -62,8 +62,8 @@ def test_who_is_always_linked_knows_what_the_team_knew_at_the_last_exchange(monk
     # Step 20 is one of exchange: all maps are as of now.
     total = np.clip(np.sum(np.stack(env.beliefs.log_odds).astype(int), axis=0), -127, 127)
     for agent in env.possible_agents:
-        assert np.array_equal(np.sign(env.perception.belief(agent).shared_map.log_odds), np.sign(total))
-    mate = env.perception.belief("robot_0").teammates["robot_2"]
+        assert np.array_equal(np.sign(env.belief(agent).shared_map.log_odds), np.sign(total))
+    mate = env.belief("robot_0").teammates["robot_2"]
     assert mate.age_s == 0.0
     assert np.allclose(mate.pose[:2] + env.perception.offset(0), env.world.poses[2, :2])
 
@@ -75,8 +75,8 @@ def test_a_link_works_one_way_where_it_is_one_way(monkeypatch):
     exchange = exchange_of(env)
     assert exchange.heard_at[1, 0] == 15
     assert exchange.heard_at[0, 1] == NEVER
-    assert env.perception.belief("robot_0").teammates == {}
-    assert set(env.perception.belief("robot_1").teammates) == {"robot_0"}
+    assert env.belief("robot_0").teammates == {}
+    assert set(env.belief("robot_1").teammates) == {"robot_0"}
 
 
 def test_news_travels_on_over_who_meets_later(monkeypatch):
@@ -113,7 +113,7 @@ def test_late_messages_come_late_and_whole(monkeypatch):
     assert exchange.copied_at[1, 0] == 0
     assert np.array_equal(exchange.copies[1][0], first)
     assert exchange.heard_at[1, 0] == 0
-    assert env.perception.belief("robot_1").teammates["robot_0"].age_s == pytest.approx(0.5)
+    assert env.belief("robot_1").teammates["robot_0"].age_s == pytest.approx(0.5)
 
 
 def test_lost_messages_are_sent_again_until_they_arrive(monkeypatch):
@@ -145,7 +145,7 @@ def test_the_map_that_reached_a_robot_is_the_sum_of_what_it_holds_at_every_step(
         wander(env, 7, seed=k)
         for robot, agent in enumerate(env.possible_agents):
             held = [copy.astype(int) for copy in exchange_of(env).copies[robot] if copy.size]
-            shared = env.perception.belief(agent).shared_map
+            shared = env.belief(agent).shared_map
             total = np.clip(np.sum(held, axis=0), -127, 127)
             assert np.array_equal(np.sign(shared.log_odds), np.sign(total))
 

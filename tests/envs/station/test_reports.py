@@ -65,7 +65,7 @@ def test_with_the_ideal_radio_the_station_knows_what_is_now():
     )
     assert report.path_left_m == pytest.approx(3.0 - report.pose.x, abs=0.05)
     assert report.travelled_m == pytest.approx(report.pose.x, abs=0.01)
-    assert report.energy_left_j == env.unwrapped.perception.belief("robot_0").energy_left_j < 127872.0
+    assert report.energy_left_j == env.unwrapped.belief("robot_0").energy_left_j < 127872.0
     assert is_as_now(env, 0, report)
     assert (report.start.x, report.start.y, report.start.theta) == (0.0, 0.0, 0.0)
 

@@ -108,7 +108,7 @@ def test_maps_are_exchanged_at_the_period_alone():
 def test_known_starts_of_the_environment_are_understood_too():
     env = MergedMaps(team(known_starts=True), MergingSettings(known_starts=True))
     observations = driven(env)[0]
-    belief = env.unwrapped.perception.belief("robot_0").teammates["robot_1"].pose
+    belief = env.unwrapped.belief("robot_0").teammates["robot_1"].pose
     np.testing.assert_allclose(observations["robot_0"]["teammates"][0, :3], belief, atol=1e-5)
 
 

@@ -225,5 +225,5 @@ def test_positions_are_told_in_the_frame_of_the_floor():
     for known_starts in (True, False):
         env = ExplorationEnv("apartment", make_settings(robots=1, resolution=0.05, known_starts=known_starts))
         env.reset(seed=0, options={"starts": np.array([(2.5, 4.0, 0.5)])})
-        x, y = env.perception.belief("robot_0").pose[:2]
+        x, y = env.belief("robot_0").pose[:2]
         assert in_floor_frame(env, "robot_0", x, y) == pytest.approx((2.5, 4.0))

@@ -113,7 +113,7 @@ def driven(floor, start, seconds, seed):
     )
     env = ExplorationEnv(floor, chosen)
     run_episode(lidarium.policy("nearest_frontier"), env, seed, {"starts": [start]})
-    belief = env.perception.belief("robot_0")
+    belief = env.belief("robot_0")
     levels = three_levels(np.array(belief.map.log_odds))
     rows, columns = np.nonzero(levels != UNKNOWN)
     cut = levels[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
