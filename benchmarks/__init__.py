@@ -1,1 +1,1 @@
-"""Speed and quality measured, one file per question; each runs alone."""
+"""Measurements of speed, studies of quality."""

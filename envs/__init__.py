@@ -1,1 +1,1 @@
-"""Worlds and environments: floors, simulation, onboard software, wrappers."""
+"""Environments with the simulation below them."""

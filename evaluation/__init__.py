@@ -1,1 +1,1 @@
-"""Metrics, the runner and the records of episodes."""
+"""Episodes run, measured, recorded, reported."""

@@ -1,4 +1,4 @@
-"""How fast the package is, beside other simulators, and how its speed grows.
+"""How fast the package is, beside other simulators.
 
 ``all`` runs every question.
 """

@@ -1,4 +1,4 @@
-"""Records of episodes: written during the run, and run again or shown later.
+"""Records of episodes, to be run again or drawn.
 
 The same version runs them again to the bit; any version shows them.
 """

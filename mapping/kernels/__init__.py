@@ -1,4 +1,4 @@
-"""Compiled functions and their utilities.
+"""Compiled functions: their decorator, cache, views of arrays, work queue.
 
 The decorator, the kernel cache, views of arrays at addresses, and work for threads.
 """

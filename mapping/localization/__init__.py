@@ -1,4 +1,4 @@
-"""Localizers on odometry and scans, all behind one protocol.
+"""Localizers on odometry with scans, all behind one protocol.
 
 They estimate the robots' poses.
 """

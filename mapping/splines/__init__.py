@@ -1,4 +1,4 @@
-"""Maps of walls as cubic B-splines, with the corners and ends of walls as points.
+"""Maps of walls as cubic B-splines, with corners as points.
 
 A scan becomes points, the points of one surface a cluster, a cluster is cut at its corners, and each piece
 becomes a curve; curves that run along a curve of the map improve and extend it, the others are new. All
