@@ -116,15 +116,17 @@ def test_limits_of_the_drive_hold(kind):
 @pytest.mark.parametrize("seed", range(3))
 def test_no_body_enters_a_wall_or_another_and_touching_is_noted(kind, seed):
     world, touched = placed(kind), 0
-    rows, columns = np.nonzero(tables().body.solid)
-    low = np.stack([columns, rows], axis=1) * CELL
+    body = tables().body
+    rows, columns = np.nonzero(body.solid)
+    low = np.stack([columns, rows], axis=1) * CELL + body.origin
     for command in commands(seed, 120):
         before = world.collisions.copy()
         world.move_and_sense(command)
         for pose in world.poses:
             gaps = pose[:2] - np.clip(pose[:2], low, low + CELL)
             assert np.hypot(*gaps.T).min() >= ROBOTS["kobuki"].radius - 1e-9
-        assert np.hypot(*(world.poses[0, :2] - world.poses[1, :2])) >= 2 * ROBOTS["kobuki"].radius - 1e-9
+        apart = np.hypot(*(world.poses[0, :2] - world.poses[1, :2]))
+        assert apart >= 2 * ROBOTS["kobuki"].radius - 1e-9
         assert (world.collisions - before <= world.contacts).all()
         touched += int(world.contacts.sum())
         assert ((world.sensors["bumper"].sum(axis=1) > 0) <= (world.contacts > 0)).all()
@@ -208,7 +210,8 @@ def backends():
 @pytest.mark.usefixtures("backends")
 @pytest.mark.parametrize("backend", ["kinematic", "staged", "plain"])
 def test_an_environment_runs_in_any_world(backend):
-    settings = make_settings(robots=2, lidar=LIDAR, raster_resolution=CELL, resolution=CELL, backend=backend)
+    options = {"raster_resolution": CELL, "resolution": CELL, "stop_coverage": None}
+    settings = make_settings(robots=2, lidar=LIDAR, backend=backend, **options)
     env = ExplorationEnv(room(), settings)
     env.reset(seed=0, options={"starts": STARTS})
     start = env.scorer.coverage
