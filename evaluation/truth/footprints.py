@@ -56,7 +56,7 @@ def _count_footprints(table: Array, episode: int, windows: Array) -> tuple[int, 
         row = first + robot
         if world.flags[row] & ENDED:
             continue
-        masks = world.masks[row]
+        masks = world.mask_rows[row]
         counted = word_grid_at(masks[2], masks[3], masks[4])
         box, row_offset, word_offset = footprint(world, row, first, robots, windows[robot])
         spans[robot, 0], spans[robot, 1], spans[robot, 2], spans[robot, 3] = box
