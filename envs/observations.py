@@ -27,7 +27,14 @@ from lidarium.envs.simulation.kernels.arrays import (
 from lidarium.envs.simulation.kernels.stages import RANGE_GAP
 from lidarium.envs.simulation.simulation import ROWS_FOR_THREADS, Simulation
 from lidarium.mapping.grids.map_crops import crop_levels, crop_turned
-from lidarium.mapping.grids.pooled_maps import forget_touched, pool_touched, touched_words
+from lidarium.mapping.grids.pooled_maps import (
+    POOL,
+    POOL_COLUMNS,
+    POOL_ROWS,
+    forget_touched,
+    pool_touched,
+    touched_words,
+)
 from lidarium.mapping.kernels.compilation import Array, kernel, use_threads
 from lidarium.mapping.kernels.views import arrays_at, grid_at, int8_grid_at, table_of, word_grid_at
 
@@ -182,7 +189,10 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
             for k in range(scales.shape[0]):
                 if scales[k] > 1:
                     pool_touched(
-                        log_odds, touched, scales[k], int8_grid_at(pools[k, 0], pools[k, 1], pools[k, 2])
+                        log_odds,
+                        touched,
+                        scales[k],
+                        int8_grid_at(pools[k, POOL], pools[k, POOL_ROWS], pools[k, POOL_COLUMNS]),
                     )
             forget_touched(touched, log_odds.shape[0])
             crop_turned(pools, x, y, believed[row, 2], scales, egocentric_maps[row])

@@ -244,7 +244,10 @@ class EpisodeBatch:
         self._tell(seen, {**terms, **earned})
 
     def _note_endings(self, acted: NDArray[np.bool_], stopping: NDArray[np.int8] | None) -> None:
-        """Note why robots that took part in the step end; what happens to them counts before their own reasons."""
+        """Note why robots that took part in the step end.
+
+        What happens to them counts before reasons of their own.
+        """
         self.reasons = np.zeros(self.rows, np.int8)
         count = note_endings(self.simulation.table, self.robots, self._rules, self.reasons)
         if count:

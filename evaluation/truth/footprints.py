@@ -7,7 +7,14 @@ import numpy as np
 
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scoring.coverage import count_bits
-from lidarium.envs.simulation.kernels.arrays import ENDED, WorldArrays, world_at
+from lidarium.envs.simulation.kernels.arrays import (
+    COUNTED_MASK,
+    ENDED,
+    MASK_ROWS,
+    MASK_WORDS,
+    WorldArrays,
+    world_at,
+)
 from lidarium.envs.simulation.kernels.stages import MAP_RESOLUTION, RANGE_MAX, footprint
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -57,12 +64,18 @@ def _count_footprints(table: Array, episode: int, windows: Array) -> tuple[int, 
         if world.flags[row] & ENDED:
             continue
         masks = world.mask_rows[row]
-        counted = word_grid_at(masks[2], masks[3], masks[4])
+        counted = word_grid_at(masks[COUNTED_MASK], masks[MASK_ROWS], masks[MASK_WORDS])
         box, row_offset, word_offset = footprint(world, row, first, robots, windows[robot])
         spans[robot, 0], spans[robot, 1], spans[robot, 2], spans[robot, 3] = box
         corners[robot, 0], corners[robot, 1] = row_offset, word_offset
-        boxes[robot, 0], boxes[robot, 1] = max(box[0] + row_offset, 0), min(box[1] + row_offset, masks[3])
-        boxes[robot, 2], boxes[robot, 3] = max(box[2] + word_offset, 0), min(box[3] + word_offset, masks[4])
+        boxes[robot, 0], boxes[robot, 1] = (
+            max(box[0] + row_offset, 0),
+            min(box[1] + row_offset, masks[MASK_ROWS]),
+        )
+        boxes[robot, 2], boxes[robot, 3] = (
+            max(box[2] + word_offset, 0),
+            min(box[3] + word_offset, masks[MASK_WORDS]),
+        )
         for i in range(boxes[robot, 0], boxes[robot, 1]):
             for j in range(boxes[robot, 2], boxes[robot, 3]):
                 seen = windows[robot, i - row_offset, j - word_offset] & counted[i, j]

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scoring.coverage import count_bits, pack_bits
-from lidarium.envs.simulation.kernels.arrays import OWN_FRAME, TRUE_POSE, WorldArrays, world_at
+from lidarium.envs.simulation.kernels.arrays import (
+    MAP,
+    MAP_COLUMNS,
+    MAP_ROWS,
+    OWN_FRAME,
+    TRUE_POSE,
+    WorldArrays,
+    world_at,
+)
 from lidarium.envs.simulation.kernels.stages import MAP_RESOLUTION, RANGE_MAX
 from lidarium.evaluation.truth.beliefs import held_maps, shares_one_map
 from lidarium.evaluation.truth.true_map import Truth
@@ -158,9 +166,9 @@ def _take_in_aligned(
 
     The update is in a box of rows and words.
     """
-    own, columns = bits[robot], world.belief_rows[first + robot, 2]
+    own, columns = bits[robot], world.belief_rows[first + robot, MAP_COLUMNS]
     first_row, first_column = _cells_beyond(world, first + robot, first // robots)
-    address = world.belief_rows[first + robot, 0] + first_row * columns + first_column
+    address = world.belief_rows[first + robot, MAP] + first_row * columns + first_column
     for i in range(box[0], box[1]):
         for j in range(box[2], box[3]):
             if truth[KNOWABLE, i, j] == np.uint64(0):
@@ -297,8 +305,8 @@ def _take_in(
         ways[robot] = world.travelled[row]
         for axis in range(3):
             poses[robot, axis] = world.poses[row, axis]
-        changes[robot, 0], changes[robot, 1] = world.belief_rows[row, 1], 0
-        changes[robot, 2], changes[robot, 3] = world.belief_rows[row, 2], 0
+        changes[robot, 0], changes[robot, 1] = world.belief_rows[row, MAP_ROWS], 0
+        changes[robot, 2], changes[robot, 3] = world.belief_rows[row, MAP_COLUMNS], 0
 
 
 @kernel

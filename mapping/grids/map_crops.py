@@ -15,6 +15,7 @@ import numpy as np
 
 from lidarium.mapping.grids.cell_blocks import BLOCK, HALF_BLOCK, write_block_of_levels, write_levels
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.grids.pooled_maps import POOL, POOL_COLUMNS, POOL_ROWS
 from lidarium.mapping.grids.turned_crops import CAN_LOOK_UP_IN_REGISTERS, turn_blocks
 from lidarium.mapping.grids.turned_crops import SIDE as BLOCK_SIDE
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -86,7 +87,11 @@ def turn_by_cells(pools: Array, x: float, y: float, heading: float, scales: Arra
     for k in range(scales.shape[0]):
         row, column = _nearest_corner(x, y, scales[k])
         _copy_levels(
-            int8_grid_at(pools[k, 0], pools[k, 1], pools[k, 2]), row - half, column - half, spans, patch
+            int8_grid_at(pools[k, POOL], pools[k, POOL_ROWS], pools[k, POOL_COLUMNS]),
+            row - half,
+            column - half,
+            spans,
+            patch,
         )
         _look_up(patch, places, crops[k].reshape(cells * cells).view(np.uint32))
 

@@ -16,6 +16,9 @@ from lidarium.mapping.kernels.bit_words import first_bit
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_vector, vector_at
 
+POOL, POOL_ROWS, POOL_COLUMNS = range(3)
+"""Columns of a table of pooled maps: address, rows, columns."""
+
 
 @kernel(inline=True)
 def touched_words(columns: int) -> int:

@@ -17,6 +17,7 @@ from numba.extending import intrinsic
 
 from lidarium.mapping.grids.cell_blocks import fetch_block
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.grids.pooled_maps import POOL, POOL_COLUMNS, POOL_ROWS
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.processor import has_feature
 from lidarium.mapping.kernels.views import LINE, scratch_grid, scratch_vector, vector_at
@@ -284,10 +285,10 @@ def turn_blocks(pools: Array, corners: Array, half: int, step_x: int, step_y: in
     _write_all_places(half, side, step_x, step_y, loads, places)
     inside = scratch_vector(ROWS, np.uint16)
     for k in range(pools.shape[0]):
-        rows, columns = pools[k, 1], pools[k, 2]
+        rows, columns = pools[k, POOL_ROWS], pools[k, POOL_COLUMNS]
         for block in range(blocks * blocks):
             row, column = corners[k, 0] + loads[block, 0], corners[k, 1] + loads[block, 1]
-            source, where = pools[k, 0] + row * columns + column, places.ctypes.data + block * _CELLS
+            source, where = pools[k, POOL] + row * columns + column, places.ctypes.data + block * _CELLS
             target = (
                 crops.ctypes.data + k * side * side + block // blocks * SIDE * side + block % blocks * SIDE
             )

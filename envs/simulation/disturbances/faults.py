@@ -19,6 +19,15 @@ NO_FAULT, LASER_DROPOUT, BLIND_SECTOR, STUCK_WHEEL, KIDNAPPING, DEAD_ROBOT, DEAD
 FAULT_STREAM = 0x66617565
 """Sets the draws of faults apart from others of the same seed."""
 
+KIND, FIRST_STEP, END_STEP, WHEEL = range(4)
+"""Places of a fault's numbers: its kind, its first step, the step after its last, the wheel that is stuck."""
+
+BEARING, WIDTH = 3, 4
+"""Places of a blind sector's numbers, after the steps [rad]."""
+
+PLACE_X, PLACE_Y, PLACE_THETA = 3, 4, 5
+"""Places of a kidnapping's numbers, after the steps [m, rad]."""
+
 FAULT_NUMBERS = 6
 """Numbers of a fault: kind, first step, end step and parameters.
 
@@ -67,16 +76,16 @@ def plan_faults(
             settings, robot, longest, generator
         )
         for k, fault in enumerate(faults[: settings.capacity]):
-            table[robot, k, 0] = KINDS.index(fault.kind)
-            table[robot, k, 1] = math.ceil(fault.at_s / time_step - 1e-9)
+            table[robot, k, KIND] = KINDS.index(fault.kind)
+            table[robot, k, FIRST_STEP] = math.ceil(fault.at_s / time_step - 1e-9)
             is_for_ever = fault.lasts_s is None or fault.kind == "dead_robot"
             # What lasts less than a step lasts one.
-            table[robot, k, 2] = (
+            table[robot, k, END_STEP] = (
                 math.inf
                 if is_for_ever
                 else fault.at_s / time_step + max((fault.lasts_s or 0.0) / time_step, 1.0)
             )
-            table[robot, k, 3:] = _needs(fault, generator, places)
+            table[robot, k, WHEEL:] = _needs(fault, generator, places)
     return table.reshape(robots, -1)
 
 
@@ -122,7 +131,7 @@ def _needs(
 
 @kernel(inline=True, borrowing=True)
 def _is_active(faults: Array, k: int, kind: int, step: int) -> bool:
-    return bool(faults[k] == kind and faults[k + 1] <= step < faults[k + 2])
+    return bool(faults[k + KIND] == kind and faults[k + FIRST_STEP] <= step < faults[k + END_STEP])
 
 
 @kernel(borrowing=True)
@@ -143,9 +152,9 @@ def stick_wheels(faults: Array, step: int, wheel_base: float, command: Array) ->
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
         if _is_active(faults, k, STUCK_WHEEL, step):
             side = 0.5 * command[1] * wheel_base
-            turning = command[0] - side if faults[k + 3] != 0.0 else command[0] + side
+            turning = command[0] - side if faults[k + WHEEL] != 0.0 else command[0] + side
             command[0] = 0.5 * turning
-            command[1] = (-turning if faults[k + 3] != 0.0 else turning) / wheel_base
+            command[1] = (-turning if faults[k + WHEEL] != 0.0 else turning) / wheel_base
 
 
 @kernel(borrowing=True)
@@ -155,16 +164,17 @@ def kidnap(faults: Array, step: int, robot: int, bodies: Array, poses: Array) ->
     Where a teammate stands there it is put as soon as that has left.
     """
     for k in range(0, faults.shape[0], FAULT_NUMBERS):
-        if faults[k] != KIDNAPPING or step < faults[k + 1]:
+        if faults[k + KIND] != KIDNAPPING or step < faults[k + FIRST_STEP]:
             continue
         is_free = True
         for other in range(poses.shape[0]):
             reach = bodies[robot, RADIUS] + bodies[other, RADIUS]
-            gap_x, gap_y = faults[k + 3] - poses[other, 0], faults[k + 4] - poses[other, 1]
+            gap_x, gap_y = faults[k + PLACE_X] - poses[other, 0], faults[k + PLACE_Y] - poses[other, 1]
             is_free = is_free and (other == robot or gap_x * gap_x + gap_y * gap_y > reach * reach)
         if is_free:
-            poses[robot, 0], poses[robot, 1], poses[robot, 2] = faults[k + 3], faults[k + 4], faults[k + 5]
-            faults[k] = NO_FAULT
+            for axis in range(3):
+                poses[robot, axis] = faults[k + PLACE_X + axis]
+            faults[k + KIND] = NO_FAULT
             return True
     return False
 
@@ -183,7 +193,7 @@ def blind_beams(
         if not is_out and not is_sector:
             continue
         for beam in range(ranges.shape[0]):
-            away = angle_first + beam * increment - faults[k + 3]
+            away = angle_first + beam * increment - faults[k + BEARING]
             away -= 2.0 * math.pi * math.floor((away + math.pi) / (2.0 * math.pi))
-            if is_out or abs(away) <= 0.5 * faults[k + 4]:
+            if is_out or abs(away) <= 0.5 * faults[k + WIDTH]:
                 ranges[beam], lengths[beam] = np.float32(np.nan), 0.0
