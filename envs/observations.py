@@ -24,7 +24,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     TOUCHED_ROWS,
     world_at,
 )
-from lidarium.envs.simulation.kernels.stages import RANGE_GAP
+from lidarium.envs.simulation.kernels.scanning import RANGE_GAP
 from lidarium.envs.simulation.simulation import ROWS_FOR_THREADS, Simulation
 from lidarium.mapping.grids.map_crops import crop_levels, crop_turned
 from lidarium.mapping.grids.pooled_maps import (

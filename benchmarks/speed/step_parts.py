@@ -16,9 +16,9 @@ from lidarium.envs.scoring.coverage import mark_seen
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, fill_gaussian
+from lidarium.envs.simulation.kernels.masks import window_corner
 from lidarium.envs.simulation.kernels.motion import move_robots
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan
-from lidarium.envs.simulation.kernels.stages import _window_corner
 from lidarium.mapping.grids.occupancy import integrate_scan
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import beam_directions
@@ -151,7 +151,7 @@ class StepParts:
             team.commands,
         )
         places = poses / [floor.resolution, floor.resolution, 1.0]
-        corners = np.array([_window_corner(x, y, reach) for x, y in places[:, :2]])
+        corners = np.array([window_corner(x, y, reach) for x, y in places[:, :2]])
         inside = places[:, :2] - corners[:, ::-1]
         directions, lengths = np.empty((ROBOTS, 4, beams)), np.empty((ROBOTS, beams))
         noisy = np.minimum(simulation.ranges.astype(np.float64) / floor.resolution, reach)

@@ -10,12 +10,14 @@ from lidarium.envs.scoring.coverage import count_bits
 from lidarium.envs.simulation.kernels.arrays import (
     COUNTED_MASK,
     ENDED,
+    MAP_RESOLUTION,
     MASK_ROWS,
     MASK_WORDS,
+    RANGE_MAX,
     WorldArrays,
     world_at,
 )
-from lidarium.envs.simulation.kernels.stages import MAP_RESOLUTION, RANGE_MAX, footprint
+from lidarium.envs.simulation.kernels.masks import footprint
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at

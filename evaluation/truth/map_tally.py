@@ -13,13 +13,14 @@ from lidarium.envs.scoring.coverage import count_bits, pack_bits
 from lidarium.envs.simulation.kernels.arrays import (
     MAP,
     MAP_COLUMNS,
+    MAP_RESOLUTION,
     MAP_ROWS,
     OWN_FRAME,
+    RANGE_MAX,
     TRUE_POSE,
     WorldArrays,
     world_at,
 )
-from lidarium.envs.simulation.kernels.stages import MAP_RESOLUTION, RANGE_MAX
 from lidarium.evaluation.truth.beliefs import held_maps, shares_one_map
 from lidarium.evaluation.truth.true_map import Truth
 from lidarium.mapping.grids.cell_blocks import negative_cells, positive_cells

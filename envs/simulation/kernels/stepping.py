@@ -39,15 +39,11 @@ from lidarium.envs.simulation.kernels.arrays import (
     WorldArrays,
     world_at,
 )
+from lidarium.envs.simulation.kernels.map_updates import invalidate_mates, perceive_robot
+from lidarium.envs.simulation.kernels.masks import score_robot
 from lidarium.envs.simulation.kernels.motion import move_robots
-from lidarium.envs.simulation.kernels.stages import (
-    invalidate_mates,
-    perceive_robot,
-    scan_scratch,
-    score_robot,
-    sense_and_perceive,
-    sense_robot,
-)
+from lidarium.envs.simulation.kernels.scanning import scan_scratch, sense_robot
+from lidarium.envs.simulation.kernels.stages import sense_and_perceive
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at
 

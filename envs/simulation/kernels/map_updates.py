@@ -1,0 +1,179 @@
+"""The map of a robot in kernels: a scan at the believed pose, without the hits on teammates."""
+
+import math
+
+import numpy as np
+
+from lidarium.envs.simulation.disturbances.odometry import RADIUS
+from lidarium.envs.simulation.kernels.arrays import (
+    ANGLE_FIRST,
+    ANGLE_INCREMENT,
+    FULL_CIRCLE,
+    KNOWN_MATES,
+    MAP,
+    MAP_COLUMNS,
+    MAP_RESOLUTION,
+    MAP_ROWS,
+    NOISE_FLOOR,
+    NOISE_SHARE,
+    RANGE_MAX,
+    SOME_MATES,
+    TOUCHED,
+    TOUCHED_ROWS,
+    WorldArrays,
+)
+from lidarium.envs.simulation.kernels.masks import window_corner
+from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy
+from lidarium.mapping.grids.noisy_returns import settle_returns
+from lidarium.mapping.grids.occupancy import integrate_scan
+from lidarium.mapping.grids.pooled_maps import touched_words
+from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
+from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import int8_grid_at, scratch_vector, word_grid_at
+
+MATE_MARGIN = 1.5
+"""Distance within which a beam's end counts as a teammate's body [map cells].
+
+It is measured to the body of the teammate.
+"""
+
+
+@kernel(borrowing=True)
+def _filter_mates(
+    world: WorldArrays, row: int, first: int, robots: int, x: float, y: float, ends: Array, is_hit: Array
+) -> None:
+    """Remove the hits on teammates whose believed poses are known.
+
+    They are no part of the floor.
+    """
+    sensor, believed = world.sensor, world.believed
+    beams = is_hit.shape[0]
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    reach = sensor[RANGE_MAX] * scale
+    turn = 2.0 * math.pi / sensor[ANGLE_INCREMENT]
+    knows_all = world.flags[row] & KNOWN_MATES != 0
+    for other in range(first, first + robots):
+        mate = other - first
+        if other == row or not (knows_all or world.contact[row, mate] != 0):
+            continue
+        mate_x = believed[other, 0] if knows_all else world.heard[row, 3 * mate]
+        mate_y = believed[other, 1] if knows_all else world.heard[row, 3 * mate + 1]
+        gap_x, gap_y = (mate_x - believed[row, 0]) * scale, (mate_y - believed[row, 1]) * scale
+        radius = world.bodies[other - first, RADIUS] * scale + MATE_MARGIN
+        if gap_x * gap_x + gap_y * gap_y > (reach + radius) ** 2:
+            continue
+        begin, count = beams_towards(
+            gap_x, gap_y, radius, believed[row, 2], sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
+        )
+        for lap in range(2):
+            low = max(int(math.floor(begin - lap * turn)) - 1, 0)
+            high = min(int(math.floor(begin - lap * turn + count)) + 2, beams - 1)
+            for beam in range(low, high + 1):
+                end_x, end_y = ends[0, beam] - x - gap_x, ends[1, beam] - y - gap_y
+                if end_x * end_x + end_y * end_y <= radius * radius:
+                    is_hit[beam] = False
+
+
+@kernel
+def invalidate_mates(world: WorldArrays, row: int, first: int, robots: int, ranges: Array) -> None:
+    """Make the beams of a scan (beams,) invalid that met teammates.
+
+    This holds as far as the robot knows where they are.
+    """
+    beams, scale = ranges.shape[0], 1.0 / world.sensor[MAP_RESOLUTION]
+    directions, ends, is_hit = np.empty((4, beams)), np.empty((2, beams)), np.empty(beams, np.bool_)
+    lengths = np.empty(beams)
+    beam_directions(world.believed[row, 2], world.unit_vectors, directions)
+    for beam in range(beams):
+        is_hit[beam] = ranges[beam] <= world.sensor[RANGE_MAX]
+        lengths[beam] = ranges[beam] * scale if is_hit[beam] else 0.0
+    scan_ends(lengths, directions, 0.0, 0.0, ends)
+    _filter_mates(world, row, first, robots, 0.0, 0.0, ends, is_hit)
+    for beam in range(beams):
+        if not is_hit[beam] and ranges[beam] <= world.sensor[RANGE_MAX]:
+            ranges[beam] = np.float32(np.nan)
+
+
+@kernel(borrowing=True)
+def update_map(
+    world: WorldArrays,
+    row: int,
+    first: int,
+    robots: int,
+    scratch: ScanScratch,
+    box: tuple[int, int, int, int],
+    is_filled: bool,
+) -> None:
+    """Update one robot's map from its scan, whose beams' directions ``scratch`` holds.
+
+    Where ``is_filled``, its ends and first window hold the seen area, of this ``box``, already; whatever
+    window is not filled is zero.
+    """
+    directions, lengths, ends, bits = scratch.directions, scratch.lengths, scratch.ends, scratch.windows[0]
+    sensor, believed, origin = world.sensor, world.believed[row], world.origins[row]
+    ranges, belief = world.ranges[row], world.belief_rows[row]
+    beams = ranges.shape[0]
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    reach = sensor[RANGE_MAX] * scale
+    x, y = (believed[0] - origin[0]) * scale, (believed[1] - origin[1]) * scale
+    if not (0.0 <= x < belief[MAP_COLUMNS] and 0.0 <= y < belief[MAP_ROWS]):
+        # Whoever takes himself to be beyond his map is lost.
+        world.failed[row] = 1
+        return
+    is_hit = scratch_vector(beams, np.bool_)
+    for beam in range(beams):
+        is_hit[beam] = ranges[beam] <= sensor[RANGE_MAX]
+    log_odds = int8_grid_at(belief[MAP], belief[MAP_ROWS], belief[MAP_COLUMNS])
+    row_offset, column_offset = window_corner(x, y, reach)
+    local_x, local_y = x - column_offset, y - row_offset
+    if not is_filled:
+        for beam in range(beams):
+            value = ranges[beam]
+            lengths[beam] = min(value * scale, reach) if value == value else 0.0
+        if is_noisy(sensor):
+            deviation, share = sensor[NOISE_FLOOR] * scale, sensor[NOISE_SHARE]
+            settle_returns(log_odds, x, y, lengths, directions, is_hit, deviation, share, world.increments[0])
+        scan_ends(lengths, directions, local_x, local_y, ends)
+        box = fill_scan_polygon(
+            lengths,
+            directions,
+            ends,
+            local_x,
+            local_y,
+            sensor[ANGLE_INCREMENT],
+            sensor[FULL_CIRCLE] != 0.0,
+            bits,
+        )
+    if world.flags[row] & (KNOWN_MATES | SOME_MATES):
+        _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
+    touched = word_grid_at(belief[TOUCHED], belief[TOUCHED_ROWS], touched_words(belief[MAP_COLUMNS]))
+    integrate_scan(
+        log_odds,
+        bits,
+        box,
+        ends,
+        is_hit,
+        row_offset,
+        column_offset,
+        world.increments,
+        scratch.windows[1],
+        touched,
+    )
+    # A hit may lie one cell beyond the seen area.
+    window = world.windows[row]
+    window[0] = max(min(window[0], box[0] + row_offset - 1), 0)
+    window[1] = min(max(window[1], box[1] + row_offset + 1), belief[MAP_ROWS])
+    window[2] = max(min(window[2], 64 * box[2] + column_offset - 1), 0)
+    window[3] = min(max(window[3], 64 * box[3] + column_offset + 1), belief[MAP_COLUMNS])
+
+
+@kernel(spliced=True)
+def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
+    """Run stage two alone: update one robot's map from its ranges.
+
+    The ranges are taken at its believed pose.
+    """
+    scratch.windows[:] = np.uint64(0)
+    beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
+    update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)

@@ -1,0 +1,158 @@
+"""The scan of a robot in kernels: true ranges by ray casting, noise, what is invalid."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarium.envs.simulation.disturbances.faults import blind_beams
+from lidarium.envs.simulation.disturbances.noise import fill_gaussian, stream_key
+from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
+from lidarium.envs.simulation.kernels.arrays import (
+    ANGLE_FIRST,
+    ANGLE_INCREMENT,
+    FRAME_RESOLUTION,
+    FRAME_X,
+    FRAME_Y,
+    LASER_HEIGHT,
+    MAP_RESOLUTION,
+    NOISE_FLOOR,
+    NOISE_SHARE,
+    RANGE_MAX,
+    RANGE_MIN,
+    WorldArrays,
+)
+from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc
+from lidarium.mapping.grids.scan_geometry import beam_directions
+from lidarium.mapping.grids.scan_polygon import window_rows, window_words
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
+
+RANGE_GAP = 1e-3
+"""Least difference between the range of a hit and the longest range [m].
+
+The longest range means no return in an observation.
+"""
+
+
+ROUND_UP = 1.0 + 1.2e-7
+"""Factor by which ranges are rounded up to float32.
+
+The end of a beam then lies in the cell that it met.
+"""
+
+
+class ScanScratch(NamedTuple):
+    """What a scan is worked out in; one serves robot after robot.
+
+    Attributes
+    ----------
+    directions, lengths, ends : (4, beams), (beams,), (2, beams) float64
+        Of the beams, see ``beam_directions`` and ``scan_ends``.
+    windows : (2, window rows, words) uint64
+        Bits of the cells around the robot: those seen, and those in which beams ended.
+    """
+
+    directions: Array
+    lengths: Array
+    ends: Array
+    windows: Array
+
+
+@kernel(borrowing=True)
+def measure(
+    world: WorldArrays, row: int, first: int, robots: int, directions: Array, ranges: Array, lengths: Array
+) -> None:
+    """Take the scan of one robot without noise.
+
+    It fills ``ranges`` [m], inf for no return, and ``lengths`` of the beams [map cells].
+    """
+    robot, episode = row - first, first // robots
+    sensor, frame, poses = world.sensor, world.frames[episode], world.poses
+    resolution = frame[FRAME_RESOLUTION]
+    reach = sensor[RANGE_MAX] / resolution
+    x, y, heading = (
+        (poses[row, 0] - frame[FRAME_X]) / resolution,
+        (poses[row, 1] - frame[FRAME_Y]) / resolution,
+        poses[row, 2],
+    )
+    angle_first, increment = sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
+    beam_directions(heading, world.unit_vectors, directions)
+    cast_scan(world.floor_rows[episode], x, y, heading, angle_first, increment, directions, reach, lengths)
+    for other in range(robots):
+        if other != robot and world.bodies[other, HEIGHT] > sensor[LASER_HEIGHT]:
+            other_x, other_y = (
+                (poses[first + other, 0] - frame[FRAME_X]) / resolution,
+                (poses[first + other, 1] - frame[FRAME_Y]) / resolution,
+            )
+            radius = world.bodies[other, RADIUS] / resolution
+            cut_by_disc(
+                x, y, heading, angle_first, increment, directions, other_x, other_y, radius, reach, lengths
+            )
+    scale = 1.0 / sensor[MAP_RESOLUTION]
+    longest = sensor[RANGE_MAX]
+    for beam in range(lengths.shape[0]):
+        met = lengths[beam] < reach
+        true_range = np.float32(lengths[beam] * resolution * ROUND_UP)
+        ranges[beam] = true_range if met else np.float32(np.inf)
+        lengths[beam] = min(true_range, longest) * scale if met else longest * scale
+    blind_beams(world.faults[row], world.steps[episode], angle_first, increment, ranges, lengths)
+
+
+@kernel(borrowing=True)
+def _add_noise(world: WorldArrays, row: int, first: int, robots: int) -> None:
+    """Disturb a scan as the sensor does."""
+    sensor, ranges = world.sensor, world.ranges[row]
+    beams, episode = ranges.shape[0], first // robots
+    noise = scratch_vector(beams, np.float32)
+    fill_gaussian(
+        stream_key(world.seeds[episode], row - first, world.steps[episode]), world.noise_table, noise
+    )
+    floor_deviation, share = np.float32(sensor[NOISE_FLOOR]), np.float32(sensor[NOISE_SHARE])
+    low, high = np.float32(sensor[RANGE_MIN]), np.float32(sensor[RANGE_MAX] - RANGE_GAP)
+    for beam in range(beams):
+        true_range = ranges[beam]
+        noisy = true_range + max(floor_deviation, share * true_range) * noise[beam]
+        ranges[beam] = min(max(noisy, low), high) if true_range < np.float32(np.inf) else true_range
+
+
+@kernel(borrowing=True)
+def sense(world: WorldArrays, row: int, first: int, robots: int, directions: Array, lengths: Array) -> None:
+    """Take the scan of one robot: measured ranges, and ``lengths`` of true beams [cells].
+
+    Lengths are in map cells.
+    """
+    measure(world, row, first, robots, directions, world.ranges[row], lengths)
+    if is_noisy(world.sensor):
+        _add_noise(world, row, first, robots)
+
+
+@kernel(spliced=True)
+def sense_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
+    """Take the scan of one robot, and keep its true ranges."""
+    measure(world, row, first, robots, scratch.directions, world.true_ranges[row], scratch.lengths)
+    world.ranges[row, :] = world.true_ranges[row]
+    if is_noisy(world.sensor):
+        _add_noise(world, row, first, robots)
+
+
+@kernel(spliced=True)
+def is_noisy(sensor: Array) -> bool:
+    """Whether ranges carry noise."""
+    return bool(sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0)
+
+
+@kernel(spliced=True)
+def scan_scratch(world: WorldArrays) -> ScanScratch:
+    """Return scratch arrays for the scans of a world.
+
+    They are freed when the kernel that asks for them returns. Do not call this within a loop.
+    """
+    beams, reach = world.ranges.shape[1], world.sensor[RANGE_MAX] / world.sensor[MAP_RESOLUTION]
+    # The windows of a laser that reaches far on a fine map are too large for the stack.
+    windows = np.empty((2, window_rows(reach), window_words(reach)), np.uint64)
+    return ScanScratch(
+        scratch_grid(4, beams, np.float64),
+        scratch_vector(beams, np.float64),
+        scratch_grid(2, beams, np.float64),
+        windows,
+    )
