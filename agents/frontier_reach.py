@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
 from lidarium.mapping.planning.frontiers import Clusters
-from lidarium.mapping.planning.grid_planning import Cell, Footprint, search
+from lidarium.mapping.planning.grid_planning import Cell, Footprint, Until, search
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +98,7 @@ def reach_of(
             navigation.clearance,
             start,
             footprint,
-            targets=targets,
-            beyond=slack,
+            until=Until(targets=targets, beyond=slack),
         )
         if not len(found.hits):
             continue

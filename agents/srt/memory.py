@@ -16,8 +16,8 @@ from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
 from lidarium.mapping.planning.frontiers import FRONTIER
-from lidarium.mapping.planning.grid_planning import Cell, centres_of, plan, search
-from lidarium.mapping.planning.search_targets import Targets
+from lidarium.mapping.planning.grid_planning import Cell, Until, centres_of, plan, search
+from lidarium.mapping.planning.search.search_targets import Targets
 
 CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
@@ -210,15 +210,13 @@ class MapMemory:
         for k, stand in enumerate(stands[:-1]):
             targets.mask[stand] = 0
             # There is always the way past where the robot is: nothing beyond it needs to be looked at.
-            found = search(
-                self._map.space,
-                self._map.log_odds,
-                self._map.clearance,
-                stand,
-                footprint,
+            until = Until(
                 targets=targets,
                 count=len(set(stands[k + 1 :]) - {stand}),
                 maximum_cost=float(costs[k] + costs.max()),
+            )
+            found = search(
+                self._map.space, self._map.log_odds, self._map.clearance, stand, footprint, until=until
             )
             for other in range(k + 1, len(stands)):
                 table[k, other] = table[other, k] = min(found.cost(stands[other]), costs[k] + costs[other])

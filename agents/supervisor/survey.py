@@ -18,7 +18,7 @@ from lidarium.mapping.grids.grid_lines import visible
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
-from lidarium.mapping.planning.grid_planning import Cell, Footprint, cells_of, centres_of, search
+from lidarium.mapping.planning.grid_planning import Cell, Footprint, Until, cells_of, centres_of, search
 
 NONE = -1
 _MARGIN = 1
@@ -215,7 +215,7 @@ class Survey:
             self._map.clearance,
             self._cell_of(agent),
             self._footprint,
-            goal=self._inside((at.x, at.y)),
+            until=Until(goal=self._inside((at.x, at.y))),
         )
         return found.cost(self._inside((at.x, at.y)))
 

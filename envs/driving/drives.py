@@ -8,7 +8,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE, MAX_POINTS, follow_paths
+from lidarium.envs.driving.path_following import (
+    ARRIVED,
+    BLOCKED,
+    DRIVING,
+    IDLE,
+    MAX_POINTS,
+    Bodies,
+    Courses,
+    Sensed,
+    follow_paths,
+)
 from lidarium.envs.radio.messages import DriveState
 from lidarium.mapping.kernels.compilation import Array, kernel
 
@@ -195,25 +205,31 @@ def follow_team(
     The rows are ``first`` to ``last`` (kernel).
     """
     follow_paths(
-        believed[first:last],
-        velocities[first:last],
-        ranges[first:last],
-        following.unit_vectors,
-        following.radii,
-        following.limits,
-        drives.paths[first:last],
-        drives.room[first:last],
-        drives.counts[first:last],
-        drives.places[first:last],
-        drives.headings[first:last],
-        drives.states[first:last],
-        drives.stood[first:last],
-        drives.backing[first:last],
-        following.knows_mates,
-        following.present,
-        following.foresight,
-        following.contact[first:last],
-        following.heard[first:last],
+        Sensed(
+            believed[first:last],
+            velocities[first:last],
+            ranges[first:last],
+            following.contact[first:last],
+            following.heard[first:last],
+        ),
+        Courses(
+            drives.paths[first:last],
+            drives.room[first:last],
+            drives.counts[first:last],
+            drives.places[first:last],
+            drives.headings[first:last],
+            drives.states[first:last],
+            drives.stood[first:last],
+            drives.backing[first:last],
+        ),
+        Bodies(
+            following.unit_vectors,
+            following.radii,
+            following.limits,
+            following.knows_mates,
+            following.present,
+            following.foresight,
+        ),
         commands[first:last],
     )
 

@@ -7,8 +7,10 @@ whose ways cross, the one with the higher number lets the other pass.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 
@@ -18,14 +20,41 @@ IDLE, DRIVING, ARRIVED, BLOCKED = range(4)
 MAX_POINTS = 512
 """Most points of a path."""
 
-LOOKAHEAD = (0.08, 0.25)
-"""Distance ahead on its line at which a robot aims [m].
+LEAST_LOOKAHEAD, MOST_LOOKAHEAD = 0.08, 0.25
+"""Distance ahead on its line at which a robot aims [m], where it is tight and where there is room."""
 
-The first is where it is tight, the second where there is room.
-"""
+LOOKAHEAD_PER_ROOM = 2.0
+"""How much farther ahead it aims per room beside its body [m/m]."""
 
 TURN_GAIN = 3.0
 """Turn rate per radian of heading error [1/s]."""
+
+TURN_IN_A_STEP = 0.5
+"""Most of a heading error that a robot turns away in one step, as a share."""
+
+PASSING_PER_ROOM, LEAST_PASSING, MOST_PASSING = 0.5, 0.015, 0.12
+"""Distance at which a point of a path counts as passed: per room [m/m], at least and at most [m]."""
+
+TOLERANCE_PER_ROOM, LEAST_TOLERANCE, MOST_TOLERANCE = 2.0, 0.01, 0.6
+"""Heading error with which a robot drives: per room [rad/m], at least and at most [rad]."""
+
+SLOWING = 0.7
+"""Share of its speed that a robot gives up at the largest heading error with which it drives."""
+
+LEAST_BEND = 0.2
+"""A robot drives through all bends below this, the more slowly the sharper [rad]."""
+
+LEAST_PIECE = 1e-9
+"""Shorter pieces of a path have no direction [m]."""
+
+LEAST_SPEED_AT_END = 0.02
+"""Speed with which a robot comes up to the end of its path at least [m/s]."""
+
+STANDING_SPEED = 0.01
+"""A robot that is slower than this stands [m/s]."""
+
+ROUNDING_S = 1e-9
+"""Times that differ by less than this are the same [s]."""
 
 ARRIVAL = 0.03
 """Distance at which the end of a path counts as reached [m]."""
@@ -61,6 +90,85 @@ BLOCKED_S = 1.0
 """A robot that wants to drive and has stood for this long is blocked [s]."""
 
 
+CRUISE, TURN_LIMIT, BRAKING, TIME_STEP = range(4)
+"""Places in ``Bodies.limits``."""
+
+
+class Sensed(NamedTuple):
+    """What is known of the robots of a team now.
+
+    Attributes
+    ----------
+    poses, velocities : (robots, 3), (robots, 2) float64
+        Believed poses and velocities [m, rad, m/s, rad/s].
+    ranges : (robots, beams) float32
+        Scans [m].
+    contact, heard : (robots, robots) uint8, (robots, robots * 3) float64
+        Where not all teammates' poses are known: of whom each robot heard lately, and where they were then
+        [m, rad].
+    """
+
+    poses: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    ranges: NDArray[np.float32]
+    contact: NDArray[np.uint8]
+    heard: NDArray[np.float64]
+
+
+class Courses(NamedTuple):
+    """Where the robots of a team drive.
+
+    Attributes
+    ----------
+    paths, margins : (robots, points, 2), (robots, points) float64
+        Points x, y [m], and the room beside the body on the piece that leads to each [m].
+    counts, places : (robots,) int64
+        Number of points, and the point that each robot drives to now.
+    headings : (robots,) float64
+        Wanted heading at the end [rad], nan for any.
+    states, stood : (robots,) int64
+        State of the drive, and steps for which the robot has stood although it wanted to drive.
+    backing : (robots,) int64
+        Steps for which the robot still backs out.
+    """
+
+    paths: NDArray[np.float64]
+    margins: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    places: NDArray[np.int64]
+    headings: NDArray[np.float64]
+    states: NDArray[np.int64]
+    stood: NDArray[np.int64]
+    backing: NDArray[np.int64]
+
+
+class Bodies(NamedTuple):
+    """What the robots of a team are, and what they go by.
+
+    Attributes
+    ----------
+    unit_vectors : (2, beams) float64
+        Directions of the beams.
+    radii : (robots,) float64
+        Of the bodies [m].
+    limits : (4,) float64
+        Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
+    knows_mates : bool
+        Whether teammates' poses are known (and comparable).
+    present : (robots,) uint8
+        Which robots are bodies to keep clear of.
+    foresight : (K,) float64
+        Times at which the other is looked for, the first 0 [s].
+    """
+
+    unit_vectors: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    limits: NDArray[np.float64]
+    knows_mates: bool
+    present: NDArray[np.uint8]
+    foresight: NDArray[np.float64]
+
+
 @kernel(inline=True)
 def _wrap(angle: float) -> float:
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
@@ -82,14 +190,12 @@ def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
 
 
 @kernel
-def _gap_to_mates(
-    robot: int, poses: Array, velocities: Array, radii: Array, foresight: Array, present: Array
-) -> float:
+def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
     """Return how far the disc can go straight to a known teammate [m].
 
     The teammate counts now or where it will be soon.
     """
-    gap = np.inf
+    gap, radii, foresight = np.inf, bodies.radii, bodies.foresight
     cosine, sine = math.cos(poses[robot, 2]), math.sin(poses[robot, 2])
     for other in range(poses.shape[0]):
         if other == robot or present[other] == 0:
@@ -114,158 +220,167 @@ def _gap_to_mates(
 
 
 @kernel
-def _gap_to_heard(
-    robot: int, poses: Array, radii: Array, foresight: Array, contact: Array, heard: Array
-) -> float:
+def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
     """Return how far the disc can go straight to a teammate heard of [m].
 
     The teammate is taken to stand where it was.
     """
-    known = heard.reshape((-1, 3)).copy()
-    known[robot] = poses[robot]
-    return _gap_to_mates(robot, known, np.zeros((poses.shape[0], 2)), radii, foresight, contact)  # type: ignore[no-any-return]
+    known = sensed.heard[robot].reshape((-1, 3)).copy()
+    known[robot] = sensed.poses[robot]
+    still = np.zeros((sensed.poses.shape[0], 2))
+    return _gap_to_mates(robot, known, still, bodies, sensed.contact[robot])  # type: ignore[no-any-return]
 
 
 @kernel
-def follow_paths(
-    poses: Array,
-    velocities: Array,
-    ranges: Array,
-    unit_vectors: Array,
-    radii: Array,
-    limits: Array,
-    paths: Array,
-    margins: Array,
-    counts: Array,
-    places: Array,
-    headings: Array,
-    states: Array,
-    stood: Array,
-    backing: Array,
-    knows_mates: bool,
-    present: Array,
-    foresight: Array,
-    contact: Array,
-    heard: Array,
-    commands: Array,
-) -> None:
-    """Give each robot the speed and turn rate that follow its path.
+def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Array) -> None:
+    """Give each robot the speed and turn rate that follow its path (kernel).
 
     Parameters
     ----------
-    poses, velocities : (robots, 3), (robots, 2) float64
-        Believed poses and velocities [m, rad, m/s, rad/s].
-    ranges : (robots, beams) float32
-        Scans [m].
-    unit_vectors : (2, beams) float64
-        Which way the beams look.
-    radii : (robots,) float64
-        Of the bodies [m].
-    limits : (4,) float64
-        Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
-    paths, margins : (robots, points, 2), (robots, points) float64
-        Points x, y [m], and the room beside the body on the piece that leads to each [m].
-    counts, places : (robots,) int64
-        Number of points, and the point that each robot drives to now (updated).
-    headings : (robots,) float64
-        Wanted heading at the end [rad], nan for any.
-    states, stood : (robots,) int64
-        State of the drive, and steps for which the robot has stood although it wanted to drive (updated).
-    backing : (robots,) int64
-        Steps for which the robot still backs out (updated).
-    knows_mates : bool
-        Whether teammates' poses are known (and comparable).
-    present : (robots,) uint8
-        Which robots are bodies to keep clear of.
-    foresight : (K,) float64
-        Times at which the other is looked for, the first 0 [s].
-    contact, heard : (robots, robots) uint8, (robots, robots * 3) float64
-        Where not all teammates' poses are known: of whom each robot heard lately, and where they were then
-        [m, rad].
+    sensed, courses, bodies : Sensed, Courses, Bodies
+        What is known of the robots, where they drive (updated), and what they are.
     commands : (robots, 2) float64
         Result: speed and turn rate [m/s, rad/s].
     """
-    gain = min(TURN_GAIN, 0.5 / limits[3])
-    cruise, turn_limit, braking, time_step = limits[0], limits[1], limits[2], limits[3]
-    for robot in range(poses.shape[0]):
+    for robot in range(sensed.poses.shape[0]):
         commands[robot, 0] = commands[robot, 1] = 0.0
-        if states[robot] != DRIVING and states[robot] != BLOCKED:
-            stood[robot] = backing[robot] = 0
-            continue
-        if backing[robot] > 0:
-            backing[robot] -= 1
+        if courses.states[robot] != DRIVING and courses.states[robot] != BLOCKED:
+            courses.stood[robot] = courses.backing[robot] = 0
+        elif courses.backing[robot] > 0:
+            courses.backing[robot] -= 1
             commands[robot, 0] = -BACKING_SPEED
-            continue
-        x, y, heading = poses[robot, 0], poses[robot, 1], poses[robot, 2]
-        last = counts[robot] - 1
-        place = places[robot]
-        while place < last:
-            passing = min(max(0.5 * margins[robot, place], 0.015), 0.12)
-            if math.hypot(paths[robot, place, 0] - x, paths[robot, place, 1] - y) > passing:
-                break
-            place += 1
-        places[robot] = place
-        end_x, end_y = paths[robot, place, 0], paths[robot, place, 1]
-        remaining = math.hypot(end_x - x, end_y - y)
-        if place == last and remaining <= ARRIVAL:
-            wanted = headings[robot]
-            error = _wrap(wanted - heading) if wanted == wanted else 0.0
-            if abs(error) <= FACING:
-                states[robot] = ARRIVED
-                stood[robot] = 0
+        else:
+            _pass_points(sensed, courses, robot)
+            if _is_at_end(sensed, courses, robot):
+                commands[robot, 1] = _turn_at_end(sensed, courses, bodies, robot)
             else:
-                commands[robot, 1] = min(max(gain * error, -turn_limit), turn_limit)
-            continue
-        # Aim at a point on the line of this piece, a little ahead of the foot of the robot on it.
-        from_x, from_y = (paths[robot, place - 1, 0], paths[robot, place - 1, 1]) if place > 0 else (x, y)
-        along_x, along_y = end_x - from_x, end_y - from_y
-        length = math.hypot(along_x, along_y)
-        aim_x, aim_y = end_x, end_y
-        if length > 1e-9:
-            foot = ((x - from_x) * along_x + (y - from_y) * along_y) / length
-            ahead = min(
-                max(foot, 0.0)
-                + min(max(LOOKAHEAD[0] + 2.0 * margins[robot, place], LOOKAHEAD[0]), LOOKAHEAD[1]),
-                length,
-            )
-            aim_x, aim_y = from_x + along_x * ahead / length, from_y + along_y * ahead / length
-        error = _wrap(math.atan2(aim_y - y, aim_x - x) - heading)
-        margin = margins[robot, place]
-        tolerance = min(max(0.01 + 2.0 * margin, 0.01), 0.6)
-        commands[robot, 1] = min(max(gain * error, -turn_limit), turn_limit)
-        if abs(error) > tolerance:
-            continue
-        speed = cruise * (1.0 - 0.7 * abs(error) / tolerance)
-        # At a bend the robot slows down to what it can turn with.
-        if place < last:
-            next_x, next_y = paths[robot, place + 1, 0], paths[robot, place + 1, 1]
-            bend = abs(_wrap(math.atan2(next_y - end_y, next_x - end_x) - math.atan2(end_y - y, end_x - x)))
-            through = cruise * max(0.0, 1.0 - bend / max(tolerance, 0.2))
-        else:
-            through = 0.0
-        speed = min(
-            speed,
-            math.sqrt(through * through + 2.0 * braking * remaining)
-            if through > 0.0
-            else math.sqrt(2.0 * braking * remaining),
+                _drive_on(sensed, courses, bodies, robot, commands)
+
+
+@kernel
+def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, commands: Array) -> None:
+    """Turn a robot towards the next piece of its path, and drive where it looks that way."""
+    aim_x, aim_y = _aim(sensed, courses, robot)
+    x, y, heading = sensed.poses[robot, 0], sensed.poses[robot, 1], sensed.poses[robot, 2]
+    error = _wrap(math.atan2(aim_y - y, aim_x - x) - heading)
+    margin = courses.margins[robot, courses.places[robot]]
+    tolerance = min(max(LEAST_TOLERANCE + TOLERANCE_PER_ROOM * margin, LEAST_TOLERANCE), MOST_TOLERANCE)
+    commands[robot, 1] = _turn_rate(error, bodies.limits)
+    if abs(error) > tolerance:
+        return
+    speed = bodies.limits[CRUISE] * (1.0 - SLOWING * abs(error) / tolerance)
+    speed = min(speed, _speed_to_next(sensed, courses, bodies.limits, robot, tolerance))
+    speed = min(speed, _safe_speed(sensed, bodies, robot))
+    commands[robot, 0] = speed
+    if speed < STANDING_SPEED:
+        courses.stood[robot] += 1
+        if courses.stood[robot] * bodies.limits[TIME_STEP] >= BLOCKED_S - ROUNDING_S:
+            courses.states[robot] = BLOCKED
+    else:
+        courses.stood[robot] = 0
+        courses.states[robot] = DRIVING
+
+
+@kernel(inline=True)
+def _turn_rate(error: float, limits: Array) -> float:
+    """Return the turn rate that makes up for a heading error [rad/s]."""
+    gain, limit = min(TURN_GAIN, TURN_IN_A_STEP / limits[TIME_STEP]), limits[TURN_LIMIT]
+    return min(max(gain * error, -limit), limit)
+
+
+@kernel
+def _pass_points(sensed: Sensed, courses: Courses, robot: int) -> None:
+    """Let a robot drive to the first point of its path that it has not passed."""
+    x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
+    paths, place = courses.paths, courses.places[robot]
+    while place < courses.counts[robot] - 1:
+        room = courses.margins[robot, place]
+        passing = min(max(PASSING_PER_ROOM * room, LEAST_PASSING), MOST_PASSING)
+        if math.hypot(paths[robot, place, 0] - x, paths[robot, place, 1] - y) > passing:
+            break
+        place += 1
+    courses.places[robot] = place
+
+
+@kernel(inline=True)
+def _remaining(sensed: Sensed, courses: Courses, robot: int) -> float:
+    """Return the distance to the point that a robot drives to [m]."""
+    place, x, y = courses.places[robot], sensed.poses[robot, 0], sensed.poses[robot, 1]
+    return math.hypot(courses.paths[robot, place, 0] - x, courses.paths[robot, place, 1] - y)
+
+
+@kernel
+def _is_at_end(sensed: Sensed, courses: Courses, robot: int) -> bool:
+    """Whether a robot is where its path ends."""
+    is_last = courses.places[robot] == courses.counts[robot] - 1
+    return bool(is_last and _remaining(sensed, courses, robot) <= ARRIVAL)
+
+
+@kernel
+def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -> float:
+    """Return the turn rate towards the wanted heading; note where it is reached."""
+    wanted = courses.headings[robot]
+    error = _wrap(wanted - sensed.poses[robot, 2]) if wanted == wanted else 0.0
+    if abs(error) > FACING:
+        return float(_turn_rate(error, bodies.limits))
+    courses.states[robot] = ARRIVED
+    courses.stood[robot] = 0
+    return 0.0
+
+
+@kernel
+def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
+    """Return a point on the line of this piece, a little ahead of the robot's foot on it [m]."""
+    x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
+    paths, place = courses.paths, courses.places[robot]
+    end_x, end_y = paths[robot, place, 0], paths[robot, place, 1]
+    from_x, from_y = (paths[robot, place - 1, 0], paths[robot, place - 1, 1]) if place > 0 else (x, y)
+    along_x, along_y = end_x - from_x, end_y - from_y
+    length = math.hypot(along_x, along_y)
+    if not length > LEAST_PIECE:
+        return end_x, end_y
+    foot = ((x - from_x) * along_x + (y - from_y) * along_y) / length
+    lookahead = LEAST_LOOKAHEAD + LOOKAHEAD_PER_ROOM * courses.margins[robot, place]
+    ahead = min(max(foot, 0.0) + min(max(lookahead, LEAST_LOOKAHEAD), MOST_LOOKAHEAD), length)
+    return from_x + along_x * ahead / length, from_y + along_y * ahead / length
+
+
+@kernel
+def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, tolerance: float) -> float:
+    """Return the speed from which a robot still brakes to what the next bend or the end wants [m/s].
+
+    At a bend it slows down to what it can turn with.
+    """
+    remaining, braking = _remaining(sensed, courses, robot), limits[BRAKING]
+    paths, place = courses.paths, courses.places[robot]
+    if place == courses.counts[robot] - 1:
+        return min(
+            math.sqrt(2.0 * braking * remaining), max(remaining / limits[TIME_STEP], LEAST_SPEED_AT_END)
         )
-        speed = min(speed, max(remaining / time_step, 0.02)) if place == last else speed
-        gap = _gap_in_scan(ranges[robot], unit_vectors, radii[robot] + SIDE_GAP)
-        allowed = math.sqrt(
-            2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * velocities[robot, 0], 0.0)
-        )
-        if knows_mates:
-            mate_gap = _gap_to_mates(robot, poses, velocities, radii, foresight, present)
-            allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * velocities[robot, 0], 0.0)))
-        elif contact[robot].sum() > 0:
-            mate_gap = _gap_to_heard(robot, poses, radii, foresight, contact[robot], heard[robot])
-            allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * velocities[robot, 0], 0.0)))
-        speed = min(speed, allowed)
-        commands[robot, 0] = speed
-        if speed < 0.01:
-            stood[robot] += 1
-            if stood[robot] * time_step >= BLOCKED_S - 1e-9:
-                states[robot] = BLOCKED
-        else:
-            stood[robot] = 0
-            states[robot] = DRIVING
+    x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
+    end_x, end_y = paths[robot, place, 0], paths[robot, place, 1]
+    next_x, next_y = paths[robot, place + 1, 0], paths[robot, place + 1, 1]
+    bend = abs(_wrap(math.atan2(next_y - end_y, next_x - end_x) - math.atan2(end_y - y, end_x - x)))
+    through = limits[CRUISE] * max(0.0, 1.0 - bend / max(tolerance, LEAST_BEND))
+    if through > 0.0:
+        return math.sqrt(through * through + 2.0 * braking * remaining)
+    return math.sqrt(2.0 * braking * remaining)
+
+
+@kernel
+def _safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
+    """Return the speed that still stops before returns and teammates [m/s].
+
+    Teammates brake as well.
+    """
+    braking, time_step = bodies.limits[BRAKING], bodies.limits[TIME_STEP]
+    own, speed = bodies.radii[robot] + SIDE_GAP, sensed.velocities[robot, 0]
+    gap = _gap_in_scan(sensed.ranges[robot], bodies.unit_vectors, own)
+    allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * speed, 0.0))
+    if bodies.knows_mates:
+        mate_gap = _gap_to_mates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
+        allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
+    elif sensed.contact[robot].sum() > 0:
+        mate_gap = _gap_to_heard(robot, sensed, bodies)
+        allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
+    return allowed

@@ -15,8 +15,9 @@ from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, TeamMaps, closeness_of, log_odds_of, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.work_queue import take_turn
-from lidarium.mapping.planning.path_search import Passage, budget_of, find_path
 from lidarium.mapping.planning.path_smoothing import kept_places, line_is_clear
+from lidarium.mapping.planning.search.path_search import budget_of, find_path
+from lidarium.mapping.planning.search.search_state import Passage, Terrain
 
 MATE_DISTANCE = 0.06
 """Paths round teammates keep this gap to them [m]."""
@@ -132,19 +133,32 @@ def _discs(planning: Planning, row: int, avoided: Array) -> Array:
     return discs
 
 
+class Destination(NamedTuple):
+    """Where a robot is to go.
+
+    Attributes
+    ----------
+    row, column : int
+        The cell to go to; outside of the map there is no way.
+    x, y : float
+        Where to end within that cell, if there is room [m]; nan for its centre.
+    heading : float
+        Wanted heading at the end [rad], nan for any.
+    maximum_cost : float
+        Most that the way may cost [m].
+    """
+
+    row: int
+    column: int
+    x: float
+    y: float
+    heading: float
+    maximum_cost: float
+
+
 @kernel
 def drive_to(
-    planning: Planning,
-    drives: Drives,
-    row: int,
-    goal_row: int,
-    goal_column: int,
-    avoided: Array,
-    heading: float,
-    maximum_cost: float,
-    end_x: float,
-    end_y: float,
-    piece: int,
+    planning: Planning, drives: Drives, row: int, destination: Destination, avoided: Array, piece: int
 ) -> bool:
     """Plan a robot's path round bodies of teammates and start on it (kernel).
 
@@ -154,16 +168,10 @@ def drive_to(
         All robots.
     row : int
         Which one.
-    goal_row, goal_column : int
-        The cell to go to; outside of the map there is no way.
+    destination : Destination
+        Where to.
     avoided : (robots,) bool
         Whose bodies to go round.
-    heading : float
-        Wanted heading at the end [rad], nan for any.
-    maximum_cost : float
-        Most that the way may cost [m].
-    end_x, end_y : float
-        Where to end within the last cell, if there is room [m]; nan for its centre.
     piece : int
         Which piece of the memory to use.
 
@@ -172,51 +180,55 @@ def drive_to(
     bool
         Whether there is a way; where there is none nothing changes.
     """
-    record = planning.records[row // planning.sharing]
-    if not (0 <= goal_row < record[ROWS] and 0 <= goal_column < record[COLUMNS]):
+    record, goal = planning.records[row // planning.sharing], (destination.row, destination.column)
+    if not (0 <= goal[0] < record[ROWS] and 0 <= goal[1] < record[COLUMNS]):
         return False
-    log_odds, closeness, passage, resolution = (
-        log_odds_of(record),
-        closeness_of(record),
-        passage_in(planning),
-        planning.resolution,
-    )
-    origin_x, origin_y = planning.origins[row, 0], planning.origins[row, 1]
-    start_row = int(math.floor((planning.believed[row, 1] - origin_y) / resolution))
-    start_column = int(math.floor((planning.believed[row, 0] - origin_x) / resolution))
+    resolution = planning.resolution
+    start_row = int(math.floor((planning.believed[row, 1] - planning.origins[row, 1]) / resolution))
+    start_column = int(math.floor((planning.believed[row, 0] - planning.origins[row, 0]) / resolution))
     if not (0 <= start_row < record[ROWS] and 0 <= start_column < record[COLUMNS]):
         return False
     discs = _discs(planning, row, avoided)
-    cost, path = find_path(
-        log_odds,
-        closeness,
-        passage,
-        planning.memory[piece],
-        discs,
-        start_row,
-        start_column,
-        goal_row,
-        goal_column,
-        budget_of(maximum_cost, resolution),
-    )
+    terrain = Terrain(log_odds_of(record), closeness_of(record), passage_in(planning), discs)
+    budget = budget_of(destination.maximum_cost, resolution)
+    cost, path = find_path(terrain, planning.memory[piece], (start_row, start_column), goal, budget)
     if cost < 0:
         return False
-    kept = kept_places(path, log_odds, closeness, passage.limit, passage.radius, passage.preferred, discs)
+    count = _write_points(planning, drives, row, path, terrain)
+    _end_within_cell(planning, drives, row, count - 1, terrain.closeness, destination)
+    drives.counts[row], drives.places[row] = count, min(1, count - 1)
+    drives.headings[row] = destination.heading
+    drives.states[row], drives.stood[row], drives.has_path[row] = DRIVING, 0, True
+    return True
+
+
+@kernel
+def _write_points(planning: Planning, drives: Drives, row: int, path: Array, terrain: Terrain) -> int:
+    """Write the points of a path of cells that straight lines can join; return how many."""
+    kept = kept_places(path, terrain)
     count = min(len(kept), MAX_POINTS)
     cells, points = drives.cells[row], drives.paths[row]
     for k in range(count):
         cells[k, 0], cells[k, 1] = path[kept[k], 0], path[kept[k], 1]
-        points[k, 0] = (cells[k, 1] + 0.5) * resolution + origin_x
-        points[k, 1] = (cells[k, 0] + 0.5) * resolution + origin_y
-        drives.room[row, k] = _room_before(cells, k, closeness, planning)
-    if max(abs(points[count - 1, 0] - end_x), abs(points[count - 1, 1] - end_y)) <= resolution:
-        # Within the last cell the target itself is as good as the cell's centre where there is room.
-        squared = passage.limit - int(closeness[cells[count - 1, 0], cells[count - 1, 1]])
+        points[k, 0] = (cells[k, 1] + 0.5) * planning.resolution + planning.origins[row, 0]
+        points[k, 1] = (cells[k, 0] + 0.5) * planning.resolution + planning.origins[row, 1]
+        drives.room[row, k] = _room_before(cells, k, terrain.closeness, planning)
+    return count
+
+
+@kernel
+def _end_within_cell(
+    planning: Planning, drives: Drives, row: int, last: int, closeness: Array, destination: Destination
+) -> None:
+    """Move the last point of a path to the target itself where there is room.
+
+    Within the last cell the target is as good as the cell's centre there.
+    """
+    cells, points, resolution = drives.cells[row], drives.paths[row], planning.resolution
+    if max(abs(points[last, 0] - destination.x), abs(points[last, 1] - destination.y)) <= resolution:
+        squared = planning.limit - int(closeness[cells[last, 0], cells[last, 1]])
         if min(math.sqrt(squared) * 0.5 * resolution, planning.farthest) >= planning.tight:
-            points[count - 1, 0], points[count - 1, 1] = end_x, end_y
-    drives.counts[row], drives.places[row], drives.headings[row] = count, min(1, count - 1), heading
-    drives.states[row], drives.stood[row], drives.has_path[row] = DRIVING, 0, True
-    return True
+            points[last, 0], points[last, 1] = destination.x, destination.y
 
 
 @kernel
@@ -260,6 +272,22 @@ def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> N
     goal_column = math.floor((place_x - planning.origins[row, 0]) / planning.resolution)
     if not (0.0 <= goal_row < record[ROWS] and 0.0 <= goal_column < record[COLUMNS]):
         return
+    destination = Destination(
+        int(goal_row), int(goal_column), place_x, place_y, drives.target_headings[row], np.inf
+    )
+    avoided, ended = _standing(planning, drives, row)
+    # First round all that stand; of these only those that have ended can never give way.
+    for _ in range(2):
+        if drive_to(planning, drives, row, destination, avoided, piece):
+            return
+        if ended.sum() == avoided.sum():
+            return
+        avoided = ended
+
+
+@kernel
+def _standing(planning: Planning, drives: Drives, row: int) -> tuple[Array, Array]:
+    """Return which teammates stand, and which of them for good, (robots,) bool each."""
     first = row // planning.robots * planning.robots
     avoided, ended = np.zeros(planning.robots, np.bool_), np.zeros(planning.robots, np.bool_)
     for mate in range(planning.robots):
@@ -267,25 +295,7 @@ def prepare_robot(planning: Planning, drives: Drives, row: int, piece: int) -> N
         if other != row and (planning.knows_mates or planning.contact[row, mate] != 0):
             ended[mate] = planning.has_ended[other]
             avoided[mate] = ended[mate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
-    # First round all that stand; of these only those that have ended can never give way.
-    for _ in range(2):
-        if drive_to(
-            planning,
-            drives,
-            row,
-            int(goal_row),
-            int(goal_column),
-            avoided,
-            drives.target_headings[row],
-            np.inf,
-            place_x,
-            place_y,
-            piece,
-        ):
-            return
-        if ended.sum() == avoided.sum():
-            return
-        avoided = ended
+    return avoided, ended
 
 
 def _prepare_teams(

@@ -22,6 +22,7 @@ from lidarium.envs.driving.drives import (
 from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, FORESIGHT_TIMES, IDLE
 from lidarium.envs.driving.planning import (
     MATE_DISTANCE,
+    Destination,
     Planning,
     drive_to,
     prepare_robot,
@@ -37,7 +38,7 @@ from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.mapping.kernels.work_queue import new_turns
 from lidarium.mapping.planning.clearance import limit_of
 from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, cells_of, discs_of, passage_of
-from lidarium.mapping.planning.path_search import Passage
+from lidarium.mapping.planning.search.search_state import Passage
 
 BODY_MARGIN = 0.002
 """Paths keep the body this far from occupied cells [m]."""
@@ -326,9 +327,8 @@ class TeamDriver:
         chosen = np.zeros(self._settings.robots, np.bool_)
         chosen[np.array(avoided, np.int64) % self._settings.robots] = True
         planning = self._fresh_planning(row)
-        return bool(
-            drive_to(planning, self.drives, row, *goal, chosen, heading, maximum_cost, math.nan, math.nan, 0)
-        )
+        destination = Destination(*goal, math.nan, math.nan, heading, maximum_cost)
+        return bool(drive_to(planning, self.drives, row, destination, chosen, 0))
 
     def _remaining(self, row: int) -> NDArray[np.float64]:
         place, count = int(self.drives.places[row]), int(self.drives.counts[row])

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, centres_of, search
+from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, Until, centres_of, search
 
 FARTHEST_REFUGE = (3.0, 12.0, 40.0)
 """How far a robot looks for a place aside, in turn [m]."""
@@ -71,7 +71,7 @@ def find_refuge(
             navigation.clearance,
             start,
             footprint,
-            maximum_cost=farthest,
+            until=Until(maximum_cost=farthest),
             blocked=discs,
         )
         cells = found.reached()

@@ -34,9 +34,9 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.work_queue import new_turns, take_turn
 from lidarium.mapping.planning.frontier_approach import approach_places, default_reach
 from lidarium.mapping.planning.frontiers import frontier_clusters, ignore_frontiers_near
-from lidarium.mapping.planning.grid_search import LARGEST_BUDGET, STRAIGHT
-from lidarium.mapping.planning.path_search import clear_memory, search_all
-from lidarium.mapping.planning.search_targets import disc_spans
+from lidarium.mapping.planning.search.path_search import clear_memory, search_all
+from lidarium.mapping.planning.search.search_state import LARGEST_BUDGET, STRAIGHT
+from lidarium.mapping.planning.search.search_targets import disc_spans
 
 CANDIDATES = 16
 """Most frontiers that a robot chooses among."""

@@ -32,7 +32,7 @@ from lidarium.mapping.planning.clearance_updates import (
     update_around,
 )
 from lidarium.mapping.planning.frontiers import FrontierMap, update_frontiers
-from lidarium.mapping.planning.grid_planning import SearchSpace
+from lidarium.mapping.planning.search.search_space import SearchSpace
 
 CLEARANCE_LIMIT = 0.6
 """Clearance is told exactly up to this [m]."""

@@ -38,7 +38,7 @@ from lidarium.mapping.merging.fusion import FusedMap, lay_over
 from lidarium.mapping.planning.clearance import limit_of, stamp_of
 from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed
 from lidarium.mapping.planning.frontiers import IGNORED
-from lidarium.mapping.planning.path_search import SearchMemory
+from lidarium.mapping.planning.search.path_search import SearchMemory
 
 
 class Perception:

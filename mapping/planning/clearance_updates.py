@@ -7,6 +7,8 @@ Theory of Computing 8, 2012); with a small largest distance the plain minimum al
 once, beats the lower envelope.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from lidarium.mapping.grids.cell_blocks import BLOCK
@@ -243,25 +245,31 @@ def _stamp_at(closeness: Array, stamp: Array, row: int, column: int) -> None:
             raise_block(closeness.ctypes.data + 2 * (other * columns + within), source)
 
 
-@kernel
-def _count_rows(
-    log_odds: Array,
-    row: int,
-    step: int,
-    rows: int,
-    column: int,
-    steps: Array,
-    fewest: Array,
-    lane: int,
-    largest: int,
-) -> None:
-    """Apply ``count_rows`` to the columns from ``column`` on.
+class _Sweep(NamedTuple):
+    """Rows that are gone through one after the other.
 
-    From a row on, in steps of 1 or -1.
+    Attributes
+    ----------
+    row, step, rows : int
+        The first row, 1 or -1, and how many there are.
+    largest : int
+        Up to which number steps are counted.
+    """
+
+    row: int
+    step: int
+    rows: int
+    largest: int
+
+
+@kernel
+def _count_rows(log_odds: Array, sweep: _Sweep, column: int, steps: Array, fewest: Array, lane: int) -> None:
+    """Apply ``count_rows`` to the columns from ``column`` on.
 
     ``steps`` is (64,); ``fewest`` (rows, width), in which the columns begin at ``lane``, may have one row for
     all. Beyond the grid nothing is occupied.
     """
+    row, step, rows, largest = sweep
     columns, width = log_odds.shape[1], fewest.shape[1]
     place = lane if step > 0 else (fewest.shape[0] - 1) * width + lane
     stride = step * width if fewest.shape[0] > 1 else 0
@@ -291,10 +299,10 @@ def _nearest_rows(log_odds: Array, reach: int, row_low: int, row_high: int, colu
         first = within if within >= 0 and 0 <= within - column <= width - BLOCK else column + chunk
         for step, outside, inside in ((1, low, row_low), (-1, high - 1, row_high - 1)):
             steps[:] = far
-            _count_rows(
-                log_odds, outside, step, abs(inside - outside), first, steps, beyond, first - column, far
-            )
-            _count_rows(log_odds, inside, step, row_high - row_low, first, steps, fewest, first - column, far)
+            before = _Sweep(outside, step, abs(inside - outside), far)
+            _count_rows(log_odds, before, first, steps, beyond, first - column)
+            within_rows = _Sweep(inside, step, row_high - row_low, far)
+            _count_rows(log_odds, within_rows, first, steps, fewest, first - column)
     return fewest
 
 

@@ -18,9 +18,10 @@ from lidarium.mapping.grids.grid_lines import line_is_open
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.frontiers import FRONTIER, Clusters, FrontierMap
-from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, Search, SearchSpace, search
-from lidarium.mapping.planning.grid_search import LEAVING, NO_ENTRY
-from lidarium.mapping.planning.search_targets import disc_spans
+from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, Until, search
+from lidarium.mapping.planning.search.search_space import Search, SearchSpace
+from lidarium.mapping.planning.search.search_state import LEAVING, NO_ENTRY
+from lidarium.mapping.planning.search.search_targets import disc_spans
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +169,8 @@ def nearest_frontier(
         None if no frontier can be reached.
     """
     distance = default_reach(footprint, space.resolution) if reach is None else reach
-    found = search(
-        space, log_odds, clearance, start, footprint, targets=frontiers.targets(distance), blocked=blocked
-    )
+    until = Until(targets=frontiers.targets(distance))
+    found = search(space, log_odds, clearance, start, footprint, until=until, blocked=blocked)
     if len(found.hits) == 0:
         return None
     row, column = int(found.hits[0, 0]), int(found.hits[0, 1])

@@ -15,8 +15,8 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.planning.clearance import full_window
 from lidarium.mapping.planning.clearance_updates import Window, grown_window
 from lidarium.mapping.planning.grid_planning import centres_of
-from lidarium.mapping.planning.grid_search import TILE_SHIFT
-from lidarium.mapping.planning.search_targets import Targets, disc_spans, near_tiles
+from lidarium.mapping.planning.search.search_state import TILE_SHIFT
+from lidarium.mapping.planning.search.search_targets import Targets, disc_spans, near_tiles
 
 FRONTIER = 1
 IGNORED = 2

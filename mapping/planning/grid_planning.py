@@ -13,10 +13,20 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.planning import grid_search
 from lidarium.mapping.planning.clearance import ClearanceField, limit_of
-from lidarium.mapping.planning.path_search import Lookout, Passage, budget_of, find_path, search_at
-from lidarium.mapping.planning.search_targets import Targets
+from lidarium.mapping.planning.search.path_search import budget_of, find_path, search_at
+from lidarium.mapping.planning.search.search_space import Search, SearchSpace
+from lidarium.mapping.planning.search.search_state import (
+    COLUMN_BITS,
+    DIAGONAL,
+    ROW_SHIFT,
+    STRAIGHT,
+    Lookout,
+    Passage,
+    Task,
+    Terrain,
+)
+from lidarium.mapping.planning.search.search_targets import Targets
 
 Cell = tuple[int, int]
 Disc = tuple[float, float, float]
@@ -100,9 +110,7 @@ def passage_of(footprint: Footprint, resolution: float, limit: int) -> Passage:
     room = max(footprint.preferred - footprint.radius, 1e-9)
     shortfall = np.clip((footprint.preferred - clearance) / room, 0.0, 1.0)
     factors = 1.0 + footprint.penalty * shortfall**2
-    costs = np.rint(np.array([[grid_search.STRAIGHT / 2], [grid_search.DIAGONAL / 2]]) * factors).astype(
-        np.int32
-    )
+    costs = np.rint(np.array([[STRAIGHT / 2], [DIAGONAL / 2]]) * factors).astype(np.int32)
     costs[:, squared < max(least, 1)] = 0
     costs.flags.writeable = False
     return Passage(
@@ -110,154 +118,42 @@ def passage_of(footprint: Footprint, resolution: float, limit: int) -> Passage:
     )
 
 
-class SearchSpace:
-    """Scratch memory of the searches over one grid.
-
-    Each search forgets the one before.
-
-    Parameters
-    ----------
-    shape : (rows, columns)
-        Of the belief; at most 32,767 cells a side.
-    resolution : float
-        Side of a cell [m].
-    """
-
-    def __init__(self, shape: tuple[int, int], resolution: float) -> None:
-        if not (0 < shape[0] < 2**15 and 0 < shape[1] < 2**15):
-            raise ValueError(f"shape is {tuple(shape)}; want 1 to 32767 cells a side")
-        if not resolution > 0.0:
-            raise ValueError(f"resolution is {resolution} m; want a positive side of a cell")
-        cells = shape[0] * shape[1]
-        self.resolution = float(resolution)
-        self.shape = (int(shape[0]), int(shape[1]))
-        self.remaining: NDArray[np.int32] = np.zeros(shape, dtype=np.int32)
-        self.parent: NDArray[np.uint8] = np.empty(shape, dtype=np.uint8)
-        self.touched: NDArray[np.int32] = np.empty(cells + 8, dtype=np.int32)
-        self.hits: NDArray[np.int32] = np.empty(cells + 8, dtype=np.int32)
-        self.buckets: NDArray[np.int32] = np.empty((16, 4096), dtype=np.int32)
-        self.touched_count = 0
-        self.generation = 0
-
-    def forget(self) -> None:
-        """Clear what the last search left; its :class:`Search` can no longer be read."""
-        grid_search.clear(self.remaining, self.touched, self.touched_count)
-        self.touched_count = 0
-        self.generation += 1
-
-    def provide(self, slots: int) -> None:
-        """Have at least so many buckets, a power of two."""
-        if slots > self.buckets.shape[0]:
-            self.buckets = np.empty((slots, self.buckets.shape[1]), dtype=np.int32)
-
-    @property
-    def memory(self) -> NDArray[np.int64]:
-        """Where the space lies, as a row of ``SearchMemory.table``."""
-        arrays = (self.remaining, self.parent, self.touched, self.buckets)
-        return np.array([*(array.ctypes.data for array in arrays), *self.buckets.shape], np.int64)
-
-
-@dataclass(frozen=True, slots=True)
-class Search:
-    """What a search found; readable until the next search in the same space.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Until:
+    """When a search ends; without any of these, where all is reached.
 
     Attributes
     ----------
-    space : SearchSpace
-        Where costs and parents lie.
-    start : (row, column)
-        Where it began.
-    budget : int
-        What could be spent, in units of cost.
-    settled : int
-        Costs up to this one [units] are final; a cell beyond counts as not reached.
-    hits : (M, 2) int64
-        The first targets (row, column), by cost and then by row and column; empty where none was looked for
-        or reached.
+    goal : (row, column), optional
+        Stop when this cell is settled.
+    targets : Targets, optional
+        Stop when ``count`` cells are settled from which a target is in reach and sight.
+    count : int
+        How many.
+    beyond : float
+        With the targets found, go on until all costs up to the dearest one's and this above it are final [m].
+    maximum_cost : float
+        Stop at this cost [m].
+
+    Raises
+    ------
+    ValueError
+        If ``beyond`` is negative.
     """
 
-    space: SearchSpace
-    start: Cell
-    budget: int
-    settled: int
-    hits: NDArray[np.int64]
-    generation: int
+    goal: Cell | None = None
+    targets: Targets | None = None
+    count: int = 1
+    beyond: float = 0.0
+    maximum_cost: float = math.inf
 
-    @property
-    def unit(self) -> float:
-        """Metres of open floor that one unit of cost stands for."""
-        return self.space.resolution / grid_search.STRAIGHT
+    def __post_init__(self) -> None:
+        if not self.beyond >= 0.0:
+            raise ValueError(f"beyond is {self.beyond} m; want 0 or more")
 
-    def cost(self, cell: Cell) -> float:
-        """Cost [m] of the cheapest way to a cell, ``inf`` where it was not reached."""
-        self._check()
-        row, column = int(cell[0]), int(cell[1])
-        if (row, column) == self.start:
-            return 0.0
-        left = int(self.space.remaining[row, column])
-        if (
-            left in (0, grid_search.NO_ENTRY)
-            or self.space.parent[row, column] >= grid_search.LEAVING
-            or self.budget - left > self.settled
-        ):
-            return math.inf
-        return (self.budget - left) * self.unit
 
-    def costs(self) -> NDArray[np.float64]:
-        """Costs (rows, columns) [m] of all cells, ``inf`` where not reached.
-
-        A pass over the whole grid: for tests and pictures.
-        """
-        self._check()
-        left = self.space.remaining
-        spent = self.budget - left.astype(np.int64)
-        reached = (left > 0) & (left != grid_search.NO_ENTRY) & (spent <= self.settled)
-        reached[reached] = self.space.parent[reached] < grid_search.LEAVING
-        costs = np.where(reached, spent * self.unit, math.inf)
-        costs[self.start] = 0.0
-        return costs
-
-    def reached(self) -> NDArray[np.int64]:
-        """Cells (N, 2) that were reached, in the order in which they were first seen."""
-        self._check()
-        packed = self.space.touched[: self.space.touched_count].astype(np.int64)
-        cells = np.stack((packed >> 16, packed & 0xFFFF), axis=1)
-        left = self.space.remaining[cells[:, 0], cells[:, 1]]
-        passable = self.space.parent[cells[:, 0], cells[:, 1]] < grid_search.LEAVING
-        reached: NDArray[np.int64] = cells[
-            (left != grid_search.NO_ENTRY) & (self.budget - left <= self.settled) & passable
-        ]
-        return reached
-
-    def path(self, cell: Cell) -> NDArray[np.int64]:
-        """Cheapest path to a cell.
-
-        Returns
-        -------
-        (N, 2) int64
-            Cells (row, column) from the start to ``cell``, both included; neighbours differ by at most one in
-            each.
-
-        Raises
-        ------
-        ValueError
-            If the cell was not reached, or another search has used the space since.
-        """
-        if math.isinf(self.cost(cell)):
-            raise ValueError(
-                f"cell {(int(cell[0]), int(cell[1]))} was not reached from {self.start}; ask for its cost "
-                "first"
-            )
-        return np.asarray(
-            grid_search.trace(self.space.parent, self.start[0], self.start[1], int(cell[0]), int(cell[1]))
-        )
-
-    def _check(self) -> None:
-        if self.generation != self.space.generation:
-            raise ValueError(
-                "another search has used this space since; read a search before the next one, or give it a "
-                "space of its own"
-            )
+ALL_REACHED = Until()
+"""A search ends where all is reached."""
 
 
 def search(
@@ -267,11 +163,7 @@ def search(
     start: Cell,
     footprint: Footprint,
     *,
-    goal: Cell | None = None,
-    targets: Targets | None = None,
-    count: int = 1,
-    beyond: float = 0.0,
-    maximum_cost: float = math.inf,
+    until: Until = ALL_REACHED,
     blocked: Iterable[Disc] = (),
 ) -> Search:
     """Spread costs from a cell over all that a body can reach.
@@ -291,16 +183,8 @@ def search(
         cells that are no nearer; such cells are part of paths but count as not reached.
     footprint : Footprint
         The body.
-    goal : (row, column), optional
-        Stop when this cell is settled.
-    targets : Targets, optional
-        Stop when ``count`` cells are settled from which a target is in reach and sight.
-    count : int
-        How many.
-    beyond : float
-        With the targets found, go on until all costs up to the dearest one's and this above it are final [m].
-    maximum_cost : float
-        Stop at this cost [m].
+    until : Until
+        When to end.
     blocked : iterable of (row, column, radius)
         Discs in cells (see :func:`discs_of`), such as teammates with both radii added, that the body's centre
         may not enter.
@@ -313,34 +197,30 @@ def search(
     Raises
     ------
     ValueError
-        If shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, ``beyond`` is
-        negative, or the footprint needs more clearance than the field knows.
+        If shapes differ, the belief is no C-contiguous int8, a cell lies outside the grid, or the footprint
+        needs more clearance than the field knows.
     """
-    _check_search(space, log_odds, clearance, start, goal)
-    if not beyond >= 0.0:
-        raise ValueError(f"beyond is {beyond} m; want 0 or more")
+    _check_search(space, log_odds, clearance, start, until.goal)
     passage = passage_of(footprint, space.resolution, clearance.limit)
     space.provide(passage.slots)
-    budget = int(budget_of(float(maximum_cost), space.resolution))
-    goal_row, goal_column = (-1, -1) if goal is None else (int(goal[0]), int(goal[1]))
-    discs = _discs_array(blocked)
-    space.forget()
-    further = int(budget_of(float(beyond), space.resolution)) if beyond > 0.0 else 0
-    task = np.array(
-        [*start, goal_row, goal_column, budget, 0, 0 if targets is None else count, further], np.int64
-    )
+    budget = int(budget_of(float(until.maximum_cost), space.resolution))
+    further = int(budget_of(float(until.beyond), space.resolution)) if until.beyond > 0.0 else 0
+    first, targets = (int(start[0]), int(start[1])), until.targets
+    goal_row, goal_column = (-1, -1) if until.goal is None else (int(until.goal[0]), int(until.goal[1]))
+    wanted = 0 if targets is None else int(until.count)
+    task = Task(*first, goal_row, goal_column, budget, False, wanted, further)
     mask, near = (_NO_MASK, _NO_MASK) if targets is None else (targets.mask, targets.near)
-    lookout = Lookout(
-        mask, near, np.zeros(1, np.int64) if targets is None else targets.spans.copy(), space.hits
-    )
+    spans = np.zeros(1, np.int64) if targets is None else targets.spans.copy()
+    lookout, discs = Lookout(mask, near, spans, space.hits), _discs_array(blocked)
+    space.forget()
     space.touched_count, hit_count, settled = search_at(
         log_odds.ctypes.data, clearance.closeness, passage, space.memory, discs, task, lookout
     )
     packed = space.hits[:hit_count].astype(np.int64)
-    rows, columns = packed >> 16, packed & 0xFFFF
-    order = np.lexsort((columns, rows, -space.remaining[rows, columns].astype(np.int64)))[:count]
+    rows, columns = packed >> ROW_SHIFT, packed & COLUMN_BITS
+    order = np.lexsort((columns, rows, -space.remaining[rows, columns].astype(np.int64)))[: until.count]
     hits = np.stack((rows[order], columns[order]), axis=1)
-    return Search(space, (int(start[0]), int(start[1])), budget, settled, hits, space.generation)
+    return Search(space, first, budget, settled, hits, space.generation)
 
 
 def plan(
@@ -358,7 +238,7 @@ def plan(
 
     Hart, Nilsson and Raphael, IEEE T-SSC 1968.
 
-    Parameters are those of :func:`search`; the cost is the same as there.
+    Parameters are those of :func:`search` and :class:`Until`; the cost is the same as there.
 
     Returns
     -------
@@ -370,18 +250,13 @@ def plan(
     space.provide(passage.slots)
     space.forget()
     cost, cells = find_path(
-        log_odds,
-        clearance.closeness,
-        passage,
+        Terrain(log_odds, clearance.closeness, passage, _discs_array(blocked)),
         space.memory,
-        _discs_array(blocked),
-        int(start[0]),
-        int(start[1]),
-        int(goal[0]),
-        int(goal[1]),
+        (int(start[0]), int(start[1])),
+        (int(goal[0]), int(goal[1])),
         budget_of(float(maximum_cost), space.resolution),
     )
-    return None if cost < 0 else (cost * (space.resolution / grid_search.STRAIGHT), cells)
+    return None if cost < 0 else (cost * (space.resolution / STRAIGHT), cells)
 
 
 def discs_of(discs: Iterable[Disc], origin: tuple[float, float], resolution: float) -> list[Disc]:

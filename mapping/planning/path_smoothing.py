@@ -18,10 +18,25 @@ from lidarium.mapping.grids.grid_lines import line_is_free
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.grid_planning import Disc, Footprint, centres_of
+from lidarium.mapping.planning.search.search_state import Passage, Terrain
 
-STEP = 0.5  # cells between the points at which a line is tested
-PIECES_AT_ONCE = 10  # pieces of that length that are measured together where there is doubt
-HALF_DIAGONAL = 0.7072  # cells from the centre of a square to its corners, rounded up
+STEP = 0.5
+"""Distance between the points at which a line is tested [cells]."""
+
+PIECES_AT_ONCE = 10
+"""Pieces of that length that are measured together where there is doubt."""
+
+HALF_DIAGONAL = 0.7072
+"""Distance from the centre of a square to its corners, rounded up [cells]."""
+
+LOSS_OF_DIAGONALS = 2.0
+"""What the squared clearance loses on a diagonal step at most [half cells squared]."""
+
+ROUNDING = 1e-9
+"""Distances that differ by less than this count as the same [cells]."""
+
+_NO_COSTS = np.zeros((2, 1), np.int32)
+_NO_COSTS.flags.writeable = False
 
 
 def shortened(
@@ -61,15 +76,11 @@ def shortened(
         raise ValueError(f"path has shape {cells.shape}; want (N, 2) cells with N >= 1")
     resolution = clearance.resolution
     discs = np.array(list(blocked), dtype=np.float64).reshape(-1, 3)
-    kept = kept_places(
-        cells,
-        log_odds,
-        clearance.closeness,
-        clearance.limit,
-        footprint.radius / resolution,
-        footprint.preferred / resolution,
-        discs,
+    # What steps cost does not matter to short cuts.
+    passage = Passage(
+        clearance.limit, _NO_COSTS, 0, footprint.radius / resolution, footprint.preferred / resolution
     )
+    kept = kept_places(cells, Terrain(log_odds, clearance.closeness, passage, discs))
     return np.asarray(cells[kept])
 
 
@@ -118,15 +129,13 @@ def line_keeps_clearance(
 
 
 @kernel
-def kept_places(
-    path: Array, log_odds: Array, closeness: Array, limit: int, radius: float, preferred: float, discs: Array
-) -> NDArray[np.int64]:
+def kept_places(path: Array, terrain: Terrain) -> NDArray[np.int64]:
     """Which cells of a path :func:`shortened` keeps (kernel).
 
     From each kept cell it goes as far as a line can: it halves the distance until a line fits, then walks on
     while one does.
     """
-    count = len(path)
+    count, closeness = len(path), terrain.closeness
     kept = np.zeros(count, np.int64)
     kept_count = 1
     anchor = 0
@@ -134,27 +143,14 @@ def kept_places(
         ahead = count - 1 - anchor
         while ahead > 1:
             nearest = _nearest_on(path, anchor, anchor + ahead + 1, closeness)
-            if _can_replace(
-                path, anchor, anchor + ahead, nearest, log_odds, closeness, limit, radius, preferred, discs
-            ):
+            if _can_replace(path, anchor, anchor + ahead, nearest, terrain):
                 break
             ahead //= 2
         ahead = max(ahead, 1)
         nearest = _nearest_on(path, anchor, anchor + ahead + 1, closeness)
         while anchor + ahead + 1 < count:
             nearest = max(nearest, _nearest_on(path, anchor + ahead + 1, anchor + ahead + 2, closeness))
-            if not _can_replace(
-                path,
-                anchor,
-                anchor + ahead + 1,
-                nearest,
-                log_odds,
-                closeness,
-                limit,
-                radius,
-                preferred,
-                discs,
-            ):
+            if not _can_replace(path, anchor, anchor + ahead + 1, nearest, terrain):
                 break
             ahead += 1
         anchor += ahead
@@ -173,31 +169,23 @@ def _nearest_on(path: Array, first: int, end: int, closeness: Array) -> int:
 
 
 @kernel
-def _can_replace(
-    path: Array,
-    first: int,
-    last: int,
-    nearest: int,
-    log_odds: Array,
-    closeness: Array,
-    limit: int,
-    radius: float,
-    preferred: float,
-    discs: Array,
-) -> bool:
+def _can_replace(path: Array, first: int, last: int, nearest: int, terrain: Terrain) -> bool:
     """Whether a straight line is as good as the piece of a path it replaces.
 
     It joins two cells of the path. The piece's greatest closeness is ``nearest``.
     """
-    own = (
-        math.sqrt(max(limit - nearest - 2.0, 0.0)) * 0.5
-    )  # diagonal steps lose at most 2 squared half cells on the way
-    needed = max(radius, min(preferred, own))
+    passage, discs = terrain.passage, terrain.discs
+    own = math.sqrt(max(passage.limit - nearest - LOSS_OF_DIAGONALS, 0.0)) * 0.5
+    needed = max(passage.radius, min(passage.preferred, own))
     row, column, to_row, to_column = path[first, 0], path[first, 1], path[last, 0], path[last, 1]
     for k in range(len(discs)):
         if _distance_to_piece(discs[k, 0], discs[k, 1], row, column, to_row, to_column) < discs[k, 2]:
             return False
-    return bool(line_is_clear(log_odds, closeness, limit, row, column, to_row, to_column, needed))
+    return bool(
+        line_is_clear(
+            terrain.log_odds, terrain.closeness, passage.limit, row, column, to_row, to_column, needed
+        )
+    )
 
 
 @kernel
@@ -235,7 +223,7 @@ def _piece_is_clear(
     row_high = min(math.ceil(max(row_a, row_b) + needed) + 1, rows)
     column_low = max(math.floor(min(column_a, column_b) - needed), 0)
     column_high = min(math.ceil(max(column_a, column_b) + needed) + 1, columns)
-    least = needed - 1e-9
+    least = needed - ROUNDING
     for row in range(row_low, row_high):
         beliefs = log_odds[row, column_low:column_high]
         for i in range(beliefs.size):
@@ -277,7 +265,7 @@ def line_is_clear(
     run = float(to_column - column)
     length = math.sqrt(rise * rise + run * run)
     pieces = max(math.ceil(length / STEP), 1)
-    piece = length / pieces + 1e-9
+    piece = length / pieces + ROUNDING
     i = 0
     while i < pieces:
         middle_row, middle_column = row + rise * (i + 0.5) / pieces, column + run * (i + 0.5) / pieces

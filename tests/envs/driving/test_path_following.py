@@ -14,6 +14,9 @@ from lidarium.envs.driving.path_following import (
     FORESIGHT_TIMES,
     IDLE,
     MAX_POINTS,
+    Bodies,
+    Courses,
+    Sensed,
     follow_paths,
 )
 from lidarium.envs.floors.floor import Floor, Raster, Solid
@@ -62,25 +65,31 @@ class Drive:
         simulation = self.simulation
         for _ in range(steps):
             follow_paths(
-                simulation.beliefs.believed,
-                simulation.world.velocities,
-                simulation.ranges,
-                simulation.lidar.unit_vectors,
-                simulation.world.bodies[:, 0].copy(),
-                self.limits,
-                self.paths,
-                self.margins,
-                self.counts,
-                self.places,
-                self.headings,
-                self.states,
-                self.stood,
-                self.backing,
-                self.knows_mates,
-                self.present,
-                FORESIGHT_TIMES,
-                simulation.beliefs.contact,
-                simulation.beliefs.heard,
+                Sensed(
+                    simulation.beliefs.believed,
+                    simulation.world.velocities,
+                    simulation.ranges,
+                    simulation.beliefs.contact,
+                    simulation.beliefs.heard,
+                ),
+                Courses(
+                    self.paths,
+                    self.margins,
+                    self.counts,
+                    self.places,
+                    self.headings,
+                    self.states,
+                    self.stood,
+                    self.backing,
+                ),
+                Bodies(
+                    simulation.lidar.unit_vectors,
+                    simulation.world.bodies[:, 0].copy(),
+                    self.limits,
+                    self.knows_mates,
+                    self.present,
+                    FORESIGHT_TIMES,
+                ),
                 self.commands,
             )
             simulation.step(self.commands)

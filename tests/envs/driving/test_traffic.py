@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.driving.traffic import find_refuge, obstructing
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.planning.grid_planning import centres_of, search
+from lidarium.mapping.planning.grid_planning import Until, centres_of, search
 
 RESOLUTION = 0.05
 ORIGIN = (0.0, 0.0)
@@ -73,7 +73,7 @@ def test_the_refuge_is_off_the_path_and_the_one_that_costs_least(size, path, sta
         navigation.clearance,
         start,
         footprint_of(0.18),
-        maximum_cost=3.0,
+        until=Until(maximum_cost=3.0),
     )
     cells = found.reached()
     off = [tuple(int(value) for value in each) for each in cells if gap_to(each, path) >= 0.45]

@@ -12,7 +12,8 @@ from lidarium.mapping.grids.grid_lines import visible
 from lidarium.mapping.planning.clearance import ClearanceField
 from lidarium.mapping.planning.frontier_approach import approach, default_reach, nearest_frontier
 from lidarium.mapping.planning.frontiers import FrontierMap
-from lidarium.mapping.planning.grid_planning import Footprint, SearchSpace, search
+from lidarium.mapping.planning.grid_planning import Footprint, search
+from lidarium.mapping.planning.search.search_space import SearchSpace
 
 RESOLUTION = 0.025
 SEEDS = st.integers(0, 10**6)

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from lidarium.mapping.planning.clearance import ClearanceField, clearance
 from lidarium.mapping.planning.grid_planning import (
     Footprint,
-    SearchSpace,
+    Until,
     cells_of,
     centres_of,
     discs_of,
@@ -21,7 +21,8 @@ from lidarium.mapping.planning.grid_planning import (
     search,
 )
 from lidarium.mapping.planning.path_smoothing import line_keeps_clearance, shortened, waypoints
-from lidarium.mapping.planning.search_targets import Targets
+from lidarium.mapping.planning.search.search_space import SearchSpace
+from lidarium.mapping.planning.search.search_targets import Targets
 
 RESOLUTION = 0.025
 SEEDS = st.integers(0, 10**6)
@@ -132,7 +133,7 @@ def test_a_star_and_the_search_for_a_goal_cost_what_the_full_search_does(seed, p
         return
     space, field = made(belief)
     full = search(space, belief, field, start, footprint).cost(goal)
-    towards = search(space, belief, field, start, footprint, goal=goal).cost(goal)
+    towards = search(space, belief, field, start, footprint, until=Until(goal=goal)).cost(goal)
     guided = plan(space, belief, field, start, goal, footprint)
     assert towards == full
     assert (math.inf if guided is None else guided[0]) == full
@@ -186,11 +187,11 @@ def test_the_first_targets_are_the_cheapest_of_the_full_search(seed, count, reac
     footprint, belief, start, space, field = beginning(seed)
     mask = np.random.default_rng(seed).random(belief.shape) < 0.003
     targets = Targets.of(mask, reach)
-    everything = search(space, belief, field, start, footprint, targets=targets, count=10**9)
+    everything = search(space, belief, field, start, footprint, until=Until(targets=targets, count=10**9))
     hits = everything.hits
     costs = np.array([everything.cost(cell) for cell in hits])
     assert (np.diff(costs) >= 0).all()
-    early = search(space, belief, field, start, footprint, targets=targets, count=count)
+    early = search(space, belief, field, start, footprint, until=Until(targets=targets, count=count))
     np.testing.assert_array_equal(early.hits, hits[:count])
     np.testing.assert_array_equal([early.cost(cell) for cell in early.hits], costs[:count])
     if reach == 0.0:
@@ -204,8 +205,8 @@ def test_beyond_the_first_target_costs_are_those_of_the_full_search(seed, beyond
     footprint, belief, start, space, field = beginning(seed)
     targets = Targets.of(np.random.default_rng(seed).random(belief.shape) < 0.003, 2.5)
     full = search(space, belief, field, start, footprint).costs()
-    first = search(space, belief, field, start, footprint, targets=targets).hits
-    found = search(space, belief, field, start, footprint, targets=targets, beyond=beyond)
+    first = search(space, belief, field, start, footprint, until=Until(targets=targets)).hits
+    found = search(space, belief, field, start, footprint, until=Until(targets=targets, beyond=beyond))
     np.testing.assert_array_equal(found.hits, first)
     most = found.cost(tuple(found.hits[0])) + beyond if len(found.hits) else np.inf
     np.testing.assert_array_equal(
@@ -223,7 +224,12 @@ def test_a_search_for_some_cells_ends_when_all_of_them_have_their_costs(seed, co
     reached = np.argwhere(np.isfinite(full))
     cells = {tuple(map(int, cell)) for cell in np.random.default_rng(seed).choice(reached, count)}
     found = search(
-        space, belief, field, start, footprint, targets=Targets.at(cells, belief.shape), count=len(cells)
+        space,
+        belief,
+        field,
+        start,
+        footprint,
+        until=Until(targets=Targets.at(cells, belief.shape), count=len(cells)),
     )
     assert {cell: found.cost(cell) for cell in cells} == {cell: full[cell] for cell in cells}
     assert {tuple(cell) for cell in found.hits.tolist()} == cells
@@ -235,7 +241,7 @@ def test_searches_do_not_see_what_earlier_searches_left():
     space, field = made(belief)
     start, other = open_start(belief, footprint, 1), open_start(belief, footprint, 2)
     first = search(space, belief, field, start, footprint).costs()
-    old = search(space, belief, field, other, footprint, maximum_cost=0.3)
+    old = search(space, belief, field, other, footprint, until=Until(maximum_cost=0.3))
     assert old.costs()[np.isfinite(old.costs())].max() <= 0.3
     np.testing.assert_array_equal(search(space, belief, field, start, footprint).costs(), first)
     with pytest.raises(ValueError, match="another search"):
@@ -377,7 +383,7 @@ def test_bad_input_is_named():
         search(space, np.zeros((5, 5), np.int8), field, (0, 0), Footprint())
     for beyond in (-1.0, math.nan):
         with pytest.raises(ValueError, match="beyond is"):
-            search(space, belief, field, (0, 0), Footprint(), beyond=beyond)
+            Until(beyond=beyond)
     with pytest.raises(ValueError, match="preferred"):
         search(space, belief, field, (0, 0), Footprint(0.2, 0.7))
     with pytest.raises(ValueError, match="radius is"):

@@ -9,9 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.grid_planning import Footprint, SearchSpace, passage_of, plan, search
-from lidarium.mapping.planning.grid_search import STRAIGHT
-from lidarium.mapping.planning.path_search import SearchMemory, budget_of, clear_memory, find_path, search_all
+from lidarium.mapping.planning.grid_planning import Footprint, passage_of, plan, search
+from lidarium.mapping.planning.search.path_search import (
+    SearchMemory,
+    budget_of,
+    clear_memory,
+    find_path,
+    search_all,
+)
+from lidarium.mapping.planning.search.search_space import SearchSpace
+from lidarium.mapping.planning.search.search_state import STRAIGHT, Terrain
 
 RESOLUTION = 0.05
 BODY = Footprint(0.08, 0.15, 3.0)
@@ -48,13 +55,10 @@ def test_a_path_is_that_of_the_search_of_all_and_the_memory_is_blank_again(seed)
             SearchSpace(log_odds.shape, RESOLUTION), log_odds, clearance, tuple(start), BODY, blocked=bodies
         )
         cost, cells = find_path(
-            log_odds,
-            clearance.closeness,
-            passage,
+            Terrain(log_odds, clearance.closeness, passage, discs),
             memory.table[1],
-            discs,
-            *start,
-            *goal,
+            tuple(start),
+            tuple(goal),
             budget_of(math.inf, RESOLUTION),
         )
         assert (cost < 0) == math.isinf(found.cost(tuple(goal)))
@@ -99,15 +103,10 @@ def test_a_path_dearer_than_the_budget_is_none():
     passage, memory = memory_for(clearance)
     for maximum, reachable in ((1.9, False), (2.1, True)):
         cost, cells = find_path(
-            log_odds,
-            clearance.closeness,
-            passage,
+            Terrain(log_odds, clearance.closeness, passage, np.empty((0, 3))),
             memory.table[0],
-            np.empty((0, 3)),
-            10,
-            10,
-            10,
-            50,
+            (10, 10),
+            (10, 50),
             budget_of(maximum, RESOLUTION),
         )
         assert (cost >= 0) == reachable

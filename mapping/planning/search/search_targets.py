@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.planning.grid_search import TILE_SHIFT
+from lidarium.mapping.planning.search.search_state import TILE_SHIFT
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,1 @@
+"""Searches of cheapest paths on a grid."""
