@@ -31,7 +31,7 @@ from lidarium.mapping.files.carmen_logs import read_carmen_log
 from lidarium.mapping.files.laser_logs import LaserLog, read_npz_log
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
-from lidarium.mapping.localization.matching.settings import SlamSettings
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.slam.following import LOG_SETTINGS, Followed, follow
 from lidarium.mapping.localization.slam.localizer import Slam
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
-from lidarium.mapping.localization.matching.settings import OdometryUncertainty
+from lidarium.mapping.localization.matching.settings.odometry import OdometryUncertainty
 
 
 class Odometry:

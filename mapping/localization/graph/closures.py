@@ -15,7 +15,8 @@ from lidarium.mapping.geometry.rigid import composed, relative, wrapped
 from lidarium.mapping.localization.matching.branch_and_bound import Pyramid, place, pyramid
 from lidarium.mapping.localization.matching.local_mapping import Finished, turned
 from lidarium.mapping.localization.matching.scan_matching import Match, refine
-from lidarium.mapping.localization.matching.settings import ClosureSettings, MatchingSettings
+from lidarium.mapping.localization.matching.settings.graph import ClosureSettings
+from lidarium.mapping.localization.matching.settings.matching import MatchingSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)

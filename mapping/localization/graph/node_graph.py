@@ -8,7 +8,7 @@ from lidarium.mapping.grids.growing_array import GrowingArray
 from lidarium.mapping.localization.dead_reckoning.odometry import compounded
 from lidarium.mapping.localization.graph.closures import Closure
 from lidarium.mapping.localization.graph.pose_graph import Edges, optimised, residuals
-from lidarium.mapping.localization.matching.settings import GraphSettings
+from lidarium.mapping.localization.matching.settings.graph import GraphSettings
 from lidarium.mapping.localization.matching.wall_compass import WallCompass
 
 Edge = tuple[int, int, NDArray[np.float64], NDArray[np.float64], bool]

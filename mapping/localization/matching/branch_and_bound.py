@@ -15,16 +15,51 @@ somewhat looser bounds.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.matching.scan_search import angle_step
-from lidarium.mapping.localization.matching.submaps import AgreementGrid
+from lidarium.mapping.localization.matching.submaps import FULL_LEVEL, AgreementGrid
 
 LEVELS = 6
 """Coarse maps: the coarsest has blocks of 2^6 cells."""
+
+SPARED_LEVELS = 2
+"""Levels below that of blocks as large as the window, which bound nothing; a few by a few do."""
+
+CHILDREN = 4
+"""Blocks into which a block is divided."""
+
+COLUMN, ROW, TURN, SUM = range(4)
+"""Places in what is found."""
+
+
+class _Coarse(NamedTuple):
+    """Coarse maps, see ``Pyramid``."""
+
+    maxima: NDArray[np.uint8]
+    shapes: NDArray[np.int64]
+
+
+class _Window(NamedTuple):
+    """Placements among which a search looks.
+
+    Attributes
+    ----------
+    headings : (turns,) float64
+        Their headings [rad].
+    corner : (2,) float64
+        Column and row of the robot in the first of them [cells].
+    width : int
+        How many there are along columns, and along rows.
+    """
+
+    headings: NDArray[np.float64]
+    corner: NDArray[np.float64]
+    width: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,18 +172,9 @@ def place(
             angle,
         )
     found = np.full(4, -1.0)
-    least, width = 255.0 * least_score * len(points), 2 * steps + 1
+    least, window = float(FULL_LEVEL) * least_score * len(points), _Window(headings, corner, 2 * steps + 1)
     is_over = _place(
-        coarse.maxima,
-        coarse.shapes,
-        points / side,
-        headings,
-        corner,
-        width,
-        least,
-        evaluations,
-        avoided,
-        found,
+        _Coarse(coarse.maxima, coarse.shapes), points / side, window, least, evaluations, avoided, found
     )
     if found[3] < 0.0:
         return None, is_over
@@ -159,7 +185,7 @@ def place(
             headings[int(found[2])],
         ]
     )
-    return Placement(pose, float(found[3]) / (255.0 * len(points))), is_over
+    return Placement(pose, float(found[3]) / (float(FULL_LEVEL) * len(points))), is_over
 
 
 @kernel
@@ -192,12 +218,9 @@ def _is_avoided(avoided: Array, column: int, row: int, heading: float) -> bool:
 
 @kernel
 def _place(
-    maxima: Array,
-    shapes: Array,
+    coarse: _Coarse,
     points: Array,
-    headings: Array,
-    corner: Array,
-    width: int,
+    window: _Window,
     least: float,
     evaluations: int,
     avoided: Array,
@@ -207,20 +230,68 @@ def _place(
 
     Notes its column, row, heading index and sum; returns whether all placements were decided.
     """
-    count, turns = points.shape[0], headings.shape[0]
+    top = _top_level(coarse, window.width)
+    blocks = (window.width + (1 << top) - 1) >> top
+    cells = _cells_of(points, window)
+    bounds = _bounds_of_blocks(coarse, cells, top, blocks)
+    looked_at = bounds.shape[0]
+    best = least
+    stack = np.empty((CHILDREN * (top + 2) + CHILDREN, 5), np.int64)
+    children = np.empty((CHILDREN, 3), np.int64)
+    for root in np.argsort(-bounds, kind="mergesort"):
+        if bounds[root] <= best:
+            break
+        turn, i, j = root // (blocks * blocks), (root // blocks) % blocks, root % blocks
+        _push(stack, 0, (bounds[root], top, turn, j << top, i << top))
+        depth = 1
+        while depth > 0:
+            depth -= 1
+            bound, level, turn, column, row = stack[depth]
+            if bound <= best:
+                continue
+            if level == 0:
+                if not _is_avoided(avoided, column, row, window.headings[turn]):
+                    best = bound
+                    found[COLUMN], found[ROW], found[TURN], found[SUM] = column, row, turn, bound
+                continue
+            if looked_at >= evaluations:
+                return False
+            block = (level, column, row)
+            number, looked = _divide(coarse, cells[turn], block, window.width, best, children)
+            looked_at += looked
+            for k in range(number):
+                _push(stack, depth, (children[k, 0], level - 1, turn, children[k, 1], children[k, 2]))
+                depth += 1
+    return True
+
+
+@kernel
+def _top_level(coarse: _Coarse, width: int) -> int:
+    """Return the level at which a search begins."""
     top = 0
-    while top < shapes.shape[0] - 1 and (1 << top) < width:
+    while top < coarse.shapes.shape[0] - 1 and (1 << top) < width:
         top += 1
-    # Blocks as large as the window bound nothing; a few by a few do.
-    top = max(top - 2, 0)
-    blocks = (width + (1 << top) - 1) >> top
-    cells = np.empty((turns, count, 2), np.int32)
-    for turn in range(turns):
+    return max(top - SPARED_LEVELS, 0)
+
+
+@kernel
+def _cells_of(points: Array, window: _Window) -> Array:
+    """Return the cells (turns, n, 2) of points [cells] in the first placement of each heading."""
+    headings, corner, count = window.headings, window.corner, points.shape[0]
+    cells = np.empty((headings.shape[0], count, 2), np.int32)
+    for turn in range(headings.shape[0]):
         cosine, sine = math.cos(headings[turn]), math.sin(headings[turn])
         for k in range(count):
             cells[turn, k, 0] = int(math.floor(cosine * points[k, 0] - sine * points[k, 1] + corner[0]))
             cells[turn, k, 1] = int(math.floor(sine * points[k, 0] + cosine * points[k, 1] + corner[1]))
-    begin, rows, columns = shapes[top]
+    return cells
+
+
+@kernel
+def _bounds_of_blocks(coarse: _Coarse, cells: Array, top: int, blocks: int) -> Array:
+    """Return the bounds of all blocks of the top level, heading by heading, row by row."""
+    turns, maxima = cells.shape[0], coarse.maxima
+    begin, rows, columns = coarse.shapes[top]
     bounds = np.empty(turns * blocks * blocks, np.int64)
     for turn in range(turns):
         for i in range(blocks):
@@ -228,52 +299,38 @@ def _place(
                 bounds[(turn * blocks + i) * blocks + j] = _bound(
                     maxima, begin, rows, columns, top, cells[turn], j << top, i << top
                 )
-    looked_at = bounds.shape[0]
-    best = least
-    stack = np.empty((4 * (top + 2) + 4, 5), np.int64)
-    children = np.empty((4, 3), np.int64)
-    for root in np.argsort(-bounds, kind="mergesort"):
-        if bounds[root] <= best:
-            break
-        turn, i, j = root // (blocks * blocks), (root // blocks) % blocks, root % blocks
-        depth = 1
-        stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3], stack[0, 4] = (
-            bounds[root],
-            top,
-            turn,
-            j << top,
-            i << top,
-        )
-        while depth > 0:
-            depth -= 1
-            bound, level, turn, column, row = stack[depth]
-            if bound <= best:
-                continue
-            if level == 0:
-                if not _is_avoided(avoided, column, row, headings[turn]):
-                    best = bound
-                    found[0], found[1], found[2], found[3] = column, row, turn, bound
-                continue
-            if looked_at >= evaluations:
-                return False
-            below = level - 1
-            begin, rows, columns = shapes[below]
-            half, number = 1 << below, 0
-            for child in range(4):
-                x, y = column + (child & 1) * half, row + (child >> 1) * half
-                if x >= width or y >= width:
-                    continue
-                value = _bound(maxima, begin, rows, columns, below, cells[turn], x, y)
-                looked_at += 1
-                if value > best:
-                    at = number
-                    while at > 0 and children[at - 1, 0] > value:
-                        children[at] = children[at - 1]
-                        at -= 1
-                    children[at, 0], children[at, 1], children[at, 2] = value, x, y
-                    number += 1
-            for k in range(number):
-                stack[depth, 0], stack[depth, 1], stack[depth, 2] = children[k, 0], below, turn
-                stack[depth, 3], stack[depth, 4] = children[k, 1], children[k, 2]
-                depth += 1
-    return True
+    return bounds
+
+
+@kernel(inline=True)
+def _push(stack: Array, depth: int, block: tuple[int, int, int, int, int]) -> None:
+    """Put a block on a stack: its bound, level, heading index, column and row."""
+    stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3], stack[depth, 4] = block
+
+
+@kernel
+def _divide(
+    coarse: _Coarse, cells: Array, block: tuple[int, int, int], width: int, best: float, children: Array
+) -> tuple[int, int]:
+    """Fill ``children`` with the parts of a block that can beat the best, in the order of their bounds.
+
+    Each is bound, column and row. Returns how many there are, and how many were looked at.
+    """
+    level, column, row = block
+    below, maxima = level - 1, coarse.maxima
+    begin, rows, columns = coarse.shapes[below]
+    half, number, looked = 1 << below, 0, 0
+    for child in range(CHILDREN):
+        x, y = column + (child & 1) * half, row + (child >> 1) * half
+        if x >= width or y >= width:
+            continue
+        value = _bound(maxima, begin, rows, columns, below, cells, x, y)
+        looked += 1
+        if value > best:
+            at = number
+            while at > 0 and children[at - 1, 0] > value:
+                children[at] = children[at - 1]
+                at -= 1
+            children[at, 0], children[at, 1], children[at, 2] = value, x, y
+            number += 1
+    return number, looked

@@ -14,7 +14,7 @@ from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.matching.branch_and_bound import place, pyramid
 from lidarium.mapping.localization.matching.scan_matching import Match, refine
 from lidarium.mapping.localization.matching.scan_search import search
-from lidarium.mapping.localization.matching.settings import SlamSettings
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.matching.submaps import AgreementGrid, Submap
 
 

@@ -13,12 +13,15 @@ an agreement that keeps fractions of cells, and odometry as a prior.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.localization.matching.submaps import UNSEEN, AgreementGrid
+from lidarium.mapping.localization.matching.smoothed_agreement import agreement, extremes_around, is_unseen
+from lidarium.mapping.localization.matching.submaps import FREE_LEVEL, UNSEEN, AgreementGrid
+from lidarium.mapping.localization.matching.surface_normals import find_normals
 
 FULL_AGREEMENT = 2.0 / 3.0
 """Greatest smoothed agreement that a point can have.
@@ -28,17 +31,49 @@ It occurs in the middle of a wall that lies along a row of cells.
 With less, points in the middle of such a wall would agree too well, and scans would come to lie beside it.
 """
 
-SURFACE_GAP = 0.3
-"""Largest gap between neighbouring points on one surface.
+MOST_STEPS = 30
+"""Steps of the descent at most."""
 
-As a share of their distance, or in metres.
-"""
+FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
+"""Share by which curvature is raised at first, and beyond which the descent gives up."""
 
-MOST_BEND = 0.15
-"""Largest ratio of the points' variance across the surface to that along it.
+EASING, TIGHTENING = 0.3, 8.0
+"""What damping is multiplied by after a step down, and after one that did not lead down."""
 
-Above this there is a corner.
-"""
+LEAST_CURVATURE = 1e-9
+"""What is added to curvature, so that the equations can be solved [1/m^2, 1/rad^2]."""
+
+STILL_M, STILL_ANGLE = 1e-4, 1e-5
+"""Smaller steps end the descent [m, rad]."""
+
+PROBES = 4
+"""Places around a pose at which curvature is looked at, half a cell to each side."""
+
+
+class Objective(NamedTuple):
+    """What the cost of a pose is made of.
+
+    Attributes
+    ----------
+    grid : AgreementGrid
+        The map.
+    points, normals : (n, 2) float64
+        Points in the robot's frame [m], and unit normals of their surfaces; zero where there is none.
+    prior, information : (3,), (3, 3) float64
+        Where odometry says the robot is, and how much that counts.
+    weight : float
+        How much full disagreement of one point counts.
+    unseen : float
+        Square of the disagreement of a point in what the map has not observed.
+    """
+
+    grid: AgreementGrid
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    prior: NDArray[np.float64]
+    information: NDArray[np.float64]
+    weight: float
+    unseen: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,167 +153,87 @@ def refine(
     if count == 0:
         return Match(pose, 0.0, 0.0, 0.0, np.zeros((3, 3)), information)
     normals = np.zeros((count, 2))
-    _find_normals(points, surface_m, normals)
-    _refine(
-        grid.levels,
-        grid.column,
-        grid.row,
-        grid.resolution,
-        points,
-        normals,
-        pose,
-        prior,
-        information,
-        weight / count,
-        unseen,
-        hessian,
-        told,
-    )
+    find_normals(points, surface_m, normals)
+    objective = Objective(grid, points, normals, prior, information, weight / count, unseen)
+    _refine(objective, pose, hessian, told)
     score, overlap, contradiction = told.tolist()
     return Match(pose, score, overlap, contradiction, hessian, information)
 
 
-@kernel(inline=True)
-def _spline_weights(t: float) -> tuple[float, float, float, float]:
-    """Return the weights of four neighbouring cells in a cubic B-spline.
+@kernel
+def _refine(objective: Objective, pose: Array, hessian: Array, told: Array) -> None:
+    """Move a pose to where the cost is least.
 
-    t runs from 0 to 1 between the middle two.
+    Tell the Hessian and what ``_judge`` says.
     """
-    u, square, cube = 1.0 - t, t * t, t * t * t
-    return (
-        u * u * u / 6.0,
-        (3.0 * cube - 6.0 * square + 4.0) / 6.0,
-        (-3.0 * cube + 3.0 * square + 3.0 * t + 1.0) / 6.0,
-        cube / 6.0,
-    )
-
-
-@kernel(inline=True)
-def _spline_slopes(t: float) -> tuple[float, float, float, float]:
-    """Slopes of the weights."""
-    u, square = 1.0 - t, t * t
-    return -0.5 * u * u, 1.5 * square - 2.0 * t, -1.5 * square + t + 0.5, 0.5 * square
-
-
-@kernel(inline=True)
-def _agreement(levels: Array, x: float, y: float) -> tuple[float, float, float]:
-    """Smoothed agreement at x, y [cells] and its slopes [1/cell].
-
-    Zero where the map ends.
-    """
-    u, v = x - 0.5, y - 0.5
-    column, row = int(math.floor(u)), int(math.floor(v))
-    if not (1 <= column < levels.shape[1] - 2 and 1 <= row < levels.shape[0] - 2):
-        return 0.0, 0.0, 0.0
-    across, across_slopes = _spline_weights(u - column), _spline_slopes(u - column)
-    along, along_slopes = _spline_weights(v - row), _spline_slopes(v - row)
-    value, slope_x, slope_y = 0.0, 0.0, 0.0
-    for i in range(4):
-        line, line_slope = 0.0, 0.0
-        for j in range(4):
-            level = max(float(levels[row + i - 1, column + j - 1]) - 1.0, 0.0)
-            line += across[j] * level
-            line_slope += across_slopes[j] * level
-        value += along[i] * line
-        slope_x += along[i] * line_slope
-        slope_y += along_slopes[i] * line
-    return value / 254.0, slope_x / 254.0, slope_y / 254.0
-
-
-@kernel(inline=True)
-def _is_unseen(levels: Array, x: float, y: float) -> bool:
-    """Whether the map has not observed the cell at x, y [cells]."""
-    column, row = int(math.floor(x)), int(math.floor(y))
-    return not (0 <= column < levels.shape[1] and 0 <= row < levels.shape[0]) or levels[row, column] == UNSEEN
-
-
-@kernel(inline=True)
-def _is_one_surface(points: Array, k: int) -> bool:
-    """Whether a point and the next one lie on one surface."""
-    gap = SURFACE_GAP * max(math.hypot(points[k, 0], points[k, 1]), 1.0)
-    return bool(math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]) <= gap)
+    _descend(objective, pose, hessian)
+    _curve_around(objective, pose, hessian)
+    _judge(objective.grid, objective.points, pose, told)
 
 
 @kernel
-def _find_normals(points: Array, reach: float, normals: Array) -> None:
-    """Fill ``normals`` (n, 2) with unit normals of the surface at each point.
-
-    The surface is that of the point and its neighbours; zero for a point alone.
-
-    Two neighbours tell it where the surface bends; elsewhere all within reach do, since noise turns what lies
-    between two near points.
-    """
-    count = points.shape[0]
-    for k in range(count):
-        before, after = k, k
-        while before > 0 and _is_one_surface(points, before - 1) and _is_near(points, before - 1, k, reach):
-            before -= 1
-        while after + 1 < count and _is_one_surface(points, after) and _is_near(points, after + 1, k, reach):
-            after += 1
-        along_x, along_y, is_bent = _axis(points[before : after + 1])
-        if is_bent:
-            before = k - 1 if k > 0 and _is_one_surface(points, k - 1) else k
-            after = k + 1 if k + 1 < count and _is_one_surface(points, k) else k
-            along_x, along_y = points[after, 0] - points[before, 0], points[after, 1] - points[before, 1]
-        length = math.hypot(along_x, along_y)
-        if length > 0.0:
-            normals[k, 0], normals[k, 1] = -along_y / length, along_x / length
-
-
-@kernel(inline=True)
-def _is_near(points: Array, k: int, m: int, reach: float) -> bool:
-    return bool(math.hypot(points[k, 0] - points[m, 0], points[k, 1] - points[m, 1]) <= reach)
-
-
-@kernel
-def _axis(points: Array) -> tuple[float, float, bool]:
-    """Return the axis of largest variance of points, and whether it is unclear.
-
-    The axis is of unit length, zero for fewer than three points. Unclear where points do not lie along
-    it, or are too few.
-    """
-    count = points.shape[0]
-    if count < 3:
-        return 0.0, 0.0, True
-    x, y = 0.0, 0.0
-    for k in range(count):
-        x += points[k, 0] / count
-        y += points[k, 1] / count
-    xx, xy, yy = 0.0, 0.0, 0.0
-    for k in range(count):
-        xx += (points[k, 0] - x) * (points[k, 0] - x)
-        xy += (points[k, 0] - x) * (points[k, 1] - y)
-        yy += (points[k, 1] - y) * (points[k, 1] - y)
-    half, middle = math.hypot(0.5 * (xx - yy), xy), 0.5 * (xx + yy)
-    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-    return math.cos(angle), math.sin(angle), middle - half > MOST_BEND * (middle + half)
+def _descend(objective: Objective, pose: Array, hessian: Array) -> None:
+    """Move a pose to where the cost is least (Levenberg and Marquardt)."""
+    prior, information, weight = objective.prior, objective.information, objective.weight
+    gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
+    trial = np.empty(3)
+    away = pose - prior
+    cost = weight * _normal_equations(objective, pose, hessian, gradient) + away @ information @ away
+    damping = FIRST_DAMPING
+    for _ in range(MOST_STEPS):
+        whole = weight * hessian + information
+        for k in range(3):
+            whole[k, k] += damping * whole[k, k] + LEAST_CURVATURE
+        move = np.linalg.solve(whole, weight * gradient - information @ away)
+        trial[:] = pose + move
+        trial_away = trial - prior
+        trial_cost = weight * _normal_equations(objective, trial, trial_hessian, trial_gradient)
+        trial_cost += trial_away @ information @ trial_away
+        if trial_cost < cost:
+            pose[:], away[:] = trial, trial_away
+            hessian[:], gradient[:] = trial_hessian, trial_gradient
+            is_still = abs(move[0]) + abs(move[1]) < STILL_M and abs(move[2]) < STILL_ANGLE
+            cost, damping = trial_cost, EASING * damping
+            if is_still:
+                break
+        else:
+            damping *= TIGHTENING
+            if damping > MOST_DAMPING:
+                break
 
 
 @kernel
-def _normal_equations(
-    levels: Array,
-    first_column: int,
-    first_row: int,
-    side: float,
-    points: Array,
-    normals: Array,
-    pose: Array,
-    unseen: float,
-    hessian: Array,
-    gradient: Array,
-) -> float:
+def _curve_around(objective: Objective, pose: Array, hessian: Array) -> None:
+    """Fill the weighed Hessian from half a cell around a pose.
+
+    On the crest of a wall slopes vanish: how steep it is, is seen half a cell away.
+    """
+    side, weight = objective.grid.resolution, objective.weight
+    trial, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
+    hessian[:] = 0.0
+    for k in range(PROBES):
+        trial[:] = pose
+        trial[k >> 1] += 0.5 * side if k & 1 else -0.5 * side
+        _normal_equations(objective, trial, trial_hessian, trial_gradient)
+        hessian += 1.0 / PROBES * weight * trial_hessian
+
+
+@kernel
+def _normal_equations(objective: Objective, pose: Array, hessian: Array, gradient: Array) -> float:
     """Fill the normal equations of the points' disagreement at a pose.
 
     Return the sum of its squares.
     """
+    levels, first_column, first_row, side = objective.grid
+    points, normals, unseen = objective.points, objective.normals, objective.unseen
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     hessian[:], gradient[:] = 0.0, 0.0
     cost = 0.0
     for k in range(points.shape[0]):
         x, y = cosine * points[k, 0] - sine * points[k, 1], sine * points[k, 0] + cosine * points[k, 1]
         u, v = (x + pose[0]) / side - first_column, (y + pose[1]) / side - first_row
-        value, slope_x, slope_y = _agreement(levels, u, v)
-        if value == 0.0 and _is_unseen(levels, u, v):
+        value, slope_x, slope_y = agreement(levels, u, v)
+        if value == 0.0 and is_unseen(levels, u, v):
             cost += unseen
             continue
         rest = 1.0 - value / FULL_AGREEMENT
@@ -305,126 +260,27 @@ def _normal_equations(
 
 
 @kernel
-def _refine(
-    levels: Array,
-    first_column: int,
-    first_row: int,
-    side: float,
-    points: Array,
-    normals: Array,
-    pose: Array,
-    prior: Array,
-    information: Array,
-    weight: float,
-    unseen: float,
-    hessian: Array,
-    told: Array,
-) -> None:
-    """Move a pose to where the cost is least (Levenberg and Marquardt).
-
-    Tell the Hessian and what ``_judge`` says.
-    """
-    gradient, trial_gradient, trial_hessian = np.empty(3), np.empty(3), np.empty((3, 3))
-    trial = np.empty(3)
-    away = pose - prior
-    cost = (
-        weight
-        * _normal_equations(
-            levels, first_column, first_row, side, points, normals, pose, unseen, hessian, gradient
-        )
-        + away @ information @ away
-    )
-    damping = 1e-3
-    for _ in range(30):
-        whole = weight * hessian + information
-        for k in range(3):
-            whole[k, k] += damping * whole[k, k] + 1e-9
-        move = np.linalg.solve(whole, weight * gradient - information @ away)
-        trial[:] = pose + move
-        trial_away = trial - prior
-        trial_cost = weight * _normal_equations(
-            levels,
-            first_column,
-            first_row,
-            side,
-            points,
-            normals,
-            trial,
-            unseen,
-            trial_hessian,
-            trial_gradient,
-        )
-        trial_cost += trial_away @ information @ trial_away
-        if trial_cost < cost:
-            pose[:], away[:] = trial, trial_away
-            hessian[:], gradient[:] = trial_hessian, trial_gradient
-            is_still = abs(move[0]) + abs(move[1]) < 1e-4 and abs(move[2]) < 1e-5
-            cost, damping = trial_cost, 0.3 * damping
-            if is_still:
-                break
-        else:
-            damping *= 8.0
-            if damping > 1e3:
-                break
-    # On the crest of a wall slopes vanish: how steep it is, is seen half a cell away.
-    hessian[:] = 0.0
-    for k in range(4):
-        trial[:] = pose
-        trial[k >> 1] += 0.5 * side if k & 1 else -0.5 * side
-        _normal_equations(
-            levels,
-            first_column,
-            first_row,
-            side,
-            points,
-            normals,
-            trial,
-            unseen,
-            trial_hessian,
-            trial_gradient,
-        )
-        hessian += 0.25 * weight * trial_hessian
-    _judge(levels, first_column, first_row, side, points, pose, told)
-
-
-@kernel
-def _judge(
-    levels: Array, first_column: int, first_row: int, side: float, points: Array, pose: Array, told: Array
-) -> None:
+def _judge(grid: AgreementGrid, points: Array, pose: Array, told: Array) -> None:
     """Compute agreement and shares of points that are known or in free space.
 
     Mean agreement of the points near observed cells, their share, and the share of points in free space.
     """
+    levels, first_column, first_row, side = grid
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     agreeing, known, contradicting = 0.0, 0, 0
     for k in range(points.shape[0]):
         x = (cosine * points[k, 0] - sine * points[k, 1] + pose[0]) / side - first_column
         y = (sine * points[k, 0] + cosine * points[k, 1] + pose[1]) / side - first_row
-        value, _, _ = _agreement(levels, x, y)
+        value, _, _ = agreement(levels, x, y)
         agreeing += min(value / FULL_AGREEMENT, 1.0)
         if value > 0.0:
             known += 1
         else:
-            lowest, highest = _extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
-            known += highest > 0
-            contradicting += lowest == 1 and highest == 1
+            lowest, highest = extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
+            known += highest > UNSEEN
+            contradicting += lowest == FREE_LEVEL and highest == FREE_LEVEL
     told[0], told[1], told[2] = (
         agreeing / max(known, 1),
         known / points.shape[0],
         contradicting / points.shape[0],
     )
-
-
-@kernel
-def _extremes_around(levels: Array, column: int, row: int) -> tuple[int, int]:
-    """Return the lowest and the highest level within three cells.
-
-    What lies outside of the map is not observed.
-    """
-    rows, columns = levels.shape
-    lowest, highest = 255, 0
-    for i in range(row - 3, row + 4):
-        for j in range(column - 3, column + 4):
-            level = int(levels[i, j]) if 0 <= i < rows and 0 <= j < columns else 0
-            lowest, highest = min(lowest, level), max(highest, level)
-    return lowest, highest

@@ -8,12 +8,44 @@ Olson, Real-time correlative scan matching (ICRA 2009), here weighed against odo
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.localization.matching.submaps import UNSEEN, AgreementGrid
+from lidarium.mapping.localization.matching.submaps import FULL_LEVEL, UNSEEN, AgreementGrid
+
+LEVEL_BITS = 8
+"""Bits of a level of agreement; squares of disagreement are counted in parts of 255."""
+
+LEVELS = 1 << LEVEL_BITS
+"""Levels of agreement that there can be."""
+
+FAR_SHARE = 0.9
+"""Share of the points that lie nearer than those by which the step of an angle is chosen."""
+
+LEAST_STEP, DEFAULT_STEP, MOST_STEP = math.radians(0.25), math.radians(1.0), math.radians(2.0)
+"""Step of an angle at least, where there are no points, and at most [rad]."""
+
+
+class Window(NamedTuple):
+    """Poses among which a search looks.
+
+    Attributes
+    ----------
+    around : (3,) float64
+        The pose in the middle [m, rad].
+    steps, turns : int
+        How many steps of a cell and of an angle to each side.
+    angle_step : float
+        Step of an angle [rad].
+    """
+
+    around: NDArray[np.float64]
+    steps: int
+    turns: int
+    angle_step: float
 
 
 def search(
@@ -48,21 +80,8 @@ def search(
     if len(points) == 0 or steps + turns == 0:
         return around
     found = np.empty(3)
-    _search(
-        grid.levels,
-        grid.column,
-        grid.row,
-        grid.resolution,
-        points,
-        around,
-        steps,
-        turns,
-        step,
-        information,
-        weight / len(points),
-        unseen,
-        found,
-    )
+    window = Window(around, steps, turns, step)
+    _search(grid, points, window, information, weight / len(points), unseen, found)
     return found
 
 
@@ -72,32 +91,28 @@ def angle_step(points: NDArray[np.float64], resolution: float) -> float:
     Of the farthest tenth no notice is taken.
     """
     if len(points) == 0:
-        return math.radians(1.0)
-    far = float(np.quantile(np.hypot(points[:, 0], points[:, 1]), 0.9))
-    return min(max(resolution / max(far, resolution), math.radians(0.25)), math.radians(2.0))
+        return DEFAULT_STEP
+    far = float(np.quantile(np.hypot(points[:, 0], points[:, 1]), FAR_SHARE))
+    return min(max(resolution / max(far, resolution), LEAST_STEP), MOST_STEP)
 
 
 @kernel
 def _search(
-    levels: Array,
-    first_column: int,
-    first_row: int,
-    side: float,
+    grid: AgreementGrid,
     points: Array,
-    around: Array,
-    steps: int,
-    turns: int,
-    step: float,
+    window: Window,
     information: Array,
     weight: float,
     unseen: float,
     found: Array,
 ) -> None:
+    """Write the pose of least cost within a window into ``found`` (3,)."""
+    levels, first_column, first_row, side = grid
+    around, steps, turns, step = window
     rows, columns = levels.shape
     width = 2 * steps + 1
     sums = np.empty((width, width), np.int64)
-    # Squares of disagreement in parts of 255.
-    unseen_cost, scale = int(255 * unseen), weight / 255.0
+    unseen_cost, scale = int(FULL_LEVEL * unseen), weight / FULL_LEVEL
     least = np.inf
     found[:] = around
     away = np.empty(3)
@@ -115,7 +130,11 @@ def _search(
             for i in range(width):
                 for j in range(width):
                     level = int(levels[row + i, column + j])
-                    sums[i, j] += unseen_cost if level == UNSEEN else ((256 - level) * (256 - level)) >> 8
+                    sums[i, j] += (
+                        unseen_cost
+                        if level == UNSEEN
+                        else ((LEVELS - level) * (LEVELS - level)) >> LEVEL_BITS
+                    )
         for i in range(width):
             for j in range(width):
                 away[0], away[1], away[2] = (j - steps) * side, (i - steps) * side, turn * step

@@ -12,7 +12,7 @@ and a robot that goes by them runs ahead of itself.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from lidarium.mapping.grids.scan_polygon import (
     window_words,
 )
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.localization.matching.settings import SubmapSettings
+from lidarium.mapping.localization.matching.settings.matching import SubmapSettings
 
 UNSEEN, FREE_LEVEL, FULL_LEVEL = 0, 1, 255
 """Levels of agreement: unobserved, free, and full.
@@ -43,8 +43,7 @@ Ends farther apart [cells] are not joined.
 _MARGIN = 4
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AgreementGrid:
+class AgreementGrid(NamedTuple):
     """A local map's agreement.
 
     Attributes
@@ -62,6 +61,29 @@ class AgreementGrid:
     column: int
     row: int
     resolution: float
+
+
+class _Cells(NamedTuple):
+    """What a local map holds of its cells.
+
+    Attributes
+    ----------
+    shares, weights : (rows, columns) float32
+        The largest share that an end of the present scan has in a cell, zero between scans; and the sum of
+        such shares over all scans.
+    counts : (rows, columns) uint16
+        How many scans observed it.
+    levels : (rows, columns) uint8
+        See ``AgreementGrid``.
+    box : (4,) int64
+        First and last row and column that were observed, the last ones excluded.
+    """
+
+    shares: NDArray[np.float32]
+    weights: NDArray[np.float32]
+    counts: NDArray[np.uint16]
+    levels: NDArray[np.uint8]
+    box: NDArray[np.int64]
 
 
 class Submap:
@@ -87,11 +109,13 @@ class Submap:
         # only.
         self._half = -(-half // 64) * 64
         side = 2 * self._half
-        self._shares = np.zeros((side, side), np.float32)
-        self._weights = np.zeros((side, side), np.float32)
-        self._counts = np.zeros((side, side), np.uint16)
-        self._levels = np.zeros((side, side), np.uint8)
-        self._box = np.array([side, 0, side, 0], np.int64)
+        self._cells = _Cells(
+            np.zeros((side, side), np.float32),
+            np.zeros((side, side), np.float32),
+            np.zeros((side, side), np.uint16),
+            np.zeros((side, side), np.uint8),
+            np.array([side, 0, side, 0], np.int64),
+        )
         self._resolution = resolution
         self._behind = (settings.behind_m / resolution, settings.behind_share)
         self.scans = 0
@@ -99,7 +123,7 @@ class Submap:
     @property
     def grid(self) -> AgreementGrid:
         """Return the agreement, a view that changes with the next scan."""
-        return AgreementGrid(self._levels, -self._half, -self._half, self._resolution)
+        return AgreementGrid(self._cells.levels, -self._half, -self._half, self._resolution)
 
     def insert(
         self, pose: NDArray[np.float64], ranges: NDArray[np.float32], geometry: ScanGeometry, longest: float
@@ -129,36 +153,22 @@ class Submap:
         if not (reach + _MARGIN <= min(x, y) and max(x, y) <= side - reach - _MARGIN):
             return False
         numbers = (geometry.angle_increment, reach, scale, float(geometry.is_full_circle), *self._behind)
-        _insert(
-            self._shares,
-            self._weights,
-            self._counts,
-            self._levels,
-            self._box,
-            (x, y, float(pose[2])),
-            ranges,
-            numbers,
-            geometry.unit_vectors,
-        )
+        _insert(self._cells, (x, y, float(pose[2])), ranges, numbers, geometry.unit_vectors)
         self.scans += 1
         return True
 
     def finished(self) -> AgreementGrid:
         """Return the agreement for good, cropped to what was observed."""
-        low_row, high_row, low_column, high_column = (int(value) for value in self._box)
+        low_row, high_row, low_column, high_column = (int(value) for value in self._cells.box)
         if low_row >= high_row:
             return AgreementGrid(np.zeros((1, 1), np.uint8), 0, 0, self._resolution)
-        levels = self._levels[low_row:high_row, low_column:high_column].copy()
+        levels = self._cells.levels[low_row:high_row, low_column:high_column].copy()
         return AgreementGrid(levels, low_column - self._half, low_row - self._half, self._resolution)
 
 
 @kernel
 def _insert(
-    shares: Array,
-    weights: Array,
-    counts: Array,
-    levels: Array,
-    box: Array,
+    cells: _Cells,
     place: tuple[float, float, float],
     ranges: Array,
     geometry: tuple[float, float, float, float, float, float],
@@ -169,6 +179,7 @@ def _insert(
     ``geometry`` is (increment, reach [cells], cells per metre, full circle, how far walls behind an end count
     as seen through [cells], the same as a share of the range).
     """
+    shares, weights, counts, levels, box = cells
     increment, reach, scale, full_circle, behind, behind_share = geometry
     beams = ranges.shape[0]
     directions = np.empty((4, beams))

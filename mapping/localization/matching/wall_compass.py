@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.localization.matching.settings import CompassSettings
+from lidarium.mapping.localization.matching.settings.graph import CompassSettings
 from lidarium.mapping.localization.matching.wall_direction import wall_direction, within_quarter
 
 

@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.localization.matching.settings import OdometryUncertainty
+from lidarium.mapping.localization.matching.settings.odometry import OdometryUncertainty
 
 
 class OdometryCalibration:

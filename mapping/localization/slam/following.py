@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
-from lidarium.mapping.localization.matching.settings import (
+from lidarium.mapping.localization.matching.settings.graph import (
     ClosureSettings,
     CompassSettings,
     GraphSettings,
-    MatchingSettings,
-    SlamSettings,
-    SubmapSettings,
 )
+from lidarium.mapping.localization.matching.settings.matching import MatchingSettings, SubmapSettings
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.slam.localizer import Slam
 
 LOG_SETTINGS = SlamSettings(

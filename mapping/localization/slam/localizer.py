@@ -23,7 +23,7 @@ from lidarium.mapping.localization.graph.closures import Closure, ClosureFinder
 from lidarium.mapping.localization.graph.node_graph import NodeGraph
 from lidarium.mapping.localization.matching.local_mapping import Finished, LocalMapper, turned, way
 from lidarium.mapping.localization.matching.scan_points import at_last_beam, scan_points
-from lidarium.mapping.localization.matching.settings import SlamSettings
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.matching.wall_compass import WallCompass
 from lidarium.mapping.localization.slam.calibration import OdometryCalibration
 

@@ -214,7 +214,7 @@ def _leave(terrain: Terrain, state: SearchState, task: Task, row: int, column: i
     remaining, parent = state.remaining, state.parent
     touched, pending, fullest = tally.touched, tally.pending, tally.fullest
     margin = _margin(terrain, row, column)
-    after = remaining[row, column] - 2 * terrain.passage.half_costs.max()
+    after = remaining[row, column] - 2 * _dearest(terrain.passage.half_costs)
     for k in range(DIRECTIONS):
         to_row = row + ROW_STEPS[k]
         to_column = column + COLUMN_STEPS[k]
@@ -239,6 +239,16 @@ def _leave(terrain: Terrain, state: SearchState, task: Task, row: int, column: i
         fullest = max(fullest, _queue(state, (task.budget - after + ahead) >> BUCKET_SHIFT, to_cell))
         pending += 1
     return _Tally(touched, pending, fullest)
+
+
+@kernel(borrowing=True)
+def _dearest(half_costs: Array) -> int:
+    """Return half the cost of the dearest step."""
+    dearest = 0
+    for kind in range(half_costs.shape[0]):
+        for closeness in range(half_costs.shape[1]):
+            dearest = max(dearest, half_costs[kind, closeness])
+    return dearest
 
 
 @kernel(borrowing=True)

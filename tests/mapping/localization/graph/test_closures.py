@@ -8,7 +8,8 @@ from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.graph.closures import ClosureFinder
 from lidarium.mapping.localization.matching.local_mapping import Finished
 from lidarium.mapping.localization.matching.scan_points import scan_points
-from lidarium.mapping.localization.matching.settings import ClosureSettings, MatchingSettings, SubmapSettings
+from lidarium.mapping.localization.matching.settings.graph import ClosureSettings
+from lidarium.mapping.localization.matching.settings.matching import MatchingSettings, SubmapSettings
 from lidarium.mapping.localization.matching.submaps import Submap
 
 KNOWN = np.diag([0.05**2, 0.05**2, math.radians(1.0) ** 2])

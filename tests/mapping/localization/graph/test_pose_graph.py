@@ -8,7 +8,7 @@ import scipy.optimize
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.graph.node_graph import NodeGraph
 from lidarium.mapping.localization.graph.pose_graph import Edges, optimised, residuals
-from lidarium.mapping.localization.matching.settings import GraphSettings
+from lidarium.mapping.localization.matching.settings.graph import GraphSettings
 
 SIDE = 10
 

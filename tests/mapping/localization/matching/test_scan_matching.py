@@ -12,7 +12,7 @@ from lidarium.mapping.localization.matching.branch_and_bound import place, pyram
 from lidarium.mapping.localization.matching.scan_matching import refine
 from lidarium.mapping.localization.matching.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.matching.scan_search import search
-from lidarium.mapping.localization.matching.settings import MatchingSettings, SubmapSettings
+from lidarium.mapping.localization.matching.settings.matching import MatchingSettings, SubmapSettings
 from lidarium.mapping.localization.matching.submaps import FREE_LEVEL, UNSEEN, Submap
 
 ORIGIN = np.array([2.5, 1.5, 0.3])

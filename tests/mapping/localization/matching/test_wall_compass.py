@@ -5,7 +5,7 @@ import pytest
 from seen_rooms import room_seen
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.localization.matching.settings import CompassSettings
+from lidarium.mapping.localization.matching.settings.graph import CompassSettings
 from lidarium.mapping.localization.matching.wall_compass import WallCompass, within_quarter
 
 STEP = math.radians(0.25)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
-from lidarium.mapping.localization.matching.settings import OdometryUncertainty, SlamSettings
+from lidarium.mapping.localization.matching.settings.odometry import OdometryUncertainty
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.slam.calibration import OdometryCalibration
 from lidarium.mapping.localization.slam.localizer import Slam
 

@@ -10,13 +10,10 @@ from driven_rooms import GEOMETRY, RING_ROUND, TWINS_VISITED, cast, driven, odd_
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.dead_reckoning.odometry import Odometry
-from lidarium.mapping.localization.matching.settings import (
-    ClosureSettings,
-    GraphSettings,
-    MatchingSettings,
-    OdometryUncertainty,
-    SlamSettings,
-)
+from lidarium.mapping.localization.matching.settings.graph import ClosureSettings, GraphSettings
+from lidarium.mapping.localization.matching.settings.matching import MatchingSettings
+from lidarium.mapping.localization.matching.settings.odometry import OdometryUncertainty
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.registry import LOCALIZERS, make_localizer
 from lidarium.mapping.localization.slam.localizer import Slam
 

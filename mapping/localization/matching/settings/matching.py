@@ -1,0 +1,150 @@
+"""Settings of matching scans with local maps, and of these maps."""
+
+import math
+from dataclasses import dataclass
+
+from lidarium.mapping.localization.matching.settings.checks import check_numbers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchingSettings:
+    """How scans are laid on the local map.
+
+    Attributes
+    ----------
+    distance_m, angle : float
+        A scan is matched after so much motion since the last one [m, rad].
+    beam_interval_s : float
+        Time between neighbouring beams; 0 for a scan taken at once [s].
+    range_m : float
+        Longest range that counts; a return beyond it says that the way there is free [m].
+    spacing_m : float
+        Returns that are nearer to each other than this count as one [m].
+    points : int
+        At most so many returns of a scan are matched.
+    least_points : int
+        With fewer returns than this (or an eighth of the beams, if that is less) a scan says nothing of the
+        pose: they fit in many places.
+    search_m, search_angle : float
+        What the search around odometry reaches beyond its standard deviation [m, rad].
+    search_deviations : float
+        How many standard deviations of odometry the search reaches.
+    blind_m, blind_angle : float
+        What the search reaches where there is no odometry, or odometry leads nowhere [m, rad].
+    wide_share : float
+        A scan of fewer returns, as a share of the beams, is sought where odometry says it is and not beyond:
+        it fits in many places.
+    blind_overlap : float
+        Share of the returns near what the local map has observed below which a match does not count where
+        odometry led nowhere.
+    evaluations : int
+        At most so many placements, and blocks of them, are looked at in such a search.
+    independent_points, independent_share : float
+        As how many independent measurements the returns of a scan count, all of them at most and each:
+        neighbouring ones err together.
+    deviation : float
+        Standard deviation of how far a return is from full agreement with the map, which is 1.
+    surface_m : float
+        Returns of a surface so near to one tell which way it runs there, across which the return is moved; 0
+        for the nearest two [m].
+    unseen : float
+        Square of the disagreement with which a return counts that lies in what the local map has not
+        observed.
+    least_score, least_overlap : float
+        Agreement, and share of the returns near what the local map has observed, below which a match does not
+        count.
+    least_share : float
+        The same for agreement as a share of what matches have had of late.
+    most_contradiction : float
+        Share of the returns in free space of the local map above which a match does not count.
+    convincing_share : float
+        Agreement, as a share of what matches have had of late, below which the search goes farther than
+        odometry says.
+    better_by : float
+        By how much more a match that is found there has to agree.
+    wide_after : int
+        After so many scans in a row that do not match, the search goes as far as where there is no odometry.
+    lost_after : int
+        After so many scans in a row that do not match, a new local map is begun.
+    lost_m, lost_angle : float
+        Standard deviation of the motion into such a new local map [m, rad].
+    """
+
+    distance_m: float = 0.1
+    angle: float = math.radians(5.0)
+    beam_interval_s: float = 0.0
+    range_m: float = 20.0
+    spacing_m: float = 0.05
+    points: int = 350
+    least_points: int = 15
+    search_m: float = 0.05
+    search_angle: float = math.radians(1.0)
+    search_deviations: float = 2.0
+    blind_m: float = 1.2
+    blind_angle: float = math.radians(50.0)
+    wide_share: float = 0.08
+    blind_overlap: float = 0.7
+    evaluations: int = 100_000
+    independent_points: float = 50.0
+    independent_share: float = 0.15
+    deviation: float = 0.2
+    surface_m: float = 0.25
+    unseen: float = 0.3
+    least_score: float = 0.15
+    least_share: float = 0.5
+    least_overlap: float = 0.2
+    most_contradiction: float = 0.25
+    convincing_share: float = 0.75
+    better_by: float = 0.1
+    wide_after: int = 3
+    lost_after: int = 8
+    lost_m: float = 2.0
+    lost_angle: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_numbers(
+            self,
+            zero=(
+                "beam_interval_s",
+                "distance_m",
+                "angle",
+                "search_m",
+                "search_angle",
+                "surface_m",
+                "unseen",
+            ),
+        )
+
+    def weight(self, points: int) -> float:
+        """Return how much full disagreement of all of so many points counts."""
+        return min(self.independent_points, self.independent_share * points) / self.deviation**2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SubmapSettings:
+    """Settings of local maps.
+
+    Each scan enters two local maps that overlap by half, and is matched with the older one.
+
+    Attributes
+    ----------
+    resolution : float
+        Side of a cell [m].
+    behind_m, behind_share : float
+        As far behind the end of a beam, at least and as a share of its range, walls that other scans saw
+        count as seen through [m, 1]; twice to three times the standard deviation of a range is right. A share
+        of 0 does without.
+    path_m : float
+        Way driven, turns counted with a metre a radian, after which a local map is finished [m].
+    least_scans : int
+        A local map holds at least so many scans.
+    """
+
+    resolution: float = 0.035
+    behind_m: float = 0.025
+    behind_share: float = 0.025
+    path_m: float = 16.0
+    least_scans: int = 10
+
+    def __post_init__(self) -> None:
+        check_numbers(self, zero=("behind_m", "behind_share"))
