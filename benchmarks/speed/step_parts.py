@@ -19,7 +19,7 @@ from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, fill_gau
 from lidarium.envs.simulation.kernels.masks import window_corner
 from lidarium.envs.simulation.kernels.motion import move_robots
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan
-from lidarium.mapping.grids.occupancy import integrate_scan
+from lidarium.mapping.grids.occupancy import SeenScan, integrate_scan
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import beam_directions
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
@@ -103,18 +103,10 @@ def _map(
         log_odds = int8_grid_at(maps[row, 0], maps[row, 1], maps[row, 2])
         box = (boxes[row, 0], boxes[row, 1], boxes[row, 2], boxes[row, 3])
         touched = word_grid_at(maps[row, 3], maps[row, 4], touched_words(maps[row, 2]))
-        integrate_scan(
-            log_odds,
-            bits[row],
-            box,
-            ends[row],
-            is_hit[row],
-            corners[row, 0],
-            corners[row, 1],
-            increments,
-            hit_bits[row],
-            touched,
+        seen = SeenScan(
+            bits[row], hit_bits[row], box, ends[row], is_hit[row], corners[row, 0], corners[row, 1]
         )
+        integrate_scan(log_odds, seen, increments, touched)
 
 
 class StepParts:

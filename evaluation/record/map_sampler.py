@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.record.display import MapChanges
 from lidarium.evaluation.truth.beliefs import cells_beyond
-from lidarium.mapping.grids.map_deltas import note_changes, note_laid_changes
+from lidarium.mapping.grids.map_deltas import LaidMaps, note_changes, note_laid_changes
 
 FAR = 1e5
 """How far from a robot a map may have changed that was rendered anew [m]."""
@@ -84,16 +84,8 @@ class MapSampler:
         reach = FAR if is_new else self._reach
         self._renderings[:] = self._env.beliefs.renderings
         if self._is_laid:
-            count = note_laid_changes(
-                self._env.beliefs.belief_rows,
-                self._before_at,
-                self._lays,
-                self._env.beliefs.believed,
-                self._last,
-                reach,
-                self._resolution,
-                *planes,
-            )
+            laid = LaidMaps(self._env.beliefs.belief_rows, self._before_at, self._lays, self._resolution)
+            count = note_laid_changes(laid, self._env.beliefs.believed, self._last, reach, *planes)
         else:
             count = note_changes(
                 self._maps, self._env.beliefs.believed, self._last, reach, self._frame, *planes

@@ -7,6 +7,7 @@ flips bits of one plane only. Only what the robots can have seen since the last 
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +145,28 @@ def note_changes(
     return found
 
 
+class LaidMaps(NamedTuple):
+    """Maps in frames of their robots' own starts, laid over a lattice.
+
+    Attributes
+    ----------
+    maps : (robots, 3 or more) int64
+        As for ``note_changes``; columns of the maps are a multiple of 8.
+    before : (robots,) int64
+        Addresses of the maps as they were at the last look, blank at the first; updated.
+    lays : (robots, 8) float64
+        How each map lies over the lattice: corner x, y of the lattice, start x, y, cosine and sine of the
+        start's heading, and corner x, y of the map in the start's frame [m].
+    resolution : float
+        Side of a cell [m].
+    """
+
+    maps: NDArray[np.int64]
+    before: NDArray[np.int64]
+    lays: NDArray[np.float64]
+    resolution: float
+
+
 @kernel
 def _mark_stale(
     log_odds: Array, before: int, lay: Array, resolution: float, span: Array, stale: Array
@@ -205,13 +228,10 @@ def _add_laid_group(
 
 @kernel
 def note_laid_changes(
-    maps: Array,
-    before: Array,
-    lays: Array,
+    laid: LaidMaps,
     poses: Array,
     last: Array,
     reach: float,
-    resolution: float,
     known: Array,
     occupied: Array,
     changes: Array,
@@ -222,17 +242,12 @@ def note_laid_changes(
 
     Parameters
     ----------
-    maps, reach, known, occupied, changes
-        As for ``note_changes``; columns of the maps are a multiple of 8.
-    before : (robots,) int64
-        Addresses of the maps as they were at the last look, blank at the first; updated.
-    lays : (robots, 8) float64
-        How each map lies over the lattice: corner x, y of the lattice, start x, y, cosine and sine of the
-        start's heading, and corner x, y of the map in the start's frame [m].
+    laid : LaidMaps
+        The robots' maps.
     poses, last : (robots, 2 or more), (robots, 2) float64
         Where each robot is in the frame of its start, and where it was at the last look (updated) [m].
-    resolution : float
-        Side of a cell [m].
+    reach, known, occupied, changes
+        As for ``note_changes``.
 
     Returns
     -------
@@ -240,6 +255,7 @@ def note_laid_changes(
         Number of changed words.
     """
     rows, words = known.shape
+    maps, before, lays, resolution = laid
     stale = np.zeros((rows, words * (64 // _GROUP)), np.uint8)
     frame = np.empty(3)
     for robot in range(maps.shape[0]):

@@ -88,8 +88,7 @@ def settle_returns(
     lengths: Array,
     directions: Array,
     is_hit: Array,
-    deviation: float,
-    share: float,
+    noise: tuple[float, float],
     occupied: int,
 ) -> None:
     """Shorten the beams that end just behind an occupied cell, so that they end in it.
@@ -106,12 +105,14 @@ def settle_returns(
         Their directions in the map.
     is_hit : (beams,) bool
         Which of them something ended; the others keep their lengths.
-    deviation, share : float
-        Standard deviation of the noise: the larger of the first [cells] and this share of the length.
+    noise : (float, float)
+        Standard deviation of the ranges: the larger of the first [cells] and the second, a share of the
+        length.
     occupied : int
         Log-odds from which on a cell counts as occupied.
     """
     rows, columns = log_odds.shape
+    deviation, share = noise
     listed = scratch_vector(lengths.shape[0], np.int32)
     for k in range(_unsettled(log_odds, x, y, lengths, directions, is_hit, occupied, listed)):
         beam = listed[k]

@@ -8,7 +8,7 @@ value. Log-odds are integers of ``LOG_ODDS_UNIT``; 0 is unknown.
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -78,27 +78,11 @@ def _note_hits(ends: Array, is_hit: Array, hit_bits: Array) -> None:
         flat[np.uintp(row * words + (column >> 6))] |= np.uint64(is_hit[beam]) << np.uint64(column & 63)
 
 
-@kernel(borrowing=True)
-def integrate_scan(
-    log_odds: Array,
-    bits: Array,
-    box: tuple[int, int, int, int],
-    ends: Array,
-    is_hit: Array,
-    row_offset: int,
-    column_offset: int,
-    increments: Array,
-    hit_bits: Array,
-    touched: Array,
-) -> None:
-    """Update a map by a scan.
+class SeenScan(NamedTuple):
+    """What a scan has seen, in a window of bits.
 
-    Seen cells are lowered, and cells in which beams ended are raised, each once.
-
-    Parameters
+    Attributes
     ----------
-    log_odds : (rows, columns) int8
-        The map; columns a multiple of 64.
     bits, hit_bits : (window rows, words) uint64
         The seen area of ``fill_scan_polygon``, and zeros (the hits are noted).
     box : tuple of int
@@ -107,12 +91,36 @@ def integrate_scan(
         End points of the beams in the window [cells], and whether something ended them.
     row_offset, column_offset : int
         Place of the window's first cell in the map; column_offset a multiple of 64.
+    """
+
+    bits: NDArray[np.uint64]
+    hit_bits: NDArray[np.uint64]
+    box: tuple[int, int, int, int]
+    ends: NDArray[np.float64]
+    is_hit: NDArray[np.bool_]
+    row_offset: int
+    column_offset: int
+
+
+@kernel(borrowing=True)
+def integrate_scan(log_odds: Array, scan: SeenScan, increments: Array, touched: Array) -> None:
+    """Update a map by a scan.
+
+    Seen cells are lowered, and cells in which beams ended are raised, each once.
+
+    Parameters
+    ----------
+    log_odds : (rows, columns) int8
+        The map; columns a multiple of 64.
+    scan : SeenScan
+        What it has seen.
     increments : (4,) int64
         ``OccupancySettings.increments``.
     touched : (rows + rows / 64, words) uint64
         Bits of the words of 64 cells of each row in which a level has changed, and of these rows
         (``pooled_maps.untouched``); added to. None are noted where it has no rows.
     """
+    bits, hit_bits, box, ends, is_hit, row_offset, column_offset = scan
     _note_hits(ends, is_hit, hit_bits)
     hit, miss, minimum, maximum = increments[0], increments[1], increments[2], increments[3]
     rows, columns = log_odds.shape
@@ -142,9 +150,7 @@ def integrate_scan(
 @kernel
 def _integrate_one(
     log_odds: Array,
-    x: float,
-    y: float,
-    heading: float,
+    place: tuple[float, float, float],
     ranges: Array,
     geometry: tuple[float, float, float, float],
     unit_vectors: Array,
@@ -152,10 +158,11 @@ def _integrate_one(
     noise: tuple[float, float],
     window: Array,
 ) -> None:
-    """Update a map by one scan at x, y [cells].
+    """Update a map by one scan at x, y [cells], heading.
 
     ``geometry`` is (increment, range_max [cells], cells per metre, full circle).
     """
+    x, y, heading = place
     reach, scale = geometry[1], geometry[2]
     beams = ranges.shape[0]
     directions = np.empty((4, beams))
@@ -167,7 +174,8 @@ def _integrate_one(
         is_hit[beam] = math.isfinite(value) and value * scale <= reach
         lengths[beam] = 0.0 if math.isnan(value) else min(value * scale, reach)
     if noise[0] > 0.0 or noise[1] > 0.0:
-        settle_returns(log_odds, x, y, lengths, directions, is_hit, noise[0] * scale, noise[1], increments[0])
+        in_cells = (noise[0] * scale, noise[1])
+        settle_returns(log_odds, x, y, lengths, directions, is_hit, in_cells, increments[0])
     bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
     margin = int(reach) + 3
     row_offset = int(math.floor(y)) - margin
@@ -179,18 +187,8 @@ def _integrate_one(
     )
     window[0], window[1] = box[0] + row_offset, box[1] + row_offset
     window[2], window[3] = 64 * box[2] + column_offset, 64 * box[3] + column_offset
-    integrate_scan(
-        log_odds,
-        bits,
-        box,
-        ends,
-        is_hit,
-        row_offset,
-        column_offset,
-        increments,
-        np.zeros_like(bits),
-        np.empty((0, 1), np.uint64),
-    )
+    seen = SeenScan(bits, np.zeros_like(bits), box, ends, is_hit, row_offset, column_offset)
+    integrate_scan(log_odds, seen, increments, np.empty((0, 1), np.uint64))
 
 
 class OccupancyGrid:
@@ -318,9 +316,7 @@ class OccupancyGrid:
         deviation, share = noise
         _integrate_one(
             self.log_odds,
-            grid_x,
-            grid_y,
-            theta,
+            (grid_x, grid_y, theta),
             scan,
             numbers,
             geometry.unit_vectors,

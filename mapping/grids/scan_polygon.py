@@ -10,7 +10,10 @@ centre right of the crossing; the running exclusive-or along a row is then the i
 every cell is visited once however many beams crossed it.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.bit_words import running_xor
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -97,20 +100,51 @@ def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array
         ends[1, beam] = y + lengths[beam] * directions[1, beam]
 
 
+class _Outline(NamedTuple):
+    """The outline of what a scan has seen.
+
+    Attributes
+    ----------
+    lengths, directions, ends
+        As for ``scan_ends``.
+    x, y : float
+        Position of the laser in the window [cells].
+    steepness : float
+        By how much of the nearer range the ranges of neighbours on one surface differ at most.
+    """
+
+    lengths: NDArray[np.float64]
+    directions: NDArray[np.float64]
+    ends: NDArray[np.float64]
+    x: float
+    y: float
+    steepness: float
+
+
+class _Edges(NamedTuple):
+    """The edges of an outline between neighbouring beams.
+
+    Attributes
+    ----------
+    crossed : (edges,) uint8
+        Rows that each crosses, or ``JUMP``.
+    first, second : (edges,) int32
+        Bits toggled in the first two of them.
+    crossings, slopes : (edges,) float64
+        Where its line crosses the first row, and by how much farther each one after it.
+    """
+
+    crossed: NDArray[np.uint8]
+    first: NDArray[np.int32]
+    second: NDArray[np.int32]
+    crossings: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+
+
 @kernel(inline=True, borrowing=True)
-def _toggle_between(
-    bits: int,
-    width: int,
-    lengths: Array,
-    directions: Array,
-    ends: Array,
-    x: float,
-    y: float,
-    previous: int,
-    beam: int,
-    steepness: float,
-) -> None:
+def _toggle_between(bits: int, width: int, outline: _Outline, previous: int, beam: int) -> None:
     """Toggle the outline between the end points of two neighbouring beams."""
+    lengths, directions, ends, x, y, steepness = outline
     step = lengths[beam] - lengths[previous]
     if abs(step) <= 1.0 + steepness * min(lengths[beam], lengths[previous]):
         from_row, to_row = _row_of(ends[1, previous]), _row_of(ends[1, beam])
@@ -138,24 +172,13 @@ def _toggle_between(
 
 @kernel(borrowing=True)
 def _find_edges(
-    lengths: Array,
-    ends: Array,
-    rows: Array,
-    steepness: float,
-    width: int,
-    crossed: Array,
-    first: Array,
-    second: Array,
-    crossings: Array,
-    slopes: Array,
+    lengths: Array, ends: Array, rows: Array, steepness: float, width: int, found: _Edges
 ) -> None:
     """Compute the rows crossed, the toggled bits and the line of each edge.
 
-    An edge joins a beam to the next. Bits are of the first two rows; rows may be ``JUMP``.
-
-    The line is where it crosses the first row, and by how much farther each one after it. Loops without
-    branches over few arrays, which LLVM runs on vectors.
+    An edge joins a beam to the next. Loops without branches over few arrays, which LLVM runs on vectors.
     """
+    crossed, first, second, crossings, slopes = found
     edges = lengths.shape[0] - 1
     from_x, to_x, from_y, to_y = ends[0, :-1], ends[0, 1:], ends[1, :-1], ends[1, 1:]
     from_row, to_row, from_length, to_length = rows[:-1], rows[1:], lengths[:-1], lengths[1:]
@@ -208,7 +231,10 @@ def fill_scan_polygon(
     """
     beams = lengths.shape[0]
     flat, width = bits.ctypes.data, 64 * bits.shape[1]
-    if not is_full_circle:
+    outline = _Outline(lengths, directions, ends, x, y, GRAZING * increment)
+    if is_full_circle:
+        _toggle_between(flat, width, outline, beams - 1, 0)
+    else:
         own_row = _row_of(y)
         for beam in (0, beams - 1):
             end_row = _row_of(ends[1, beam])
@@ -221,21 +247,34 @@ def fill_scan_polygon(
     for beam in range(beams):
         low_row, high_row = min(low_row, rows[beam]), max(high_row, rows[beam])
         low_column, high_column = min(low_column, columns[beam]), max(high_column, columns[beam])
-    steepness = GRAZING * increment
-    if is_full_circle:
-        _toggle_between(flat, width, lengths, directions, ends, x, y, beams - 1, 0, steepness)
+    _toggle_edges(flat, width, outline, rows)
+    box = (
+        max(int(low_row) - 2, 0),
+        min(int(high_row) + 2, bits.shape[0]),
+        max(int(low_column) - 1, 0) >> 6,
+        min((int(high_column) + 2) >> 6, bits.shape[1] - 1) + 1,
+    )
+    _fill_rows(bits, box)
+    return box
+
+
+@kernel(inline=True, borrowing=True)
+def _toggle_edges(flat: int, width: int, outline: _Outline, rows: Array) -> None:
+    """Toggle the outline between all end points; ``rows`` (beams,) int32 are theirs."""
+    beams = rows.shape[0]
     crossed, first, second = (
         scratch_vector(beams, np.uint8),
         scratch_vector(beams, np.int32),
         scratch_vector(beams, np.int32),
     )
     crossings, slopes = scratch_vector(beams, np.float64), scratch_vector(beams, np.float64)
-    _find_edges(lengths, ends, rows, steepness, width, crossed, first, second, crossings, slopes)
+    edges = _Edges(crossed, first, second, crossings, slopes)
+    _find_edges(outline.lengths, outline.ends, rows, outline.steepness, width, edges)
     toggles, listed = scratch_vector(2 * beams + 2, np.int32), np.uintp(0)
     for k in range(beams - 1):
         count = crossed[k]
         if count == JUMP:
-            _toggle_between(flat, width, lengths, directions, ends, x, y, k, k + 1, steepness)
+            _toggle_between(flat, width, outline, k, k + 1)
             continue
         # Most edges cross two rows, one or none. What they toggle is listed without branches, which could not
         # be foreseen.
@@ -251,15 +290,15 @@ def fill_scan_polygon(
                 _toggle_bit(flat, start + int(crossing))
     for k in range(listed):
         _toggle_bit(flat, toggles[k])
-    row_low, row_high = max(int(low_row) - 2, 0), min(int(high_row) + 2, bits.shape[0])
-    word_low, word_high = (
-        max(int(low_column) - 1, 0) >> 6,
-        min((int(high_column) + 2) >> 6, bits.shape[1] - 1) + 1,
-    )
+
+
+@kernel(inline=True, borrowing=True)
+def _fill_rows(bits: Array, box: tuple[int, int, int, int]) -> None:
+    """Set the bits between those toggled, in the rows and words of a box."""
+    row_low, row_high, word_low, word_high = box
     for i in range(row_low, row_high):
         carry = np.uint64(0)
         for word in range(word_low, word_high):
             value = running_xor(bits[i, word]) ^ carry
             bits[i, word] = value
             carry = np.uint64(0) - (value >> np.uint64(63))
-    return row_low, row_high, word_low, word_high

@@ -25,7 +25,7 @@ from lidarium.envs.simulation.kernels.arrays import (
 from lidarium.envs.simulation.kernels.masks import window_corner
 from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy
 from lidarium.mapping.grids.noisy_returns import settle_returns
-from lidarium.mapping.grids.occupancy import integrate_scan
+from lidarium.mapping.grids.occupancy import SeenScan, integrate_scan
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends
@@ -133,7 +133,8 @@ def update_map(
             lengths[beam] = min(value * scale, reach) if value == value else 0.0
         if is_noisy(sensor):
             deviation, share = sensor[NOISE_FLOOR] * scale, sensor[NOISE_SHARE]
-            settle_returns(log_odds, x, y, lengths, directions, is_hit, deviation, share, world.increments[0])
+            noise = (deviation, share)
+            settle_returns(log_odds, x, y, lengths, directions, is_hit, noise, world.increments[0])
         scan_ends(lengths, directions, local_x, local_y, ends)
         box = fill_scan_polygon(
             lengths,
@@ -148,18 +149,8 @@ def update_map(
     if world.flags[row] & (KNOWN_MATES | SOME_MATES):
         _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
     touched = word_grid_at(belief[TOUCHED], belief[TOUCHED_ROWS], touched_words(belief[MAP_COLUMNS]))
-    integrate_scan(
-        log_odds,
-        bits,
-        box,
-        ends,
-        is_hit,
-        row_offset,
-        column_offset,
-        world.increments,
-        scratch.windows[1],
-        touched,
-    )
+    seen = SeenScan(bits, scratch.windows[1], box, ends, is_hit, row_offset, column_offset)
+    integrate_scan(log_odds, seen, world.increments, touched)
     # A hit may lie one cell beyond the seen area.
     window = world.windows[row]
     window[0] = max(min(window[0], box[0] + row_offset - 1), 0)

@@ -91,7 +91,7 @@ def test_returns_settle_as_told_beam_by_beam_at_the_border_and_beyond_it_too(
         np.array([np.cos(angles), np.sin(angles)]),
     )
     expected = settled_one_by_one(log_odds, x, y, lengths, directions, is_hit, *noise, 15)
-    settle_returns(log_odds, x, y, lengths, directions, is_hit, *noise, 15)
+    settle_returns(log_odds, x, y, lengths, directions, is_hit, (float(noise[0]), float(noise[1])), 15)
     np.testing.assert_array_equal(lengths, expected)
 
 
