@@ -28,18 +28,15 @@ class Reproduce(Command):
     name: Positional[str]
     """which study; `lidarium show studies` lists them"""
     data: Path | None = None
-    """folder of real floors; without it generated floors alone"""
+    """folder of real floors and laser logs; without it generated floors alone"""
     every: int = 1
-    """every so many-th of each kind of floor, for a shorter run.
-
-    For the supervisor, this applies to its seeds, then to its floors.
-    """
+    """of each kind of floor, or of other parts of a study, every N-th, for a shorter run"""
     share: float | None = None
     """the same as a share: 0.1 is --every 10"""
     runs: Path = Path("runs/reproduce")
-    """folder for the episodes"""
+    """folder for episodes and other work"""
     workers: int = 0
-    """processes that run episodes; 0 for as many as there are cores"""
+    """processes that run episodes; 0 for as many as there are cores; what is timed runs in one"""
     records: bool = False
     """keep a record of every episode"""
 

@@ -1,12 +1,32 @@
-"""Studies: published results, each made anew by ``lidarium reproduce NAME``."""
+"""Studies: published results, each made by ``lidarium reproduce NAME``."""
 
-from lidarium.benchmarks.studies.study import Study
+from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.registry import Registry
 
 STUDIES: Registry[Study] = Registry("study")
 """Studies by name; the page of one is ``docs/results/NAME.md``."""
 
 _PACKAGE = "lidarium.benchmarks.studies"
+STUDIES.register(
+    "evaluation",
+    f"{_PACKAGE}.evaluation.study:STUDY",
+    "what an evaluation costs beside its episodes, what two workers gain, what survives kills",
+)
+STUDIES.register(
+    "floor_cache",
+    f"{_PACKAGE}.floor_cache:STUDY",
+    "resets over floors of set:train from memory and store, and the memory of processes",
+)
+STUDIES.register(
+    "floors",
+    f"{_PACKAGE}.floors:STUDY",
+    "every real floor, dungeons and 200 generated floors explored with 1 to 3 robots",
+)
+STUDIES.register(
+    "interval_coverage",
+    f"{_PACKAGE}.interval_coverage.study:STUDY",
+    "how often the intervals of reports hold a known truth",
+)
 STUDIES.register(
     "leaderboard",
     f"{_PACKAGE}.leaderboard.study:STUDY",
@@ -16,6 +36,31 @@ STUDIES.register(
     "merging",
     f"{_PACKAGE}.merging.study:STUDY",
     "map merging on a bank of maps that robots made, beside the thesis and ROS map_merge",
+)
+STUDIES.register(
+    "merging_tuning",
+    f"{_PACKAGE}.merging.tuning:STUDY",
+    "map merging on the half of the bank on which its limits are tuned",
+)
+STUDIES.register(
+    "policies",
+    f"{_PACKAGE}.policies:STUDY",
+    "how long the policies take on drawn floors with 1 to 3 robots",
+)
+STUDIES.register(
+    "realism",
+    f"{_PACKAGE}.realism.study:STUDY",
+    "how well robots know where they are with noise, wheels that slip, and SLAM",
+)
+STUDIES.register(
+    "slam",
+    f"{_PACKAGE}.slam.study:STUDY",
+    "SLAM on recorded laser logs and on a simulated robot: errors and times",
+)
+STUDIES.register(
+    "splines",
+    f"{_PACKAGE}.splines:STUDY",
+    "maps of walls as B-splines and localization on them",
 )
 STUDIES.register(
     "srt",

@@ -1,49 +1,63 @@
-"""Resets over the floors of set:train in processes that share a store.
-
-Several processes take part; the results are in docs/results/floor_cache.md.
-
-    python benchmarks/studies/floor_cache.py --floors 100 --processes 2
-    python benchmarks/studies/floor_cache.py --processes 2 --out docs/results/floor_cache.md
+"""Resets over the floors of set:train in several processes that share a store.
 
 Three phases, each in fresh processes: *cold*, each process makes its share of the floors; *warm*, each loads
 the floors that another one made; *held*, each loads as many floors as it has episodes and holds them. Every
-reset is appended to ``resets.jsonl`` in the folder of ``--runs`` at once; a second call goes on where the
-first stopped.
+reset is appended to ``resets.jsonl`` at once; a second call does what is missing.
 """
 
-import argparse
 import json
 import multiprocessing
 import os
 import platform
-import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from datetime import date
 from pathlib import Path
 from statistics import mean, median
 
 import numpy as np
-from tqdm import tqdm
+
+import lidarium
+from lidarium.benchmarks.studies.shared.kept import Progress
+from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.catalogue.names import load_floor, set_floors
+from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE, SIZE_VARIABLE, Store
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
+from lidarium.envs.simulation.kernels.floor_cache import floor_tables
+from lidarium.evaluation.episodes.output import write_json
+
+FLOORS = 10_000
+"""The first so many floors of the set."""
+
+PROCESSES = 2
+EPISODES = (64, 1024)
+"""Floors that each process holds at once."""
 
 STORE_MIB = 1024
 ROBOTS, LIDAR = 2, "lidar_360_6m"
+ASKED_FILE, LOG_FILE, STORE_FOLDER = "asked.json", "resets.jsonl", "store"
+SECONDS_BETWEEN_READS = 0.5
+
+Rows = list[dict[str, object]]
 
 
 def memory() -> dict[str, float]:
     """Return how much memory this process takes, whole, private and shared [MiB].
 
-    Empty where the system does not tell.
+    Empty where the system does not say.
     """
     try:
         lines = Path("/proc/self/smaps_rollup").read_text().splitlines()[1:]
     except OSError:
         return {}
-    told = {name.rstrip(":"): int(size) / 1024.0 for name, size, *_ in map(str.split, lines)}
+    sizes = {name.rstrip(":"): int(size) / 1024.0 for name, size, *_ in map(str.split, lines)}
     private, shared = (
-        sum(size for name, size in told.items() if name.startswith(kind)) for kind in ("Private_", "Shared_")
+        sum(size for name, size in sizes.items() if name.startswith(kind)) for kind in ("Private_", "Shared_")
     )
-    return {"rss_mib": told["Rss"], "pss_mib": told["Pss"], "private_mib": private, "shared_mib": shared}
+    return {"rss_mib": sizes["Rss"], "pss_mib": sizes["Pss"], "private_mib": private, "shared_mib": shared}
 
 
 def append(path: Path, row: dict[str, object]) -> None:
@@ -57,12 +71,7 @@ def reset_over(phase: str, process: int, floors: list[str], log: Path) -> None:
 
     The time of floor and tables is taken apart from that of the rest.
     """
-    from lidarium.envs.exploration import ExplorationEnv
-    from lidarium.envs.floors.catalogue.names import load_floor
-    from lidarium.envs.settings.making import make_settings
-    from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-
-    settings = make_settings(robots=ROBOTS, lidar=LIDAR)
+    settings = _settings()
     env = ExplorationEnv("apartment", settings)
     env.reset(seed=0)
     for floor in floors:
@@ -89,11 +98,7 @@ def reset_over(phase: str, process: int, floors: list[str], log: Path) -> None:
 
 def hold(phase: str, process: int, floors: list[str], log: Path) -> None:
     """Load the tables of some floors and hold them, as that many episodes would."""
-    from lidarium.envs.floors.catalogue.names import load_floor
-    from lidarium.envs.settings.making import make_settings
-    from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-
-    settings = make_settings(robots=ROBOTS, lidar=LIDAR)
+    settings = _settings()
     heights = settings.raster_resolution, settings.lidar.height, settings.robot.height
     floor_tables(load_floor("apartment"), *heights)
     before = memory()
@@ -107,69 +112,133 @@ def hold(phase: str, process: int, floors: list[str], log: Path) -> None:
     append(log, {**row, **memory(), "rss_before_mib": before.get("rss_mib", 0.0)})
 
 
-def rows_of(log: Path) -> list[dict[str, object]]:
+def rows_of(log: Path) -> Rows:
     """Read what has been measured."""
     return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
 
 
-def run_phase(work: Callable[..., None], phase: str, shares: list[list[str]], log: Path, total: int) -> None:
-    """Run a phase in a process for each share, with a progress bar.
+def run_phase(
+    work: Callable[[str, int, list[str], Path], None],
+    phase: str,
+    shares: list[list[str]],
+    log: Path,
+    total: int,
+) -> Progress:
+    """Run a phase in a process for each share.
 
-    The bar follows the ``total`` lines of the log.
+    Yields how many of the ``total`` lines of the log are there.
+
+    Raises
+    ------
+    RuntimeError
+        Where a process has failed.
     """
     context = multiprocessing.get_context("spawn")
     processes = [context.Process(target=work, args=(phase, k, share, log)) for k, share in enumerate(shares)]
+    known = len(rows_of(log))
     for process in processes:
         process.start()
-    known = len(rows_of(log))
-    with tqdm(total=total, desc=phase, file=sys.stderr) as bar:
+    try:
         while any(process.is_alive() for process in processes):
-            time.sleep(0.5)
-            bar.update(min(len(rows_of(log)) - known, total) - bar.n)
+            time.sleep(SECONDS_BETWEEN_READS)
+            yield phase, min(len(rows_of(log)) - known, total), total
+    finally:
+        for process in processes:
+            process.terminate()
+            process.join()
     if any(process.exitcode for process in processes):
-        raise SystemExit(f"a process of phase {phase} failed")
+        raise RuntimeError(f"a process of phase {phase} failed")
 
 
-def measure(arguments: argparse.Namespace, log: Path) -> None:
-    """Run what is missing in the log."""
-    from lidarium.envs.floors.catalogue.names import set_floors
+def work(folder: Path, _data: Path | None, every: int, _workers: int) -> Progress:
+    """Run what the log lacks, over every N-th floor.
 
-    floors = list(set_floors("set:train")[: arguments.floors])
-    count = arguments.processes
-    for phase, shift in (("cold", 0), ("warm", 1)):
-        done = {row["floor"] for row in rows_of(log) if row["phase"] == phase}
-        shares = [
-            [floor for floor in floors[(k + shift) % count :: count] if floor not in done]
-            for k in range(count)
-        ]
-        if shift:
-            shares = [
-                [share[place] for place in np.random.default_rng(k).permutation(len(share))]
-                for k, share in enumerate(shares)
+    The number of processes is part of the study, not of the command.
+
+    Raises
+    ------
+    ValueError
+        Where the folder holds resets of other floors, or of another version.
+    """
+    floors = list(set_floors("set:train")[:FLOORS][::every])
+    _check_same(folder / ASKED_FILE, floors, every)
+    log = folder / LOG_FILE
+    with _environment(folder / STORE_FOLDER):
+        for phase, shift in (("cold", 0), ("warm", 1)):
+            shares = _missing_shares(floors, phase, shift, log)
+            if any(shares):
+                yield from run_phase(reset_over, phase, shares, log, sum(map(len, shares)))
+        for episodes in EPISODES:
+            generator = np.random.default_rng(episodes)
+            chosen = [
+                generator.choice(len(floors), min(episodes, len(floors)), replace=False)
+                for _ in range(PROCESSES)
             ]
-        if any(shares):
-            run_phase(reset_over, phase, shares, log, sum(map(len, shares)))
-    for episodes in arguments.episodes:
-        generator = np.random.default_rng(episodes)
-        chosen = [
-            generator.choice(len(floors), min(episodes, len(floors)), replace=False) for _ in range(count)
-        ]
-        shares = [[floors[place] for place in places] for places in chosen]
-        if not any(row["phase"] == f"held {episodes}" for row in rows_of(log)):
-            run_phase(hold, f"held {episodes}", shares, log, count)
+            shares = [[floors[place] for place in places] for places in chosen]
+            if not any(row["phase"] == f"held {episodes}" for row in rows_of(log)):
+                yield from run_phase(hold, f"held {episodes}", shares, log, PROCESSES)
 
 
-def report(arguments: argparse.Namespace, rows: list[dict[str, object]], store_mib: float) -> str:
-    """Return the tables of what was measured."""
-    import lidarium
+def _missing_shares(floors: list[str], phase: str, shift: int, log: Path) -> list[list[str]]:
+    """Return the floors that each process has to reset on.
 
+    They are dealt out one by one; where they are shifted, their order is drawn.
+    """
+    done = {row["floor"] for row in rows_of(log) if row["phase"] == phase}
+    shares = [
+        [floor for floor in floors[(k + shift) % PROCESSES :: PROCESSES] if floor not in done]
+        for k in range(PROCESSES)
+    ]
+    if not shift:
+        return shares
+    return [
+        [share[place] for place in np.random.default_rng(k).permutation(len(share))]
+        for k, share in enumerate(shares)
+    ]
+
+
+def _check_same(path: Path, floors: list[str], every: int) -> None:
+    """Note which floors are asked for; resets of others are refused."""
+    asked = {"version": lidarium.__version__, "floors": len(floors), "every": every}
+    if path.exists() and json.loads(path.read_text(encoding="utf-8")) != asked:
+        raise ValueError(
+            f"{path.parent} holds resets of other floors or of another version; choose another folder with "
+            "--runs"
+        )
+    write_json(path, asked)
+
+
+def _settings() -> ExplorationSettings:
+    return make_settings(robots=ROBOTS, lidar=LIDAR)
+
+
+@contextmanager
+def _environment(store: Path) -> Iterator[None]:
+    """Give processes that are started meanwhile a store, and one thread each."""
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    wanted = {FOLDER_VARIABLE: str(store.absolute()), SIZE_VARIABLE: str(STORE_MIB), **threads}
+    before = {name: os.environ.get(name) for name in wanted}
+    os.environ |= wanted
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def page(folder: Path, command: str) -> str:
+    """Return the results as markdown."""
+    rows = rows_of(folder / LOG_FILE)
+    store_mib = Store(folder / STORE_FOLDER, STORE_MIB * 2**20).size() / 2**20
     floors = len({row["floor"] for row in rows if row["phase"] == "warm"})
-    sizes = [float(str(row["tables_bytes"])) / 2**20 for row in rows if row["phase"] == "warm"]
+    sizes = [_number(row, "tables_bytes") / 2**20 for row in rows if row["phase"] == "warm"]
     lines = [
         "# Floors from cache and store",
         "",
-        f"`python benchmarks/studies/floor_cache.py --floors {arguments.floors} --processes "
-        f"{arguments.processes}` on {date.today().isoformat()}, "
+        f"`{command}` on {date.today().isoformat()}, "
         f"lidarium {lidarium.__version__}, Python {platform.python_version()}, {os.cpu_count()} cores: "
         "floors of `set:train`, world of "
         f"0.025 m, {ROBOTS} robots with `{LIDAR}`, maps of 0.05 m.",
@@ -178,69 +247,49 @@ def report(arguments: argparse.Namespace, rows: list[dict[str, object]], store_m
         f"{1024.0 * store_mib / max(floors, 1):.1f} KiB each. In memory the "
         f"tables of a floor take {mean(sizes):.2f} MiB in the mean, {max(sizes):.2f} MiB at most.",
         "",
-        "| reset | floors | floor and tables: mean ms | median | most | rest of the reset: mean ms |",
-        "|---|---|---|---|---|---|",
-    ]
-    for phase, title in (("cold", "cold: made and stored"), ("warm", "warm: from the store")):
-        times = [float(str(row["tables_s"])) * 1e3 for row in rows if row["phase"] == phase]
-        rest = [float(str(row["rest_s"])) * 1e3 for row in rows if row["phase"] == phase]
-        lines.append(
-            f"| {title} | {len(times):,} | {mean(times):.1f} | {median(times):.1f} | {max(times):.1f} | "
-            f"{mean(rest):.1f} |"
-        )
-    lines += [
+        *_times(rows),
         "",
         "Memory of each process [MiB]: after the warm resets, where the cache is as full as it may be; and "
         "with the tables of as many "
         "floors as there are episodes. PSS counts what processes share by halves, thirds and so on.",
         "",
-        "| process | tables held | RSS | PSS | private | shared |",
-        "|---|---|---|---|---|---|",
+        *_memory(rows),
     ]
-    for row in rows:
-        if row["phase"] == "warm memory" or str(row["phase"]).startswith("held"):
-            told = [
-                f"{float(str(row[name])):.0f}" if name in row else "-"
-                for name in ("rss_mib", "pss_mib", "private_mib", "shared_mib")
-            ]
-            held = f"{float(str(row['tables_mib'])):.0f}" if "tables_mib" in row else "-"
-            title = f"{row['episodes']} floors held" if "episodes" in row else "after the warm resets"
-            lines.append(f"| {row['process']}: {title} | {held} | {' | '.join(told)} |")
     return "\n".join(lines) + "\n"
 
 
-def main() -> None:
-    """Measure and tell."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--floors", type=int, default=10_000, help="the first so many floors of the set")
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument(
-        "--episodes", type=int, nargs="+", default=[64, 1024], help="floors that each process holds at once"
-    )
-    parser.add_argument(
-        "--runs", type=Path, default=Path("runs/floor_cache"), help="where the store and the measurements lie"
-    )
-    parser.add_argument("--out", type=Path, help="write the report there, too")
-    arguments = parser.parse_args()
-    arguments.runs.mkdir(parents=True, exist_ok=True)
-    os.environ |= {
-        "LIDARIUM_FLOOR_STORE": str(arguments.runs / "store"),
-        "LIDARIUM_FLOOR_STORE_MIB": str(STORE_MIB),
-    }
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = "1"
-    from lidarium.envs.floors.catalogue.store import floor_store
-
-    log = arguments.runs / "resets.jsonl"
-    measure(arguments, log)
-    text = report(arguments, rows_of(log), floor_store().size() / 2**20)
-    print(text)
-    if arguments.out:
-        arguments.out.parent.mkdir(parents=True, exist_ok=True)
-        arguments.out.write_text(text)
+def _times(rows: Rows) -> list[str]:
+    """Return the table of times."""
+    lines = [
+        "| reset | floors | floor and tables: mean ms | median | most | rest of the reset: mean ms |",
+        "|---|---|---|---|---|---|",
+    ]
+    for phase, title in (("cold", "cold: made and stored"), ("warm", "warm: from the store")):
+        times = [_number(row, "tables_s") * 1e3 for row in rows if row["phase"] == phase]
+        rest = [_number(row, "rest_s") * 1e3 for row in rows if row["phase"] == phase]
+        lines.append(
+            f"| {title} | {len(times):,} | {mean(times):.1f} | {median(times):.1f} | {max(times):.1f} | "
+            f"{mean(rest):.1f} |"
+        )
+    return lines
 
 
-if __name__ == "__main__":
-    main()
+def _memory(rows: Rows) -> list[str]:
+    """Return the table of memory."""
+    lines = ["| process | tables held | RSS | PSS | private | shared |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        if row["phase"] == "warm memory" or str(row["phase"]).startswith("held"):
+            cells = [
+                f"{_number(row, name):.0f}" if name in row else "-"
+                for name in ("tables_mib", "rss_mib", "pss_mib", "private_mib", "shared_mib")
+            ]
+            title = f"{row['episodes']} floors held" if "episodes" in row else "after the warm resets"
+            lines.append(f"| {row['process']}: {title} | {' | '.join(cells)} |")
+    return lines
+
+
+def _number(row: Mapping[str, object], name: str) -> float:
+    return float(str(row[name]))
+
+
+STUDY = Study(page, work=work)

@@ -1,26 +1,26 @@
-"""Exploration of real and generated floors with 1, 2 and 3 robots.
+"""Every real floor, dungeons and 200 generated floors, explored by 1 to 3 robots."""
 
-It covers every real floor, dungeon and 200 generated floors, and writes docs/results/floors.md.
-
-    python benchmarks/studies/floors.py --data ../shared/data --out runs/floors --workers 2
-    python benchmarks/studies/floors.py --out runs/floors --report docs/results/floors.md
-
-Each finished run is appended to ``episodes.jsonl`` at once; a second call goes on where the first stopped.
-"""
-
-import argparse
-import json
-import os
 import platform
-import sys
 import time
 from collections import defaultdict
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from statistics import median
+from typing import Any
 
-from tqdm import tqdm
+import lidarium
+from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.real_floors import real_floors
+from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+
+POLICY = "nearest_frontier"
+TEAMS = (1, 2, 3)
+RUNS_FILE = "runs.jsonl"
 
 KINDS = {
     "kth": "KTH campus floors (XML, conn >= 0.8)",
@@ -31,25 +31,30 @@ KINDS = {
 }
 GENERATED = range(4_000_000, 4_000_200)
 
+Row = Mapping[str, Any]
 
-def floors(data: Path) -> list[tuple[str, str]]:
-    """Return (kind, floor) of everything that is explored."""
-    plans = data / "floorplans"
-    connected = {
-        name
-        for name, entry in json.loads((plans / "kth" / "meta.json").read_text()).items()
-        if entry["conn"] >= 0.8
-    }
-    kth = [
-        path
-        for path in sorted((plans / "kth" / "xml").glob("*.xml.gz"))
-        if path.name.removesuffix(".xml.gz") in connected
-    ]
-    found = [("kth", path) for path in kth]
-    found += [("lifull", path) for path in sorted((plans / "lifull" / "txt").glob("*.txt"))]
-    found += [("slam", path) for path in sorted((data / "slam_maps").glob("*.yaml"))]
-    found += [("dungeon", path) for path in sorted((plans / "synthetic_dungeon").glob("*.png"))]
-    return [(kind, str(path)) for kind, path in found] + [
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A floor of some kind that a number of robots explore."""
+
+    kind: str
+    floor: str
+    robots: int
+
+    @property
+    def key(self) -> str:
+        """Name that no other one of its file has."""
+        return f"{self.kind} | {name_of(self.floor)} | {self.robots}"
+
+
+def floors(data: Path | None) -> list[tuple[str, str]]:
+    """Return (kind, floor) of all that is explored.
+
+    Without data these are generated floors alone.
+    """
+    found = {} if data is None else real_floors(data)
+    return [(kind, str(path)) for kind, paths in found.items() for path in paths] + [
         ("generated", f"building:{seed}") for seed in GENERATED
     ]
 
@@ -59,18 +64,16 @@ def name_of(floor: str) -> str:
     return Path(floor).name.split(".")[0] if "/" in floor else floor
 
 
-def explore(kind: str, floor: str, robots: int, policy: str) -> dict[str, object]:
-    """Run one episode without a horizon; what the run says, or why it could not start."""
-    import lidarium
-    from lidarium.envs.exploration import ExplorationEnv
-    from lidarium.envs.settings.making import make_settings
-    from lidarium.evaluation.episodes.runner import run_episode
+def explore(run: Run) -> dict[str, Any]:
+    """Run an episode without a horizon.
 
-    row: dict[str, object] = {"kind": kind, "floor": name_of(floor), "robots": robots, "policy": policy}
+    Returns its figures, or why it could not start.
+    """
+    row = {"kind": run.kind, "floor": name_of(run.floor), "robots": run.robots, "policy": POLICY}
     began = time.perf_counter()
     try:
-        env = ExplorationEnv(floor, make_settings(robots=robots, resolution=0.025, horizon_s=None))
-        episode = run_episode(lidarium.policy(policy), env, seed=0)
+        env = ExplorationEnv(run.floor, make_settings(robots=run.robots, resolution=0.025, horizon_s=None))
+        episode = run_episode(lidarium.policy(POLICY), env, seed=0)
     except ValueError as error:
         return {**row, "error": str(error)}
     scorer, world = env.scorer, env.world
@@ -87,57 +90,46 @@ def explore(kind: str, floor: str, robots: int, policy: str) -> dict[str, object
     }
 
 
-def key_of(row: dict[str, object]) -> tuple[object, ...]:
-    """Return what tells runs apart."""
-    return row["kind"], row["floor"], row["robots"], row["policy"]
+def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
+    """Explore every N-th pair of floor and team."""
+    runs = [Run(kind, floor, robots) for kind, floor in floors(data) for robots in TEAMS][::every]
+    yield from do_missing(folder / RUNS_FILE, "runs", runs, explore, workers)
 
 
-def run_all(arguments: argparse.Namespace) -> None:
-    """Run what is missing in ``episodes.jsonl``."""
-    path = arguments.out / "episodes.jsonl"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    done = {key_of(json.loads(line)) for line in path.read_text().splitlines()} if path.exists() else set()
-    jobs = [
-        (kind, floor, robots, arguments.policy)
-        for kind, floor in floors(arguments.data)
-        for robots in arguments.robots
-        if (not arguments.kinds or kind in arguments.kinds)
-        and (kind, name_of(floor), robots, arguments.policy) not in done
-    ][:: arguments.every]
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = "1"
-    with (
-        ProcessPoolExecutor(arguments.workers) as pool,
-        path.open("a") as lines,
-        tqdm(total=len(jobs), file=sys.stderr) as bar,
-    ):
-        for job in as_completed([pool.submit(explore, *job) for job in jobs]):
-            row = job.result()
-            lines.write(json.dumps(row) + "\n")
-            lines.flush()
-            bar.update()
-            if row.get("error") or float(str(row["coverage"])) < 0.99 or row["collisions"]:
-                bar.write(json.dumps(row))
-
-
-def report(arguments: argparse.Namespace) -> None:
-    """Write the table of all runs."""
-    import lidarium
-
-    rows = [json.loads(line) for line in (arguments.out / "episodes.jsonl").read_text().splitlines()]
-    rows = [row for row in rows if row["policy"] == arguments.policy]
+def page(folder: Path, command: str) -> str:
+    """Return the results as markdown."""
+    rows = kept_lines(folder / RUNS_FILE)
     runs = [row for row in rows if "error" not in row]
     refused = [row for row in rows if "error" in row]
+    missed = [row for row in runs if row["coverage"] < 0.99 or row["collisions"]]
     lines = [
         "# Every floor, explored",
         "",
-        f"`python benchmarks/studies/floors.py --workers {arguments.workers}` on {date.today().isoformat()}, "
-        f"lidarium {lidarium.__version__}, "
-        f"Python {platform.python_version()}: policy `{arguments.policy}`, Kobuki (radius 0.18 m), URG-04LX "
-        "(727 beams, 240 degrees, "
+        f"`{command}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, "
+        f"Python {platform.python_version()}: policy `{POLICY}`, Kobuki (radius 0.18 m), URG-04LX (727 "
+        "beams, 240 degrees, "
         "5.6 m), true poses, no noise, world and maps at 0.025 m, no horizon, seed 0. A run "
         "ends as `covered` when 0.99 of `C_free` is sensed.",
         "",
+        *_summary(runs),
+        "",
+        f"## Misses\n\n{len(missed)} of {len(runs)} runs below 0.99 or with a collision.",
+        "",
+    ]
+    lines += [
+        f"- {row['floor']}, {row['robots']} robots: coverage {row['coverage']:.4f}, collisions "
+        f"{row['collisions']}, ended {row['ended']}"
+        for row in missed
+    ]
+    lines += ["", "## Floors that the robots do not fit in", ""]
+    lines += [f"- {row['floor']}, {row['robots']} robots: {row['error']}" for row in refused] or ["None."]
+    lines += ["", "## All runs", "", "Coverage / time in s / path of the team in m.", "", *_all_runs(runs)]
+    return "\n".join(lines) + "\n"
+
+
+def _summary(runs: Sequence[Row]) -> list[str]:
+    """Return a table with a line for each kind of floor and number of robots."""
+    lines = [
         "| floors | robots | runs | reached 0.99 | least coverage | collisions | area, median m2 | time, "
         "median s | path, median m "
         "| wall, median s |",
@@ -157,27 +149,15 @@ def report(arguments: argparse.Namespace) -> None:
                     f"| {median(row['path_m'] for row in chosen):.0f} | "
                     f"{median(row['wall_s'] for row in chosen):.1f} |"
                 )
-    missed = [row for row in runs if row["coverage"] < 0.99 or row["collisions"]]
-    lines += ["", f"## Misses\n\n{len(missed)} of {len(runs)} runs below 0.99 or with a collision.", ""]
-    lines += [
-        f"- {row['floor']}, {row['robots']} robots: coverage {row['coverage']:.4f}, collisions "
-        f"{row['collisions']}, ended {row['ended']}"
-        for row in missed
-    ]
-    lines += ["", "## Floors that the robots do not fit in", ""]
-    lines += [f"- {row['floor']}, {row['robots']} robots: {row['error']}" for row in refused] or ["None."]
-    by_floor: dict[tuple[str, str], dict[int, dict[str, object]]] = defaultdict(dict)
+    return lines
+
+
+def _all_runs(runs: Sequence[Row]) -> list[str]:
+    """Return a table with a line for each floor."""
+    by_floor: dict[tuple[str, str], dict[int, Row]] = defaultdict(dict)
     for row in runs:
         by_floor[row["kind"], row["floor"]][row["robots"]] = row
-    lines += [
-        "",
-        "## All runs",
-        "",
-        "Coverage / time in s / path of the team in m.",
-        "",
-        "| floor | m2 | 1 robot | 2 robots | 3 robots |",
-        "|---|---|---|---|---|",
-    ]
+    lines = ["| floor | m2 | 1 robot | 2 robots | 3 robots |", "|---|---|---|---|---|"]
     for (_, floor), cells in sorted(
         by_floor.items(), key=lambda item: (list(KINDS).index(item[0][0]), item[0][1])
     ):
@@ -189,33 +169,7 @@ def report(arguments: argparse.Namespace) -> None:
             for robots in (1, 2, 3)
         ]
         lines.append(f"| {floor} | {area} | {' | '.join(shown)} |")
-    arguments.report.parent.mkdir(parents=True, exist_ok=True)
-    arguments.report.write_text("\n".join(lines) + "\n")
+    return lines
 
 
-def main() -> None:
-    """Run, or write the report."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--data",
-        type=Path,
-        default=Path(__file__).resolve().parents[2] / "shared" / "data",
-        help="folder of the real floors",
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/floors"), help="where the runs are kept")
-    parser.add_argument("--robots", type=int, nargs="+", default=[1, 2, 3])
-    parser.add_argument("--policy", default="nearest_frontier")
-    parser.add_argument("--kinds", nargs="*", choices=list(KINDS), default=[])
-    parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--every", type=int, default=1, help="only every n-th of the missing runs")
-    parser.add_argument(
-        "--report", type=Path, help="write the table of the finished runs there, and run nothing"
-    )
-    arguments = parser.parse_args()
-    report(arguments) if arguments.report else run_all(arguments)
-
-
-if __name__ == "__main__":
-    main()
+STUDY = Study(page, work=work)

@@ -3,7 +3,6 @@
 Teams have 1, 2 and 3 robots that know where they start.
 """
 
-import json
 import platform
 from collections.abc import Iterable, Mapping
 from datetime import date
@@ -11,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import lidarium
-from lidarium.benchmarks.studies.study import Study
+from lidarium.benchmarks.studies.shared.real_floors import real_floors
+from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
 
@@ -58,38 +58,6 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
         for kind, found in floors.items()
         if found
     }
-
-
-def real_floors(data: Path) -> dict[str, list[Path]]:
-    """Return the files of real floors below a folder, by kind.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where the folder holds none of them.
-    """
-    plans = Path(data) / "floorplans"
-    meta = plans / "kth" / "meta.json"
-    connected = (
-        {name for name, entry in json.loads(meta.read_text()).items() if entry["conn"] >= 0.8}
-        if meta.is_file()
-        else set()
-    )
-    found = {
-        "kth": [
-            path
-            for path in sorted((plans / "kth" / "xml").glob("*.xml.gz"))
-            if path.name.removesuffix(".xml.gz") in connected
-        ],
-        "lifull": sorted((plans / "lifull" / "txt").glob("*.txt")),
-        "slam": sorted((Path(data) / "slam_maps").glob("*.yaml")),
-        "dungeon": sorted((plans / "synthetic_dungeon").glob("*.png")),
-    }
-    if not any(found.values()):
-        raise FileNotFoundError(
-            f"no real floors below {data}; want the folders floorplans and slam_maps there"
-        )
-    return found
 
 
 def page(folder: Path, command: str) -> str:

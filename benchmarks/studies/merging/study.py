@@ -1,12 +1,8 @@
-"""Map merging: the thesis's experiments on a bank of robot-made maps.
-
-They stand beside the thesis's tables and the pipeline of ROS map_merge.
-"""
+"""Map merging: the thesis's experiments on a bank of maps that robots made, beside its tables and the pipeline of ROS map_merge."""
 
 import json
 import platform
 from collections import Counter
-from collections.abc import Iterator
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -14,17 +10,10 @@ from typing import Any
 
 import lidarium
 from lidarium.benchmarks.studies.merging import tables
-from lidarium.benchmarks.studies.merging.bank.bank import (
-    drives_of,
-    fill,
-    missing_drives,
-    read_maps,
-    read_pairs,
-    write_pairs,
-)
-from lidarium.benchmarks.studies.merging.bank.floors import BankFloor, bank_floors
+from lidarium.benchmarks.studies.merging.bank.bank import read_maps, read_pairs
+from lidarium.benchmarks.studies.merging.bank.floors import bank_floors
 from lidarium.benchmarks.studies.merging.bank.groups import merge_real_pairs, merge_teams
-from lidarium.benchmarks.studies.merging.bank.pairs import choose_pairs
+from lidarium.benchmarks.studies.merging.bank.making import kept_floors, make_bank
 from lidarium.benchmarks.studies.merging.features import (
     compare_descriptors,
     compare_detectors,
@@ -33,13 +22,12 @@ from lidarium.benchmarks.studies.merging.features import (
 from lidarium.benchmarks.studies.merging.figures import Tried
 from lidarium.benchmarks.studies.merging.pictures import draw_pairs
 from lidarium.benchmarks.studies.merging.trials import METHODS, read_outcomes, try_pairs
-from lidarium.benchmarks.studies.study import Study
+from lidarium.benchmarks.studies.shared.kept import Progress
+from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.suites.workers import shared_out
 
-Progress = Iterator[tuple[str, int, int]]
-
-DATA_FILE, EXTRA_FILE = "floors.json", "extra.json"
+EXTRA_FILE = "extra.json"
 EXTRA = ("detectors", "descriptors", "methods", "teams", "real")
 
 
@@ -49,23 +37,8 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     What is there is not done again. Yields what is being done, how much is, and of how much.
     """
     floors = bank_floors(data, every)
-    _check_same(folder / DATA_FILE, floors)
-    total = len(drives_of(floors))
-    first, failures = total - len(missing_drives(folder, floors)) + 1, []
-    for done, (drive, error) in enumerate(fill(folder, floors, workers), first):
-        if error is not None:
-            failures.append(f"{drive.name}: {error}")
-        yield "drives", done, total
-    if failures:
-        raise ValueError(f"{len(failures)} drives came to no end, the first is {failures[0]}")
-    maps = read_maps(folder, floors)
-    pairs = read_pairs(folder)
-    if pairs is None:
-        pairs = []
-        for pair in choose_pairs(maps):
-            pairs.append(pair)
-            yield "labelled pairs", len(pairs), len(pairs)
-        write_pairs(folder, pairs)
+    yield from make_bank(folder, floors, workers)
+    maps, pairs = read_maps(folder, floors), read_pairs(folder) or []
     tested = [pair for pair in pairs if pair.half == "test"]
     for method in METHODS:
         for done in try_pairs(folder / "outcomes", maps, tested, method, workers):
@@ -82,7 +55,7 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
 
 def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]]:
     """Do one of the other experiments, on the maps of the test half."""
-    maps = read_maps(folder, [floor for floor in _kept_floors(folder / DATA_FILE) if floor.half == "test"])
+    maps = read_maps(folder, [floor for floor in kept_floors(folder) if floor.half == "test"])
     if name == "detectors":
         return compare_detectors(maps)
     if name == "descriptors":
@@ -104,10 +77,8 @@ def page(folder: Path, command: str) -> str:
     extra = json.loads((folder / EXTRA_FILE).read_text(encoding="utf-8"))
     parts = [
         "# Merging maps",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
-        f"{platform.python_version()}. How maps "
-        "are merged is told in [merging maps](../reference/merging.md). Times are of the processor, medians "
-        "on a machine that others "
+        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python {platform.python_version()}. How maps "
+        "are merged is told in [merging maps](../reference/merging.md). Times are of the processor, medians on a machine that others "
         "share; ratios are of runs in turn.",
         _about_bank(folder, len(pairs)),
         "## The bank\n\n" + tables.bank_table(tried),
@@ -128,7 +99,7 @@ def page(folder: Path, command: str) -> str:
 
 def pictures(folder: Path, out: Path) -> None:
     """Draw pairs of the bank beside the page."""
-    floors = _kept_floors(folder / DATA_FILE)
+    floors = kept_floors(folder)
     pairs = [pair for pair in read_pairs(folder) or [] if pair.half == "test"]
     draw_pairs(
         out / "merging_pairs.png",
@@ -139,72 +110,26 @@ def pictures(folder: Path, out: Path) -> None:
 
 
 def _about_bank(folder: Path, tested: int) -> str:
-    floors = _kept_floors(folder / DATA_FILE)
+    floors = kept_floors(folder)
     copies = sum(floor.is_copy for floor in floors)
     counts = Counter(pair.category for pair in read_pairs(folder) or [])
     return (
-        f"Robots explore {len(floors) - copies} floors (generated, drawn and real ones) and {copies} copies "
-        "from which furniture was "
-        "taken away, from three starts, twice from each (copies once). Their maps are kept when a third, two "
-        "thirds and 95 % of a floor "
-        "are seen, in buildings of like rooms when 12, 35 and 90 % are. The laser has 3 cm of noise, and "
-        "scans are drawn at poses that "
-        "err smoothly by up to 4 cm and 0.3 degrees. The pairs, of robots from different starts, in both "
-        "halves:\n\n"
+        f"Robots explore {len(floors) - copies} floors (generated, drawn and real ones) and {copies} copies from which furniture was "
+        "taken away, from three starts, twice from each (copies once). Their maps are kept when a third, two thirds and 95 % of a floor "
+        "are seen, in buildings of like rooms when 12, 35 and 90 % are. The laser has 3 cm of noise, and scans are drawn at poses that "
+        "err smoothly by up to 4 cm and 0.3 degrees. The pairs, of robots from different starts, in both halves:\n\n"
         f"- {counts['positive']} positives: maps of one floor with 15 % of overlap and more.\n"
         f"- {counts['negative']} negatives: maps of different floors.\n"
-        f"- {counts['look_alike']} look-alikes: like rooms of one building, or a floor and its copy, that "
-        "differ in truth by 1 m of "
+        f"- {counts['look_alike']} look-alikes: like rooms of one building, or a floor and its copy, that differ in truth by 1 m of "
         "wall or more wherever they look alike. They are negatives too.\n"
-        f"- Undecidable: {counts['symmetric']} symmetric positives, which another transform explains as well "
-        "in truth (along a corridor "
-        f"every shift does), and {counts['indistinct']} indistinct negatives, which differ by less than 1 m. "
-        "A refusal is right; they are "
+        f"- Undecidable: {counts['symmetric']} symmetric positives, which another transform explains as well in truth (along a corridor "
+        f"every shift does), and {counts['indistinct']} indistinct negatives, which differ by less than 1 m. A refusal is right; they are "
         "in no rate.\n\n"
-        f"Half of the floors was for tuning. All figures are of the other half, {tested} pairs. It was drawn "
-        "anew after two former ones "
-        "had been looked at: of the 554 and 572 negatives there 1 and 6 were accepted, the bounds were "
-        "tightened, and like rooms of which "
-        "some overlay shows no difference were counted as indistinct. A positive is recalled where it is "
-        "joined within 0.10 m and 1 degree "
+        f"Half of the floors was for tuning. All figures are of the other half, {tested} pairs. It was drawn anew after two former ones "
+        "had been looked at: of the 554 and 572 negatives there 1 and 6 were accepted, the bounds were tightened, and like rooms of which "
+        "some overlay shows no difference were counted as indistinct. A positive is recalled where it is joined within 0.10 m and 1 degree "
         "at the overlap's centroid. Intervals are Clopper and Pearson's, 95 %."
     )
-
-
-def _check_same(path: Path, floors: list[BankFloor]) -> None:
-    """Note which floors the bank has; a bank of others is not gone on with.
-
-    Raises
-    ------
-    ValueError
-        Where the folder holds a bank of other floors or another version.
-    """
-    asked = {"version": lidarium.__version__, "floors": [_entry(floor) for floor in floors]}
-    if path.exists() and json.loads(path.read_text(encoding="utf-8")) != asked:
-        raise ValueError(
-            f"{path.parent} holds a bank of other floors or of another version; choose another folder with "
-            "--runs"
-        )
-    write_json(path, asked)
-
-
-def _entry(floor: BankFloor) -> dict[str, Any]:
-    path = None if floor.path is None else str(floor.path)
-    return {
-        "name": floor.name,
-        "half": floor.half,
-        "kind": floor.kind,
-        "seed": floor.seed,
-        "path": path,
-        "is_copy": floor.is_copy,
-    }
-
-
-def _kept_floors(path: Path) -> list[BankFloor]:
-    entries = json.loads(path.read_text(encoding="utf-8"))["floors"]
-    return [
-        BankFloor(**{**one, "path": None if one["path"] is None else Path(one["path"])}) for one in entries
-    ]
 
 
 STUDY = Study(page, work=work, pictures=pictures)

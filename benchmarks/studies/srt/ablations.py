@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from lidarium.benchmarks.studies.shared.map_figures import map_figures
 from lidarium.benchmarks.studies.srt.goal_runs import GoalRun, Way, drive_to_goal
-from lidarium.benchmarks.studies.srt.map_figures import map_figures
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.policy import SensorBasedRandomTree
-from lidarium.benchmarks.studies.srt.map_figures import MapFigures, map_figures
+from lidarium.benchmarks.studies.shared.map_figures import MapFigures, map_figures
 from lidarium.benchmarks.studies.srt.shortest_path import shortest_path
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings.making import make_settings

@@ -4,23 +4,18 @@ It has the worlds in the thesis's mode and the default one, full exploration, an
 """
 
 import platform
-from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
-from typing import Any
 
 import lidarium
+from lidarium.benchmarks.studies.shared.kept import Progress, do_missing
+from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.benchmarks.studies.srt import tables
 from lidarium.benchmarks.studies.srt.ablations import FollowedWay, measure_variants
 from lidarium.benchmarks.studies.srt.goal_runs import MODES, WORLDS, GoalRun, measure_goal_run
 from lidarium.benchmarks.studies.srt.pictures import draw_coverage, draw_world
-from lidarium.benchmarks.studies.study import Study
-from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile, read_episodes
+from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
-from lidarium.evaluation.suites.workers import shared_out
-
-Progress = Iterator[tuple[str, int, int]]
-Task = GoalRun | FollowedWay
 
 SEEDS, STARTS, FOLLOWED = range(200, 230), range(100, 105), range(200, 203)
 """Seeds of the runs, of the starts, and of the paths of variants.
@@ -71,35 +66,9 @@ def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress
     What is there is not done again.
     """
     runs = [GoalRun(mode, world, seed) for seed in SEEDS[::every] for world in WORLDS for mode in MODES]
-    yield from _filled(folder / GOALS_FILE, "runs towards goals", runs, measure_goal_run, workers)
+    yield from do_missing(folder / GOALS_FILE, "runs towards goals", runs, measure_goal_run, workers)
     ways = [FollowedWay(world, seed) for seed in FOLLOWED[::every] for world in WORLDS]
-    yield from _filled(folder / ABLATIONS_FILE, "ablations", ways, measure_variants, workers)
-
-
-def _filled(
-    path: Path, what: str, tasks: list[Any], measure: Callable[[Any], dict[str, Any]], workers: int
-) -> Progress:
-    """Do what a file lacks, a line for each task.
-
-    Raises
-    ------
-    ValueError
-        Where the file is of another version.
-    """
-    with EpisodesFile(path) as file:
-        if any(line["version"] != lidarium.__version__ for line in file.episodes):
-            raise ValueError(
-                f"{path} is of another version than {lidarium.__version__}; choose another folder with --runs"
-            )
-        finished = {line[KEY] for line in file.episodes}
-        missing = [task for task in tasks if task.key not in finished]
-        for done, (_, line) in enumerate(
-            shared_out(measure, missing, workers), len(tasks) - len(missing) + 1
-        ):
-            if isinstance(line, Exception):
-                raise line
-            file.append({**line, "version": lidarium.__version__})
-            yield what, done, len(tasks)
+    yield from do_missing(folder / ABLATIONS_FILE, "ablations", ways, measure_variants, workers)
 
 
 def page(folder: Path, command: str) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import lidarium
-from lidarium.benchmarks.studies.study import Study
+from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.benchmarks.studies.supervisor import tables
 from lidarium.benchmarks.studies.supervisor.figures import (
     Row,

@@ -52,19 +52,6 @@ def test_a_run_towards_a_goal_is_measured(line):
     assert line["coverage_curve"][-1] == pytest.approx(line["coverage"], abs=1e-4)
 
 
-def test_what_is_in_the_file_is_not_done_again(tmp_path):
-    tasks = [GoalRun("default", "srt_lab", seed) for seed in range(2)]
-    asked = []
-
-    def measure(task):
-        asked.append(task)
-        return {"key": task.key}
-
-    for _ in range(2):
-        list(srt._filled(tmp_path / "runs.jsonl", "runs", tasks, measure, 1))
-    assert asked == tasks
-
-
 def test_tables_have_a_line_for_each_world_and_mode(line):
     lines = [{**line, "world": world, "mode": mode} for world in WORLDS for mode in MODES]
     assert tables.goals(lines).count("\n") == 1 + len(lines) + len(tables.PUBLISHED)

@@ -1,36 +1,20 @@
-"""How often the intervals of `evaluation/statistics` hold a known truth.
-
-Writes docs/results/interval_coverage.md.
-
-    python benchmarks/studies/interval_coverage.py
-    python benchmarks/studies/interval_coverage.py --trials 200 --out runs/interval_coverage.md
+"""Figures of data of known truth, and how often their intervals hold it.
 
 Runs of two policies are drawn in pairs: their times have a known distribution each and are correlated, as
 those on one floor are.
 """
 
-import argparse
-import platform
-import sys
-import time
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import date
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from scipy import integrate, optimize, stats
-from tqdm import tqdm
 
-import lidarium
-from lidarium.evaluation.episodes.output import write_text
 from lidarium.evaluation.statistics import (
-    FEWEST_FOR_NOMINAL,
     CensoredTimes,
     Interval,
     interquartile_mean_interval,
@@ -44,8 +28,6 @@ from lidarium.evaluation.statistics import (
     share_interval,
 )
 
-SIZES = (10, 20, 50, 100, 200)
-WANTED = (0.93, 0.97)
 SLOWER = 1.2
 """How much more time the second policy takes."""
 
@@ -61,7 +43,7 @@ Values = NDArray[np.float64]
 class Family:
     """A distribution of times [s] as scipy has it.
 
-    It states whether it belongs to what is asked for or goes beyond it.
+    It belongs to what is asked for, or goes beyond it.
     """
 
     name: str
@@ -118,7 +100,7 @@ class Case:
         From a generator, the size and a seed of resampling: the interval of one trial. A ``ValueError`` is a
         refusal.
     is_asked_for : bool
-        Whether the figure must lie within `WANTED` at `FEWEST_FOR_NOMINAL` values and more.
+        Whether the interval must hold the truth about as often as it says; others go beyond that.
     """
 
     figure: str
@@ -126,6 +108,11 @@ class Case:
     truth: float
     interval: Callable[[np.random.Generator, int, int], Interval]
     is_asked_for: bool = True
+
+    @property
+    def key(self) -> str:
+        """Name that no other one of its file has."""
+        return f"{self.figure} | {self.data}"
 
 
 def cases(resamples: int) -> Iterator[Case]:
@@ -231,9 +218,9 @@ def _share(share: float, generator: np.random.Generator, size: int, _seed: int) 
 
 
 def held(case: Case, size: int, trials: int) -> tuple[float, int]:
-    """Return the share of trials whose interval holds the truth.
+    """Return the share of trials whose interval holds the truth, and how many refused.
 
-    Trials that were refused do not count in the share; their number is returned, too.
+    The share is of those that did not refuse.
     """
     generator = np.random.default_rng([_SEED, size, zlib.crc32(f"{case.figure} {case.data}".encode())])
     hits = refused = 0
@@ -245,108 +232,3 @@ def held(case: Case, size: int, trials: int) -> tuple[float, int]:
         else:
             hits += found.low <= case.truth <= found.high
     return hits / max(trials - refused, 1), refused
-
-
-def measure(trials: int, resamples: int) -> list[tuple[Case, list[tuple[float, int]]]]:
-    """Measure all cases at all sizes."""
-    chosen = list(cases(resamples))
-    return [
-        (case, [held(case, size, trials) for size in SIZES])
-        for case in tqdm(chosen, "cases", file=sys.stderr, leave=False)
-    ]
-
-
-def is_reached(shares: list[tuple[float, int]]) -> bool:
-    """Whether a case lies within `WANTED` at all sizes that count."""
-    return all(
-        WANTED[0] <= share <= WANTED[1]
-        for size, (share, _) in zip(SIZES, shares, strict=True)
-        if size >= FEWEST_FOR_NOMINAL
-    )
-
-
-def page(
-    found: list[tuple[Case, list[tuple[float, int]]]], trials: int, resamples: int, seconds: float
-) -> str:
-    """Return the results as markdown."""
-    missed = [(case, shares) for case, shares in found if case.is_asked_for and not is_reached(shares)]
-    asked = sum(case.is_asked_for for case, _ in found)
-    lines = [
-        "# How often intervals hold the truth",
-        "",
-        f"`{_command(trials, resamples)}` on {date.today().isoformat()}, lidarium {lidarium.__version__}, "
-        "Python "
-        f"{platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}; {seconds:.0f} s "
-        "on one core.",
-        "",
-        f"Share of {trials:,} trials in which the 95 % interval holds the known truth, in %, by the number "
-        "of runs or pairs. Its standard "
-        f"error is {100.0 * np.sqrt(0.95 * 0.05 / trials):.1f} at 95 %. Intervals are made of {resamples:,} "
-        "resamples here, of 10,000 in "
-        f"reports. Asked for are {100 * WANTED[0]:.0f} to {100 * WANTED[1]:.0f} at {FEWEST_FOR_NOMINAL} and "
-        "more on normal, skewed and "
-        "20 % censored data; the figures at 10 and 20 are published, not asked for, and reports warn there. "
-        "Rows marked as beyond are "
-        "harder than what is asked for, or discrete. What each interval is made of: "
-        "[statistics](../reference/statistics.md).",
-        "",
-        "Times of two policies are drawn in pairs whose normal scores have a correlation of 0.5; the second "
-        "policy takes 1.2 times "
-        "as long. Cut by the horizon: runs end where the first policy has missed a fifth. Cut at random: "
-        "exponential cuts come "
-        "before a fifth of its times, and the horizon is its upper quartile.",
-        "",
-        f"**Reached in {asked - len(missed)} of {asked} rows that are asked for.**"
-        + (
-            ""
-            if not missed
-            else " Missed: " + "; ".join(f"{case.figure}, {case.data}" for case, _ in missed) + "."
-        ),
-    ]
-    figure = ""
-    for case, shares in found:
-        if case.figure != figure:
-            figure = case.figure
-            lines += ["", f"## {figure[0].upper()}{figure[1:]}", ""]
-            lines += [
-                f"| data | {' | '.join(f'n = {size}' for size in SIZES)} | 93 to 97 from n = 50 |",
-                "|---|" + "---|" * (len(SIZES) + 1),
-            ]
-        verdict = ("yes" if is_reached(shares) else "**no**") + ("" if case.is_asked_for else " (beyond)")
-        cells = [
-            f"{100.0 * share:.1f}{f' ({refused} refused)' if refused else ''}" for share, refused in shares
-        ]
-        lines.append(f"| {case.data} | {' | '.join(cells)} | {verdict} |")
-    lines += [
-        "",
-        "*refused*: trials in which the longest time was cut before the horizon, so that the mean up to "
-        "there is unknown; the "
-        "function says so, and the share is of the others.",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _command(trials: int, resamples: int) -> str:
-    return f"python benchmarks/studies/interval_coverage.py --trials {trials} --resamples {resamples}"
-
-
-def main() -> None:
-    """Measure and write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--trials", type=int, default=2000)
-    parser.add_argument("--resamples", type=int, default=399)
-    parser.add_argument(
-        "--out", type=Path, default=Path("docs/results/interval_coverage.md"), help="the page"
-    )
-    chosen = parser.parse_args()
-    began = time.perf_counter()
-    found = measure(chosen.trials, chosen.resamples)
-    text = page(found, chosen.trials, chosen.resamples, time.perf_counter() - began)
-    write_text(chosen.out, text)
-    print(text)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""What a study is: work that one command does anew, with the page that reports it."""
+"""What a study is: work that one command does, with the page that reports it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

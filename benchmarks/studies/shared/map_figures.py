@@ -1,7 +1,4 @@
-"""The quality of a localizer on a spline map along a path.
-
-Figures are its poses, its map, and how small that is.
-"""
+"""How well a localizer on a spline map did: its poses, its map, and its size."""
 
 import math
 from dataclasses import dataclass
@@ -34,12 +31,12 @@ Poses = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class MapFigures:
-    """Figures of a way: lengths in metres, angles in degrees, shares, bytes.
+    """Figures of a run: lengths in metres, angles in degrees, shares, bytes.
 
     Attributes
     ----------
     ate_m, end_m, end_deg : float
-        Error of the poses: root of the mean square over the way, and at its end.
+        Error of the poses: root of the mean square over the path, and at its end.
     odometry_ate_m : float
         The same of odometry alone.
     wall_mean_m, wall_p95_m : float

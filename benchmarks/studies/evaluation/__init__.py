@@ -1,0 +1,1 @@
+"""The study of what evaluations cost, and of what survives killed ones."""

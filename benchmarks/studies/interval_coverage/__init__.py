@@ -1,0 +1,1 @@
+"""The study of how often intervals hold a known truth."""

@@ -1,0 +1,1 @@
+"""The study of robots in worlds that are not ideal."""

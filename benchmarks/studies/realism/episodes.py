@@ -1,0 +1,231 @@
+"""Episodes in the world of `realism="lab"`, and what is measured of them.
+
+The policy is `nearest_frontier`. Measured are ATE (frames agree, since the start is known), the error of
+the last pose, wheels alone along the same path, IoU of occupied cells against the truth at 5 cm with a
+cell's tolerance, and the wall time of a scan (a match and the map's update; a correction of the past and
+the rendering).
+"""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import lidarium
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.scoring.coverage import unpack_bits
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.episodes.history import History
+from lidarium.evaluation.episodes.result import result_of
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
+from lidarium.evaluation.metrics.maps import occupied_iou
+from lidarium.evaluation.metrics.poses import absolute_error, best_transform
+from lidarium.evaluation.truth.beliefs import team_log_odds
+from lidarium.evaluation.truth.true_map import truth_of
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Localizer, Sensing
+
+TEAM = 5
+"""Robots of the team whose speed is measured."""
+
+TEAM_HORIZON_S = 120.0
+HORIZON_S = 600.0
+"""Longest episode [s]."""
+
+REPEATS = 5
+"""Runs of an episode with a long correction, as the machine does other work too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A floor that a number of robots explore from a seed."""
+
+    floor: str
+    robots: int
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """Name that no other one of its file has."""
+        return f"{Path(self.floor).name.partition('.')[0]} | {self.robots} | seed {self.seed}"
+
+
+class TimedLocalizer:
+    """A localizer that notes how long each scan takes it."""
+
+    def __init__(self, localizer: Localizer, seconds: list[tuple[float, bool]]) -> None:
+        self._localizer, self._seconds = localizer, seconds
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """That of the localizer."""
+        return self._localizer.covariance
+
+    def reset(self, pose: NDArray[np.float64], seed: int) -> None:
+        """Begin the localizer again."""
+        self._localizer.reset(pose, seed)
+
+    def localize(self, sensing: Sensing) -> NDArray[np.float64]:
+        """Time what the localizer does with a scan."""
+        began = time.perf_counter()
+        pose = self._localizer.localize(sensing)
+        self._seconds.append((time.perf_counter() - began, False))
+        return pose
+
+    def take_correction(self) -> KeyScans | None:
+        """Note whether the scan before corrected the past."""
+        began = time.perf_counter()
+        correction = self._localizer.take_correction()
+        if correction is not None:
+            self._seconds[-1] = (self._seconds[-1][0] + time.perf_counter() - began, True)
+        return correction
+
+
+class Watch(Watcher):
+    """Watches how long scans take localizers, and where wheels would place robots.
+
+    Attributes
+    ----------
+    seconds : list of (float, bool)
+        Wall time of each scan [s], and whether it corrected the past.
+    wheels : list of (robots,) float64
+        How far dead reckoning is off after each step [m].
+    believed, true : list of (robots, 3) float64
+        Poses after each step [m, m, rad].
+    """
+
+    def begin(self, env: ExplorationEnv) -> None:
+        """Begin a new episode."""
+        self.seconds: list[tuple[float, bool]] = []
+        self.wheels: list[NDArray[np.float64]] = []
+        self.believed: list[NDArray[np.float64]] = []
+        self.true: list[NDArray[np.float64]] = []
+        localizers = env.perception.localizers
+        localizers[:] = [
+            None if localizer is None else TimedLocalizer(localizer, self.seconds) for localizer in localizers
+        ]
+        render = env.simulation.render_anew
+
+        def render_timed(row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+            began = time.perf_counter()
+            render(row, poses, ranges)
+            self.seconds[-1] = (self.seconds[-1][0] + time.perf_counter() - began, True)
+
+        env.simulation.render_anew = render_timed  # type: ignore[method-assign]
+
+    def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
+        """Note how far dead reckoning is off, and where robots are and believe to be."""
+        world = env.world
+        cosine, sine = np.cos(world.starts[:, 2]), np.sin(world.starts[:, 2])
+        x, y = env.simulation.odometry[:, 0], env.simulation.odometry[:, 1]
+        reckoned = world.starts[:, :2] + np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
+        self.wheels.append(np.hypot(*(reckoned - world.poses[:, :2]).T))
+        self.believed.append(env.beliefs.believed.copy())
+        self.true.append(world.poses.copy())
+
+    def outcome(self, env: ExplorationEnv) -> None:
+        """Nothing has to be noted here."""
+
+
+def measure_run(run: Run) -> dict[str, Any]:
+    """Run one episode, and for the first seed one with true poses."""
+    measured = episode(run)
+    if run.seed == 0:
+        measured["true_iou"] = true_iou(run)
+    return measured
+
+
+def episode(run: Run) -> dict[str, Any]:
+    """Run one episode; return what is measured of it."""
+    history, watch, robots = History(), Watch(), run.robots
+    settings = make_settings(robots=robots, realism="lab", horizon_s=HORIZON_S, resolution=0.05)
+    env = WatchedExploration(run.floor, settings, watchers=[history, watch])
+    result = result_of(
+        run_episode(lidarium.policy("nearest_frontier"), env, seed=run.seed), "nearest_frontier", history
+    )
+    believed, true = np.array(watch.believed), np.array(watch.true)
+    aligned = [absolute_error(believed[:, robot], true[:, robot]) for robot in range(robots)]
+    last = np.hypot(*(env.beliefs.believed - env.world.poses)[:, :2].T)
+    return {
+        "floor": result["floor"],
+        "spec": run.floor,
+        "robots": robots,
+        "seed": run.seed,
+        "time_s": result["time_s"],
+        "coverage": result["coverage_final"],
+        "way_m": result["path_m"],
+        "ate_m": result["ate_m"],
+        "aligned_m": aligned,
+        "last_m": last.tolist(),
+        "wheels_m": np.sqrt(np.mean(np.square(watch.wheels), axis=0)).tolist(),
+        "seconds": watch.seconds,
+        "iou": result["iou_occupied"],
+        "aligned_iou": aligned_iou(env, believed.reshape(-1, 3), true.reshape(-1, 3)),
+    }
+
+
+def true_iou(run: Run) -> float:
+    """Return IoU of the team's map in the same episode with true poses."""
+    settings = make_settings(
+        robots=run.robots, realism="lab", localization="truth", horizon_s=HORIZON_S, resolution=0.05
+    )
+    env = ExplorationEnv(run.floor, settings)
+    ended = run_episode(lidarium.policy("nearest_frontier"), env, seed=run.seed)
+    return float(result_of(ended, "nearest_frontier")["iou_occupied"])
+
+
+def aligned_iou(env: ExplorationEnv, believed: NDArray[np.float64], true: NDArray[np.float64]) -> float:
+    """Return IoU of the team's map after the best rigid motion.
+
+    That is the motion of all believed poses (poses, 3) onto the true ones.
+    """
+    log_odds, origin = team_log_odds(env)
+    truth, resolution = truth_of(env), env.settings.occupancy.resolution
+    there = Transform(*best_transform(believed, true).tolist()).inverse()
+    rows, columns = np.indices(log_odds.shape)
+    centres = np.stack([columns, rows], axis=-1) * resolution + 0.5 * resolution + np.array(origin)
+    cells = (
+        np.floor((there.apply(centres.reshape(-1, 2)) - origin) / resolution)
+        .astype(np.int64)
+        .reshape(centres.shape)
+    )
+    is_inside = ((cells >= 0) & (cells < log_odds.shape[::-1])).all(axis=-1)
+    laid = np.zeros(log_odds.shape, np.bool_)
+    laid[is_inside] = log_odds[cells[is_inside, 1], cells[is_inside, 0]] > 0
+    return occupied_iou(laid, truth.occupied, unpack_bits(env.score.team_masks[0], log_odds.shape[1]))
+
+
+def corrections_of(measured: dict[str, Any]) -> NDArray[np.float64]:
+    """Return how long the corrections of an episode's past took [s]."""
+    return np.array([seconds for seconds, is_corrected in measured["seconds"] if is_corrected] or [np.nan])
+
+
+def repeated_correction(run: Run) -> dict[str, Any]:
+    """Return how long the longest correction of an episode takes [s].
+
+    Each correction is the median over repeats of the episode, which are equal to the bit.
+    """
+    again = [episode(run) for _ in range(REPEATS)]
+    longest = np.median([corrections_of(repeat) for repeat in again], axis=0).max()
+    return {"longest_s": float(longest) if np.isfinite(longest) else None}
+
+
+def team_rates(seeds: int) -> list[float]:
+    """Return the agent steps a second of five robots on one core.
+
+    Episodes take two minutes; `nearest_frontier` is included.
+    """
+    rates = []
+    # The first episode may compile.
+    for seed in range(-1, seeds):
+        settings = make_settings(
+            robots=TEAM, realism="lab", horizon_s=TEAM_HORIZON_S, resolution=0.05, stop_coverage=None
+        )
+        env = ExplorationEnv("building:17", settings)
+        run = run_episode(lidarium.policy("nearest_frontier"), env, seed=max(seed, 0))
+        rates.append(int(env.world.steps[0]) * TEAM / run.wall_seconds)
+    return rates[1:]

@@ -1,0 +1,1 @@
+"""What studies share: their interface, work that is kept, floors, figures."""

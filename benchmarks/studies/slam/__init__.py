@@ -1,0 +1,1 @@
+"""The study of SLAM on recorded logs and on a simulated robot."""

@@ -1,0 +1,49 @@
+"""The study of spline maps: a short drive is measured, kept, and stands in the table."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from lidarium.benchmarks.studies import STUDIES, splines
+
+
+@pytest.fixture
+def tiny(monkeypatch):
+    drive = splines.drive
+
+    def short(floor, seed):
+        walk = drive(floor, seed)
+        return splines.Drive(walk.ranges[:60], walk.poses[:60])
+
+    monkeypatch.setattr(splines, "drive", short)
+    monkeypatch.setattr(splines, "SEEDS", range(100, 101))
+
+
+def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path):
+    study = STUDIES["splines"]
+    assert list(study.work(tmp_path, None, 100, 1)) == [("floors", 1, 1)]
+    assert list(study.work(tmp_path, None, 100, 1)) == []
+    page = study.page(tmp_path, "lidarium reproduce splines --every 100")
+    assert "Made with `lidarium reproduce splines --every 100`" in page
+    for name in splines.LOCALIZERS:
+        assert f"| srt_corridor | `{name}` | " in page
+        assert (tmp_path / splines.PICTURES_FOLDER / f"srt_corridor_{name}.png").exists()
+
+
+def test_figures_that_are_no_numbers_are_kept():
+    figures = splines.MapFigures(
+        0.1, 0.1, 1.0, 0.3, math.nan, math.nan, 0.5, 1.0, 0, 0, size_bytes=8, of_end_points=0.1, of_grid=0.1
+    )
+    kept = json.loads(json.dumps(splines._as_entry(splines.Run(figures, 1.0, 2.0)), allow_nan=False))
+    run = splines._run_of(kept)
+    assert math.isnan(run.figures.wall_mean_m)
+    assert run.figures.size_bytes == 8
+
+
+def test_odometry_is_too_long_by_its_bias_and_repeats_with_its_seed():
+    poses = np.stack([np.linspace(0.0, 10.0, 101), np.zeros(101), np.zeros(101)], axis=1)
+    reckoned = splines.odometry(poses, 3)
+    assert reckoned[-1, 0] == pytest.approx(10.5, abs=0.1)
+    assert np.array_equal(reckoned, splines.odometry(poses, 3))
