@@ -285,7 +285,7 @@ def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, comm
 def _turn_rate(error: float, limits: Array) -> float:
     """Return the turn rate that makes up for a heading error [rad/s]."""
     gain, limit = min(TURN_GAIN, TURN_IN_A_STEP / limits[TIME_STEP]), limits[TURN_LIMIT]
-    return min(max(gain * error, -limit), limit)
+    return min(max(gain * error, -limit), limit)  # type: ignore[no-any-return]
 
 
 @kernel
@@ -354,7 +354,7 @@ def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, 
     remaining, braking = _remaining(sensed, courses, robot), limits[BRAKING]
     paths, place = courses.paths, courses.places[robot]
     if place == courses.counts[robot] - 1:
-        return min(
+        return min(  # type: ignore[no-any-return]
             math.sqrt(2.0 * braking * remaining), max(remaining / limits[TIME_STEP], LEAST_SPEED_AT_END)
         )
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]

@@ -1,4 +1,7 @@
-"""Map merging: the thesis's experiments on a bank of maps that robots made, beside its tables and the pipeline of ROS map_merge."""
+"""Map merging: the thesis's experiments on a bank of robot-made maps.
+
+They stand beside the thesis's tables and the pipeline of ROS map_merge.
+"""
 
 import json
 import platform
@@ -77,8 +80,10 @@ def page(folder: Path, command: str) -> str:
     extra = json.loads((folder / EXTRA_FILE).read_text(encoding="utf-8"))
     parts = [
         "# Merging maps",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python {platform.python_version()}. How maps "
-        "are merged is told in [merging maps](../reference/merging.md). Times are of the processor, medians on a machine that others "
+        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
+        f"{platform.python_version()}. How maps "
+        "are merged is told in [merging maps](../reference/merging.md). Times are of the processor, medians "
+        "on a machine that others "
         "share; ratios are of runs in turn.",
         _about_bank(folder, len(pairs)),
         "## The bank\n\n" + tables.bank_table(tried),
@@ -114,20 +119,30 @@ def _about_bank(folder: Path, tested: int) -> str:
     copies = sum(floor.is_copy for floor in floors)
     counts = Counter(pair.category for pair in read_pairs(folder) or [])
     return (
-        f"Robots explore {len(floors) - copies} floors (generated, drawn and real ones) and {copies} copies from which furniture was "
-        "taken away, from three starts, twice from each (copies once). Their maps are kept when a third, two thirds and 95 % of a floor "
-        "are seen, in buildings of like rooms when 12, 35 and 90 % are. The laser has 3 cm of noise, and scans are drawn at poses that "
-        "err smoothly by up to 4 cm and 0.3 degrees. The pairs, of robots from different starts, in both halves:\n\n"
+        f"Robots explore {len(floors) - copies} floors (generated, drawn and real ones) and {copies} copies "
+        "from which furniture was "
+        "taken away, from three starts, twice from each (copies once). Their maps are kept when a third, two "
+        "thirds and 95 % of a floor "
+        "are seen, in buildings of like rooms when 12, 35 and 90 % are. The laser has 3 cm of noise, and "
+        "scans are drawn at poses that "
+        "err smoothly by up to 4 cm and 0.3 degrees. The pairs, of robots from different starts, in both "
+        "halves:\n\n"
         f"- {counts['positive']} positives: maps of one floor with 15 % of overlap and more.\n"
         f"- {counts['negative']} negatives: maps of different floors.\n"
-        f"- {counts['look_alike']} look-alikes: like rooms of one building, or a floor and its copy, that differ in truth by 1 m of "
+        f"- {counts['look_alike']} look-alikes: like rooms of one building, or a floor and its copy, that "
+        "differ in truth by 1 m of "
         "wall or more wherever they look alike. They are negatives too.\n"
-        f"- Undecidable: {counts['symmetric']} symmetric positives, which another transform explains as well in truth (along a corridor "
-        f"every shift does), and {counts['indistinct']} indistinct negatives, which differ by less than 1 m. A refusal is right; they are "
+        f"- Undecidable: {counts['symmetric']} symmetric positives, which another transform explains as well "
+        "in truth (along a corridor "
+        f"every shift does), and {counts['indistinct']} indistinct negatives, which differ by less than 1 m. "
+        "A refusal is right; they are "
         "in no rate.\n\n"
-        f"Half of the floors was for tuning. All figures are of the other half, {tested} pairs. It was drawn anew after two former ones "
-        "had been looked at: of the 554 and 572 negatives there 1 and 6 were accepted, the bounds were tightened, and like rooms of which "
-        "some overlay shows no difference were counted as indistinct. A positive is recalled where it is joined within 0.10 m and 1 degree "
+        f"Half of the floors was for tuning. All figures are of the other half, {tested} pairs. It was drawn "
+        "anew after two former ones "
+        "had been looked at: of the 554 and 572 negatives there 1 and 6 were accepted, the bounds were "
+        "tightened, and like rooms of which "
+        "some overlay shows no difference were counted as indistinct. A positive is recalled where it is "
+        "joined within 0.10 m and 1 degree "
         "at the overlap's centroid. Intervals are Clopper and Pearson's, 95 %."
     )
 

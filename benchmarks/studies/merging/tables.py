@@ -164,7 +164,8 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
         )
     return (
         "\n".join(lines)
-        + f"\n\nThe 280 ms that it claims are the longest times of its stages, added up once: {thesis.claimed_ms():.0f} ms. "
+        + f"\n\nThe 280 ms that it claims are the longest times of its stages, added up once: "
+        f"{thesis.claimed_ms():.0f} ms. "
         f"With both maps described its worst pair takes {max(spent):.0f} ms."
     )
 

@@ -83,8 +83,10 @@ def page(folder: Path, command: str) -> str:
         "## Towards goals",
         "A Pioneer P3-DX with the URG-04LX (noise of its data sheet) looks for the goal of each world; "
         "wheels tell 5 % too much or too "
-        'little of ways and turns, drift and slip (`odometry="typical"`); it localizes on the map of curves that it makes '
-        '(`localization="splines"`). A goal is reached within 0.2 m. The world\'s raster is 1 cm. Entries are medians, least and '
+        'little of ways and turns, drift and slip (`odometry="typical"`); '
+        "it localizes on the map of curves that it makes "
+        '(`localization="splines"`). A goal is reached within 0.2 m. The world\'s raster is 1 cm. '
+        "Entries are medians, least and "
         "greatest; the area covered is the least, the distance from the start the greatest. *Printed* is "
         "what the thesis tells of its own "
         "worlds, of which only descriptions are left: ours are drawn after these, so its figures are no "
