@@ -11,7 +11,20 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
-from lidarium.scripts import bench, evaluate, floors, merge, replay, report, reproduce, run, show, slam
+from lidarium.scripts import (
+    animate,
+    bench,
+    evaluate,
+    floors,
+    merge,
+    replay,
+    report,
+    reproduce,
+    run,
+    show,
+    slam,
+)
+from lidarium.scripts.animate import Animate
 from lidarium.scripts.bench import Bench
 from lidarium.scripts.common import (
     BAD_INPUT,
@@ -39,6 +52,7 @@ Choice = (
     | Annotated[Report, subcommand("report")]
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Replay, subcommand("replay")]
+    | Annotated[Animate, subcommand("animate")]
     | Annotated[Merge, subcommand("merge")]
     | Annotated[Slam, subcommand("slam")]
     | Annotated[Floors, subcommand("floors")]
@@ -52,6 +66,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Report: report.execute,
     Reproduce: reproduce.execute,
     Replay: replay.execute,
+    Animate: animate.execute,
     Merge: merge.execute,
     Slam: slam.execute,
     floors.List: floors.list_floors,
@@ -64,7 +79,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
 }
 
 
-_WITH_KERNELS = (Run, Evaluate, Reproduce, Merge, Slam, floors.Prepare, Bench)
+_WITH_KERNELS = (Run, Evaluate, Reproduce, Animate, Merge, Slam, floors.Prepare, Bench)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
