@@ -11,6 +11,7 @@ html_theme = "furo"
 html_title = f"lidarium {release}"
 exclude_patterns = ["_build"]
 
+myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 3
 napoleon_google_docstring = False
 napoleon_use_ivar = True
