@@ -1,0 +1,55 @@
+"""Pages of the documentation name what there is."""
+
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from lidarium.envs.simulation.kernels.arrays import WorldArrays
+from lidarium.registry import REGISTRIES
+from lidarium.scripts.main import Choice
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def text_of(name):
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def test_the_architecture_names_all_arrays_of_the_kernels():
+    page = text_of("docs/architecture.md")
+    assert not [name for name in WorldArrays._fields if f"`{name}`" not in page]
+
+
+def test_the_architecture_names_all_registries():
+    page = text_of("docs/architecture.md")
+    assert not [kind for kind in REGISTRIES if f"`{kind}`" not in page]
+
+
+def test_the_architecture_can_be_read_in_five_minutes():
+    assert text_of("docs/architecture.md").count("\n") <= 120
+    assert text_of("README.md").count("\n") <= 90
+
+
+@pytest.mark.parametrize(
+    "page", sorted((ROOT / "docs" / "decisions").glob("0*.md")), ids=lambda page: page.stem
+)
+def test_a_decision_says_why_and_what_follows(page):
+    text = page.read_text(encoding="utf-8")
+    assert re.findall(r"^## (\w+)$", text, re.MULTILINE) == ["Context", "Decision", "Consequences"]
+    assert text.count("\n") <= 40
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_to_files(page):
+    targets = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", page.read_text(encoding="utf-8"))
+    assert not [target for target in targets if not (page.parent / target).exists()]
+
+
+def test_the_readme_names_commands_that_exist():
+    known = {argument.__metadata__[0].name for argument in get_args(Choice)}
+    named = set(re.findall(r"`?lidarium (?!-)([a-z]+) ?(?:--|`|\w+ --|runs)", text_of("README.md")))
+    assert named
+    assert named <= known
