@@ -53,3 +53,9 @@ def test_the_readme_names_commands_that_exist():
     named = set(re.findall(r"`?lidarium (?!-)([a-z]+) ?(?:--|`|\w+ --|runs)", text_of("README.md")))
     assert named
     assert named <= known
+
+
+def test_entries_of_the_changelog_are_short():
+    entries = re.findall(r"^- (.*)$", text_of("CHANGELOG.md"), re.MULTILINE)
+    assert entries
+    assert not [entry for entry in entries if len(entry.split()) > 30]
