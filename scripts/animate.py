@@ -23,7 +23,7 @@ FRAME_MS, JOIN_MS, LAST_MS = 100, 1800, 2500
 """How long a frame is shown, one in which maps are joined, the last one [ms]."""
 
 JOINED = (13, 148, 136)
-"""Colour of what tells of a join: red, green, blue."""
+"""Colour of joins: red, green, blue."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ class Moment:
     time_s: float
     coverage: float
     own: list[Any]
-    laid: "NDArray[Any]"
+    on_floor: "NDArray[Any]"
     believed: "NDArray[Any]"
     poses: "NDArray[Any]"
     groups: list[set[int]]
@@ -176,7 +176,7 @@ def _floor(env: "ExplorationEnv", moment: Moment, colours: list["Colour"]) -> "F
     picture = np.array([parts.UNEXPLORED, parts.BACKGROUND], np.float64)[solid[view.rows, view.columns]]
     layers = np.zeros((*picture.shape[:2], 1))
     for group, colour in ((group, colours[min(group)]) for group in moment.groups):
-        cells = np.sign(np.sum(moment.laid[sorted(group)], axis=0, dtype=np.int16))
+        cells = np.sign(np.sum(moment.on_floor[sorted(group)], axis=0, dtype=np.int16))
         cells = np.kron(cells, np.ones((multiple, multiple), np.int16))[view.rows, view.columns]
         shades = (parts.WALL, parts.EXPLORED) if len(group) > 1 else (colour, _pale(colour))
         shown, is_known = np.array([(0, 0, 0), *shades], np.float64)[cells], (cells != 0)[..., None]
