@@ -2,22 +2,18 @@
 
 import json
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 from lidarium.benchmarks.studies import STUDIES, splines
+from lidarium.envs.settings.making import make_settings
 
 
 @pytest.fixture
 def tiny(monkeypatch):
-    drive = splines.drive
-
-    def short(floor, seed):
-        walk = drive(floor, seed)
-        return splines.Drive(walk.ranges[:60], walk.poses[:60])
-
-    monkeypatch.setattr(splines, "drive", short)
+    monkeypatch.setattr(splines, "make_settings", partial(make_settings, horizon_s=6.0))
     monkeypatch.setattr(splines, "SEEDS", range(100, 101))
 
 

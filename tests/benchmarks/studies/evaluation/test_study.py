@@ -28,10 +28,19 @@ def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path):
     assert "was killed (SIGKILL) 1 times" in page
 
 
-def test_workers_are_compared_by_programs_of_their_own():
+def test_workers_are_compared_on_the_same_suite(monkeypatch):
+    codes = []
+
+    def run_here(command, check):
+        codes.append(command[-1])
+        exec(command[-1].replace(", 2)", ", 1)"))
+
+    monkeypatch.setattr(programs.subprocess, "run", run_here)
+    monkeypatch.setattr(programs, "SETTINGS", {**costs.SETTINGS, "horizon_s": 3.0})
     gain, episodes = programs.gain_of_workers(1, ("scene_corner",))
     assert gain > 0.0
     assert episodes == len(programs.POLICIES)
+    assert [code[-4:] for code in codes] == [", 1)", ", 2)"]
 
 
 def test_a_share_has_fewer_seeds_and_kills(monkeypatch):

@@ -9,7 +9,7 @@ from lidarium.benchmarks.studies.slam import study as slam
 @pytest.fixture
 def short(monkeypatch):
     monkeypatch.setattr(slam, "HORIZON_S", 15.0)
-    monkeypatch.setattr(slam, "WARMED_BY", "orebro")
+    monkeypatch.setattr(slam, "WARMED_BY", "belgioioso")
     monkeypatch.setattr(slam, "RELATIONS", {})
     slam._warm_up.cache_clear()
 
