@@ -30,6 +30,8 @@ class Show(Command):
             "batteries",
             "formats",
             "studies",
+            "rewards",
+            "backends",
             "settings",
             "supervisor",
         ]
@@ -176,6 +178,18 @@ def _localizers() -> tuple[dict[str, Any], str]:
     return {"localizers": lines}, table(lines.items(), indent="")
 
 
+def _rewards() -> tuple[dict[str, Any], str]:
+    from lidarium.envs.outcome.reward_terms import REWARD_TERMS
+
+    return {"rewards": REWARD_TERMS.summaries}, table(REWARD_TERMS.summaries.items(), indent="")
+
+
+def _backends() -> tuple[dict[str, Any], str]:
+    from lidarium.envs.simulation.backends import BACKENDS
+
+    return {"backends": BACKENDS.summaries}, table(BACKENDS.summaries.items(), indent="")
+
+
 def _supervisor() -> tuple[dict[str, Any], str]:
     from lidarium.agents.supervisor.settings import SupervisorSettings
     from lidarium.agents.supervisor.tree import decision_tree, tree_data, tree_text
@@ -208,6 +222,8 @@ _LISTS = {
     "batteries": _batteries,
     "formats": _formats,
     "studies": _studies,
+    "rewards": _rewards,
+    "backends": _backends,
     "settings": _settings,
     "supervisor": _supervisor,
 }

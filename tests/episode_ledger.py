@@ -17,18 +17,18 @@ NOT_HASHED = re.compile(r"decision_ms|tick_ms|peak_mb|steps_per_s|version|settin
 """Keys of results that tell of the machine, or that change with every new setting."""
 
 DOCUMENTED = {
-    "run_episode": "lidarium.evaluation.runner",
-    "WatchedExploration": "lidarium.evaluation.watching",
+    "run_episode": "lidarium.evaluation.episodes.runner",
+    "WatchedExploration": "lidarium.evaluation.episodes.watching",
     "make_settings": "lidarium.envs.settings",
     "MergedMaps": "lidarium.envs.wrappers.merged_maps",
     "MergingSettings": "lidarium.envs.wrappers.merged_maps",
-    "RadioSettings": "lidarium.envs.simulation.disturbances.radio",
-    "Battery": "lidarium.envs.simulation.battery",
-    "Fault": "lidarium.envs.simulation.disturbances.faults",
-    "FaultSettings": "lidarium.envs.simulation.disturbances.faults",
-    "Order": "lidarium.envs.onboard.state",
-    "OrderKind": "lidarium.envs.onboard.state",
-    "Target": "lidarium.envs.onboard.state",
+    "RadioSettings": "lidarium.envs.settings.radio",
+    "Battery": "lidarium.envs.settings.battery",
+    "Fault": "lidarium.envs.settings.faults",
+    "FaultSettings": "lidarium.envs.settings.faults",
+    "Order": "lidarium.envs.radio.messages",
+    "OrderKind": "lidarium.envs.radio.messages",
+    "Target": "lidarium.envs.radio.messages",
     "Floor": "lidarium.envs.floors.floor",
     "Solid": "lidarium.envs.floors.floor",
 }

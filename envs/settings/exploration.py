@@ -157,6 +157,8 @@ class ExplorationSettings:
             raise ValueError(
                 f"localization is {self.localization!r}; want one of {', '.join(localizations())}"
             )
+        if self.localizer is not None:
+            self._check_localizer()
         if self.backend != "kinematic" and self.backend not in registry("backend"):
             raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(registry('backend'))}")
         if not (math.isfinite(self.time_step) and self.time_step > 0.0):
