@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import scratch_grid
 
 IDLE, DRIVING, ARRIVED, BLOCKED = range(4)
 """States of a drive."""
@@ -169,12 +170,12 @@ class Bodies(NamedTuple):
     foresight: NDArray[np.float64]
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _wrap(angle: float) -> float:
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@kernel
+@kernel(borrowing=True)
 def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
     """How far the disc can go straight ahead before it meets a return [m]."""
     gap = np.inf
@@ -189,7 +190,7 @@ def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
     return gap
 
 
-@kernel
+@kernel(borrowing=True)
 def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
     """Return how far the disc can go straight to a known teammate [m].
 
@@ -219,19 +220,33 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, p
     return gap
 
 
-@kernel
+@kernel(inline=True, borrowing=True)
+def _hears_any(contact: Array, robot: int) -> bool:
+    """Whether a robot heard of any teammate lately."""
+    for other in range(contact.shape[1]):
+        if contact[robot, other] != 0:
+            return True
+    return False
+
+
+@kernel(borrowing=True)
 def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
     """Return how far the disc can go straight to a teammate heard of [m].
 
     The teammate is taken to stand where it was.
     """
-    known = sensed.heard[robot].reshape((-1, 3)).copy()
-    known[robot] = sensed.poses[robot]
-    still = np.zeros((sensed.poses.shape[0], 2))
+    robots = sensed.poses.shape[0]
+    known, still = scratch_grid(robots, 3, np.float64), scratch_grid(robots, 2, np.float64)
+    for other in range(robots):
+        still[other, 0] = still[other, 1] = 0.0
+        for axis in range(3):
+            known[other, axis] = sensed.heard[robot, 3 * other + axis]
+    for axis in range(3):
+        known[robot, axis] = sensed.poses[robot, axis]
     return _gap_to_mates(robot, known, still, bodies, sensed.contact[robot])  # type: ignore[no-any-return]
 
 
-@kernel
+@kernel(borrowing=True)
 def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Array) -> None:
     """Give each robot the speed and turn rate that follow its path (kernel).
 
@@ -257,7 +272,7 @@ def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Arr
                 _drive_on(sensed, courses, bodies, robot, commands)
 
 
-@kernel
+@kernel(borrowing=True)
 def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, commands: Array) -> None:
     """Turn a robot towards the next piece of its path, and drive where it looks that way."""
     aim_x, aim_y = _aim(sensed, courses, robot)
@@ -281,14 +296,14 @@ def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, comm
         courses.states[robot] = DRIVING
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _turn_rate(error: float, limits: Array) -> float:
     """Return the turn rate that makes up for a heading error [rad/s]."""
     gain, limit = min(TURN_GAIN, TURN_IN_A_STEP / limits[TIME_STEP]), limits[TURN_LIMIT]
     return min(max(gain * error, -limit), limit)  # type: ignore[no-any-return]
 
 
-@kernel
+@kernel(borrowing=True)
 def _pass_points(sensed: Sensed, courses: Courses, robot: int) -> None:
     """Let a robot drive to the first point of its path that it has not passed."""
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
@@ -302,21 +317,21 @@ def _pass_points(sensed: Sensed, courses: Courses, robot: int) -> None:
     courses.places[robot] = place
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrowing=True)
 def _remaining(sensed: Sensed, courses: Courses, robot: int) -> float:
     """Return the distance to the point that a robot drives to [m]."""
     place, x, y = courses.places[robot], sensed.poses[robot, 0], sensed.poses[robot, 1]
     return math.hypot(courses.paths[robot, place, 0] - x, courses.paths[robot, place, 1] - y)
 
 
-@kernel
+@kernel(borrowing=True)
 def _is_at_end(sensed: Sensed, courses: Courses, robot: int) -> bool:
     """Whether a robot is where its path ends."""
     is_last = courses.places[robot] == courses.counts[robot] - 1
     return bool(is_last and _remaining(sensed, courses, robot) <= ARRIVAL)
 
 
-@kernel
+@kernel(borrowing=True)
 def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -> float:
     """Return the turn rate towards the wanted heading; note where it is reached."""
     wanted = courses.headings[robot]
@@ -328,7 +343,7 @@ def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -
     return 0.0
 
 
-@kernel
+@kernel(borrowing=True)
 def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
     """Return a point on the line of this piece, a little ahead of the robot's foot on it [m]."""
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
@@ -345,7 +360,7 @@ def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
     return from_x + along_x * ahead / length, from_y + along_y * ahead / length
 
 
-@kernel
+@kernel(borrowing=True)
 def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, tolerance: float) -> float:
     """Return the speed from which a robot still brakes to what the next bend or the end wants [m/s].
 
@@ -367,7 +382,7 @@ def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, 
     return math.sqrt(2.0 * braking * remaining)
 
 
-@kernel
+@kernel(borrowing=True)
 def _safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
     """Return the speed that still stops before returns and teammates [m/s].
 
@@ -380,7 +395,7 @@ def _safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
     if bodies.knows_mates:
         mate_gap = _gap_to_mates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
         allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
-    elif sensed.contact[robot].sum() > 0:
+    elif _hears_any(sensed.contact, robot):
         mate_gap = _gap_to_heard(robot, sensed, bodies)
         allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
     return allowed

@@ -109,7 +109,6 @@ def _search(
     """Write the pose of least cost within a window into ``found`` (3,)."""
     levels, first_column, first_row, side = grid
     around, steps, turns, step = window
-    rows, columns = levels.shape
     width = 2 * steps + 1
     sums = np.empty((width, width), np.int64)
     unseen_cost, scale = int(FULL_LEVEL * unseen), weight / FULL_LEVEL
@@ -120,21 +119,7 @@ def _search(
         heading = around[2] + turn * step
         cosine, sine = math.cos(heading) / side, math.sin(heading) / side
         x0, y0 = around[0] / side - first_column - steps, around[1] / side - first_row - steps
-        sums[:] = 0
-        for k in range(points.shape[0]):
-            column = int(math.floor(cosine * points[k, 0] - sine * points[k, 1] + x0))
-            row = int(math.floor(sine * points[k, 0] + cosine * points[k, 1] + y0))
-            if column < 0 or row < 0 or column + width > columns or row + width > rows:
-                sums += unseen_cost
-                continue
-            for i in range(width):
-                for j in range(width):
-                    level = int(levels[row + i, column + j])
-                    sums[i, j] += (
-                        unseen_cost
-                        if level == UNSEEN
-                        else ((LEVELS - level) * (LEVELS - level)) >> LEVEL_BITS
-                    )
+        _sum_disagreement(levels, points, (cosine, sine, x0, y0), unseen_cost, sums)
         for i in range(width):
             for j in range(width):
                 away[0], away[1], away[2] = (j - steps) * side, (i - steps) * side, turn * step
@@ -142,3 +127,35 @@ def _search(
                 if cost < least:
                     least = cost
                     found[:] = around + away
+
+
+@kernel(borrowing=True)
+def _sum_disagreement(
+    levels: Array, points: Array, place: tuple[float, float, float, float], unseen_cost: int, sums: Array
+) -> None:
+    """Fill ``sums`` (width, width) with the points' disagreement at each place of a window.
+
+    ``place`` is cosine and sine of the heading, by the side of a cell, and the window's corner [cells].
+    """
+    cosine, sine, x0, y0 = place
+    rows, columns = levels.shape
+    width = sums.shape[0]
+    sums[:] = 0
+    for k in range(points.shape[0]):
+        column = int(math.floor(cosine * points[k, 0] - sine * points[k, 1] + x0))
+        row = int(math.floor(sine * points[k, 0] + cosine * points[k, 1] + y0))
+        if column < 0 or row < 0 or column + width > columns or row + width > rows:
+            _add_everywhere(sums, unseen_cost)
+            continue
+        for i in range(width):
+            for j in range(width):
+                level = int(levels[row + i, column + j])
+                squared = ((LEVELS - level) * (LEVELS - level)) >> LEVEL_BITS
+                sums[i, j] += unseen_cost if level == UNSEEN else squared
+
+
+@kernel(borrowing=True)
+def _add_everywhere(sums: Array, cost: int) -> None:
+    for i in range(sums.shape[0]):
+        for j in range(sums.shape[1]):
+            sums[i, j] += cost

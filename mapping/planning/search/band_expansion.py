@@ -128,11 +128,12 @@ def _expand_cell(
         before = flat.remaining[there]
         if before >= left - (DIAGONAL if is_diagonal else STRAIGHT) or flat.log_odds[there] >= 0:
             continue
-        half = half_costs[int(is_diagonal), flat.closeness[there]]
+        to_closeness = flat.closeness[there]
+        half = half_costs[int(is_diagonal), to_closeness]
         after = left - half - (own_diagonal if is_diagonal else own_straight)
         if half == 0 or after <= before or (before > 0 and flat.parent[there] >= LEAVING):
             continue
-        if is_diagonal and not _step_is_open(terrain, flat, here, there, k):
+        if is_diagonal and not _step_is_open(terrain, flat, here, k, max(own_closeness, to_closeness)):
             continue
         to_cell = np.int32(cell + steps[PACKED_STEPS, k])
         if before == 0:
@@ -166,8 +167,10 @@ def _is_within(row: int, column: int, rows: int, columns: int) -> bool:
 
 
 @kernel(inline=True, borrowing=True)
-def _step_is_open(terrain: Terrain, flat: _Flat, here: int, there: int, k: int) -> bool:
+def _step_is_open(terrain: Terrain, flat: _Flat, here: int, k: int, nearest: int) -> bool:
     """Whether a diagonal step keeps its clearance between its ends.
+
+    The ends have closeness up to ``nearest``.
 
     Between the centres of two diagonal neighbours the squared clearance in half cells falls at most 2 below
     that of both ends, and not at all where both cells beside the step have it too. So the path of centres is
@@ -176,7 +179,7 @@ def _step_is_open(terrain: Terrain, flat: _Flat, here: int, there: int, k: int) 
     beside = np.uintp(np.int64(here) + ROW_STEPS[k] * terrain.log_odds.shape[1])
     abeam = np.uintp(np.int64(here) + COLUMN_STEPS[k])
     free_beside, free_abeam = flat.log_odds[beside] < 0, flat.log_odds[abeam] < 0
-    if max(flat.closeness[here], flat.closeness[there]) <= terrain.passage.roomy:
+    if nearest <= terrain.passage.roomy:
         return bool(free_beside or free_abeam)
     if not (free_beside and free_abeam):
         return False
