@@ -19,7 +19,7 @@ from lidarium.envs.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beginning:
+class EpisodeStart:
     """What an episode begins with.
 
     Attributes
@@ -45,7 +45,7 @@ class Beginning:
 
 def begin(
     generator: np.random.Generator, choice: FloorChoice, chosen: ResetOptions, settings: ExplorationSettings
-) -> Beginning:
+) -> EpisodeStart:
     """Draw how an episode begins.
 
     Parameters
@@ -77,7 +77,7 @@ def begin(
     if goal is not None:
         check_goal(tables.body, goal)
     seed = int(generator.integers(2**63))
-    return Beginning(floor, tables, starts, seed, goal)
+    return EpisodeStart(floor, tables, starts, seed, goal)
 
 
 def make_simulation(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
@@ -85,7 +85,7 @@ def make_simulation(settings: ExplorationSettings, episodes: int = 1) -> Simulat
     return BACKENDS[settings.backend](settings, episodes)
 
 
-def map_frames(beginning: Beginning, settings: ExplorationSettings) -> NDArray[np.float64]:
+def map_frames(beginning: EpisodeStart, settings: ExplorationSettings) -> NDArray[np.float64]:
     """Return the origin of each robot's map frame, shape (robots, 2) [m].
 
     It is in the frame of the robot's believed pose.
@@ -98,7 +98,7 @@ def map_frames(beginning: Beginning, settings: ExplorationSettings) -> NDArray[n
     return np.asarray(origin + np.floor((beginning.starts[:, :2] - origin) / cell) * cell)
 
 
-def goal_of_robots(beginning: Beginning, settings: ExplorationSettings) -> tuple[float, float]:
+def goal_of_robots(beginning: EpisodeStart, settings: ExplorationSettings) -> tuple[float, float]:
     """Return the goal as the robots know it, in the frame of their believed poses [m].
 
     Nan where they know none.

@@ -14,7 +14,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_simulation, map_frames
+from lidarium.envs.episode_start import EpisodeStart, begin, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, action_space, observation_space
 from lidarium.envs.onboard.belief import Belief
@@ -176,7 +176,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self._generator = np.random.default_rng(seed)
         return self.start(begin(self._generator, self._choice, chosen, self.settings))
 
-    def start(self, beginning: Beginning) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+    def start(self, beginning: EpisodeStart) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode that begins as was drawn, or as one did before.
 
         Returns what ``reset`` returns.

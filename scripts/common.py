@@ -128,7 +128,7 @@ def tell(message: str) -> None:
     print(message, file=sys.stderr, flush=True)
 
 
-def tell_of_compiling() -> None:
+def announce_compiling() -> None:
     """Tell, at the first start, why nothing happens for a while."""
     from lidarium.mapping.kernels.compilation import is_cache_empty
 

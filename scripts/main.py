@@ -33,8 +33,8 @@ from lidarium.scripts.common import (
     INTERRUPTED,
     Answer,
     Command,
+    announce_compiling,
     tell,
-    tell_of_compiling,
 )
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
@@ -140,7 +140,7 @@ def _answered(command: Command) -> int:
     from lidarium.evaluation.episodes.output import as_json
 
     if isinstance(command, _WITH_KERNELS):
-        tell_of_compiling()
+        announce_compiling()
     answer = _EXECUTE[type(command)](command)
     text = as_json(answer.result) if command.json else answer.text + "\n"
     if answer.result:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
 from lidarium.agents.srt.drive import Limits
-from lidarium.agents.srt.frontier_tour import MATE_SAME, MOST, first_on_tour
+from lidarium.agents.srt.frontier_tour import MOST, TEAMMATE_SAME, first_on_tour
 from lidarium.agents.srt.memory import Memory
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
@@ -127,9 +127,9 @@ def tour_way(
     """
     if senses.goal is not None or settings.candidates != "goal" or settings.algorithm != "integrated":
         return []
-    of_mates = [target.focus for target in targets]
+    of_teammates = [target.focus for target in targets]
     for least in (settings.least_frontier, LAST_FRONTIER):
-        begun = first_on_tour(memory, senses, limits, least, source.intent, of_mates)
+        begun = first_on_tour(memory, senses, limits, least, source.intent, of_teammates)
         if begun is not None:
             return _to_focus(node, *begun)
     return []
@@ -175,7 +175,7 @@ def _left_by(targets: Sequence[Candidate], found: list[Candidate]) -> list[Candi
         for each in found
         if not any(
             (each.opening is not None and each.opening is target.opening)
-            or math.dist(each.focus, target.focus) < MATE_SAME
+            or math.dist(each.focus, target.focus) < TEAMMATE_SAME
             for target in targets
         )
     ]
@@ -222,7 +222,7 @@ def _to_frontier(
     left = [
         k
         for k, focus in enumerate(found.focuses)
-        if all(math.dist(focus, target.focus) >= MATE_SAME for target in targets)
+        if all(math.dist(focus, target.focus) >= TEAMMATE_SAME for target in targets)
     ]
     best = min(left, key=cost_of, default=None)
     return [] if best is None else _to_focus(node, found.legs(best), found.focuses[best])

@@ -29,7 +29,7 @@ BLIND_S = 10.0
 BACKING_S, BACKING_SPEED = 1.5, 0.12
 """How long and how fast a blocked robot backs out [s, m/s]."""
 
-MATE_NEAR = 1.5
+TEAMMATE_NEAR = 1.5
 """A teammate within this distance may be what blocks a robot [m]."""
 
 ASIDES = 6
@@ -411,7 +411,9 @@ class Explorer:
             self._arrive(leg, senses, memory)
             return
         self._failures += 1
-        steps_aside = blocks % 3 == 2 or any(senses.distance_to(mate) < MATE_NEAR for mate in senses.mates)
+        steps_aside = blocks % 3 == 2 or any(
+            senses.distance_to(teammate) < TEAMMATE_NEAR for teammate in senses.teammates
+        )
         departed = self._node
         self._pause(senses, memory)
         if leg.is_goal and self._failures > ASIDES:

@@ -25,18 +25,23 @@ WAY_OF_SIZE = 1.0
 A robot drives so much farther to begin with a long frontier, as more is to be seen behind it.
 """
 
-MATE_SPREAD = 5.0
+TEAMMATE_SPREAD = 5.0
 """Distance from a teammate's target within which frontiers cost more [m].
 
 The added cost is by how much nearer they are.
 """
 
-MATE_SAME = 1.0
+TEAMMATE_SAME = 1.0
 """What lies this near to what a teammate goes for is the teammate's [m]."""
 
 
 def first_on_tour(
-    memory: Memory, senses: Senses, limits: Limits, least: float, intent: Intent, of_mates: Sequence[Place]
+    memory: Memory,
+    senses: Senses,
+    limits: Limits,
+    least: float,
+    intent: Intent,
+    of_teammates: Sequence[Place],
 ) -> tuple[Legs, Place] | None:
     """Return the path to the tour's first frontier, and what to observe there.
 
@@ -67,10 +72,10 @@ def first_on_tour(
     frontiers = memory.frontiers(senses.pose[:2], least, MOST)
     if frontiers is None:
         return None
-    to_mates = np.array([[math.dist(focus, mate) for mate in of_mates] for focus in frontiers.focuses]).min(
-        axis=1, initial=math.inf
-    )
-    is_left = to_mates >= MATE_SAME
+    to_teammates = np.array(
+        [[math.dist(focus, teammate) for teammate in of_teammates] for focus in frontiers.focuses]
+    ).min(axis=1, initial=math.inf)
+    is_left = to_teammates >= TEAMMATE_SAME
     if not is_left.any():
         return None
     gap = frontiers.ahead - senses.pose[:2]
@@ -78,7 +83,9 @@ def first_on_tour(
         [wrapped(float(angle)) for angle in np.arctan2(gap[:, 1], gap[:, 0]) - float(senses.pose[2])]
     )
     first = (
-        frontiers.costs + turns * limits.speed / limits.turn_rate + np.maximum(MATE_SPREAD - to_mates, 0.0)
+        frontiers.costs
+        + turns * limits.speed / limits.turn_rate
+        + np.maximum(TEAMMATE_SPREAD - to_teammates, 0.0)
     )
     first -= WAY_OF_SIZE * frontiers.sizes
     if intent.latest is not None:

@@ -64,11 +64,13 @@ class SensorBasedRandomTree(Policy):
         actions: dict[str, Action] = {}
         for agent, observation in observations.items():
             explorer, belief = self._explorers[agent], self._team.belief(agent)
-            in_contact = [self._explorers[mate] for mate in self._contacts(agent) if mate in observations]
-            for mate in in_contact:
-                mate.known |= explorer.known
-                explorer.known |= mate.known
-            targets = [mate.target for mate in in_contact if mate.target is not None]
+            in_contact = [
+                self._explorers[teammate] for teammate in self._contacts(agent) if teammate in observations
+            ]
+            for teammate in in_contact:
+                teammate.known |= explorer.known
+                explorer.known |= teammate.known
+            targets = [teammate.target for teammate in in_contact if teammate.target is not None]
             memory = memory_of(
                 belief, [self.tree.nodes[number] for number in sorted(explorer.known)], self.settings
             )
@@ -88,8 +90,8 @@ class SensorBasedRandomTree(Policy):
             return []
         return [
             name
-            for name, mate in belief.teammates.items()
-            if mate.age_s <= NEWS_S and name in self._explorers
+            for name, teammate in belief.teammates.items()
+            if teammate.age_s <= NEWS_S and name in self._explorers
         ]
 
 

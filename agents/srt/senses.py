@@ -46,7 +46,7 @@ class Senses:
     scan: NDArray[np.float32]
     is_pressed: bool
     goal: NDArray[np.float64] | None
-    mates: list[NDArray[np.float64]]
+    teammates: list[NDArray[np.float64]]
 
     def is_blind(self, geometry: ScanGeometry) -> bool:
         """Whether no beam tells anything."""
@@ -62,14 +62,16 @@ def senses_of(time_s: float, observation: Observation, belief: Belief) -> Senses
     """Return what a robot has, of an observation and its belief."""
     origin = np.array(belief.map_origin)
     pose = np.asarray(belief.pose, np.float64)
-    mates = [mate.pose[:2] - origin for mate in belief.teammates.values() if mate.age_s <= NEWS_S]
+    teammates = [
+        teammate.pose[:2] - origin for teammate in belief.teammates.values() if teammate.age_s <= NEWS_S
+    ]
     return Senses(
         time_s,
         np.array([*(pose[:2] - origin), pose[2]]),
         observation["scan"],
         bool(np.any(observation.get("bumper", 0))),
         None if belief.goal is None else belief.goal - origin,
-        mates,
+        teammates,
     )
 
 

@@ -265,7 +265,7 @@ class Supervised(Policy):
         ]
         for group in station.groups():
             for agent in group:
-                others = [mate for mate in group if mate != agent]
+                others = [teammate for teammate in group if teammate != agent]
                 if not others and agent not in self._told:
                     continue
                 if self._team.tell(agent, station.fused(others, agent) if others else None):

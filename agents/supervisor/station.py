@@ -123,9 +123,17 @@ class MergeStation:
         if has_failed:
             self._note(time_s, "excluded", (agent,), "it has failed; its map is not used any more")
             # With its map goes what showed the others that their images of it, in doorways say, are no walls.
-            mates = [mate for mate in self.agents if mate != agent and self._is_used(mate)]
-            frames = {mate: frame for mate in mates if (frame := self.lookup(mate, agent)) is not None}
-            self.left_behind += [(mate, frame.apply(self._trail(agent))) for mate, frame in frames.items()]
+            teammates = [
+                teammate for teammate in self.agents if teammate != agent and self._is_used(teammate)
+            ]
+            frames = {
+                teammate: frame
+                for teammate in teammates
+                if (frame := self.lookup(teammate, agent)) is not None
+            }
+            self.left_behind += [
+                (teammate, frame.apply(self._trail(agent))) for teammate, frame in frames.items()
+            ]
         track = self._tracks[agent]
         track.append((report.travelled_m, self.known_m2(agent)))
         while len(track) > 1 and track[1][0] <= report.travelled_m - self.settings.enclosed_way_m:
@@ -217,7 +225,7 @@ class MergeStation:
         coarse = GrowingMap(resampled(whole.levels, self.resolution, self._merge_resolution), whole.origin)
         # A third robot's image on the one map would contradict the floor on which the other one saw it drive
         # on.
-        bare = without_bodies(coarse, self._mates_trails(agent), self._radius, self._merge_resolution)
+        bare = without_bodies(coarse, self._teammates_trails(agent), self._radius, self._merge_resolution)
         return without_own_trail(bare, self._trail(agent), self._radius, self._merge_resolution)
 
     def _map_without_bodies(self, agent: str) -> GrowingMap:
@@ -226,17 +234,17 @@ class MergeStation:
         What it may have drawn of them is removed.
         """
         return without_bodies(
-            self.reports[agent].map, self._mates_trails(agent), self._radius, self.resolution
+            self.reports[agent].map, self._teammates_trails(agent), self._radius, self.resolution
         )
 
-    def _mates_trails(self, agent: str) -> list[NDArray[np.float64]]:
+    def _teammates_trails(self, agent: str) -> list[NDArray[np.float64]]:
         """Return where those have been that a robot is joined with, in its map frame [m]."""
-        mates = {
-            mate: frame
-            for mate in self.agents
-            if mate != agent and (frame := self.lookup(agent, mate)) is not None
+        teammates = {
+            teammate: frame
+            for teammate in self.agents
+            if teammate != agent and (frame := self.lookup(agent, teammate)) is not None
         }
-        return [frame.apply(self._trail(mate)) for mate, frame in mates.items()]
+        return [frame.apply(self._trail(teammate)) for teammate, frame in teammates.items()]
 
     def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
         """Return the middle of what two maps both know [m].

@@ -188,14 +188,14 @@ class Supervisor:
             inputs = replace(
                 inputs, remaining_m=float(survey.goals.costs[row, goal]) if goal != NOBODY else math.inf
             )
-        others = [mate for mate in workers if mate != agent]
+        others = [teammate for teammate in workers if teammate != agent]
         worth = np.where(survey.is_goal(), 1.0, -np.inf)
-        for mate in others:
-            place = survey.places[mate]
+        for teammate in others:
+            place = survey.places[teammate]
             if place is not None:
                 worth = worth - survey.seen_at(place)
-            if taken[mate] != NOBODY:
-                worth[taken[mate]] = -np.inf
+            if taken[teammate] != NOBODY:
+                worth[taken[teammate]] = -np.inf
         if survey.going[agent] != NOBODY and rival is not None:
             worth[survey.going[agent]] = -np.inf
         costs, weight = survey.goals.costs[row], self._settings.cost_weight
@@ -236,28 +236,30 @@ class Supervisor:
         To a robot that stands by, the nearest one that has any goal.
         """
         is_waiting = agent in self.standing_by
-        mates = [
-            self._inputs(mate, survey.known_area_m2)
-            for mate in workers
-            if mate != agent
-            and mate not in self.standing_by
+        teammates = [
+            self._inputs(teammate, survey.known_area_m2)
+            for teammate in workers
+            if teammate != agent
+            and teammate not in self.standing_by
             and (
-                survey.places[mate] is not None
+                survey.places[teammate] is not None
                 if is_waiting
-                else survey.is_same_goal(agent, mate, self._settings.same_goal_m)
+                else survey.is_same_goal(agent, teammate, self._settings.same_goal_m)
             )
         ]
-        return min(mates, key=lambda mate: (mate.remaining_m, mate.agent), default=None)
+        return min(teammates, key=lambda teammate: (teammate.remaining_m, teammate.agent), default=None)
 
     def _opponent(self, agent: str, others: list[str], survey: Survey) -> RobotInputs | None:
         """Return the nearest robot that an agent is about to meet."""
-        mates = [
-            self._inputs(mate, survey.known_area_m2) for mate in others if survey.are_meeting(agent, mate)
+        teammates = [
+            self._inputs(teammate, survey.known_area_m2)
+            for teammate in others
+            if survey.are_meeting(agent, teammate)
         ]
-        return min(mates, key=lambda mate: (mate.remaining_m, mate.agent), default=None)
+        return min(teammates, key=lambda teammate: (teammate.remaining_m, teammate.agent), default=None)
 
     def _is_behind(self, agent: str, group: list[str]) -> bool:
-        known = [self.station.known_m2(mate) for mate in group if mate != agent]
+        known = [self.station.known_m2(teammate) for teammate in group if teammate != agent]
         return bool(known) and self.station.known_m2(agent) < self._settings.unbalanced_share * float(
             np.mean(known)
         )

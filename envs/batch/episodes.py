@@ -25,7 +25,7 @@ from lidarium.envs.batch.running import (
     run_parallel,
     run_serial,
 )
-from lidarium.envs.episode_start import Beginning, begin, goal_of_robots, make_simulation, map_frames
+from lidarium.envs.episode_start import EpisodeStart, begin, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observations import ObservationWriter, observation_space
 from lidarium.envs.onboard.perception import Perception
@@ -38,7 +38,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.station.operating import state_after
-from lidarium.mapping.kernels.work_queue import new_turns
+from lidarium.mapping.kernels.work_queue import new_queue
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -294,7 +294,7 @@ class EpisodeBatch:
             seen,
             *self._writer.arguments(self.observations),
             self._orders[0],
-            new_turns(),
+            new_queue(),
             threads,
         )
 
@@ -334,9 +334,9 @@ class EpisodeBatch:
         beginning: NDArray[np.int64],
         seeds: Sequence[int | None] | None,
         options: Mapping[int, ResetOptions],
-    ) -> dict[int, Beginning]:
+    ) -> dict[int, EpisodeStart]:
         """Draw how episodes begin, before anything of them is changed."""
-        drawn: dict[int, Beginning] = {}
+        drawn: dict[int, EpisodeStart] = {}
         generators = dict(enumerate(self._generators))
         for k, episode in enumerate(int(episode) for episode in beginning):
             seed = None if seeds is None else seeds[k]
@@ -350,7 +350,7 @@ class EpisodeBatch:
         self._generators = [generators[episode] for episode in range(self.episodes)]
         return drawn
 
-    def _place(self, episode: int, start: Beginning) -> None:
+    def _place(self, episode: int, start: EpisodeStart) -> None:
         """Put the robots of an episode where they begin."""
         rows = slice(episode * self.robots, (episode + 1) * self.robots)
         self.simulation.place(episode, start.tables, start.starts, start.seed, self.settings.known_starts)

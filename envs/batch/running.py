@@ -11,7 +11,7 @@ from lidarium.envs.outcome.endings import Rules, ending_of
 from lidarium.envs.simulation.kernels.arrays import WorldArrays, world_at
 from lidarium.envs.simulation.kernels.stepping import step_episode
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.work_queue import take_turn
+from lidarium.mapping.kernels.work_queue import take_next
 
 WAITS, LOOKS, STEPS, DECIDES = range(4)
 """Modes of an episode in a call.
@@ -129,10 +129,10 @@ def _run_episodes(
     Threads take the episodes by ``new_turns`` in the ``order`` (episodes,) int64.
     """
     for _ in numba.prange(threads):
-        turn = take_turn(turns)
+        turn = take_next(turns)
         while turn < order.shape[0]:
             episode = order[turn]
-            turn = take_turn(turns)
+            turn = take_next(turns)
             if modes[episode] != WAITS:
                 _run_episode(
                     table,

@@ -101,7 +101,7 @@ class Following(NamedTuple):
     unit_vectors: NDArray[np.float64]
     radii: NDArray[np.float64]
     limits: NDArray[np.float64]
-    knows_mates: bool
+    knows_teammates: bool
     contact: NDArray[np.uint8]
     heard: NDArray[np.float64]
     present: NDArray[np.uint8]
@@ -226,7 +226,7 @@ def follow_team(
             following.unit_vectors,
             following.radii,
             following.limits,
-            following.knows_mates,
+            following.knows_teammates,
             following.present,
             following.foresight,
         ),

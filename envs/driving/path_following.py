@@ -66,10 +66,10 @@ FACING = 0.1
 STANDSTILL = 0.006
 """Gap to a return at which a robot stands [m]."""
 
-MATE_GAP = 0.03
+TEAMMATE_GAP = 0.03
 """Gap that robots keep to each other [m]."""
 
-LEAST_MATE_GAP = 0.004
+LEAST_TEAMMATE_GAP = 0.004
 """Gap that the lower-numbered robot keeps in passing [m].
 
 It holds where two robots stand nearer than the usual gap.
@@ -165,7 +165,7 @@ class Bodies(NamedTuple):
     unit_vectors: NDArray[np.float64]
     radii: NDArray[np.float64]
     limits: NDArray[np.float64]
-    knows_mates: bool
+    knows_teammates: bool
     present: NDArray[np.uint8]
     foresight: NDArray[np.float64]
 
@@ -191,7 +191,7 @@ def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
 
 
 @kernel(borrowing=True)
-def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
+def _gap_to_teammates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
     """Return how far the disc can go straight to a known teammate [m].
 
     The teammate counts now or where it will be soon.
@@ -204,7 +204,7 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, p
         for k in range(foresight.shape[0]):
             if k > 0 and other > robot:
                 break
-            reach = radii[robot] + radii[other] + MATE_GAP
+            reach = radii[robot] + radii[other] + TEAMMATE_GAP
             drift = velocities[other, 0] * foresight[k]
             gap_x = poses[other, 0] + drift * math.cos(poses[other, 2]) - poses[robot, 0]
             gap_y = poses[other, 1] + drift * math.sin(poses[other, 2]) - poses[robot, 1]
@@ -212,7 +212,7 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, p
             if x * x + y * y <= reach * reach:
                 # Nearer than robots should be: the one with the lower number may pass where it does not
                 # touch, else apart.
-                touching = radii[robot] + radii[other] + LEAST_MATE_GAP
+                touching = radii[robot] + radii[other] + LEAST_TEAMMATE_GAP
                 if x > 0.0 and (robot > other or -touching < y < touching):
                     gap = 0.0
             elif x > 0.0 and -reach < y < reach:
@@ -223,10 +223,10 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, p
 @kernel(inline=True, borrowing=True)
 def _hears_any(contact: Array, robot: int) -> bool:
     """Whether a robot heard of any teammate lately."""
+    heard = 0
     for other in range(contact.shape[1]):
-        if contact[robot, other] != 0:
-            return True
-    return False
+        heard += contact[robot, other]
+    return heard > 0
 
 
 @kernel(borrowing=True)
@@ -243,7 +243,7 @@ def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
             known[other, axis] = sensed.heard[robot, 3 * other + axis]
     for axis in range(3):
         known[robot, axis] = sensed.poses[robot, axis]
-    return _gap_to_mates(robot, known, still, bodies, sensed.contact[robot])  # type: ignore[no-any-return]
+    return _gap_to_teammates(robot, known, still, bodies, sensed.contact[robot])  # type: ignore[no-any-return]
 
 
 @kernel(borrowing=True)
@@ -272,7 +272,7 @@ def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Arr
                 _drive_on(sensed, courses, bodies, robot, commands)
 
 
-@kernel(borrowing=True)
+@kernel(inline=True, borrowing=True)
 def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, commands: Array) -> None:
     """Turn a robot towards the next piece of its path, and drive where it looks that way."""
     aim_x, aim_y = _aim(sensed, courses, robot)
@@ -300,10 +300,10 @@ def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, comm
 def _turn_rate(error: float, limits: Array) -> float:
     """Return the turn rate that makes up for a heading error [rad/s]."""
     gain, limit = min(TURN_GAIN, TURN_IN_A_STEP / limits[TIME_STEP]), limits[TURN_LIMIT]
-    return min(max(gain * error, -limit), limit)  # type: ignore[no-any-return]
+    return float(min(max(gain * error, -limit), limit))
 
 
-@kernel(borrowing=True)
+@kernel(inline=True, borrowing=True)
 def _pass_points(sensed: Sensed, courses: Courses, robot: int) -> None:
     """Let a robot drive to the first point of its path that it has not passed."""
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
@@ -324,14 +324,14 @@ def _remaining(sensed: Sensed, courses: Courses, robot: int) -> float:
     return math.hypot(courses.paths[robot, place, 0] - x, courses.paths[robot, place, 1] - y)
 
 
-@kernel(borrowing=True)
+@kernel(inline=True, borrowing=True)
 def _is_at_end(sensed: Sensed, courses: Courses, robot: int) -> bool:
     """Whether a robot is where its path ends."""
     is_last = courses.places[robot] == courses.counts[robot] - 1
     return bool(is_last and _remaining(sensed, courses, robot) <= ARRIVAL)
 
 
-@kernel(borrowing=True)
+@kernel(inline=True, borrowing=True)
 def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -> float:
     """Return the turn rate towards the wanted heading; note where it is reached."""
     wanted = courses.headings[robot]
@@ -343,7 +343,7 @@ def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -
     return 0.0
 
 
-@kernel(borrowing=True)
+@kernel(inline=True, borrowing=True)
 def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
     """Return a point on the line of this piece, a little ahead of the robot's foot on it [m]."""
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
@@ -360,7 +360,7 @@ def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
     return from_x + along_x * ahead / length, from_y + along_y * ahead / length
 
 
-@kernel(borrowing=True)
+@kernel(inline=True, borrowing=True)
 def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, tolerance: float) -> float:
     """Return the speed from which a robot still brakes to what the next bend or the end wants [m/s].
 
@@ -382,7 +382,7 @@ def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, 
     return math.sqrt(2.0 * braking * remaining)
 
 
-@kernel(borrowing=True)
+@kernel(inline=True, borrowing=True)
 def _safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
     """Return the speed that still stops before returns and teammates [m/s].
 
@@ -392,10 +392,10 @@ def _safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
     own, speed = bodies.radii[robot] + SIDE_GAP, sensed.velocities[robot, 0]
     gap = _gap_in_scan(sensed.ranges[robot], bodies.unit_vectors, own)
     allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * speed, 0.0))
-    if bodies.knows_mates:
-        mate_gap = _gap_to_mates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
-        allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
+    if bodies.knows_teammates:
+        teammate_gap = _gap_to_teammates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
+        allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
     elif _hears_any(sensed.contact, robot):
-        mate_gap = _gap_to_heard(robot, sensed, bodies)
-        allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
-    return allowed
+        teammate_gap = _gap_to_heard(robot, sensed, bodies)
+        allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
+    return float(allowed)

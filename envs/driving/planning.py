@@ -14,12 +14,12 @@ from lidarium.envs.driving.drives import Drives, drop_path
 from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE, MAX_POINTS
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, TeamMaps, closeness_of, log_odds_of, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.work_queue import take_turn
+from lidarium.mapping.kernels.work_queue import take_next
 from lidarium.mapping.planning.path_smoothing import kept_places, line_is_clear
 from lidarium.mapping.planning.search.path_search import budget_of, find_path
 from lidarium.mapping.planning.search.search_state import Passage, Terrain
 
-MATE_DISTANCE = 0.06
+TEAMMATE_DISTANCE = 0.06
 """Paths round teammates keep this gap to them [m]."""
 
 
@@ -55,7 +55,7 @@ class Planning(NamedTuple):
     """
 
     robots: int
-    knows_mates: bool
+    knows_teammates: bool
     contact: NDArray[np.uint8]
     heard: NDArray[np.float64]
     radius: float
@@ -121,14 +121,14 @@ def _discs(planning: Planning, row: int, avoided: Array) -> Array:
     first = row // planning.robots * planning.robots
     discs = np.empty((avoided.sum(), 3))
     count = 0
-    for mate in range(planning.robots):
-        if avoided[mate]:
-            x, y = planning.believed[first + mate, 0], planning.believed[first + mate, 1]
-            if not planning.knows_mates:
-                x, y = planning.heard[row, 3 * mate], planning.heard[row, 3 * mate + 1]
+    for teammate in range(planning.robots):
+        if avoided[teammate]:
+            x, y = planning.believed[first + teammate, 0], planning.believed[first + teammate, 1]
+            if not planning.knows_teammates:
+                x, y = planning.heard[row, 3 * teammate], planning.heard[row, 3 * teammate + 1]
             discs[count, 0] = (y - planning.origins[row, 1]) / planning.resolution - 0.5
             discs[count, 1] = (x - planning.origins[row, 0]) / planning.resolution - 0.5
-            discs[count, 2] = (planning.radius + planning.radius + MATE_DISTANCE) / planning.resolution
+            discs[count, 2] = (planning.radius + planning.radius + TEAMMATE_DISTANCE) / planning.resolution
             count += 1
     return discs
 
@@ -290,11 +290,13 @@ def _standing(planning: Planning, drives: Drives, row: int) -> tuple[Array, Arra
     """Return which teammates stand, and which of them for good, (robots,) bool each."""
     first = row // planning.robots * planning.robots
     avoided, ended = np.zeros(planning.robots, np.bool_), np.zeros(planning.robots, np.bool_)
-    for mate in range(planning.robots):
-        other = first + mate
-        if other != row and (planning.knows_mates or planning.contact[row, mate] != 0):
-            ended[mate] = planning.has_ended[other]
-            avoided[mate] = ended[mate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
+    for teammate in range(planning.robots):
+        other = first + teammate
+        if other != row and (planning.knows_teammates or planning.contact[row, teammate] != 0):
+            ended[teammate] = planning.has_ended[other]
+            avoided[teammate] = (
+                ended[teammate] or drives.states[other] == IDLE or drives.states[other] == ARRIVED
+            )
     return avoided, ended
 
 
@@ -312,7 +314,7 @@ def _prepare_teams(
     The work is in so many pieces; it is noted where a robot is blocked.
     """
     for piece in numba.prange(pieces):
-        k = take_turn(turns)
+        k = take_next(turns)
         while k < len(episodes):
             first = episodes[k] * planning.robots
             is_fresh = False
@@ -326,7 +328,7 @@ def _prepare_teams(
                     prepare_robot(planning, drives, row, piece)
                 if drives.states[row] == BLOCKED:
                     is_blocked[k] = True
-            k = take_turn(turns)
+            k = take_next(turns)
 
 
 prepare_teams_serial = kernel(_prepare_teams)

@@ -21,7 +21,7 @@ from lidarium.envs.driving.drives import (
 )
 from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, FORESIGHT_TIMES, IDLE
 from lidarium.envs.driving.planning import (
-    MATE_DISTANCE,
+    TEAMMATE_DISTANCE,
     Destination,
     Planning,
     drive_to,
@@ -35,7 +35,7 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import DriveState, Orders, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.mapping.kernels.work_queue import new_turns
+from lidarium.mapping.kernels.work_queue import new_queue
 from lidarium.mapping.planning.clearance import limit_of
 from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, cells_of, discs_of, passage_of
 from lidarium.mapping.planning.search.search_state import Passage
@@ -116,7 +116,7 @@ class TeamDriver:
             settings.lidar.unit_vectors,
             np.full(settings.robots, robot.radius),
             limits,
-            perception.knows_mates,
+            perception.knows_teammates,
             perception.beliefs.contact,
             perception.beliefs.heard,
             np.ones(settings.robots, np.uint8),
@@ -204,7 +204,7 @@ class TeamDriver:
             )
             threads = self._perception.threads_for(len(simple))
             prepare = prepare_teams_parallel if threads > 1 else prepare_teams_serial
-            prepare(planning, drives, self._perception.maps, simple, is_blocked, new_turns(), threads)
+            prepare(planning, drives, self._perception.maps, simple, is_blocked, new_queue(), threads)
         for episode in simple[is_blocked]:
             self._settle_team(int(episode))
         for episode in episodes[has_refuge]:
@@ -249,17 +249,17 @@ class TeamDriver:
     def _team(self, episode: int) -> slice:
         return slice(episode * self._settings.robots, (episode + 1) * self._settings.robots)
 
-    def _mates(self, row: int) -> list[int]:
+    def _teammates(self, row: int) -> list[int]:
         """Return the rows of a robot's teammates, of those that it knows where they are."""
         first, contact = (
             row // self._settings.robots * self._settings.robots,
             self._perception.beliefs.contact[row],
         )
-        knows_all = self._perception.knows_mates
+        knows_all = self._perception.knows_teammates
         return [
-            first + mate
-            for mate in range(self._settings.robots)
-            if first + mate != row and (knows_all or contact[mate])
+            first + teammate
+            for teammate in range(self._settings.robots)
+            if first + teammate != row and (knows_all or contact[teammate])
         ]
 
     def _live(self, episode: int) -> list[int]:
@@ -280,7 +280,7 @@ class TeamDriver:
         world = perception.world
         return Planning(
             settings.robots,
-            perception.knows_mates,
+            perception.knows_teammates,
             perception.beliefs.contact,
             perception.beliefs.heard,
             settings.robot.radius,
@@ -385,7 +385,7 @@ class TeamDriver:
         reach = self._settings.robot.radius + NEAR + self._settings.robot.radius
         near = [
             other
-            for other in self._mates(row)
+            for other in self._teammates(row)
             if math.dist(here, self._perception.pose_known_to(row, other)[:2]) < reach
         ]
         last = drives.cells[row, drives.counts[row] - 1]
@@ -401,14 +401,15 @@ class TeamDriver:
             return
         movable = [other for other in near if other in live]
         for other in sorted(
-            movable, key=lambda mate: (drives.states[mate] not in (IDLE, ARRIVED), -self._rank(mate))
+            movable,
+            key=lambda teammate: (drives.states[teammate] not in (IDLE, ARRIVED), -self._rank(teammate)),
         ):
             is_idle = drives.states[other] in (IDLE, ARRIVED)
             first, second = (other, row) if is_idle or self._rank(other) > self._rank(row) else (row, other)
-            if self._give_way(first, second) or self._give_way(second, first):
+            if self._yield_to(first, second) or self._yield_to(second, first):
                 return
 
-    def _give_way(self, row: int, to: int) -> bool:
+    def _yield_to(self, row: int, to: int) -> bool:
         """Send a robot out of the way of another's path.
 
         False where there is no such place.
@@ -416,12 +417,12 @@ class TeamDriver:
         drives, world, distance = (
             self.drives,
             self._perception.world,
-            2.0 * self._settings.robot.radius + MATE_DISTANCE,
+            2.0 * self._settings.robot.radius + TEAMMATE_DISTANCE,
         )
         if drives.passing[to] == row or drives.counts[to] == 0:
             return False
         navigation = self._perception.planning_map(row, self.shares_map)
-        others = self._mates(row)
+        others = self._teammates(row)
         poses = [self._perception.pose_known_to(row, other) for other in others]
         bodies: list[Disc] = [(float(pose[0]), float(pose[1]), distance) for pose in poses]
         discs = discs_of(bodies, self._origin(row), navigation.resolution)

@@ -98,7 +98,7 @@ def components(raster: Raster, radius: float) -> Components:
     return _kept(raster, ("components", radius), make)
 
 
-def swept_free_space(raster: Raster, radius: float, starts: NDArray[np.float64]) -> NDArray[np.bool_]:
+def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return the free cells that discs can sweep from the starts.
 
     Parameters

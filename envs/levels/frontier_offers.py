@@ -31,7 +31,7 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import Orders, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.work_queue import new_turns, take_turn
+from lidarium.mapping.kernels.work_queue import new_queue, take_next
 from lidarium.mapping.planning.frontier_approach import approach_places, default_reach
 from lidarium.mapping.planning.frontiers import frontier_clusters, ignore_frontiers_near
 from lidarium.mapping.planning.search.path_search import clear_memory, search_all
@@ -264,7 +264,7 @@ def _renew_teams(
 ) -> None:
     """Give up what robots chose in vain, then offer anew, in so many pieces."""
     for piece in numba.prange(pieces):
-        k = take_turn(turns)
+        k = take_next(turns)
         while k < len(episodes):
             _give_up(planning, maps, drives, looking, choices, episodes[k], is_live, reasons)
             cells, starts = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
@@ -277,7 +277,7 @@ def _renew_teams(
                     record = planning.records[listed]
                     cells, starts = frontier_clusters(flags_of(record), tiles_of(record), 1)
                 _offer(planning, looking, offers, row, cells, starts, piece)
-            k = take_turn(turns)
+            k = take_next(turns)
 
 
 _renew_teams_serial = kernel(_renew_teams)
@@ -390,7 +390,7 @@ class FrontierOffers:
                 is_live,
                 is_offered,
                 reasons,
-                new_turns(),
+                new_queue(),
                 threads,
             )
         return reasons

@@ -34,7 +34,7 @@ from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.kernels.compilation import use_threads
 from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
-from lidarium.mapping.merging.fusion import FusedMap, lay_over
+from lidarium.mapping.merging.fusion import FusedMap, overlay
 from lidarium.mapping.planning.clearance import limit_of, stamp_of
 from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed
 from lidarium.mapping.planning.frontiers import IGNORED
@@ -92,7 +92,7 @@ class Perception:
             is_team and settings.radio.is_ideal,
             is_team and not settings.radio.is_ideal,
         )
-        self.knows_mates = settings.known_starts and settings.radio.is_ideal
+        self.knows_teammates = settings.known_starts and settings.radio.is_ideal
         self.exchanges = (
             []
             if settings.radio.is_ideal
@@ -251,7 +251,7 @@ class Perception:
             return
         told = np.zeros(self.beliefs.log_odds[row].shape, np.int8)
         if others is not None:
-            lay_over(told, others, self.origin_in_frame(row))
+            overlay(told, others, self.origin_in_frame(row))
         before = self._told[row]
         is_other = told != 0 if before is None else told != before
         self._told[row], self._adds_up = told, True
@@ -336,7 +336,11 @@ class Perception:
         told = self._told[row]
         if self.hears:
             copies = self.exchanges[episode].copies[row - first]
-            held = [copy.ctypes.data for mate, copy in enumerate(copies) if first + mate != row and copy.size]
+            held = [
+                copy.ctypes.data
+                for teammate, copy in enumerate(copies)
+                if first + teammate != row and copy.size
+            ]
         else:
             held = [] if told is None else [told.ctypes.data]
         beliefs = np.array(
@@ -432,7 +436,7 @@ class Perception:
 
         It is in the frame of believed poses.
         """
-        if self.knows_mates:
+        if self.knows_teammates:
             return np.asarray(self.beliefs.believed[other])
         return np.asarray(self.beliefs.heard[row].reshape(-1, 3)[other % self._robots])
 
@@ -463,12 +467,12 @@ class Perception:
         exchange, robot = self.exchanges[self.episode_of(row)], row - first
         step, radius = int(self.world.steps[self.episode_of(row)]), self.settings.robot.radius
         known = {}
-        for mate, agent in enumerate(self.settings.agents):
-            if mate != robot and exchange.heard_at[robot, mate] != NEVER:
-                x, y, theta = exchange.heard[robot, mate]
+        for teammate, agent in enumerate(self.settings.agents):
+            if teammate != robot and exchange.heard_at[robot, teammate] != NEVER:
+                x, y, theta = exchange.heard[robot, teammate]
                 pose = np.array([x - self.offsets[row, 0], y - self.offsets[row, 1], theta])
-                age_s = float(step - exchange.heard_at[robot, mate]) * self.settings.time_step
-                known[agent] = Teammate(pose, age_s, radius, bool(exchange.heard_ended[robot, mate]))
+                age_s = float(step - exchange.heard_at[robot, teammate]) * self.settings.time_step
+                known[agent] = Teammate(pose, age_s, radius, bool(exchange.heard_ended[robot, teammate]))
         return known
 
     def goal_of(self, row: int) -> NDArray[np.float64] | None:

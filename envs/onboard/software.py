@@ -13,7 +13,7 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.exchange import CONTACT_S, NEVER
 from lidarium.envs.settings.exploration import KERNEL_LOCALIZATIONS, ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.envs.simulation.kernels.stepping import ranges_without_mates
+from lidarium.envs.simulation.kernels.stepping import ranges_without_teammates
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
 
@@ -91,7 +91,7 @@ class Software:
             localizer = self._perception.localizers[row]
             if localizer is None or world.flags[row] & ENDED:
                 continue
-            ranges_without_mates(simulation.table, row, robots, self._beams)
+            ranges_without_teammates(simulation.table, row, robots, self._beams)
             simulation.beliefs.believed[row] = localizer.localize(
                 Sensing(time_s, simulation.odometry[row].copy(), self._beams.copy())
             )

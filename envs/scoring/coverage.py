@@ -99,7 +99,7 @@ def mark_seen(
 
 
 @kernel(borrowing=True)
-def share_news(owns: Array, team: Array, news: Array, first: int, robots: int, gains: Array) -> int:
+def share_new_cells(owns: Array, team: Array, news: Array, first: int, robots: int, gains: Array) -> int:
     """Credit each cell that is new to the team to the robots that saw it.
 
     Those that saw it in this step share it equally, in robot order.

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.scoring.coverage import pack_bits
 from lidarium.envs.scoring.rewards import TERMS
-from lidarium.mapping.kernels.huge_pages import Pages
+from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 
 def counted_cells(body_free: NDArray[np.bool_], multiple: int) -> NDArray[np.bool_]:
@@ -80,7 +80,7 @@ class Score:
         others = (self.counted_masks[other] for other in same)
         return next((mask for mask in others if np.array_equal(mask, counted)), counted)
 
-    def place(self, episode: int, counted: NDArray[np.uint64], pages: Pages) -> None:
+    def place(self, episode: int, counted: NDArray[np.uint64], pages: ArrayPool) -> None:
         """Start an episode whose F is ``counted`` (rows, words): nothing is sensed."""
         self.counted_masks[episode] = counted
         self.team_masks[episode] = pages.blank(counted.shape, np.uint64)
@@ -90,7 +90,7 @@ class Score:
         self.seen[rows], self.gains[rows] = 0, 0.0
         self.rewarded[rows], self.rewards[rows], self.reward_terms[rows] = 0.0, 0.0, 0.0
 
-    def place_robot(self, row: int, pages: Pages) -> None:
+    def place_robot(self, row: int, pages: ArrayPool) -> None:
         """Give a robot an empty mask."""
         self.masks[row] = pages.blank(self.counted_masks[row // self._robots].shape, np.uint64)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.mapping.grids.occupancy import WORD
 from lidarium.mapping.grids.pooled_maps import touch
-from lidarium.mapping.kernels.huge_pages import Pages
+from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 LEAST_MARGIN = 8.0
 """Maps of robots whose poses drift reach at least this far beyond the floor [m]."""
@@ -17,7 +17,7 @@ Map = tuple[NDArray[np.int8], tuple[float, float]]
 """Log-odds (rows, columns), and where cell (0, 0) begins [m]."""
 
 
-def map_around_start(pages: Pages, floor: FloorTables, resolution: float) -> Map:
+def map_around_start(pages: ArrayPool, floor: FloorTables, resolution: float) -> Map:
     """Return a map in the start's own frame that holds the whole floor.
 
     It does so however the floor is turned.
@@ -29,7 +29,7 @@ def map_around_start(pages: Pages, floor: FloorTables, resolution: float) -> Map
     return pages.blank((2 * half, 2 * half), np.int8), (-half * resolution, -half * resolution)
 
 
-def map_with_margin(pages: Pages, floor: FloorTables, rows: int, columns: int, resolution: float) -> Map:
+def map_with_margin(pages: ArrayPool, floor: FloorTables, rows: int, columns: int, resolution: float) -> Map:
     """Return a map on the floor's lattice that reaches beyond the floor.
 
     It has ``rows`` x ``columns`` cells, for poses that drift.

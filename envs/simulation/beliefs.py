@@ -9,7 +9,7 @@ from lidarium.envs.simulation.belief_maps import blank, map_around_start, map_wi
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.mapping.grids.occupancy import WORD, OccupancySettings
 from lidarium.mapping.grids.pooled_maps import untouched
-from lidarium.mapping.kernels.huge_pages import Pages
+from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 
 class Beliefs:
@@ -70,7 +70,7 @@ class Beliefs:
         floor: FloorTables,
         start: NDArray[np.float64] | None,
         shape: tuple[int, int],
-        pages: Pages,
+        pages: ArrayPool,
     ) -> None:
         """Start anew with a blank map.
 

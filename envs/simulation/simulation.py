@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.scoring.score import Score
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.simulation.backend import World
@@ -17,9 +17,9 @@ from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
 from lidarium.envs.simulation.kernels.arrays import (
     DEAD_RECKONING,
-    KNOWN_MATES,
+    KNOWN_TEAMMATES,
     OWN_FRAME,
-    SOME_MATES,
+    SOME_TEAMMATES,
     TRUE_POSE,
     sensor_numbers,
     table_of_owners,
@@ -33,7 +33,7 @@ from lidarium.envs.simulation.kernels.stepping import (
 )
 from lidarium.mapping.grids.occupancy import WORD, OccupancySettings
 from lidarium.mapping.kernels.compilation import use_threads
-from lidarium.mapping.kernels.huge_pages import Pages
+from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""
@@ -97,7 +97,7 @@ class Simulation:
         scales: Sequence[int] = (),
         reward_weights: NDArray[np.float64] | None = None,
         localization: str = "truth",
-        knows_mates: bool = True,
+        knows_teammates: bool = True,
     ) -> None:
         self.world, self.robots, self.episodes = world, world.robots, world.episodes
         rows, is_true = self.robots * self.episodes, localization == "truth"
@@ -105,7 +105,7 @@ class Simulation:
         self.score = Score(self.robots, self.episodes, reward_weights)
         self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
         self._flags = {"truth": TRUE_POSE, "odometry": DEAD_RECKONING}.get(localization, 0)
-        self._mate_flag = KNOWN_MATES if knows_mates else SOME_MATES
+        self._teammate_flag = KNOWN_TEAMMATES if knows_teammates else SOME_TEAMMATES
         self.sensor = sensor_numbers(lidar, time_step, occupancy.resolution)
         self.unit_vectors, self.noise_table = lidar.unit_vectors, GAUSSIAN_TABLE
         sensors = world.sensors
@@ -113,7 +113,7 @@ class Simulation:
         self.measured, self.bumpers = sensors["velocity"], sensors["bumper"]
         self.floor_rows, self.frames = np.zeros((self.episodes, 10), np.int64), np.zeros((self.episodes, 3))
         self._everywhere = np.ones(self.episodes, np.bool_)
-        self._pages: Pages | None = None
+        self._pool: ArrayPool | None = None
         self._threads = min(threads, int(os.cpu_count() or 1))
         self._table = table_of_owners(self, world, self.beliefs, self.score)
 
@@ -139,24 +139,24 @@ class Simulation:
         starts = within_half_turns(starts)
         # What the laser cannot look into does not count, even where a low body could pass below it.
         smallest = float(self.world.bodies[:, RADIUS].min())
-        free = swept_free_space(floor.body, smallest, starts) & (floor.laser.solid == 0)
+        free = reachable_free_space(floor.body, smallest, starts) & (floor.laser.solid == 0)
         floors = enumerate(self.world.floors)
         same = [other for other, known in floors if other != episode and known is floor]
         counted = self.score.shared(free, multiple, same)
         rows, words = counted.shape
         # What an episode's step goes through lies together.
-        if self._pages is None:
+        if self._pool is None:
             # Log-odds take a byte a cell; masks and pooled maps hardly half of that.
-            self._pages = Pages(3 * counted.size * WORD * self.robots * self.episodes // 2)
+            self._pool = ArrayPool(3 * counted.size * WORD * self.robots * self.episodes // 2)
         self.world.place(episode, floor, starts, free, seed)
         self.frames[episode] = floor.frame
-        self.score.place(episode, counted, self._pages)
+        self.score.place(episode, counted, self._pool)
         for row in range(first, last):
             start = starts[row - first] if known_starts else None
-            self.score.place_robot(row, self._pages)
-            self.beliefs.place(row, floor, start, (rows, words * WORD), self._pages)
+            self.score.place_robot(row, self._pool)
+            self.beliefs.place(row, floor, start, (rows, words * WORD), self._pool)
         self._point_at(episode)
-        self.world.flags[first:last] = self._flags | (self._mate_flag if known_starts else OWN_FRAME)
+        self.world.flags[first:last] = self._flags | (self._teammate_flag if known_starts else OWN_FRAME)
         self.beliefs.forget_changes(first, last)
 
     def _multiple(self, floor: FloorTables) -> int:
@@ -248,11 +248,11 @@ class Simulation:
         render_row(self._table, row, self.robots, np.ascontiguousarray(poses), np.ascontiguousarray(ranges))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_table", "_pages")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_table", "_pool")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._pages = None
+        self._pool = None
         self._table = table_of_owners(self, self.world, self.beliefs, self.score)
         for episode in range(self.episodes):
             self._point_at(episode)

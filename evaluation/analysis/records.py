@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.evaluation.analysis.episodes import Row
 from lidarium.evaluation.record import read_record
-from lidarium.mapping.grids.speckle_filter import without_specks
+from lidarium.mapping.grids.speckle_filter import without_small_components
 
 FOLDER = "records"
 
@@ -114,7 +114,7 @@ def record_key(row: Row) -> Key:
 def read_track(entry: Entry) -> Track:
     """Read ways and the last map of a record."""
     display = read_record(entry.path).display
-    levels = without_specks(display.map_at(float(display.times[-1])))
+    levels = without_small_components(display.map_at(float(display.times[-1])))
     return Track(
         display.times, display.poses, levels, (display.origin[0], display.origin[1]), display.resolution
     )

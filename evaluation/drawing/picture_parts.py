@@ -91,7 +91,7 @@ def page(aspect: float) -> tuple[Figure, Axes, Axes, Axes]:
     )
 
 
-def save_page(path: Path, figure: Figure, title: str, subtitle: str) -> None:
+def save_figure(path: Path, figure: Figure, title: str, subtitle: str) -> None:
     """Write a page with its titles as a PNG file."""
     figure.suptitle(title, x=0.012, ha="left", fontsize=15, fontweight="bold", color=INK)
     figure.axes[0].set_title(subtitle, loc="left", fontsize=10.5, color=FAINT)
@@ -143,7 +143,7 @@ def drawn_together(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(padded.reshape(rows // block, block, columns // block, block).max(axis=1).max(axis=2))
 
 
-def draw_ways(axes: Axes, track: NDArray[np.float64], radius: float) -> None:
+def draw_trajectories(axes: Axes, track: NDArray[np.float64], radius: float) -> None:
     """Draw the paths of robots along their poses (times, robots, 3).
 
     The robots have a radius [m]; paths run from start to end.

@@ -36,19 +36,19 @@ from lidarium.evaluation.drawing.picture_parts import (
     SOLID,
     box_around,
     draw_curve,
-    draw_ways,
+    draw_trajectories,
     drawn_together,
     list_robots,
     page,
     rgb,
-    save_page,
+    save_figure,
     show_cells,
 )
 from lidarium.evaluation.drawing.video import FRAMES_PER_SECOND, LAST_FRAME_S, check_speed, film_writer
 from lidarium.evaluation.metrics import path_lengths
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.grids.speckle_filter import without_specks
+from lidarium.mapping.grids.speckle_filter import without_small_components
 
 _PALETTE = np.zeros((256, 3), np.uint8)
 _PALETTE[[OCCUPIED, UNKNOWN, FREE]] = WALL, UNEXPLORED, EXPLORED
@@ -81,7 +81,7 @@ class TrackFrames:
         Paths are those of the last minute, targets are rings, and robots have their headings.
         """
         display, view = self._display, self.view
-        levels = without_specks(display.map_at(time_s))[view.rows, view.columns]
+        levels = without_small_components(display.map_at(time_s))[view.rows, view.columns]
         frame = enlarged(_PALETTE[_blocks(levels, view)], view)
         recent = (display.times >= time_s - RECENT_S) & (display.times <= time_s + 1e-9)
         poses = display.poses_at(time_s)
@@ -150,7 +150,7 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
     It shows the team's map, all paths, coverage over time and endings.
     """
     header, display = record.header, record.display
-    levels = without_specks(display.map_at(math.inf))
+    levels = without_small_components(display.map_at(math.inf))
     box = box_around(levels != UNKNOWN, display.origin, display.resolution)
     figure, floor_axes, curve_axes, team_axes = page(box.aspect)
     # In the order of what shows where cells are drawn together.
@@ -158,7 +158,7 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
     classes[levels == FREE], classes[levels == OCCUPIED] = 1, 2
     palette = np.stack([rgb(colour) for colour in (_UNSEEN, "#ffffff", INK)])
     show_cells(floor_axes, palette[drawn_together(classes[box.rows, box.columns])], box, _UNSEEN)
-    draw_ways(floor_axes, display.poses, radius_of(record))
+    draw_trajectories(floor_axes, display.poses, radius_of(record))
     _draw_legend(figure)
     end, coverage = float(display.times[-1]), float(display.coverage[-1, 1])
     reached = {
@@ -184,7 +184,7 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
         "" if header["seed"] is None else f"seed {header['seed']}",
         f"lidarium {header['version']}",
     ]
-    save_page(path, figure, title, ", ".join(part for part in about if part))
+    save_figure(path, figure, title, ", ".join(part for part in about if part))
 
 
 def radius_of(record: EpisodeRecord) -> float:

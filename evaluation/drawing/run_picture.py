@@ -24,12 +24,12 @@ from lidarium.evaluation.drawing.picture_parts import (
     box_around,
     draw_curve,
     draw_start,
-    draw_ways,
+    draw_trajectories,
     drawn_together,
     list_robots,
     page,
     rgb,
-    save_page,
+    save_figure,
     show_cells,
 )
 from lidarium.evaluation.drawing.supervision_marks import draw_supervision
@@ -37,7 +37,7 @@ from lidarium.evaluation.episodes.runner import Episode
 from lidarium.evaluation.truth.beliefs import team_log_odds
 from lidarium.evaluation.truth.true_map import occupied_in_truth
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN, three_levels
-from lidarium.mapping.grids.speckle_filter import without_specks
+from lidarium.mapping.grids.speckle_filter import without_small_components
 from lidarium.mapping.planning.frontiers import IGNORED
 from lidarium.mapping.planning.grid_planning import centres_of
 
@@ -66,7 +66,7 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
     x_min, y_min, x_max, y_max = env.floor.bounds
     figure, floor_axes, curve_axes, team_axes = page((x_max - x_min) / (y_max - y_min))
     _draw_maps(floor_axes, episode)
-    draw_ways(
+    draw_trajectories(
         floor_axes,
         np.stack([poses for _, poses in scorer.track] + [env.world.poses]),
         env.settings.robot.radius,
@@ -83,7 +83,7 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
         f"s{how}"
     )
     subtitle = f"{robots}, {policy}, seed {episode.seed}, {float(env.world.travelled.sum()):.1f} m driven"
-    save_page(path, figure, title, subtitle)
+    save_figure(path, figure, title, subtitle)
 
 
 def save_floor_picture(path: Path, floor: Floor, height: float, resolution: float = 0.025) -> None:
@@ -118,7 +118,7 @@ def save_floor_picture(path: Path, floor: Floor, height: float, resolution: floa
             zorder=8,
         )
     x_min, y_min, x_max, y_max = floor.bounds
-    save_page(
+    save_figure(
         path,
         figure,
         floor.name,
@@ -167,7 +167,7 @@ def _draw_maps(axes: Axes, episode: Episode) -> None:
     solid = occupied_in_truth(env)
     counted = unpack_bits(env.score.counted_masks[0], solid.shape[1])
     rows, columns = np.flatnonzero(solid.any(axis=1))[-1] + 1, np.flatnonzero(solid.any(axis=0))[-1] + 1
-    levels = without_specks(three_levels(log_odds))
+    levels = without_small_components(three_levels(log_odds))
     solid, counted, levels = solid[:rows, :columns], counted[:rows, :columns], levels[:rows, :columns]
     # In the order of what shows where cells are drawn together.
     classes = np.zeros(solid.shape, np.uint8)
@@ -197,7 +197,7 @@ def _border_of_team_map(episode: Episode) -> tuple[NDArray[np.bool_], tuple[floa
     What one robot has left on its own map another may have seen.
     """
     log_odds, origin = team_log_odds(episode.env)
-    levels = without_specks(three_levels(log_odds))
+    levels = without_small_components(three_levels(log_odds))
     square = np.ones((3, 3), np.uint8)
     free, unknown = (cv2.dilate((levels == level).astype(np.uint8), square) != 0 for level in (FREE, UNKNOWN))
     return np.asarray(free & unknown), origin

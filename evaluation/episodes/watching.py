@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.report import GivenUp
-from lidarium.envs.episode_start import Beginning
+from lidarium.envs.episode_start import EpisodeStart
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.radio.messages import Orders
@@ -83,7 +83,7 @@ class WatchedExploration(ExplorationEnv):
         super().__init__(floor, settings, image_resolution=image_resolution)
         self.watchers: list[Watcher] = list(watchers)
 
-    def start(self, beginning: Beginning) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+    def start(self, beginning: EpisodeStart) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode, as ``ExplorationEnv.start``."""
         told = super().start(beginning)
         for watcher in self.watchers:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.record.display import MapChanges
 from lidarium.evaluation.truth.beliefs import cells_beyond
-from lidarium.mapping.grids.map_deltas import LaidMaps, note_changes, note_laid_changes
+from lidarium.mapping.grids.map_deltas import LaidMaps, note_changes, note_overlaid_changes
 
 FAR = 1e5
 """How far from a robot a map may have changed that was rendered anew [m]."""
@@ -57,16 +57,18 @@ class MapSampler:
             settings.lidar.range_max + 0.5 * settings.robot.max_speed * period_s + 4 * self._resolution
         )
         self._last = env.beliefs.believed[:, :2].copy()
-        self._is_laid = not settings.known_starts
+        self._is_overlaid = not settings.known_starts
         self._maps = env.beliefs.belief_rows.copy()
         if settings.known_starts:
             for row in range(settings.robots):
                 first_row, first_column = cells_beyond(env, row)
                 self._maps[row, 0] += first_row * self._maps[row, 2] + first_column
         self._renderings = env.beliefs.renderings.copy()
-        self._lays = _lays_of(env, self.origin)
+        self._lays = _overlays_of(env, self.origin)
         self._before = (
-            [np.zeros(log_odds.shape, np.int8) for log_odds in env.beliefs.log_odds] if self._is_laid else []
+            [np.zeros(log_odds.shape, np.int8) for log_odds in env.beliefs.log_odds]
+            if self._is_overlaid
+            else []
         )
         self._before_at = np.array([log_odds.ctypes.data for log_odds in self._before], np.int64)
         self._steps: list[int] = []
@@ -83,9 +85,9 @@ class MapSampler:
         is_new = not np.array_equal(self._renderings, self._env.beliefs.renderings)
         reach = FAR if is_new else self._reach
         self._renderings[:] = self._env.beliefs.renderings
-        if self._is_laid:
+        if self._is_overlaid:
             laid = LaidMaps(self._env.beliefs.belief_rows, self._before_at, self._lays, self._resolution)
-            count = note_laid_changes(laid, self._env.beliefs.believed, self._last, reach, *planes)
+            count = note_overlaid_changes(laid, self._env.beliefs.believed, self._last, reach, *planes)
         else:
             count = note_changes(
                 self._maps, self._env.beliefs.believed, self._last, reach, self._frame, *planes
@@ -105,7 +107,7 @@ class MapSampler:
         return MapChanges(*self.shape, times, counts, places[order], changes[order, 1], changes[order, 2])
 
 
-def _lays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
+def _overlays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
     """Return how maps in the frames of the starts lie over the floor's lattice.
 
     It is in the form that ``note_laid_changes`` takes.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import lidarium
-from lidarium.envs.episode_start import Beginning
+from lidarium.envs.episode_start import EpisodeStart
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor
 from lidarium.envs.floors.floor import Floor
@@ -79,7 +79,7 @@ def drive_again(
     goal = None if header["goal"] is None else (header["goal"][0], header["goal"][1])
     # The recorded speeds have all pauses in them; nobody is there to end one that the re-run would make.
     env = WatchedExploration(there, replace(settings, pauses_when_blocked=False), watchers=watchers)
-    env.start(Beginning(there, tables, np.array(header["starts"], np.float64), header["noise_seed"], goal))
+    env.start(EpisodeStart(there, tables, np.array(header["starts"], np.float64), header["noise_seed"], goal))
     endings: dict[int, list[tuple[str, str]]] = {}
     for step, agent, reason in header["endings"]:
         endings.setdefault(step, []).append((agent, reason))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Raster
-from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.scoring.coverage import unpack_bits
 from lidarium.envs.scoring.score import counted_cells
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
@@ -72,7 +72,7 @@ def left_by_failed(env: ExplorationEnv) -> Mask | None:
             body.origin[0] + (columns + 0.5) * resolution - x, body.origin[1] + (rows + 0.5) * resolution - y
         )
         solid[near < env.settings.robot.radius - resolution] = 1
-    swept = swept_free_space(
+    swept = reachable_free_space(
         Raster(solid, body.origin, resolution), float(world.bodies[:, RADIUS].min()), world.poses[~failed]
     )
     free = swept & (tables.laser.solid == 0)

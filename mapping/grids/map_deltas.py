@@ -207,7 +207,7 @@ def _mark_stale(
 
 
 @kernel
-def _add_laid_group(
+def _add_overlaid_group(
     log_odds: Array, lay: Array, resolution: float, row: int, first: int, total: Array
 ) -> None:
     """Add the cells of a rotated map that lie below a group of the lattice.
@@ -227,7 +227,7 @@ def _add_laid_group(
 
 
 @kernel
-def note_laid_changes(
+def note_overlaid_changes(
     laid: LaidMaps,
     poses: Array,
     last: Array,
@@ -276,7 +276,7 @@ def note_laid_changes(
                     part = sums[group * _GROUP : (group + 1) * _GROUP]
                     part[:] = np.int16(0)
                     for robot in range(maps.shape[0]):
-                        _add_laid_group(
+                        _add_overlaid_group(
                             maps[robot], lays[robot], resolution, row, word * 64 + group * _GROUP, part
                         )
             if _note_word(sums.ctypes.data, where, row, word, known, occupied, changes[found]):

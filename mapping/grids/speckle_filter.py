@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 
-LARGEST_SPECK = 3
+LARGEST_COMPONENT = 3
 """Most free cells of a small component, where it lies in a wall.
 
 No other free cell touches the component over a side.
@@ -18,13 +18,13 @@ No other free cell touches the component over a side.
 _CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 
 
-def without_specks(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def without_small_components(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return a three-level map with small free components within walls closed.
 
     The map is for pictures.
 
     Where cells are finer than the noise of the laser, ends of beams scatter over a wall's front, and single
-    free cells remain between them. A speck is a group of at most `LARGEST_SPECK` free cells, joined over
+    free cells remain between them. A speck is a group of at most `LARGEST_COMPONENT` free cells, joined over
     sides, half or more of whose sides are walls.
 
     Parameters
@@ -35,15 +35,17 @@ def without_specks(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     count, labels, statistics, _ = cv2.connectedComponentsWithStats(
         (levels == FREE).astype(np.uint8), connectivity=4
     )
-    is_small = statistics[:, cv2.CC_STAT_AREA] <= LARGEST_SPECK
+    is_small = statistics[:, cv2.CC_STAT_AREA] <= LARGEST_COMPONENT
     is_small[0] = False
     if not is_small.any():
         return levels.copy()
     # Sides of each cell that are walls, and those that are not of its own group.
     walls = cv2.filter2D((levels == OCCUPIED).astype(np.uint8), -1, _CROSS, borderType=cv2.BORDER_CONSTANT)
     others = cv2.filter2D((levels != FREE).astype(np.uint8), -1, _CROSS, borderType=cv2.BORDER_CONSTANT)
-    speck = is_small[labels]
-    sides = [np.bincount(labels[speck], weights=kind[speck], minlength=count) for kind in (walls, others)]
+    component = is_small[labels]
+    sides = [
+        np.bincount(labels[component], weights=kind[component], minlength=count) for kind in (walls, others)
+    ]
     is_in_wall = is_small & (2 * sides[0] >= sides[1]) & (sides[0] > 0)
     closed = levels.copy()
     closed[is_in_wall[labels]] = OCCUPIED

@@ -38,7 +38,7 @@ A large page takes up memory as a whole as soon as a part of it is accessed.
 Number = TypeVar("Number", bound=np.generic)
 
 
-class Pages:
+class ArrayPool:
     """Blank memory for arrays, one beside the other.
 
     What numpy allocates may come from memory that was used before, which has to be written over as a whole.

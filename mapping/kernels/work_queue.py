@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 
-def new_turns() -> NDArray[np.int64]:
+def new_queue() -> NDArray[np.int64]:
     """Return the counter of a loop that has not begun, for ``take_turn``."""
     return np.zeros(1, np.int64)
 
@@ -37,7 +37,7 @@ _take: Any = intrinsic(_add_one)
 
 
 @kernel(inline=True)
-def take_turn(turns: Array) -> int:
+def take_next(turns: Array) -> int:
     """Return the number of the next turn of ``new_turns``, from 0 on.
 
     No two threads are given the same.

@@ -120,7 +120,7 @@ def _bounds(
     )
 
 
-def lay_over(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, float]) -> None:
+def overlay(log_odds: NDArray[np.int8], fused: FusedMap, origin: tuple[float, float]) -> None:
     """Write what a fused map knows into a blank map of the same cells, in its units.
 
     What lies beyond it is lost.

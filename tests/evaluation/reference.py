@@ -13,7 +13,7 @@ import numpy as np
 from lidarium.evaluation.episodes.watching import Watcher
 
 GRAZING = 8.0
-MATE_MARGIN = 1.5
+TEAMMATE_MARGIN = 1.5
 JUST_INSIDE = 1.0 + 1.2e-7
 HIT, MISS, LEAST, MOST = 17, 8, -40, 70
 ENDED = 4
@@ -189,8 +189,11 @@ class Reference:
             if length > self.reach:
                 continue
             end = pose[:2] + length * np.array([math.cos(pose[2] + angle), math.sin(pose[2] + angle)])
-            mates = [other for k, other in enumerate(poses) if k != robot]
-            if any(math.dist(end, mate[:2]) <= self.radius + MATE_MARGIN * self.resolution for mate in mates):
+            teammates = [other for k, other in enumerate(poses) if k != robot]
+            if any(
+                math.dist(end, teammate[:2]) <= self.radius + TEAMMATE_MARGIN * self.resolution
+                for teammate in teammates
+            ):
                 continue
             column, row = np.floor((end - self.origin) / self.resolution).astype(int)
             cells.add((int(row), int(column)))

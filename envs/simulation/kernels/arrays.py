@@ -15,7 +15,7 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import arrays_at, table_of
 
-TRUE_POSE, KNOWN_MATES, ENDED, OWN_FRAME, DEAD_RECKONING, SOME_MATES = 1, 2, 4, 8, 16, 32
+TRUE_POSE, KNOWN_TEAMMATES, ENDED, OWN_FRAME, DEAD_RECKONING, SOME_TEAMMATES = 1, 2, 4, 8, 16, 32
 """Flags of a row: what the robot knows of poses, and whether it has ended.
 
 In order: the localizer knows the true pose; teammates' poses are known; the robot has ended (its body stands

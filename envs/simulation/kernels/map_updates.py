@@ -9,7 +9,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     ANGLE_FIRST,
     ANGLE_INCREMENT,
     FULL_CIRCLE,
-    KNOWN_MATES,
+    KNOWN_TEAMMATES,
     MAP,
     MAP_COLUMNS,
     MAP_RESOLUTION,
@@ -17,7 +17,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     NOISE_FLOOR,
     NOISE_SHARE,
     RANGE_MAX,
-    SOME_MATES,
+    SOME_TEAMMATES,
     TOUCHED,
     TOUCHED_ROWS,
     WorldArrays,
@@ -32,7 +32,7 @@ from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_grid_at, scratch_vector, word_grid_at
 
-MATE_MARGIN = 1.5
+TEAMMATE_MARGIN = 1.5
 """Distance within which a beam's end counts as a teammate's body [map cells].
 
 It is measured to the body of the teammate.
@@ -40,7 +40,7 @@ It is measured to the body of the teammate.
 
 
 @kernel(borrowing=True)
-def _filter_mates(
+def _filter_teammates(
     world: WorldArrays, row: int, first: int, robots: int, x: float, y: float, ends: Array, is_hit: Array
 ) -> None:
     """Remove the hits on teammates whose believed poses are known.
@@ -52,15 +52,15 @@ def _filter_mates(
     scale = 1.0 / sensor[MAP_RESOLUTION]
     reach = sensor[RANGE_MAX] * scale
     turn = 2.0 * math.pi / sensor[ANGLE_INCREMENT]
-    knows_all = world.flags[row] & KNOWN_MATES != 0
+    knows_all = world.flags[row] & KNOWN_TEAMMATES != 0
     for other in range(first, first + robots):
-        mate = other - first
-        if other == row or not (knows_all or world.contact[row, mate] != 0):
+        teammate = other - first
+        if other == row or not (knows_all or world.contact[row, teammate] != 0):
             continue
-        mate_x = believed[other, 0] if knows_all else world.heard[row, 3 * mate]
-        mate_y = believed[other, 1] if knows_all else world.heard[row, 3 * mate + 1]
-        gap_x, gap_y = (mate_x - believed[row, 0]) * scale, (mate_y - believed[row, 1]) * scale
-        radius = world.bodies[other - first, RADIUS] * scale + MATE_MARGIN
+        teammate_x = believed[other, 0] if knows_all else world.heard[row, 3 * teammate]
+        teammate_y = believed[other, 1] if knows_all else world.heard[row, 3 * teammate + 1]
+        gap_x, gap_y = (teammate_x - believed[row, 0]) * scale, (teammate_y - believed[row, 1]) * scale
+        radius = world.bodies[other - first, RADIUS] * scale + TEAMMATE_MARGIN
         if gap_x * gap_x + gap_y * gap_y > (reach + radius) ** 2:
             continue
         begin, count = beams_towards(
@@ -76,7 +76,7 @@ def _filter_mates(
 
 
 @kernel
-def invalidate_mates(world: WorldArrays, row: int, first: int, robots: int, ranges: Array) -> None:
+def invalidate_teammates(world: WorldArrays, row: int, first: int, robots: int, ranges: Array) -> None:
     """Make the beams of a scan (beams,) invalid that met teammates.
 
     This holds as far as the robot knows where they are.
@@ -89,7 +89,7 @@ def invalidate_mates(world: WorldArrays, row: int, first: int, robots: int, rang
         is_hit[beam] = ranges[beam] <= world.sensor[RANGE_MAX]
         lengths[beam] = ranges[beam] * scale if is_hit[beam] else 0.0
     scan_ends(lengths, directions, 0.0, 0.0, ends)
-    _filter_mates(world, row, first, robots, 0.0, 0.0, ends, is_hit)
+    _filter_teammates(world, row, first, robots, 0.0, 0.0, ends, is_hit)
     for beam in range(beams):
         if not is_hit[beam] and ranges[beam] <= world.sensor[RANGE_MAX]:
             ranges[beam] = np.float32(np.nan)
@@ -146,8 +146,8 @@ def update_map(
             sensor[FULL_CIRCLE] != 0.0,
             bits,
         )
-    if world.flags[row] & (KNOWN_MATES | SOME_MATES):
-        _filter_mates(world, row, first, robots, local_x, local_y, ends, is_hit)
+    if world.flags[row] & (KNOWN_TEAMMATES | SOME_TEAMMATES):
+        _filter_teammates(world, row, first, robots, local_x, local_y, ends, is_hit)
     touched = word_grid_at(belief[TOUCHED], belief[TOUCHED_ROWS], touched_words(belief[MAP_COLUMNS]))
     seen = SeenScan(bits, scratch.windows[1], box, ends, is_hit, row_offset, column_offset)
     integrate_scan(log_odds, seen, world.increments, touched)

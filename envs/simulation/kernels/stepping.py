@@ -9,7 +9,7 @@ import math
 
 import numba
 
-from lidarium.envs.scoring.coverage import share_news
+from lidarium.envs.scoring.coverage import share_new_cells
 from lidarium.envs.scoring.rewards import add_rewards
 from lidarium.envs.simulation.disturbances.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
 from lidarium.envs.simulation.disturbances.noise import stream_key
@@ -27,19 +27,19 @@ from lidarium.envs.simulation.kernels.arrays import (
     ENDED,
     FLOOR_COLUMNS,
     FLOOR_ROWS,
-    KNOWN_MATES,
+    KNOWN_TEAMMATES,
     MASK_ROWS,
     MASK_WORDS,
     OWN_FRAME,
     OWN_MASK,
-    SOME_MATES,
+    SOME_TEAMMATES,
     TEAM_MASK,
     TIME_STEP,
     TRUE_POSE,
     WorldArrays,
     world_at,
 )
-from lidarium.envs.simulation.kernels.map_updates import invalidate_mates, perceive_robot
+from lidarium.envs.simulation.kernels.map_updates import invalidate_teammates, perceive_robot
 from lidarium.envs.simulation.kernels.masks import score_robot
 from lidarium.envs.simulation.kernels.motion import move_robots
 from lidarium.envs.simulation.kernels.scanning import scan_scratch, sense_robot
@@ -165,7 +165,7 @@ def _share(world: WorldArrays, episode: int, robots: int) -> None:
         world.mask_rows[first, MASK_ROWS],
         world.mask_rows[first, MASK_WORDS],
     )
-    world.team_seen[episode] += share_news(
+    world.team_seen[episode] += share_new_cells(
         world.mask_rows[:, OWN_MASK], team, world.boxes, first, robots, world.gains
     )
     world.steps[episode] += 1
@@ -260,7 +260,7 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
     world = world_at(table)
     flags, pose, scan = world.flags[row], world.believed[row].copy(), world.ranges[row].copy()
     # Where teammates were at the time is not known any more.
-    world.flags[row] = flags & ~(KNOWN_MATES | SOME_MATES)
+    world.flags[row] = flags & ~(KNOWN_TEAMMATES | SOME_TEAMMATES)
     scratch = scan_scratch(world)
     for k in range(poses.shape[0]):
         world.believed[row, 0], world.believed[row, 1], world.believed[row, 2] = (
@@ -276,15 +276,15 @@ def render_row(table: Array, row: int, robots: int, poses: Array, ranges: Array)
 
 
 @kernel
-def ranges_without_mates(table: Array, row: int, robots: int, ranges: Array) -> None:
+def ranges_without_teammates(table: Array, row: int, robots: int, ranges: Array) -> None:
     """Copy a robot's scan into ``ranges`` (beams,), without teammates.
 
     Beams that met teammates are made invalid where the robot knows these.
     """
     world = world_at(table)
     ranges[:] = world.ranges[row]
-    if world.flags[row] & (KNOWN_MATES | SOME_MATES):
-        invalidate_mates(world, row, row // robots * robots, robots, ranges)
+    if world.flags[row] & (KNOWN_TEAMMATES | SOME_TEAMMATES):
+        invalidate_teammates(world, row, row // robots * robots, robots, ranges)
 
 
 def _step_serial(

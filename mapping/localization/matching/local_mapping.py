@@ -227,7 +227,7 @@ class LocalMapper:
             settings.surface_m,
         )
 
-    def laid_again(self, points: NDArray[np.float64]) -> Match | None:
+    def rendered_again(self, points: NDArray[np.float64]) -> Match | None:
         """Return where the older local map's first scan now lies on that map.
 
         Its points are (n, 2) [m]. None if they do not match.

@@ -149,7 +149,7 @@ def _sum_disagreement(
             continue
         for i in range(width):
             for j in range(width):
-                level = int(levels[row + i, column + j])
+                level = int(levels[np.uintp(row + i), np.uintp(column + j)])
                 squared = ((LEVELS - level) * (LEVELS - level)) >> LEVEL_BITS
                 sums[i, j] += unseen_cost if level == UNSEEN else squared
 

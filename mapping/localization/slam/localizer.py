@@ -308,7 +308,7 @@ class Slam:
         The map was begun by few scans, whose errors displace the scan from the robot's start.
         """
         self._first = None
-        match = self._mapper.laid_again(points) if self._mapper.node == 1 else None
+        match = self._mapper.rendered_again(points) if self._mapper.node == 1 else None
         if match is not None:
             self._graph.begin_at(composed(pose, relative(match.pose, np.zeros(3))))
             self._note_correction()

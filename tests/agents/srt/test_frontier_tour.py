@@ -191,5 +191,5 @@ def test_towards_a_goal_a_robot_goes_to_the_frontier_from_which_least_is_left():
 
 def test_towards_a_goal_what_a_teammate_goes_for_is_left_to_it():
     memory = hall([(2.5, 3.5), (10.5, 11.5)])
-    mate = Candidate(0, np.array([12.0, 4.0]), None, np.array([12.0, 5.0]), is_frontier=True)
-    assert went_for(memory, (11.0, 8.0), [mate]) < 4.0
+    teammate = Candidate(0, np.array([12.0, 4.0]), None, np.array([12.0, 5.0]), is_frontier=True)
+    assert went_for(memory, (11.0, 8.0), [teammate]) < 4.0

@@ -98,7 +98,7 @@ def test_a_robot_claims_nothing_of_where_it_has_been():
     assert np.count_nonzero(levels == 127) == pytest.approx((4.0 + 0.66) * 0.66 / RESOLUTION**2, rel=0.15)
 
 
-def test_mates_of_a_robot_that_fails_learn_once_where_it_drove(station):
+def test_teammates_of_a_robot_that_fails_learn_once_where_it_drove(station):
     trail = [(8.0, 8.0)] * 3 + [(9.0, 8.0)]
     for time_s in (8.0, 10.0):
         station.receive(

@@ -43,7 +43,7 @@ def test_whatever_states_robots_are_in_only_those_that_operate_get_orders(robots
         working = [one for one in team if one.state is OperatingState.OPERATING]
         for one in team:
             # All that operate go to one goal: the first of them is the nearest.
-            rivals = [mate for mate in working if mate is not one]
+            rivals = [teammate for teammate in working if teammate is not one]
             rule, order, _ = outcome(Case(one, rival=rivals[0] if rivals else None))
             if one.state is OperatingState.FAILED:
                 assert (rule, order) == (1, None)

@@ -42,7 +42,7 @@ def hall(rows=200, columns=280, boxes=()):
 class Drive:
     """Robots that follow hand-made paths."""
 
-    def __init__(self, tables, starts, paths, heading=math.nan, knows_mates=True, margin=0.3):
+    def __init__(self, tables, starts, paths, heading=math.nan, knows_teammates=True, margin=0.3):
         count = len(starts)
         self.simulation = KinematicSimulation.of_team(
             [ROBOTS["kobuki"]] * count, Lidar(), OccupancySettings()
@@ -58,7 +58,7 @@ class Drive:
         self.places, self.headings = np.minimum(1, self.counts - 1), np.full(count, heading)
         self.states = np.where(self.counts > 0, DRIVING, IDLE)
         self.stood, self.backing = np.zeros(count, np.int64), np.zeros(count, np.int64)
-        self.knows_mates, self.present = knows_mates, np.ones(count, np.uint8)
+        self.knows_teammates, self.present = knows_teammates, np.ones(count, np.uint8)
         self.commands, self.track, self.speeds = np.zeros((count, 2)), [], []
 
     def step(self, steps=1):
@@ -86,7 +86,7 @@ class Drive:
                     simulation.lidar.unit_vectors,
                     simulation.world.bodies[:, 0].copy(),
                     self.limits,
-                    self.knows_mates,
+                    self.knows_teammates,
                     self.present,
                     FORESIGHT_TIMES,
                 ),
@@ -177,9 +177,12 @@ def test_the_robot_passes_a_post_just_beside_its_swath():
 
 
 @pytest.mark.parametrize("knows_mates", [True, False])
-def test_the_robot_stops_before_a_body_that_appears_on_its_way_and_goes_on_when_it_is_gone(knows_mates):
+def test_the_robot_stops_before_a_body_that_appears_on_its_way_and_goes_on_when_it_is_gone(knows_teammates):
     drive = Drive(
-        hall(), [(1.0, 2.0, 0.0), (4.0, 4.0, 0.0)], [[(1.0, 2.0), (5.0, 2.0)], []], knows_mates=knows_mates
+        hall(),
+        [(1.0, 2.0, 0.0), (4.0, 4.0, 0.0)],
+        [[(1.0, 2.0), (5.0, 2.0)], []],
+        knows_teammates=knows_teammates,
     ).step(25)
     speed = float(drive.simulation.world.velocities[0, 0])
     assert speed == pytest.approx(0.33, abs=0.01)

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from lidarium.envs.floors import free_space
 from lidarium.envs.floors.floor import Raster
-from lidarium.envs.floors.free_space import KEPT, components, configuration_space, swept_free_space
+from lidarium.envs.floors.free_space import KEPT, components, configuration_space, reachable_free_space
 from lidarium.envs.floors.starts import draw_starts
 from tests.envs.floors.rooms import two_rooms
 
@@ -51,22 +51,22 @@ def test_the_swept_space_is_what_discs_cover_from_the_start(seed, radius):
         <= radius + 1e-9
     )
     start = np.array([[(column + 0.5) * 0.05, (row + 0.5) * 0.05, 0.0]])
-    np.testing.assert_array_equal(swept_free_space(raster, radius, start), near & (raster.solid == 0))
+    np.testing.assert_array_equal(reachable_free_space(raster, radius, start), near & (raster.solid == 0))
 
 
 def test_a_sealed_room_is_never_swept():
-    swept = swept_free_space(two_rooms(), 0.18, np.array([[1.0, 1.0, 0.0]]))
+    swept = reachable_free_space(two_rooms(), 0.18, np.array([[1.0, 1.0, 0.0]]))
     assert 0.97 < swept.sum() * 0.025**2 / 16.0 <= 1.0
 
 
 def test_a_door_is_passed_by_a_robot_that_fits_and_by_no_other():
     start = np.array([[1.0, 1.0, 0.0]])
-    assert swept_free_space(two_rooms(0.8), 0.18, start).sum() * 0.025**2 > 23.0
-    assert swept_free_space(two_rooms(0.8), 0.45, start).sum() * 0.025**2 < 17.0
+    assert reachable_free_space(two_rooms(0.8), 0.18, start).sum() * 0.025**2 > 23.0
+    assert reachable_free_space(two_rooms(0.8), 0.45, start).sum() * 0.025**2 < 17.0
 
 
 def test_both_rooms_are_swept_if_robots_start_in_both():
-    swept = swept_free_space(two_rooms(), 0.18, np.array([[1.0, 1.0], [5.0, 2.0]]))
+    swept = reachable_free_space(two_rooms(), 0.18, np.array([[1.0, 1.0], [5.0, 2.0]]))
     assert swept.sum() * 0.025**2 > 23.0
 
 
@@ -98,18 +98,18 @@ def read_only(raster):
 def test_what_a_shared_raster_is_asked_again_is_kept_and_is_what_a_new_one_gives():
     raster, start = read_only(two_rooms(0.8)), np.array([[1.0, 1.0, 0.0]])
     size = raster.nbytes
-    first = swept_free_space(raster, 0.18, start)
+    first = reachable_free_space(raster, 0.18, start)
     assert raster.nbytes == size
-    second = swept_free_space(raster, 0.18, start)
+    second = reachable_free_space(raster, 0.18, start)
     assert raster.nbytes > size
-    assert swept_free_space(raster, 0.18, start) is second
+    assert reachable_free_space(raster, 0.18, start) is second
     assert not second.flags.writeable
     np.testing.assert_array_equal(first, second)
     for radius in (0.18, 0.45):
         for place in ((1.0, 1.0), (5.0, 2.0)):
             at = np.array([place])
             np.testing.assert_array_equal(
-                swept_free_space(raster, radius, at), swept_free_space(two_rooms(0.8), radius, at)
+                reachable_free_space(raster, radius, at), reachable_free_space(two_rooms(0.8), radius, at)
             )
 
 

@@ -80,11 +80,11 @@ def test_poses_of_all_are_told_in_each_robots_own_frame():
         offset = env.perception.offset(row)
         assert np.allclose(belief.pose[:2] + offset, env.world.poses[row, :2])
         assert set(belief.teammates) == set(env.agents) - {agent}
-        for name, mate in belief.teammates.items():
+        for name, teammate in belief.teammates.items():
             other = int(name[-1])
-            assert np.allclose(mate.pose[:2] + offset, env.world.poses[other, :2])
-            assert mate.pose[2] == env.world.poses[other, 2]
-            assert (mate.age_s, mate.radius, mate.has_ended) == (0.0, 0.18, False)
+            assert np.allclose(teammate.pose[:2] + offset, env.world.poses[other, :2])
+            assert teammate.pose[2] == env.world.poses[other, 2]
+            assert (teammate.age_s, teammate.radius, teammate.has_ended) == (0.0, 0.18, False)
         assert belief.radius == 0.18
         assert np.array_equal(belief.velocity, env.world.velocities[row])
         assert not belief.spread.any()
@@ -104,7 +104,7 @@ def test_the_origin_of_the_map_puts_its_cells_where_they_are_in_the_frame():
         assert row < 3
 
 
-def test_a_mate_that_has_ended_is_known_to_have():
+def test_a_teammate_that_has_ended_is_known_to_have():
     env = driven()
     env.stop("robot_2", "stopped")
     env.step({agent: np.zeros(2, np.float32) for agent in env.agents[:2]})

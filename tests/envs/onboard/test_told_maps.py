@@ -37,7 +37,7 @@ def cell(belief, x, y):
     return int(np.floor((y - origin[1]) / RESOLUTION)), int(np.floor((x - origin[0]) / RESOLUTION))
 
 
-def test_a_robot_that_was_told_has_the_sum_of_both_maps_and_its_mate_its_own(env):
+def test_a_robot_that_was_told_has_the_sum_of_both_maps_and_its_teammate_its_own(env):
     perception, belief = env.perception, env.belief("robot_0")
     assert belief.shared_map is None
     perception.tell(0, known(20, 30, (9.0, -9.0)))

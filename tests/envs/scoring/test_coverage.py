@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor, Raster, Solid
-from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.outcome.scorer import THRESHOLDS, Scorer
-from lidarium.envs.scoring.coverage import count_bits, mark_seen, pack_bits, share_news, unpack_bits
+from lidarium.envs.scoring.coverage import count_bits, mark_seen, pack_bits, share_new_cells, unpack_bits
 from lidarium.envs.scoring.rewards import reward_weights
 from lidarium.envs.scoring.score import counted_cells
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -140,7 +140,9 @@ def test_sharing_news_equals_a_slow_count_cell_by_cell(seed, robots):
         )
         assert new_own == (scans[k] & counted & ~owns[k]).sum()
     gains = np.zeros(robots)
-    total = share_news(np.array([own.ctypes.data for own in packed]), packed_team, news, 0, robots, gains)
+    total = share_new_cells(
+        np.array([own.ctypes.data for own in packed]), packed_team, news, 0, robots, gains
+    )
     fresh = [scan & counted & ~team_seen for scan in scans]
     sharers = np.sum(fresh, axis=0)
     assert np.allclose(gains, [(1.0 / sharers[mine]).sum() for mine in fresh])
@@ -193,7 +195,7 @@ def test_the_cells_that_count_are_those_that_the_smallest_disc_sweeps():
     start = np.array([[1.5, 2.0, 0.0]])
     simulation = team(1, 0.05)
     simulation.place(0, tables, start, 1)
-    swept = swept_free_space(tables.body, 0.18, start)
+    swept = reachable_free_space(tables.body, 0.18, start)
     expected = counted_cells(swept, 2)
     counted = unpack_bits(simulation.score.counted_masks[0], simulation.beliefs.log_odds[0].shape[1])
     assert np.array_equal(counted[:, : expected.shape[1]], expected)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.grids.map_deltas import LaidMaps, levels_of_planes, note_changes, note_laid_changes
+from lidarium.mapping.grids.map_deltas import LaidMaps, levels_of_planes, note_changes, note_overlaid_changes
 
 FAR = 1e3
 
@@ -111,7 +111,7 @@ def test_turned_maps_are_laid_over_the_lattice_where_they_changed(seed, robots):
             row, column = generator.integers(0, 110, 2)
             log_odds[row : row + 9, column : column + 15] = generator.integers(-127, 128, (9, 15))
         laid = LaidMaps(records_of(maps), addresses, lays, resolution)
-        note_laid_changes(laid, poses, last, FAR, known, occupied, buffer)
+        note_overlaid_changes(laid, poses, last, FAR, known, occupied, buffer)
         np.testing.assert_array_equal(
             levels_of_planes(known, occupied), levels_of_sum(laid_slowly(maps, lays, resolution, rows, words))
         )

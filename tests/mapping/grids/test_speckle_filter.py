@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.grids.speckle_filter import LARGEST_SPECK, without_specks
+from lidarium.mapping.grids.speckle_filter import LARGEST_COMPONENT, without_small_components
 
 LEVELS = arrays(
     np.uint8,
@@ -26,39 +26,39 @@ def wall():
 def test_a_free_cell_within_a_wall_is_closed():
     levels = wall()
     levels[10, 7] = FREE
-    np.testing.assert_array_equal(without_specks(levels), wall())
+    np.testing.assert_array_equal(without_small_components(levels), wall())
 
 
 def test_free_cells_that_touch_at_corners_alone_are_specks_of_their_own():
     levels = wall()
     levels[9:12, 4:20] = np.where(np.indices((3, 16)).sum(axis=0) % 2, np.uint8(FREE), levels[9:12, 4:20])
-    np.testing.assert_array_equal(without_specks(levels), wall())
+    np.testing.assert_array_equal(without_small_components(levels), wall())
 
 
 def test_what_is_larger_than_a_speck_stays_open():
     levels = wall()
-    levels[10, 5 : 5 + LARGEST_SPECK + 1] = FREE
-    np.testing.assert_array_equal(without_specks(levels), levels)
+    levels[10, 5 : 5 + LARGEST_COMPONENT + 1] = FREE
+    np.testing.assert_array_equal(without_small_components(levels), levels)
 
 
 def test_a_gap_that_the_floor_reaches_stays_open():
     levels = wall()
     levels[8:10, 5] = FREE
-    np.testing.assert_array_equal(without_specks(levels), levels)
+    np.testing.assert_array_equal(without_small_components(levels), levels)
 
 
 def test_what_was_glimpsed_far_from_walls_stays_free():
     levels = np.full((9, 9), UNKNOWN, np.uint8)
     levels[4, 4] = FREE
-    np.testing.assert_array_equal(without_specks(levels), levels)
+    np.testing.assert_array_equal(without_small_components(levels), levels)
 
 
 @given(LEVELS)
 def test_only_free_cells_change_and_only_to_walls_and_no_speck_is_left(levels):
     before = levels.copy()
-    closed = without_specks(levels)
+    closed = without_small_components(levels)
     np.testing.assert_array_equal(levels, before)
     changed = closed != levels
     assert (levels[changed] == FREE).all()
     assert (closed[changed] == OCCUPIED).all()
-    np.testing.assert_array_equal(without_specks(closed), closed)
+    np.testing.assert_array_equal(without_small_components(closed), closed)

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lidarium.mapping.kernels.huge_pages import LARGE_PAGE, LARGEST_PIECE, PIECE, Pages
+from lidarium.mapping.kernels.huge_pages import LARGE_PAGE, LARGEST_PIECE, PIECE, ArrayPool
 from lidarium.mapping.kernels.views import LINE
 
 
 def test_arrays_of_pages_are_blank_apart_and_begin_on_lines():
-    pages = Pages()
+    pages = ArrayPool()
     kinds = [
         ((3, 64), np.int8),
         ((0, 2), np.uint64),
@@ -64,13 +64,13 @@ def resident():
 @pytest.mark.parametrize("expected", [0, LARGEST_PIECE])
 def test_what_is_not_touched_takes_no_room(expected):
     before = resident()
-    pages = Pages(expected)
+    pages = ArrayPool(expected)
     arrays = [pages.blank((64, 2**20), np.uint8), pages.blank((2**18,), np.uint8)]
     arrays[0][0, 0] = arrays[1][0] = 1
     assert resident() - before <= 4 * LARGE_PAGE
 
 
 def test_large_arrays_leave_the_rest_of_a_piece_to_others():
-    pages = Pages()
+    pages = ArrayPool()
     small, _large, next_one = (pages.blank((size,), np.uint8) for size in (LINE, PIECE, LINE))
     assert next_one.ctypes.data - small.ctypes.data == LINE

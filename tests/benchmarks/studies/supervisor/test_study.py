@@ -10,7 +10,7 @@ from lidarium.benchmarks.studies.supervisor.goals import Goal
 from lidarium.benchmarks.studies.supervisor.study import failing_suite, typical_runs
 from lidarium.benchmarks.studies.supervisor.tables import failing_table, left_table
 from lidarium.envs.floors.catalogue.names import load_floor
-from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.floors.starts import draw_starts
 from lidarium.evaluation.statistics import Interval
 from lidarium.evaluation.suites.campaign import Campaign
@@ -40,7 +40,7 @@ def test_a_share_takes_seeds_first_and_then_floors():
 def test_floors_are_as_large_as_is_said(name):
     raster = load_floor(name).raster(0.05, 0.05, 0.52)
     starts = draw_starts(raster, 0.18, 1, np.random.default_rng(0))
-    assert swept_free_space(raster, 0.18, starts).sum() * 0.05**2 == pytest.approx(
+    assert reachable_free_space(raster, 0.18, starts).sum() * 0.05**2 == pytest.approx(
         plan.GENERATED[name], abs=1.0
     )
 

@@ -15,7 +15,7 @@ from lidarium.envs.floors.catalogue import names as catalogue
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.catalogue.store import FOLDER_VARIABLE, floor_store
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.floors.free_space import swept_free_space
+from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.floors.generation.buildings import generate_building
 from lidarium.envs.simulation.kernels import floor_cache
 from lidarium.envs.simulation.kernels.floor_cache import (
@@ -166,7 +166,7 @@ def test_what_episodes_add_to_tables_counts():
     cache.get("first", lambda: tables)
     bare = cache.nbytes
     for _ in range(2):
-        swept_free_space(tables.body, 0.1, np.array([[2.5, 2.5]]))
+        reachable_free_space(tables.body, 0.1, np.array([[2.5, 2.5]]))
     assert cache.get("first", refuse) is tables
     assert cache.nbytes == tables.nbytes > bare
     cache.get("large", lambda: FloorTables.of_floor(box(6.0), *HEIGHTS))

@@ -11,7 +11,7 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Raster
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import ROBOTS
-from lidarium.envs.simulation.kernels.arrays import ENDED, KNOWN_MATES
+from lidarium.envs.simulation.kernels.arrays import ENDED, KNOWN_TEAMMATES
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.envs.simulation.kernels.motion import distance_bound
@@ -204,7 +204,7 @@ def test_the_map_is_that_of_the_occupancy_grid_fed_with_the_same_scans(tables):
     generator = np.random.default_rng(7)
     one = simulation(1, noise=0.01)
     one.place(0, tables, starts_on(tables, 1, generator), 1)
-    one.flags[:] &= ~KNOWN_MATES
+    one.flags[:] &= ~KNOWN_TEAMMATES
     lidar = one.lidar
     geometry = ScanGeometry(beams=lidar.beams, field_of_view=lidar.field_of_view, range_max=lidar.range_max)
     grid = OccupancyGrid(OccupancySettings(resolution=0.05))
