@@ -22,7 +22,10 @@ MAX_POINTS = 512
 """Most points of a path."""
 
 LEAST_LOOKAHEAD, MOST_LOOKAHEAD = 0.08, 0.25
-"""Distance ahead on its line at which a robot aims [m], where it is tight and where there is room."""
+"""Distance ahead on its line at which a robot aims [m].
+
+The first is where it is tight, the second where there is room.
+"""
 
 LOOKAHEAD_PER_ROOM = 2.0
 """How much farther ahead it aims per room beside its body [m/m]."""
@@ -34,13 +37,19 @@ TURN_IN_A_STEP = 0.5
 """Most of a heading error that a robot turns away in one step, as a share."""
 
 PASSING_PER_ROOM, LEAST_PASSING, MOST_PASSING = 0.5, 0.015, 0.12
-"""Distance at which a point of a path counts as passed: per room [m/m], at least and at most [m]."""
+"""Distance at which a point of a path counts as passed.
+
+Per room beside the body [m/m], at least and at most [m].
+"""
 
 TOLERANCE_PER_ROOM, LEAST_TOLERANCE, MOST_TOLERANCE = 2.0, 0.01, 0.6
-"""Heading error with which a robot drives: per room [rad/m], at least and at most [rad]."""
+"""Heading error with which a robot drives.
+
+Per room beside the body [rad/m], at least and at most [rad].
+"""
 
 SLOWING = 0.7
-"""Share of its speed that a robot gives up at the largest heading error with which it drives."""
+"""Share of its speed that a robot gives up at its largest heading error [1]."""
 
 LEAST_BEND = 0.2
 """A robot drives through all bends below this, the more slowly the sharper [rad]."""
@@ -274,7 +283,7 @@ def follow_paths(sensed: Sensed, courses: Courses, bodies: Bodies, commands: Arr
 
 @kernel(inline=True, borrowing=True)
 def _drive_on(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int, commands: Array) -> None:
-    """Turn a robot towards the next piece of its path, and drive where it looks that way."""
+    """Turn a robot to the next piece of its path, and drive where it faces it."""
     aim_x, aim_y = _aim(sensed, courses, robot)
     x, y, heading = sensed.poses[robot, 0], sensed.poses[robot, 1], sensed.poses[robot, 2]
     error = _wrap(math.atan2(aim_y - y, aim_x - x) - heading)
@@ -345,7 +354,10 @@ def _turn_at_end(sensed: Sensed, courses: Courses, bodies: Bodies, robot: int) -
 
 @kernel(inline=True, borrowing=True)
 def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
-    """Return a point on the line of this piece, a little ahead of the robot's foot on it [m]."""
+    """Return the point at which a robot aims, on the line of its piece of path [m].
+
+    A little ahead of the robot's foot on that line.
+    """
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
     paths, place = courses.paths, courses.places[robot]
     end_x, end_y = paths[robot, place, 0], paths[robot, place, 1]
@@ -362,16 +374,21 @@ def _aim(sensed: Sensed, courses: Courses, robot: int) -> tuple[float, float]:
 
 @kernel(inline=True, borrowing=True)
 def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, tolerance: float) -> float:
-    """Return the speed from which a robot still brakes to what the next bend or the end wants [m/s].
+    """Return the speed that still brakes for the next bend or the end [m/s].
 
     At a bend it slows down to what it can turn with.
     """
     remaining, braking = _remaining(sensed, courses, robot), limits[BRAKING]
     paths, place = courses.paths, courses.places[robot]
     if place == courses.counts[robot] - 1:
+<<<<<<< HEAD
         return min(  # type: ignore[no-any-return]
             math.sqrt(2.0 * braking * remaining), max(remaining / limits[TIME_STEP], LEAST_SPEED_AT_END)
         )
+=======
+        at_end = max(remaining / limits[TIME_STEP], LEAST_SPEED_AT_END)
+        return float(min(math.sqrt(2.0 * braking * remaining), at_end))
+>>>>>>> 42058cf (Shorten first lines of docstrings)
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
     end_x, end_y = paths[robot, place, 0], paths[robot, place, 1]
     next_x, next_y = paths[robot, place + 1, 0], paths[robot, place + 1, 1]
@@ -396,6 +413,12 @@ def _safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
         teammate_gap = _gap_to_teammates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
         allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
     elif _hears_any(sensed.contact, robot):
+<<<<<<< HEAD
         teammate_gap = _gap_to_heard(robot, sensed, bodies)
         allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
     return float(allowed)
+=======
+        mate_gap = _gap_to_heard(robot, sensed, bodies)
+        allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
+    return allowed
+>>>>>>> 42058cf (Shorten first lines of docstrings)

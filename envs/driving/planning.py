@@ -139,13 +139,13 @@ class Destination(NamedTuple):
     Attributes
     ----------
     row, column : int
-        The cell to go to; outside of the map there is no way.
+        The cell to go to; outside of the map there is no path.
     x, y : float
         Where to end within that cell, if there is room [m]; nan for its centre.
     heading : float
         Wanted heading at the end [rad], nan for any.
     maximum_cost : float
-        Most that the way may cost [m].
+        Most that the path may cost [m].
     """
 
     row: int
@@ -204,7 +204,10 @@ def drive_to(
 
 @kernel
 def _write_points(planning: Planning, drives: Drives, row: int, path: Array, terrain: Terrain) -> int:
-    """Write the points of a path of cells that straight lines can join; return how many."""
+    """Write the points of a path of cells; return how many.
+
+    Straight lines can join them.
+    """
     kept = kept_places(path, terrain)
     count = min(len(kept), MAX_POINTS)
     cells, points = drives.cells[row], drives.paths[row]

@@ -30,7 +30,7 @@ HALF_DIAGONAL = 0.7072
 """Distance from the centre of a square to its corners, rounded up [cells]."""
 
 LOSS_OF_DIAGONALS = 2.0
-"""What the squared clearance loses on a diagonal step at most [half cells squared]."""
+"""Squared clearance lost on a diagonal step at most [half cells squared]."""
 
 ROUNDING = 1e-9
 """Distances that differ by less than this count as the same [cells]."""

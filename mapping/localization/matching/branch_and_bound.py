@@ -28,7 +28,10 @@ LEVELS = 6
 """Coarse maps: the coarsest has blocks of 2^6 cells."""
 
 SPARED_LEVELS = 2
-"""Levels below that of blocks as large as the window, which bound nothing; a few by a few do."""
+"""A search begins so many levels below that of blocks as large as its window.
+
+Such blocks bound nothing; a few by a few do.
+"""
 
 CHILDREN = 4
 """Blocks into which a block is divided."""
@@ -45,7 +48,7 @@ class _Coarse(NamedTuple):
 
 
 class _Window(NamedTuple):
-    """Placements among which a search looks.
+    """Placements among which a search chooses.
 
     Attributes
     ----------
@@ -276,7 +279,10 @@ def _top_level(coarse: _Coarse, width: int) -> int:
 
 @kernel
 def _cells_of(points: Array, window: _Window) -> Array:
-    """Return the cells (turns, n, 2) of points [cells] in the first placement of each heading."""
+    """Return the cells of points in the first placement of each heading.
+
+    Points are in cells; the result is (headings, n, 2) int32.
+    """
     headings, corner, count = window.headings, window.corner, points.shape[0]
     cells = np.empty((headings.shape[0], count, 2), np.int32)
     for turn in range(headings.shape[0]):
@@ -289,7 +295,10 @@ def _cells_of(points: Array, window: _Window) -> Array:
 
 @kernel
 def _bounds_of_blocks(coarse: _Coarse, cells: Array, top: int, blocks: int) -> Array:
-    """Return the bounds of all blocks of the top level, heading by heading, row by row."""
+    """Return the bounds of all blocks of the top level.
+
+    Heading by heading, row by row.
+    """
     turns, maxima = cells.shape[0], coarse.maxima
     begin, rows, columns = coarse.shapes[top]
     bounds = np.empty(turns * blocks * blocks, np.int64)
@@ -312,9 +321,10 @@ def _push(stack: Array, depth: int, block: tuple[int, int, int, int, int]) -> No
 def _divide(
     coarse: _Coarse, cells: Array, block: tuple[int, int, int], width: int, best: float, children: Array
 ) -> tuple[int, int]:
-    """Fill ``children`` with the parts of a block that can beat the best, in the order of their bounds.
+    """Fill ``children`` with the parts of a block that can beat the best.
 
-    Each is bound, column and row. Returns how many there are, and how many were looked at.
+    They are in the order of their bounds; each is bound, column and row. Returns how many there are, and how
+    many were looked at.
     """
     level, column, row = block
     below, maxima = level - 1, coarse.maxima

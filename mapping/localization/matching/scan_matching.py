@@ -35,13 +35,13 @@ MOST_STEPS = 30
 """Steps of the descent at most."""
 
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
-"""Share by which curvature is raised at first, and beyond which the descent gives up."""
+"""Share by which curvature is raised: at first, and at most before giving up."""
 
 EASING, TIGHTENING = 0.3, 8.0
-"""What damping is multiplied by after a step down, and after one that did not lead down."""
+"""Factors of damping after a step that led down, and after one that did not."""
 
 LEAST_CURVATURE = 1e-9
-"""What is added to curvature, so that the equations can be solved [1/m^2, 1/rad^2]."""
+"""Curvature that is added, so that equations can be solved [1/m^2, 1/rad^2]."""
 
 STILL_M, STILL_ANGLE = 1e-4, 1e-5
 """Smaller steps end the descent [m, rad]."""

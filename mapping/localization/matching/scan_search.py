@@ -17,20 +17,23 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.localization.matching.submaps import FULL_LEVEL, UNSEEN, AgreementGrid
 
 LEVEL_BITS = 8
-"""Bits of a level of agreement; squares of disagreement are counted in parts of 255."""
+"""Bits of a level of agreement.
+
+Squares of disagreement are counted in parts of 255.
+"""
 
 LEVELS = 1 << LEVEL_BITS
 """Levels of agreement that there can be."""
 
 FAR_SHARE = 0.9
-"""Share of the points that lie nearer than those by which the step of an angle is chosen."""
+"""Share of the points that lie nearer than those that set the step of an angle."""
 
 LEAST_STEP, DEFAULT_STEP, MOST_STEP = math.radians(0.25), math.radians(1.0), math.radians(2.0)
 """Step of an angle at least, where there are no points, and at most [rad]."""
 
 
 class Window(NamedTuple):
-    """Poses among which a search looks.
+    """Poses among which a search chooses.
 
     Attributes
     ----------
@@ -133,7 +136,7 @@ def _search(
 def _sum_disagreement(
     levels: Array, points: Array, place: tuple[float, float, float, float], unseen_cost: int, sums: Array
 ) -> None:
-    """Fill ``sums`` (width, width) with the points' disagreement at each place of a window.
+    """Fill ``sums`` (width, width) with the disagreement at the places of a window.
 
     ``place`` is cosine and sine of the heading, by the side of a cell, and the window's corner [cells].
     """

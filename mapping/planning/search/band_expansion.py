@@ -1,4 +1,4 @@
-"""One band of costs of a search: the steps that lead from its cells to their neighbours.
+"""The steps from the cells of one band of costs to their neighbours.
 
 Inside a blocked zone a body may only move to cells with no less room, until it is out.
 """
@@ -49,7 +49,7 @@ class _Flat(NamedTuple):
 
 
 class _Tally(NamedTuple):
-    """Numbers of touched cells, of waiting entries, and of entries in the fullest bucket."""
+    """Numbers of touched cells, waiting entries, and entries in the fullest bucket."""
 
     touched: int
     pending: int

@@ -18,7 +18,7 @@ from lidarium.mapping.planning.search.search_state import (
 )
 
 MOST_CELLS_A_SIDE = 2**15 - 1
-"""Cells that a side of a grid may have, so that a row and a column fit into 32 bits."""
+"""Cells that a side of a grid may have: a row and a column fit into 32 bits."""
 
 
 class SearchSpace:

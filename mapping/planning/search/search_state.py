@@ -1,4 +1,4 @@
-"""What a search over a belief works on: the terrain, the task, and the memory that it writes to.
+"""The terrain, the task and the memory of a search over a belief.
 
 A search keeps what *remains* of its budget in each cell, 0 = not reached: memory is touched only where the
 search goes, and cleared from the list of touched cells.
@@ -27,7 +27,10 @@ LARGEST_BUDGET = 2**31 - 2
 """Most that a search can spend [units]."""
 
 LEAVING = 8
-"""Mark beside the direction in ``parent``: the cell is passed only to leave a blocked zone."""
+"""Mark beside the direction in ``parent``.
+
+The cell is passed only to leave a blocked zone.
+"""
 
 TILE_SHIFT = 4
 """Targets are counted in tiles of 2 to the power of this, 16 x 16 cells."""

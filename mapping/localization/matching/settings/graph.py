@@ -1,4 +1,4 @@
-"""Settings of what corrects the past: closures, the graph of poses, and the directions of walls."""
+"""Settings of closures, of the graph of poses, and of directions of walls."""
 
 import math
 from dataclasses import dataclass
