@@ -381,14 +381,8 @@ def _speed_to_next(sensed: Sensed, courses: Courses, limits: Array, robot: int, 
     remaining, braking = _remaining(sensed, courses, robot), limits[BRAKING]
     paths, place = courses.paths, courses.places[robot]
     if place == courses.counts[robot] - 1:
-<<<<<<< HEAD
-        return min(  # type: ignore[no-any-return]
-            math.sqrt(2.0 * braking * remaining), max(remaining / limits[TIME_STEP], LEAST_SPEED_AT_END)
-        )
-=======
         at_end = max(remaining / limits[TIME_STEP], LEAST_SPEED_AT_END)
         return float(min(math.sqrt(2.0 * braking * remaining), at_end))
->>>>>>> 42058cf (Shorten first lines of docstrings)
     x, y = sensed.poses[robot, 0], sensed.poses[robot, 1]
     end_x, end_y = paths[robot, place, 0], paths[robot, place, 1]
     next_x, next_y = paths[robot, place + 1, 0], paths[robot, place + 1, 1]
@@ -413,12 +407,6 @@ def _safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
         teammate_gap = _gap_to_teammates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
         allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
     elif _hears_any(sensed.contact, robot):
-<<<<<<< HEAD
         teammate_gap = _gap_to_heard(robot, sensed, bodies)
         allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
-    return float(allowed)
-=======
-        mate_gap = _gap_to_heard(robot, sensed, bodies)
-        allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
     return allowed
->>>>>>> 42058cf (Shorten first lines of docstrings)
