@@ -37,7 +37,7 @@ class Senses:
         Whether the bumper is pressed.
     goal : (2,) float64 or None
         Where it has to go [m].
-    mates : list of (2,) float64
+    teammates : list of (2,) float64
         Where teammates are, of those whom it has news of [m].
     """
 

@@ -91,8 +91,8 @@ def page(aspect: float) -> tuple[Figure, Axes, Axes, Axes]:
     )
 
 
-def save_figure(path: Path, figure: Figure, title: str, subtitle: str) -> None:
-    """Write a page with its titles as a PNG file."""
+def save_titled_figure(path: Path, figure: Figure, title: str, subtitle: str) -> None:
+    """Write a figure with its titles as a PNG file."""
     figure.suptitle(title, x=0.012, ha="left", fontsize=15, fontweight="bold", color=INK)
     figure.axes[0].set_title(subtitle, loc="left", fontsize=10.5, color=FAINT)
     save_figure(path, figure)

@@ -41,7 +41,7 @@ from lidarium.evaluation.drawing.picture_parts import (
     list_robots,
     page,
     rgb,
-    save_figure,
+    save_titled_figure,
     show_cells,
 )
 from lidarium.evaluation.drawing.video import FRAMES_PER_SECOND, LAST_FRAME_S, check_speed, film_writer
@@ -184,7 +184,7 @@ def save_track_picture(path: Path, record: EpisodeRecord) -> None:
         "" if header["seed"] is None else f"seed {header['seed']}",
         f"lidarium {header['version']}",
     ]
-    save_figure(path, figure, title, ", ".join(part for part in about if part))
+    save_titled_figure(path, figure, title, ", ".join(part for part in about if part))
 
 
 def radius_of(record: EpisodeRecord) -> float:

@@ -29,7 +29,7 @@ from lidarium.evaluation.drawing.picture_parts import (
     list_robots,
     page,
     rgb,
-    save_figure,
+    save_titled_figure,
     show_cells,
 )
 from lidarium.evaluation.drawing.supervision_marks import draw_supervision
@@ -83,7 +83,7 @@ def save_run_picture(path: Path, episode: Episode, policy: str) -> None:
         f"s{how}"
     )
     subtitle = f"{robots}, {policy}, seed {episode.seed}, {float(env.world.travelled.sum()):.1f} m driven"
-    save_figure(path, figure, title, subtitle)
+    save_titled_figure(path, figure, title, subtitle)
 
 
 def save_floor_picture(path: Path, floor: Floor, height: float, resolution: float = 0.025) -> None:
@@ -118,7 +118,7 @@ def save_floor_picture(path: Path, floor: Floor, height: float, resolution: floa
             zorder=8,
         )
     x_min, y_min, x_max, y_max = floor.bounds
-    save_figure(
+    save_titled_figure(
         path,
         figure,
         floor.name,

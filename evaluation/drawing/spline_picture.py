@@ -19,7 +19,7 @@ from lidarium.evaluation.drawing.picture_parts import (
     box_around,
     drawn_together,
     rgb,
-    save_figure,
+    save_titled_figure,
     show_cells,
 )
 from lidarium.mapping.splines.spline_map import SplineMap
@@ -106,7 +106,7 @@ def save_spline_picture(
     told = (
         f"{len(spline_map.curves)} curves with {controls} control points, {spline_map.length:.1f} m of wall"
     )
-    save_figure(path, figure, title or floor.name, told)
+    save_titled_figure(path, figure, title or floor.name, told)
 
 
 def _draw_map(axes: Axes, spline_map: SplineMap) -> list[Line2D]:

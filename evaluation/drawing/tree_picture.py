@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.tree import Leaf, Node, decision_tree, leaves, words_of
-from lidarium.evaluation.drawing.picture_parts import FAINT, INK, save_figure
+from lidarium.evaluation.drawing.picture_parts import FAINT, INK, save_titled_figure
 
 _LINE_CHARACTERS = 22
 _ORDER_COLOUR, _NO_ORDER_COLOUR, _QUESTION_COLOUR = "#fde68a", "#e5e7eb", "#dbeafe"
@@ -34,7 +34,7 @@ def save_tree_picture(path: Path, settings: SupervisorSettings | None = None) ->
     axes.set_xlim(-0.6, count - 0.4)
     axes.set_ylim(depth - 0.4, -0.6)
     _draw(axes, tree, 0, 0)
-    save_figure(path, figure, "supervisor", "what is asked of each robot, and what follows")
+    save_titled_figure(path, figure, "supervisor", "what is asked of each robot, and what follows")
 
 
 def _depth(tree: Node | Leaf) -> int:
