@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.batch.running import DECIDES, STEPS
 from lidarium.envs.driving.drives import DRIVE_STATES, Drives, Following, no_drives
-from lidarium.envs.driving.path_following import FORESIGHT_TIMES
+from lidarium.envs.driving.safety_stop import FORESIGHT_TIMES
 from lidarium.envs.driving.team_driver import TeamDriver
 from lidarium.envs.exploration import scale_shares
 from lidarium.envs.levels.frontier_offers import CANDIDATES, REASONS, FrontierOffers

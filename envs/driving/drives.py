@@ -14,11 +14,10 @@ from lidarium.envs.driving.path_following import (
     DRIVING,
     IDLE,
     MAX_POINTS,
-    Bodies,
     Courses,
-    Sensed,
     follow_paths,
 )
+from lidarium.envs.driving.safety_stop import Bodies, Sensed
 from lidarium.envs.radio.messages import DriveState
 from lidarium.mapping.kernels.compilation import Array, kernel
 

@@ -19,7 +19,7 @@ from lidarium.envs.driving.drives import (
     is_done,
     no_drives,
 )
-from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, FORESIGHT_TIMES, IDLE
+from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE
 from lidarium.envs.driving.planning import (
     TEAMMATE_DISTANCE,
     Destination,
@@ -29,6 +29,7 @@ from lidarium.envs.driving.planning import (
     prepare_teams_parallel,
     prepare_teams_serial,
 )
+from lidarium.envs.driving.safety_stop import FORESIGHT_TIMES
 from lidarium.envs.driving.traffic import find_refuge, obstructing
 from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT
 from lidarium.envs.onboard.perception import Perception

@@ -30,7 +30,10 @@ MOVED: dict[str, tuple[str, ...]] = {
     "envs.floors.store": ("envs.floors.catalogue.store",),
     "envs.frame_parts": ("envs.drawing.frame_parts",),
     "envs.onboard.drives": ("envs.driving.drives",),
-    "envs.onboard.driving": ("envs.driving.path_following",),
+    "envs.onboard.driving": (
+        "envs.driving.path_following",
+        "envs.driving.safety_stop",
+    ),
     "envs.onboard.exchange": ("envs.radio.exchange",),
     "envs.onboard.frontier_offers": ("envs.levels.frontier_offers",),
     "envs.onboard.operating": ("envs.station.operating",),

@@ -11,14 +11,12 @@ from lidarium.envs.driving.path_following import (
     ARRIVED,
     BLOCKED,
     DRIVING,
-    FORESIGHT_TIMES,
     IDLE,
     MAX_POINTS,
-    Bodies,
     Courses,
-    Sensed,
     follow_paths,
 )
+from lidarium.envs.driving.safety_stop import FORESIGHT_TIMES, Bodies, Sensed
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.envs.radio.messages import DriveState, Target
 from lidarium.envs.settings.lidar import Lidar
