@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from lidarium.envs.floors.floor import Floor
     from lidarium.envs.settings.exploration import ExplorationSettings
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 class _MovedModules:
