@@ -12,7 +12,7 @@ POLICIES: Registry[Callable[..., Policy]] = Registry("policy")
 A module is imported when it is first needed.
 """
 
-_FRONTIER = "lidarium.agents.frontier"
+_FRONTIER = "lidarium.agents.frontier_policies"
 POLICIES.register(
     "random_walk",
     "lidarium.agents.random_walk:RandomWalk",
@@ -45,17 +45,17 @@ POLICIES.register(
 )
 POLICIES.register(
     "supervised",
-    "lidarium.agents.supervisor.policy:supervised",
+    "lidarium.agents.supervisor.factories:supervised",
     "robots explore alone; a station merges their maps, and redirects and stops them by a tree of rules",
 )
 POLICIES.register(
     "independent",
-    "lidarium.agents.supervisor.policy:independent",
+    "lidarium.agents.supervisor.factories:independent",
     "each robot explores the whole floor alone; a bound for teams that merge their maps",
 )
 POLICIES.register(
     "oracle_starts",
-    "lidarium.agents.supervisor.policy:oracle_starts",
+    "lidarium.agents.supervisor.factories:oracle_starts",
     "supervised robots that are given how they stand to each other; a bound for teams that merge",
 )
 

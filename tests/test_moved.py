@@ -28,6 +28,8 @@ def test_a_module_that_has_moved_is_found_by_its_old_name(old):
     ("old", "name", "new"),
     [
         ("agents.policy", "make_policy", "agents.catalogue"),
+        ("agents.frontier", "NearestFrontier", "agents.frontier_policies"),
+        ("envs.onboard.perception", "Belief", "envs.onboard.belief"),
         ("envs.floors.catalogue", "load_floor", "envs.floors.catalogue.names"),
         ("envs.settings", "LIDARS", "envs.settings.lidar"),
         ("evaluation.truth", "truth_of", "evaluation.truth.true_map"),

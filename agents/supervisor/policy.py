@@ -6,16 +6,15 @@ A supervisor directs any policy that goes to goals.
 import math
 import time
 from collections.abc import Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.frontier import NearestFrontier
-from lidarium.agents.policy import Action, PerRobot, Policy, Stop, Team
+from lidarium.agents.policy import Action, Policy, Stop, Team
 from lidarium.agents.report import GivenOrder, GivenUp, Join, LogEntry, PolicyReport, Supervision
+from lidarium.agents.supervisor.led_team import LedTeam
 from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
@@ -23,17 +22,17 @@ from lidarium.agents.supervisor.supervisor import Command, Supervisor
 from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.radio.messages import DriveState, OperatingState, Order, OrderKind
-from lidarium.envs.station.reports import Report
-from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.envs.radio.messages import DriveState, Order, OrderKind
 from lidarium.mapping.planning.frontiers import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
 
 PATIENCE_S = 20.0
 """Time without motion after which a sent robot explores by itself again [s]."""
 
+
 MOVED_M = 0.15
 """What counts as having moved [m]."""
+
 
 LOST_S = 2.0
 """An order that a robot has not taken after this long has not reached it [s]."""
@@ -171,7 +170,7 @@ class Supervised(Policy):
         self._look_due, self._merge_due = settings.period_s, 0.0
         self._exploring: set[str] = set()
         self.tick_seconds, self.merge_seconds = [], []
-        self.policy.reset(_Led(team, self._exploring), seed)
+        self.policy.reset(LedTeam(team, self._exploring), seed)
 
     def act(self, observations: Mapping[str, Observation]) -> dict[str, Action]:
         """Let the policy decide for all robots that the supervisor has not sent anywhere."""
@@ -334,66 +333,6 @@ class Supervised(Policy):
 
     def _rest(self, agent: str, observation: Observation) -> Action:
         return len(observation["frontiers"]) if self.level == "frontier" else None
-
-
-class _Led:
-    """A team as the policy under a supervisor sees it.
-
-    Drives for the supervisor are hidden from the policy.
-    """
-
-    def __init__(self, team: Team, exploring: AbstractSet[str]) -> None:
-        self._team, self._exploring = team, exploring
-
-    @property
-    def agents(self) -> list[str]:
-        return self._team.agents
-
-    @property
-    def time_s(self) -> float:
-        return self._team.time_s
-
-    def belief(self, agent: str) -> Belief:
-        return self._team.belief(agent)
-
-    def drive_state(self, agent: str) -> DriveState:
-        return self._team.drive_state(agent) if agent in self._exploring else DriveState.IDLE
-
-    def operating_state(self, agent: str) -> OperatingState:
-        return self._team.operating_state(agent)
-
-    def report(self, agent: str) -> Report | None:
-        return self._team.report(agent)
-
-    def last_order(self, agent: str) -> Order | None:
-        return self._team.last_order(agent)
-
-    def tell(self, agent: str, others: FusedMap | None) -> bool:
-        return self._team.tell(agent, others)
-
-    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        return self._team.forget_walls(agent, trail)
-
-
-def supervised(**options: Any) -> Supervised:  # noqa: ANN401
-    """Return nearest-frontier explorers under a supervisor.
-
-    Options are those of ``SupervisorSettings``.
-    """
-    return Supervised(NearestFrontier(), **options)
-
-
-def oracle_starts(**options: Any) -> Supervised:  # noqa: ANN401
-    """Return supervised explorers that know their relative starts, as a bound.
-
-    They are nearest-frontier explorers, as those of ``supervised``.
-    """
-    return Supervised(NearestFrontier(), **{"trusts_starts": True, **options})
-
-
-def independent() -> PerRobot:
-    """Return nearest-frontier explorers that know nothing of each other, as a bound."""
-    return PerRobot(lambda: NearestFrontier(shares_map=False))
 
 
 def _trusting(settings: SupervisorSettings) -> SupervisorSettings:

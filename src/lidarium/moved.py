@@ -207,6 +207,7 @@ MOVED: dict[str, tuple[str, ...]] = {
 """Where modules have gone, below ``lidarium``; one that was split has gone to several."""
 
 MOVED_NAMES: dict[str, tuple[str, ...]] = {
+    "agents.frontier": ("agents.frontier_policies",),
     "agents.policy": (
         "agents.catalogue",
         "agents.report",

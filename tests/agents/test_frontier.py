@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.agents.frontier import ExploreLite, NearestFrontier, UtilityFrontier
+from lidarium.agents.frontier_policies import ExploreLite, NearestFrontier, UtilityFrontier
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.evaluation.episodes.runner import run_episode
 
@@ -110,7 +110,7 @@ def test_frontiers_far_away_are_left_out_only_where_they_change_no_choice(robots
     bit."""
 
     def choices(first_slack):
-        monkeypatch.setattr("lidarium.agents.frontier.FIRST_SLACK", first_slack)
+        monkeypatch.setattr("lidarium.agents.frontier_policies.FIRST_SLACK", first_slack)
         env = lidarium.parallel_env(
             "building:4", robots=robots, horizon_s=120.0, stop_coverage=None, map_cells=32, resolution=0.05
         )

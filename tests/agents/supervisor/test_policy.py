@@ -8,7 +8,8 @@ import pytest
 import lidarium
 from lidarium.agents import Policy
 from lidarium.agents.random_walk import RandomWalk
-from lidarium.agents.supervisor.policy import Supervised, supervised
+from lidarium.agents.supervisor.factories import supervised
+from lidarium.agents.supervisor.policy import Supervised
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.envs.settings.faults import Fault, FaultSettings
 from lidarium.evaluation.episodes.result import result_of

@@ -1,0 +1,51 @@
+"""A team as the policy under a supervisor sees it."""
+
+from collections.abc import Set as AbstractSet
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.policy import Team
+from lidarium.envs.onboard.belief import Belief
+from lidarium.envs.radio.messages import DriveState, OperatingState, Order
+from lidarium.envs.station.reports import Report
+from lidarium.mapping.merging.fusion import FusedMap
+
+
+class LedTeam:
+    """A team as the policy under a supervisor sees it.
+
+    Drives for the supervisor are hidden from the policy.
+    """
+
+    def __init__(self, team: Team, exploring: AbstractSet[str]) -> None:
+        self._team, self._exploring = team, exploring
+
+    @property
+    def agents(self) -> list[str]:
+        return self._team.agents
+
+    @property
+    def time_s(self) -> float:
+        return self._team.time_s
+
+    def belief(self, agent: str) -> Belief:
+        return self._team.belief(agent)
+
+    def drive_state(self, agent: str) -> DriveState:
+        return self._team.drive_state(agent) if agent in self._exploring else DriveState.IDLE
+
+    def operating_state(self, agent: str) -> OperatingState:
+        return self._team.operating_state(agent)
+
+    def report(self, agent: str) -> Report | None:
+        return self._team.report(agent)
+
+    def last_order(self, agent: str) -> Order | None:
+        return self._team.last_order(agent)
+
+    def tell(self, agent: str, others: FusedMap | None) -> bool:
+        return self._team.tell(agent, others)
+
+    def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
+        return self._team.forget_walls(agent, trail)
