@@ -23,29 +23,38 @@ class LedTeam:
 
     @property
     def agents(self) -> list[str]:
+        """Live agents."""
         return self._team.agents
 
     @property
     def time_s(self) -> float:
+        """Simulated time [s]."""
         return self._team.time_s
 
     def belief(self, agent: str) -> Belief:
+        """Return what an agent's onboard software knows."""
         return self._team.belief(agent)
 
     def drive_state(self, agent: str) -> DriveState:
+        """Return the state of its driving; idle where it drives for the supervisor."""
         return self._team.drive_state(agent) if agent in self._exploring else DriveState.IDLE
 
     def operating_state(self, agent: str) -> OperatingState:
+        """Return whether it takes part in the work."""
         return self._team.operating_state(agent)
 
     def report(self, agent: str) -> Report | None:
+        """Return what last reached the station."""
         return self._team.report(agent)
 
     def last_order(self, agent: str) -> Order | None:
+        """Return the last order that it took."""
         return self._team.last_order(agent)
 
     def tell(self, agent: str, others: FusedMap | None) -> bool:
+        """Send it what others know."""
         return self._team.tell(agent, others)
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
+        """Let it forget walls where another robot drove."""
         return self._team.forget_walls(agent, trail)
