@@ -9,7 +9,6 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 os.environ.setdefault("LIDARIUM_FLOOR_STORE", "off")
@@ -21,6 +20,7 @@ from episode_ledger import Ledger, named
 
 import lidarium
 from lidarium.agents import PerRobot, Stop
+from lidarium.evaluation.episodes.watching import Watcher
 
 SEED = 11
 SMALL: dict[str, Any] = {"map_cells": 64, "stop_coverage": None}
@@ -211,6 +211,23 @@ def learner_rows(floor: str, steps: int, **options: Any) -> Case:
     return Case(run, 50, False)
 
 
+class Overseen(Watcher):
+    """Hashes the commands and true states of all steps, and who is live."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        self._ledger = ledger
+
+    def begin(self, env: Any) -> None:
+        self.outcome(env)
+
+    def step(self, env: Any, commands: Any) -> None:
+        self._ledger.add("motion", {"commands": commands, "state": env.state()})
+        self._ledger.tick()
+
+    def outcome(self, env: Any) -> None:
+        self._ledger.add("ends", {"live": env.agents})
+
+
 class Overheard:
     """A policy, and what it is shown."""
 
@@ -243,19 +260,11 @@ def policy(
     """Return an episode that a policy of the catalogue runs, with commands and true states of all steps."""
 
     def run(ledger: Ledger) -> None:
-        def step(env: Any, commands: Any) -> None:
-            ledger.add("motion", {"commands": commands, "state": env.state()})
-            ledger.tick()
-
-        def outcome(env: Any) -> None:
-            ledger.add("ends", {"live": env.agents})
-
         def made() -> Any:
             return lidarium.policy(name, **(setup or {}))
 
         settings = named("make_settings")(**{**built(options), "max_cycles": steps})
-        watcher = SimpleNamespace(begin=outcome, step=step, outcome=outcome)
-        env = named("WatchedExploration")(floor, settings, watchers=[watcher])
+        env = named("WatchedExploration")(floor, settings, watchers=[Overseen(ledger)])
         heard = Overheard(PerRobot(made) if each else made(), ledger)
         merging = named("MergingSettings")(period_s=2.0) if merged else None
         episode = named("run_episode")(heard, env, SEED, merging=merging)

@@ -95,7 +95,7 @@ def test_an_unknown_policy_is_refused_with_the_nearest_name(wrong, meant):
 
 
 def test_a_name_that_is_nothing_like_any_lists_all():
-    with pytest.raises(ValueError, match=r"unknown policy 'zzz' \(known: explore_lite, "):
+    with pytest.raises(ValueError, match=r"unknown policy 'zzz' \(known: random_walk, "):
         make_policy("zzz")
 
 

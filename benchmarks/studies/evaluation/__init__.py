@@ -1,1 +1,1 @@
-"""The study of what evaluations cost, and of what survives killed ones."""
+"""The study of what evaluations cost, with what survives killed ones."""

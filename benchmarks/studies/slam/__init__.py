@@ -1,1 +1,1 @@
-"""The study of SLAM on recorded logs and on a simulated robot."""
+"""The study of SLAM on recorded logs, with a simulated robot beside."""
