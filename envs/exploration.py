@@ -300,8 +300,6 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         rewards = {agent: rewards_of_rows[rows[agent]] for agent in live}
         endings, is_truncated = self._endings(live)
         infos = self._infos(live)
-        for agent in live:
-            infos[agent]["reward_terms"] = self.scorer.terms[rows[agent]]
         terminations, truncations = dict.fromkeys(live, False), dict.fromkeys(live, is_truncated)
         if endings or is_truncated:
             for agent in live:
@@ -412,6 +410,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                 "truth": {"pose": poses[row], "coverage": coverage, "seen_cells": seen[row]},
                 "state": states[row]._value_,
                 "order": "" if order is None else order.kind._value_,
+                "reward_terms": self.scorer.terms[row],
             }
         if self._is_battery_limited:
             for agent in agents:

@@ -162,13 +162,12 @@ class ExplorationVecEnv(VecEnv):
 
     def _infos_of(self, rows: NDArray[np.int64]) -> Infos:
         """Return the batch's infos as a dict for each of some rows."""
-        truth, told = self.batch.infos["truth"], self.batch.infos
-        names = [name for name in told if name != "truth" and not name.startswith("_")]
+        infos = self.batch.infos
+        names = [name for name in infos if not name.startswith("_")]
         return [
             {
-                "truth": {name: array[row] for name, array in truth.items()},
                 "active": True,
-                **{name: told[name][row] for name in names if told[f"_{name}"][row]},
+                **{name: _of_row(infos[name], row) for name in names if infos[f"_{name}"][row]},
             }
             for row in rows
         ]
@@ -230,3 +229,12 @@ class ExplorationVecEnv(VecEnv):
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """Return no images: a batch is not drawn."""
         return [None] * self.num_envs
+
+
+def _of_row(values: Any, row: int) -> Any:  # noqa: ANN401
+    """Return the entry of a row; of values by name, an entry of each."""
+    return (
+        {name: _of_row(each, row) for name, each in values.items()}
+        if isinstance(values, dict)
+        else values[row]
+    )

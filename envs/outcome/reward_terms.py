@@ -82,6 +82,11 @@ class ExtraTerms:
         self._terms = {name: (weight, REWARD_TERMS[name]()) for name, weight in weights}
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the terms."""
+        return tuple(self._terms)
+
+    @property
     def is_empty(self) -> bool:
         """Whether nothing is added."""
         return not self._terms

@@ -65,6 +65,8 @@ class Scorer:
         """Start an episode with the scan taken at the start."""
         self._score.rewards[:], self._score.reward_terms[:] = 0.0, 0.0
         self._extra.start(self._world, 0)
+        names = (*TERMS, *self._extra.names)
+        self.terms = [dict.fromkeys(names, 0.0) for _ in range(self._world.robots)]
         self.times, self.curve, self.track, self.ended_because = {}, [], [], {}
         self._last_seen = -1
         self.advance()

@@ -37,6 +37,8 @@ class RewardSettings:
                     f"weight {name} of the reward is {getattr(self, name)}; want a finite number"
                 )
         # Settings can be compared and hashed, so a mapping becomes pairs.
+        if not isinstance(self.more, Mapping | tuple | list):
+            raise ValueError(f"more of the reward is {self.more!r}; want a mapping of names to weights")
         pairs = self.more.items() if isinstance(self.more, Mapping) else self.more
         object.__setattr__(self, "more", tuple((str(name), weight) for name, weight in pairs))
         for name, weight in self.more:

@@ -266,7 +266,7 @@ def test_explorers_need_no_observation_and_the_random_walk_says_which_it_needs()
         assert (env.world.travelled > 0.5).all()
         ends.append(env.world.poses)
     assert all(np.array_equal(end, ends[0]) for end in ends)
-    with pytest.raises(ValueError, match=r"random walk needs scan, bumper, which .* observe"):
+    with pytest.raises(ValueError, match=r"RandomWalk needs scan, bumper, which .* observe"):
         run_episode(
             RandomWalk(), ExplorationEnv("scene_room", make_settings(robots=1, observe=["pose"], **SMALL)), 1
         )

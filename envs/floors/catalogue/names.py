@@ -38,7 +38,7 @@ A change of the generator thus cannot pass unseen.
 GENERATORS = ("building", *KINDS)
 """Prefixes of generated floors: of any kind, or of one kind."""
 
-MADE_BY = ("envs/floors", "mapping/files/output.py", "mapping/kernels/compilation.py")
+MADE_BY = ("envs/floors", "mapping/files/output.py", "mapping/kernels")
 """Sources that determine generated floors, and how the store holds them."""
 
 

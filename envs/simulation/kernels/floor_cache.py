@@ -32,7 +32,7 @@ MADE_BY = (
     "envs/simulation/kernels/motion.py",
     "envs/simulation/kernels/ray_tables.py",
     "mapping/files/output.py",
-    "mapping/kernels/compilation.py",
+    "mapping/kernels",
 )
 """Sources that determine what the store holds for a floor."""
 

@@ -78,8 +78,9 @@ def test_a_second_start_compiles_nothing():
 def test_nothing_but_the_temporary_folder_takes_files_in_the_read_only_environment(tmp_path):
     environment = cached_start.read_only_environment(tmp_path)
     program = (
-        "import lidarium, os; from lidarium.mapping import files, kernels; from pathlib import Path; "
-        "print(lidarium.__file__, kernels._FOLDER, files.is_writable(files.user_cache_folder()), "
+        "import lidarium, os; from lidarium.mapping.kernels import cache_folders, compilation; "
+        "print(lidarium.__file__, compilation._FOLDER, "
+        "cache_folders.is_writable(cache_folders.user_cache_folder()), "
         "sep=os.linesep)"
     )
     told = subprocess.run(

@@ -56,7 +56,8 @@ def check_info(infos, row, wanted):
         assert np.array_equal(infos["truth"][name][row], value), name
     told = {name for name in infos if not name.startswith("_") and infos[f"_{name}"][row]}
     assert told - {"active"} == set(wanted)
-    for name in set(wanted) - {"truth"}:
+    assert {name: each[row] for name, each in infos["reward_terms"].items()} == wanted["reward_terms"]
+    for name in set(wanted) - {"truth", "reward_terms"}:
         assert infos[name][row] == wanted[name], name
 
 

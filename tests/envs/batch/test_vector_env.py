@@ -30,7 +30,9 @@ FEW = {"lidar": COARSE, "observe": ["scan", "pose"], "robots": 1, "threads": 1}
 IDS = {"velocity": "Exploration", "waypoint": "WaypointExploration", "frontier": "FrontierExploration"}
 AHEAD, STAY = (1.0, 0.0), (0.0, 0.0)
 
-TOLD_ALWAYS = {prefix + name for name in ("truth", "state", "order", "active") for prefix in ("", "_")}
+TOLD_ALWAYS = {
+    prefix + name for name in ("truth", "state", "order", "active", "reward_terms") for prefix in ("", "_")
+}
 """Keys of infos when nothing special has happened."""
 
 
@@ -79,7 +81,8 @@ def test_one_robot_an_episode_is_as_in_gymnasiums_own_vector_environment(level):
             assert part.dtype == wanted_part.dtype
             assert np.array_equal(part, wanted_part)
         infos, wanted_infos = without_masks(told[-1]), without_masks(wanted[-1])
-        assert_same(infos.pop("truth"), without_masks(wanted_infos.pop("truth")))
+        for nested in ("truth", "reward_terms"):
+            assert_same(infos.pop(nested), without_masks(wanted_infos.pop(nested)))
         assert set(infos) == set(wanted_infos)
         for name, array in infos.items():
             assert np.array_equal(told[-1][f"_{name}"], wanted[-1][f"_{name}"])

@@ -78,7 +78,7 @@ class Teams:
             settings.occupancy,
             settings.time_step,
             self.episodes,
-            settings.threads,
+            threads=settings.threads,
         )
         self.offsets = np.zeros((self.rows, 2))
         self.perception = Perception(self.simulation, settings, self.offsets)

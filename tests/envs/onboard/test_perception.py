@@ -130,7 +130,7 @@ def test_what_a_belief_hands_out_of_poses_is_a_copy():
 
 def test_an_agent_that_is_not_on_the_team_has_no_belief():
     with pytest.raises(ValueError, match="robot_9"):
-        driven(0).perception.belief("robot_9")
+        driven(0).belief("robot_9")
 
 
 def test_a_new_episode_forgets_all_maps():

@@ -117,7 +117,7 @@ def test_pooled_and_navigation_maps_follow_a_rendering(localizers):
 def test_the_spread_of_a_belief_is_what_the_localizer_tells(localizers):
     env, _ = explored(5, localization="reckoner")
     assert env.belief("robot_1").spread == pytest.approx([0.2, 0.3, 0.1])
-    assert explored(5)[0].perception.belief("robot_1").spread.tolist() == [0.0, 0.0, 0.0]
+    assert explored(5)[0].belief("robot_1").spread.tolist() == [0.0, 0.0, 0.0]
 
 
 def test_localizers_draw_from_the_seed_of_the_episode(localizers):

@@ -226,9 +226,9 @@ def test_noise_changes_the_map_and_not_the_score():
         commands = generator.uniform(-0.2, 1.0, (2, 2)) * [0.77, 1.2]
         exact.step(commands, moves_bodies=step > 0)
         noisy.step(commands, moves_bodies=step > 0)
-        assert np.array_equal(exact.gains, noisy.gains)
-        assert exact.team_seen[0] == noisy.team_seen[0]
-    assert not np.array_equal(exact.log_odds[0], noisy.log_odds[0])
+        assert np.array_equal(exact.score.gains, noisy.score.gains)
+        assert exact.score.team_seen[0] == noisy.score.team_seen[0]
+    assert not np.array_equal(exact.beliefs.log_odds[0], noisy.beliefs.log_odds[0])
 
 
 def scored(weights, robots=2):

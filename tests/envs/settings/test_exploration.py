@@ -86,7 +86,7 @@ def test_a_bad_short_option_is_refused_with_what_is_known(options, words):
     ("name", "meant"), [("scann", "scan"), ("egocentric", "egocentric_map"), ("speed", "pose"), (7, None)]
 )
 def test_an_unknown_observation_is_refused_with_the_nearest_name(name, meant):
-    with pytest.raises(ValueError, match="observe has the unknown name") as caught:
+    with pytest.raises(ValueError, match="observe has an unknown name") as caught:
         make_settings(observe=["pose", name])
     assert repr(name) in str(caught.value)
     assert ("did you mean" in str(caught.value)) == (meant is not None)

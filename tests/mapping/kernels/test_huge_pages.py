@@ -35,8 +35,8 @@ def test_arrays_of_pages_are_blank_apart_and_begin_on_lines():
 FORKS = """
 import os
 import numpy as np
-from lidarium.mapping.kernels.huge_pages import Pages
-array = Pages().blank((4, 64), np.int8)
+from lidarium.mapping.kernels.huge_pages import ArrayPool
+array = ArrayPool().blank((4, 64), np.int8)
 array[0] = 5
 if os.fork() == 0:
     array[...] = 7

@@ -37,8 +37,8 @@ def test_a_drive_ends_in_the_same_place_in_a_batch_of_any_size(drives):
     small, large = Histories(drives, 2, 0.025), Histories(drives, 8, 0.025)
     small.run()
     large.run()
-    assert np.array_equal(small.world.poses, large.world.poses[-2:])
-    assert not np.array_equal(large.world.poses, drives.starts)
+    assert np.array_equal(small.simulation.world.poses, large.simulation.world.poses[-2:])
+    assert not np.array_equal(large.simulation.world.poses, drives.starts)
 
 
 def test_robots_on_the_maps_of_others_drive_alike_in_less_memory(drives):

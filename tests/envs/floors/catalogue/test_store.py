@@ -235,7 +235,7 @@ def imported(path):
         left += [
             name.removeprefix("lidarium.").replace(".", "/") + ".py"
             for name in froms
-            if name.startswith("lidarium.")
+            if name.startswith("lidarium.") and name != "lidarium.registry"
         ]
     return found
 

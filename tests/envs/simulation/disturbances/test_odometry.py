@@ -113,17 +113,17 @@ def test_noise_spreads_with_the_root_of_the_way_whatever_the_time_step():
 def test_drives_do_not_quite_what_they_are_told_and_the_wheels_know_it():
     model = bias(speed_noise=0.05, turn_rate_noise=0.05)
     exact, noisy = drive((0.5, 0.2), odometry="ideal"), drive((0.5, 0.2), odometry=model)
-    assert not np.allclose(exact.poses, noisy.poses, atol=1e-6)
-    assert np.allclose(noisy.believed, noisy.poses, atol=1e-9)
+    assert not np.allclose(exact.world.poses, noisy.world.poses, atol=1e-6)
+    assert np.allclose(noisy.beliefs.believed, noisy.world.poses, atol=1e-9)
 
 
 def test_the_same_seed_is_the_same_run_to_the_bit():
     one, other, another = (
         drive((0.5, 0.2), seed=seed, odometry="poor", noise="datasheet") for seed in (3, 3, 4)
     )
-    assert np.array_equal(one.believed, other.believed)
-    assert np.array_equal(one.log_odds[0], other.log_odds[0])
-    assert not np.array_equal(one.believed, another.believed)
+    assert np.array_equal(one.beliefs.believed, other.beliefs.believed)
+    assert np.array_equal(one.beliefs.log_odds[0], other.beliefs.log_odds[0])
+    assert not np.array_equal(one.beliefs.believed, another.beliefs.believed)
 
 
 def test_with_unknown_starts_reckoning_begins_at_zero():

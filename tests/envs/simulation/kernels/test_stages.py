@@ -64,13 +64,19 @@ def simulation(robots=3, episodes=1, noise=0.0, threads=1, resolution=0.05, beam
     )
 
 
+def array_of(simulation, name):
+    """The array of a simulation, of whichever of its parts has it."""
+    owners = (simulation.world, simulation.beliefs, simulation.score, simulation)
+    return next(getattr(owner, name) for owner in owners if hasattr(owner, name))
+
+
 def same(one, other, rows=slice(None), other_rows=slice(None)):
     for name in STATE:
         if name != "team_seen":
-            assert np.array_equal(getattr(one, name)[rows], getattr(other, name)[other_rows]), name
-    for a, b in zip(one.log_odds[rows], other.log_odds[other_rows], strict=True):
+            assert np.array_equal(array_of(one, name)[rows], array_of(other, name)[other_rows]), name
+    for a, b in zip(one.beliefs.log_odds[rows], other.beliefs.log_odds[other_rows], strict=True):
         assert np.array_equal(a, b)
-    for a, b in zip(one.masks[rows], other.masks[other_rows], strict=True):
+    for a, b in zip(one.score.masks[rows], other.score.masks[other_rows], strict=True):
         assert np.array_equal(a, b)
 
 
@@ -91,24 +97,23 @@ def test_the_fused_step_is_the_two_stages_one_after_the_other(tables, noise, kno
     for each in (fused, staged):
         each.place(0, tables, starts, 5, known)
         each.step(np.zeros((3, 2)), moves_bodies=False)
-    for step in range(200):
+    for _ in range(200):
         commands = commands_of(generator, 3)
         fused.step(commands)
-        sensed = staged.move_and_sense(commands, step)
+        staged.step(commands, perceives=False)
         staged.perceive()
-        assert np.array_equal(sensed.ranges, fused.ranges)
-        assert np.array_equal(sensed.true_pose, fused.poses)
-        assert np.array_equal(staged.steps, fused.steps)
+        assert np.array_equal(staged.ranges, fused.ranges)
+        assert np.array_equal(staged.world.steps, fused.world.steps)
         same(fused, staged)
-        assert staged.team_seen[0] == fused.team_seen[0]
-    assert fused.team_seen[0] > 1000
-    assert fused.collisions.sum() > 0
+        assert staged.score.team_seen[0] == fused.score.team_seen[0]
+    assert fused.score.team_seen[0] > 1000
+    assert fused.world.collisions.sum() > 0
 
 
 def test_serial_and_parallel_kernels_agree_to_the_bit(tables):
     generator = np.random.default_rng(2)
     serial, parallel = simulation(16, noise=0.01), simulation(16, noise=0.01, threads=2)
-    assert serial._step is not parallel._step
+    assert (serial.threads, parallel.threads) == (1, 2)
     starts = starts_on(tables, 16, generator)
     for each in (serial, parallel):
         each.place(0, tables, starts, 8)
@@ -117,7 +122,7 @@ def test_serial_and_parallel_kernels_agree_to_the_bit(tables):
         serial.step(commands, moves_bodies=step > 0)
         parallel.step(commands, moves_bodies=step > 0)
         same(serial, parallel)
-        assert serial.team_seen[0] == parallel.team_seen[0]
+        assert serial.score.team_seen[0] == parallel.score.team_seen[0]
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -140,8 +145,8 @@ def test_four_episodes_in_a_batch_are_four_worlds_alone(tables, threads):
             rows = slice(2 * episode, 2 * episode + 2)
             alone[episode].step(commands[rows], moves_bodies=step > 0)
             same(batch, alone[episode], rows)
-            assert batch.team_seen[episode] == alone[episode].team_seen[0]
-            assert batch.coverage(episode) == alone[episode].coverage(0)
+            assert batch.score.team_seen[episode] == alone[episode].team_seen[0]
+            assert batch.score.coverage(episode) == alone[episode].coverage(0)
 
 
 def test_an_episode_placed_anew_forgets_the_old_one_and_leaves_the_others(tables):
@@ -169,11 +174,11 @@ def test_a_world_copied_in_mid_episode_goes_on_alike_and_apart(tables, how):
     for _ in range(20):
         original.step(commands_of(generator, 3))
     copied = pickle.loads(pickle.dumps(original)) if how == "pickle" else copy.deepcopy(original)
-    frozen = copied.log_odds[0].copy()
+    frozen = copied.beliefs.log_odds[0].copy()
     commands = [commands_of(generator, 3) for _ in range(20)]
     for each in commands:
         original.step(each)
-    assert np.array_equal(copied.log_odds[0], frozen)
+    assert np.array_equal(copied.beliefs.log_odds[0], frozen)
     for each in commands:
         copied.step(each)
     same(original, copied)
@@ -192,28 +197,32 @@ def test_unknown_starts_give_the_same_map_in_the_frame_of_the_start(tables):
         commands = commands_of(generator, 1)
         known.step(commands, moves_bodies=step > 0)
         own.step(commands, moves_bodies=step > 0)
-    assert np.allclose(own.believed[0], known.believed[0] - [*start[0, :2], 0.0], atol=1e-9)
-    column, row = (np.round((np.array(own.origins[0]) + start[0, :2] - known.origins[0]) / 0.05)).astype(int)
-    rows, columns = np.nonzero(known.log_odds[0])
-    there = own.log_odds[0][rows - row, columns - column]
-    assert (there == known.log_odds[0][rows, columns]).mean() > 0.999
-    assert np.array_equal(known.masks[0], own.masks[0])
+    assert np.allclose(own.beliefs.believed[0], known.beliefs.believed[0] - [*start[0, :2], 0.0], atol=1e-9)
+    column, row = (
+        np.round((np.array(own.beliefs.origins[0]) + start[0, :2] - known.beliefs.origins[0]) / 0.05)
+    ).astype(int)
+    rows, columns = np.nonzero(known.beliefs.log_odds[0])
+    there = own.beliefs.log_odds[0][rows - row, columns - column]
+    assert (there == known.beliefs.log_odds[0][rows, columns]).mean() > 0.999
+    assert np.array_equal(known.score.masks[0], own.score.masks[0])
 
 
 def test_the_map_is_that_of_the_occupancy_grid_fed_with_the_same_scans(tables):
     generator = np.random.default_rng(7)
     one = simulation(1, noise=0.01)
     one.place(0, tables, starts_on(tables, 1, generator), 1)
-    one.flags[:] &= ~KNOWN_TEAMMATES
+    one.world.flags[:] &= ~KNOWN_TEAMMATES
     lidar = one.lidar
     geometry = ScanGeometry(beams=lidar.beams, field_of_view=lidar.field_of_view, range_max=lidar.range_max)
     grid = OccupancyGrid(OccupancySettings(resolution=0.05))
     for step in range(30):
         one.step(commands_of(generator, 1), moves_bodies=step > 0)
-        grid.integrate(one.poses[0], one.ranges[0], geometry, noise=(0.01, 0.01))
-    column, row = (round((a - b) / 0.05) for a, b in zip(grid.origin, one.origins[0], strict=True))
-    rows, columns = np.nonzero(one.log_odds[0])
-    assert (grid.log_odds[rows - row, columns - column] == one.log_odds[0][rows, columns]).mean() > 0.999
+        grid.integrate(one.world.poses[0], one.ranges[0], geometry, noise=(0.01, 0.01))
+    column, row = (round((a - b) / 0.05) for a, b in zip(grid.origin, one.beliefs.origins[0], strict=True))
+    rows, columns = np.nonzero(one.beliefs.log_odds[0])
+    assert (
+        grid.log_odds[rows - row, columns - column] == one.beliefs.log_odds[0][rows, columns]
+    ).mean() > 0.999
 
 
 def hall(rows=160, columns=240):
@@ -230,8 +239,8 @@ def test_robots_see_each_other_but_known_teammates_stay_out_of_the_map():
         pair.place(0, hall(), starts, 1, known)
         pair.step(np.zeros((2, 2)), moves_bodies=False)
         assert pair.ranges[0, 90] == pytest.approx(1.5 - 0.18, abs=1e-6)
-        x, y = pair.believed[0, :2] - pair.origins[0] + [1.5 - 0.175, 0.0]
-        assert (pair.log_odds[0][int(y / 0.05), int(x / 0.05)] > 0) != known
+        x, y = pair.beliefs.believed[0, :2] - pair.beliefs.origins[0] + [1.5 - 0.175, 0.0]
+        assert (pair.beliefs.log_odds[0][int(y / 0.05), int(x / 0.05)] > 0) != known
 
 
 def test_a_robot_too_low_for_the_laser_is_not_seen():
@@ -245,17 +254,21 @@ def test_an_ended_robot_stays_as_a_body_with_its_sensors_off():
     pair = simulation(2)
     pair.place(0, hall(), np.array([[2.0, 2.0, 0.0], [2.6, 2.0, 0.0]]), 1)
     pair.step(np.zeros((2, 2)), moves_bodies=False)
-    pair.flags[1] |= ENDED
-    pair.moves[1] = 0
-    ranges, log_odds, mask = pair.ranges[1].copy(), pair.log_odds[1].copy(), pair.masks[1].copy()
+    pair.world.flags[1] |= ENDED
+    pair.world.moves[1] = 0
+    ranges, log_odds, mask = (
+        pair.ranges[1].copy(),
+        pair.beliefs.log_odds[1].copy(),
+        pair.score.masks[1].copy(),
+    )
     for _ in range(30):
         pair.step(np.array([[0.5, 0.0], [0.5, 0.5]]))
-    assert np.array_equal(pair.poses[1], [2.6, 2.0, 0.0])
+    assert np.array_equal(pair.world.poses[1], [2.6, 2.0, 0.0])
     assert np.array_equal(pair.ranges[1], ranges)
-    assert np.array_equal(pair.log_odds[1], log_odds)
-    assert np.array_equal(pair.masks[1], mask)
-    assert pair.gains[1] == 0.0
-    assert pair.poses[0, 0] == pytest.approx(2.6 - 0.36, abs=1e-5)
+    assert np.array_equal(pair.beliefs.log_odds[1], log_odds)
+    assert np.array_equal(pair.score.masks[1], mask)
+    assert pair.score.gains[1] == 0.0
+    assert pair.world.poses[0, 0] == pytest.approx(2.6 - 0.36, abs=1e-5)
     assert pair.ranges[0, 90] == pytest.approx(0.18, abs=1e-5)
 
 
@@ -264,12 +277,12 @@ def test_the_window_of_changes_holds_every_cell_that_changed(tables):
     team = simulation(2, noise=0.01)
     team.place(0, tables, starts_on(tables, 2, generator), 1)
     for step in range(40):
-        before = [log_odds.copy() for log_odds in team.log_odds]
-        team.forget_changes(0, 2)
+        before = [log_odds.copy() for log_odds in team.beliefs.log_odds]
+        team.beliefs.forget_changes(0, 2)
         team.step(commands_of(generator, 2), moves_bodies=step > 0)
         for row in range(2):
-            changed = np.argwhere(team.log_odds[row] != before[row])
-            low_row, high_row, low_column, high_column = team.windows[row]
+            changed = np.argwhere(team.beliefs.log_odds[row] != before[row])
+            low_row, high_row, low_column, high_column = team.beliefs.windows[row]
             assert changed[:, 0].min() >= low_row
             assert changed[:, 0].max() < high_row
             assert changed[:, 1].min() >= low_column
