@@ -146,7 +146,15 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._stopping = self.operating.stopping
 
     def belief(self, agent: str) -> Belief:
-        """Return the handle on what an agent's onboard software knows."""
+        """Return the handle on what an agent's onboard software knows.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such agent.
+        """
+        if agent not in self._rows:
+            raise ValueError(f"{agent!r} is not among the agents {self.possible_agents}")
         return Belief(self.perception, self._rows[agent])
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:

@@ -4,7 +4,7 @@ The speeds are those that its robots were driven at.
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,9 @@ from lidarium.evaluation.episodes.result import settings_sha256
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.state import state_sha256
+
+ADDED = frozenset({"localizer"})
+"""Settings that older records do not have."""
 
 
 def rerun(
@@ -122,6 +125,11 @@ def settings_of(header: dict[str, Any]) -> ExplorationSettings:
     ValueError
         Where they are not whole, or not those that were hashed.
     """
+    missing = {each.name for each in fields(ExplorationSettings)} - set(header["settings"]) - ADDED
+    if missing:
+        raise ValueError(
+            f"the settings of the record are not those of lidarium {lidarium.__version__}: no {min(missing)}"
+        )
     try:
         settings = make_settings(**header["settings"])
     except TypeError as error:

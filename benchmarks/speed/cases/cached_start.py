@@ -86,7 +86,7 @@ def read_only_environment(folder: Path) -> dict[str, str]:
         shutil.copytree(
             importlib.import_module(f"lidarium.{name}").__path__[0], package / name, ignore=skipped
         )
-    (package / "mapping" / "__pycache__").write_text("in the way")
+    (package / "mapping" / "kernels" / "__pycache__").write_text("in the way")
     home.mkdir()
     (home / ".cache").write_text("in the way")
     temporary.mkdir()

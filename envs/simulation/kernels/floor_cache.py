@@ -28,6 +28,8 @@ DEFAULT_MIB = 256.0
 
 MADE_BY = (
     "envs/floors",
+    "envs/settings/lidar.py",
+    "envs/simulation/kernels/arrays.py",
     "envs/simulation/kernels/floor_tables.py",
     "envs/simulation/kernels/motion.py",
     "envs/simulation/kernels/ray_tables.py",

@@ -174,7 +174,7 @@ def test_the_robot_passes_a_post_just_beside_its_swath():
     assert drive.simulation.world.collisions[0] == 0
 
 
-@pytest.mark.parametrize("knows_mates", [True, False])
+@pytest.mark.parametrize("knows_teammates", [True, False])
 def test_the_robot_stops_before_a_body_that_appears_on_its_way_and_goes_on_when_it_is_gone(knows_teammates):
     drive = Drive(
         hall(),

@@ -145,8 +145,8 @@ def test_four_episodes_in_a_batch_are_four_worlds_alone(tables, threads):
             rows = slice(2 * episode, 2 * episode + 2)
             alone[episode].step(commands[rows], moves_bodies=step > 0)
             same(batch, alone[episode], rows)
-            assert batch.score.team_seen[episode] == alone[episode].team_seen[0]
-            assert batch.score.coverage(episode) == alone[episode].coverage(0)
+            assert batch.score.team_seen[episode] == alone[episode].score.team_seen[0]
+            assert batch.score.coverage(episode) == alone[episode].score.coverage(0)
 
 
 def test_an_episode_placed_anew_forgets_the_old_one_and_leaves_the_others(tables):
