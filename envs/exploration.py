@@ -4,7 +4,6 @@ The team explores a floor.
 """
 
 import copy
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,29 +25,15 @@ from lidarium.envs.outcome.scorer import Scorer
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, read_options
+from lidarium.envs.shares import scale_shares
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.station.reports import Station
-from lidarium.mapping.kernels.compilation import Array, kernel
 
 if TYPE_CHECKING:
     from lidarium.envs.drawing.rendering import Scene
 
+
 Observation = dict[str, NDArray[Any]]
-
-
-@kernel
-def scale_shares(commands: Array, limits: Array) -> bool:
-    """Turn shares within [-1, 1] into speeds and turn rates.
-
-    False where one is nan or infinite.
-    """
-    for robot in range(commands.shape[0]):
-        for axis in range(2):
-            share = commands[robot, axis]
-            if not math.isfinite(share):
-                return False
-            commands[robot, axis] = min(max(share, -1.0), 1.0) * limits[axis]
-    return True
 
 
 class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
