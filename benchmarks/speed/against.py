@@ -1,4 +1,4 @@
-"""The learning preset of this code beside that of another checkout.
+"""Steps of this code beside those of another checkout.
 
 Both are driven alternately; the comparison shows what a change of the kernels gained.
 
@@ -14,13 +14,14 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from lidarium.benchmarks.speed.harness.batches import OBSERVED, DrivenBatch
-from lidarium.benchmarks.speed.scenes.floors import straight_floor
+import lidarium
 
-KINDS = ("all observations", "without egocentric maps")
+KINDS = ("all observations", "without egocentric maps", "one environment", "waypoint decisions")
+FLOOR = "building:3"
 STEPS = 20
 """Steps of a block."""
 
@@ -28,23 +29,42 @@ STEPS = 20
 def serve(threads: int) -> None:
     """Drive a block of a kind for each line of standard input that names it.
 
-    Its time per agent step [us] is printed.
+    Its time per agent step [us] is printed. Public names alone are used, so that any version can take part.
     """
-    preset = {"lidar": "lidar_360_6m", "resolution": 0.05}
-    plain = tuple(name for name in OBSERVED if name != "egocentric_map")
-    floor = straight_floor()
-    batches = {
-        KINDS[0]: DrivenBatch(floor, threads, **preset),
-        KINDS[1]: DrivenBatch(floor, threads, **preset, observe=plain),
+    preset = {
+        "robots": 2,
+        "lidar": "lidar_360_6m",
+        "resolution": 0.05,
+        "horizon_s": None,
+        "stop_coverage": None,
     }
+    plain = ("scan", "pose", "velocity", "bumper", "map")
+    rows: dict[str, Any] = {
+        KINDS[0]: lidarium.vector_env(
+            64, FLOOR, threads=threads, copy=False, observe=(*plain, "egocentric_map"), **preset
+        ),
+        KINDS[1]: lidarium.vector_env(64, FLOOR, threads=threads, copy=False, observe=plain, **preset),
+        KINDS[2]: lidarium.parallel_env(FLOOR, **{**preset, "robots": 3}),
+        KINDS[3]: lidarium.vector_env(64, FLOOR, threads=threads, level="waypoint", copy=False, **preset),
+    }
+    generator = np.random.default_rng(0)
     for line in sys.stdin:
         kind, _, place = line.strip().partition(" from ")
+        env = rows[kind]
         if place:
-            batches[kind].start(int(place))
+            env.reset(seed=int(place))
+        steps = 3 if kind == KINDS[3] else STEPS
+        if kind == KINDS[2]:
+            agents = env.possible_agents
+            actions = [dict.fromkeys(agents, action) for action in generator.uniform(-0.5, 1.0, (steps, 2))]
+        else:
+            agents = range(env.num_envs)
+            bounds = (-1.0, 1.0) if kind == KINDS[3] else (-0.5, 1.0)
+            actions = list(generator.uniform(*bounds, (steps, env.num_envs, 2)).astype(np.float32))
         began = time.perf_counter()
-        for _ in range(STEPS):
-            batches[kind].step()
-        print((time.perf_counter() - began) / STEPS / batches[kind].agents * 1e6, flush=True)
+        for action in actions:
+            env.step(action)
+        print((time.perf_counter() - began) / steps / len(agents) * 1e6, flush=True)
 
 
 def times(pythons: list[str], threads: int, rounds: int, blocks: int) -> dict[str, np.ndarray]:
@@ -89,9 +109,7 @@ def _answer(process: "subprocess.Popen[str]", question: str) -> str:
 
 def main() -> None:
     """Compare two checkouts and print medians with quartiles."""
-    parser = argparse.ArgumentParser(
-        description="The learning preset of this code beside that of another checkout."
-    )
+    parser = argparse.ArgumentParser(description="Steps of this code beside those of another checkout.")
     parser.add_argument(
         "other", nargs="?", help="interpreter of a virtual environment with the other checkout"
     )
