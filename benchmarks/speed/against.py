@@ -31,7 +31,7 @@ def serve(threads: int) -> None:
 
     Its time per agent step [us] is printed. Public names alone are used, so that any version can take part.
     """
-    preset = {
+    preset: dict[str, Any] = {
         "robots": 2,
         "lidar": "lidar_360_6m",
         "resolution": 0.05,
