@@ -28,6 +28,7 @@ from lidarium.envs.settings.reset_options import FloorChoice, read_options
 from lidarium.envs.shares import scale_shares
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.station.reports import Station
+from lidarium.mapping.kernels.views import table_of
 
 if TYPE_CHECKING:
     from lidarium.envs.drawing.rendering import Scene
@@ -106,6 +107,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         )
         self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
         self._rules = make_rules(self.simulation, self.settings)
+        self._rules_table: NDArray[np.int64] | None = None
         self._reasons = np.zeros(self.settings.robots, np.int8)
         self._generator: np.random.Generator | None = None
         self._offsets = np.zeros((self.settings.robots, 2))
@@ -325,8 +327,14 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     def ends_now(self) -> bool:
         """Whether the next outcome ends an agent, or a robot has paused by itself."""
         self._note_energy()
-        count = note_endings(self.simulation.table, self.settings.robots, self._rules, self._reasons)
+        count = self._count_endings()
         return bool(count) or self.operating.is_interrupting
+
+    def _count_endings(self) -> int:
+        """Note why robots end now, and return how many do."""
+        if self._rules_table is None:
+            self._rules_table = table_of(self._rules)
+        return int(note_endings(self.simulation.table, len(self._reasons), self._rules_table, self._reasons))
 
     def _note_energy(self) -> None:
         if self._is_battery_limited:
@@ -362,7 +370,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     def _endings(self, live: Sequence[str]) -> tuple[dict[str, str], bool]:
         """Return why agents end now, and whether the horizon cuts the episode."""
         self._note_energy()
-        count = note_endings(self.simulation.table, self.settings.robots, self._rules, self._reasons)
+        count = self._count_endings()
         if not count and not self._stopping:
             return {}, False
         endings = {agent: reason for agent, reason in self._stopping.items() if agent in live}
@@ -394,7 +402,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self.world.poses.copy(),
             self.score.seen.tolist(),
         )
-        states, orders = self.operating.states, self.operating.orders
+        states, orders, terms = self.operating.states, self.operating.orders, self.scorer.terms
         infos: dict[str, dict[str, Any]] = {}
         for agent in agents:
             row = rows[agent]
@@ -403,7 +411,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
                 "truth": {"pose": poses[row], "coverage": coverage, "seen_cells": seen[row]},
                 "state": states[row]._value_,
                 "order": "" if order is None else order.kind._value_,
-                "reward_terms": self.scorer.terms[row],
+                "reward_terms": terms[row],
             }
         if self._is_battery_limited:
             for agent in agents:
@@ -451,4 +459,5 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self._window = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_window": None}
+        # A copy's arrays lie elsewhere.
+        return {**self.__dict__, "_window": None, "_rules_table": None}

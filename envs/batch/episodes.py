@@ -38,6 +38,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.station.operating import state_after
+from lidarium.mapping.kernels.views import table_of
 from lidarium.mapping.kernels.work_queue import new_queue
 
 Arrays = dict[str, NDArray[Any]]
@@ -249,7 +250,7 @@ class EpisodeBatch:
         What happens to them counts before reasons of their own.
         """
         self.reasons = np.zeros(self.rows, np.int8)
-        count = note_endings(self.simulation.table, self.robots, self._rules, self.reasons)
+        count = note_endings(self.simulation.table, self.robots, table_of(self._rules), self.reasons)
         if count:
             self.reasons[~acted] = 0
         if stopping is not None:

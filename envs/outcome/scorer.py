@@ -58,6 +58,7 @@ class Scorer:
         self.ended_because: dict[str, str] = {}
         self.terms: list[dict[str, float]] = [{} for _ in range(world.robots)]
         self._extra = ExtraTerms(settings.reward.more)
+        self._has_extra = not self._extra.is_empty
         self._last_seen = -1
         self._track_steps = max(round(TRACK_PERIOD_S / settings.time_step), 1)
 
@@ -100,11 +101,11 @@ class Scorer:
 
     def take_rewards(self) -> list[float]:
         """Return each robot's reward since the last call, and start anew; ``terms`` says of what."""
-        rewards: list[float] = self._score.rewards.tolist()
-        self.terms = [dict(zip(TERMS, row, strict=True)) for row in self._score.reward_terms.tolist()]
-        self._score.rewards.fill(0.0)
-        self._score.reward_terms.fill(0.0)
-        if not self._extra.is_empty:
+        score = self._score
+        rewards: list[float] = score.rewards.tolist()
+        self.terms = [dict(zip(TERMS, row)) for row in score.reward_terms.tolist()]  # noqa: B905 (hot)
+        score.earned.fill(0.0)
+        if self._has_extra:
             for name, earned in self._extra.earned(self._world).items():
                 for row, value in enumerate(earned.tolist()):
                     self.terms[row][name] = value

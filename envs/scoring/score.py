@@ -47,6 +47,8 @@ class Score:
         What each robot has earned since this was last set to 0.
     reward_terms : (rows, 4) float64
         The same by ``rewards.TERMS``; before weights.
+    earned : (rows * 5,) float64
+        The memory of both.
     mask_rows : (rows, 5) int64
         Where the masks lie (``masks`` of ``kernels.arrays``).
     """
@@ -56,8 +58,9 @@ class Score:
         self._robots, self._episodes = robots, episodes
         self.reward_weights = np.zeros(len(TERMS)) if weights is None else np.array(weights, np.float64)
         self.seen, self.gains = np.zeros(rows, np.int64), np.zeros(rows)
-        self.rewarded, self.rewards = np.zeros(rows), np.zeros(rows)
-        self.reward_terms = np.zeros((rows, len(TERMS)))
+        # Rewards and their terms lie together, so that one call clears them.
+        self.earned, self.rewarded = np.zeros(rows * (1 + len(TERMS))), np.zeros(rows)
+        self.rewards, self.reward_terms = self.earned[:rows], self.earned[rows:].reshape(rows, len(TERMS))
         self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
         self.masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * rows
         self.team_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes

@@ -115,6 +115,7 @@ class Simulation:
         self._everywhere = np.ones(self.episodes, np.bool_)
         self._pool: ArrayPool | None = None
         self._threads = min(threads, int(os.cpu_count() or 1))
+        self._is_parallel = self.threads > 1
         self._table = table_of_owners(self, world, self.beliefs, self.score)
 
     def place(

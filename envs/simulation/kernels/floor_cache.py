@@ -29,6 +29,8 @@ DEFAULT_MIB = 256.0
 MADE_BY = (
     "envs/floors",
     "envs/settings/lidar.py",
+    "mapping/grids/scan_geometry.py",
+    "mapping/geometry",
     "envs/simulation/kernels/arrays.py",
     "envs/simulation/kernels/floor_tables.py",
     "envs/simulation/kernels/motion.py",

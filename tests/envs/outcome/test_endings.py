@@ -5,6 +5,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.outcome.endings import REASONS, make_rules, note_endings
+from lidarium.mapping.kernels.views import table_of
 
 
 def expected(env, rules, row):
@@ -41,6 +42,6 @@ def test_the_first_rule_that_holds_is_the_reason(seed):
     if generator.random() < 0.5:
         rules.goals[0] = env.world.poses[0, :2] + 0.1
     reasons = np.zeros(3, np.int8)
-    count = note_endings(env.simulation.table, 3, rules, reasons)
+    count = note_endings(env.simulation.table, 3, table_of(rules), reasons)
     assert [REASONS[number] for number in reasons] == [expected(env, rules, row) for row in range(3)]
     assert count == (reasons != 0).sum()
