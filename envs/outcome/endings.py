@@ -108,8 +108,8 @@ def ending_of(world: WorldArrays, row: int, episode: int, rules: Rules) -> int:
 def note_endings(table: Array, robots: int, rules_table: Array, reasons: Array) -> int:
     """Write why each robot ends now into ``reasons`` (rows,) int8.
 
-    Returns how many end. ``rules_table`` is the table of ``Rules``: one array is handed over in less time than
-    five.
+    Returns how many end. ``rules_table`` is the table of ``Rules``: handing over one array takes less time
+    than five.
     """
     world, rules = world_at(table), arrays_at(rules_table, Rules)
     count = 0

@@ -29,6 +29,8 @@ DEFAULT_MIB = 256.0
 MADE_BY = (
     "envs/floors",
     "envs/settings/lidar.py",
+    "envs/settings/odometry.py",
+    "envs/simulation/disturbances",
     "mapping/grids/scan_geometry.py",
     "mapping/geometry",
     "envs/simulation/kernels/arrays.py",
