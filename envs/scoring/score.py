@@ -1,6 +1,7 @@
 """The score: what of a floor counts, who has sensed which of it, what that earns."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,12 +61,22 @@ class Score:
         self.seen, self.gains = np.zeros(rows, np.int64), np.zeros(rows)
         # Rewards and their terms lie together, so that one call clears them.
         self.earned, self.rewarded = np.zeros(rows * (1 + len(TERMS))), np.zeros(rows)
-        self.rewards, self.reward_terms = self.earned[:rows], self.earned[rows:].reshape(rows, len(TERMS))
+        self._part_earned()
         self.team_seen, self.counted = np.zeros(episodes, np.int64), np.zeros(episodes, np.int64)
         self.masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * rows
         self.team_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes
         self.counted_masks: list[NDArray[np.uint64]] = [np.zeros((0, 1), np.uint64)] * episodes
         self.mask_rows, self.boxes = np.zeros((rows, 5), np.int64), np.zeros((rows, 4), np.int64)
+
+    def _part_earned(self) -> None:
+        """Make the rewards and their terms parts of one memory."""
+        rows = self._robots * self._episodes
+        self.rewards, self.reward_terms = self.earned[:rows], self.earned[rows:].reshape(rows, len(TERMS))
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        # Copies of parts are no parts of the copy.
+        self._part_earned()
 
     def shared(self, free: NDArray[np.bool_], multiple: int, same: Sequence[int]) -> NDArray[np.uint64]:
         """Return F of a floor as bits, in the array of another episode that has the same.
