@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
+from lidarium.scripts import first_start
 from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, table, tell
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ def execute(command: Evaluate) -> Answer:
     campaign = Campaign(
         _suite(command), folder, command.workers or len(os.sched_getaffinity(0)), command.records
     )
+    first_start.compile_first(command.json)
     is_interrupted = False
     runs = campaign.run()
     try:

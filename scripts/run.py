@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lidarium.scripts import first_start
 from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name, table
 
 if TYPE_CHECKING:
@@ -106,6 +107,7 @@ def execute(command: Run) -> Answer:
     recorder = _recorder(command)
     env, history = _environment(command, recorder)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
+    first_start.compile_first(command.json)
     episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
     assert env.floor is not None
     folder = _folder(command, env.floor.name)

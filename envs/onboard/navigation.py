@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.simulation.kernels.arrays import MAP, MAP_COLUMNS, MAP_ROWS
-from lidarium.mapping.grids.cell_blocks import BLOCK, positive_cells, sum_blocks
+from lidarium.mapping.kernels.cell_blocks import positive_cells, sum_blocks
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.vectors import BLOCK
 from lidarium.mapping.kernels.views import (
     int8_at,
     int8_grid_at,

@@ -8,7 +8,7 @@ smallest robot sweeps over its configuration space, connected to the starts.
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.grids.cell_blocks import fetch_block
+from lidarium.mapping.kernels.cell_blocks import fetch_block
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at
 

@@ -23,8 +23,8 @@ from lidarium.envs.simulation.kernels.arrays import (
 )
 from lidarium.evaluation.truth.beliefs import held_maps, shares_one_map
 from lidarium.evaluation.truth.true_map import Truth
-from lidarium.mapping.grids.cell_blocks import negative_cells, positive_cells
 from lidarium.mapping.grids.occupancy import WORD
+from lidarium.mapping.kernels.cell_blocks import negative_cells, positive_cells
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_grid_at
 

@@ -13,12 +13,14 @@ import math
 
 import numpy as np
 
-from lidarium.mapping.grids.cell_blocks import BLOCK, HALF_BLOCK, write_block_of_levels, write_levels
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.pooled_maps import POOL, POOL_COLUMNS, POOL_ROWS
-from lidarium.mapping.grids.turned_crops import CAN_LOOK_UP_IN_REGISTERS, turn_blocks
-from lidarium.mapping.grids.turned_crops import SIDE as BLOCK_SIDE
+from lidarium.mapping.grids.turned_crops import turn_blocks
+from lidarium.mapping.kernels.cell_blocks import HALF_BLOCK, write_block_of_levels, write_levels
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.crop_blocks import CAN_LOOK_UP_IN_REGISTERS
+from lidarium.mapping.kernels.crop_blocks import SIDE as BLOCK_SIDE
+from lidarium.mapping.kernels.vectors import BLOCK
 from lidarium.mapping.kernels.views import bytes_at, int8_at, int8_grid_at, scratch_grid
 
 _FREE, _UNKNOWN, _OCCUPIED = np.uint8(FREE), np.uint8(UNKNOWN), np.uint8(OCCUPIED)

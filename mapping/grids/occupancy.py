@@ -13,14 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.grids.cell_blocks import fetch_block, update_block
 from lidarium.mapping.grids.noisy_returns import settle_returns
 from lidarium.mapping.grids.scan_geometry import ScanGeometry, beam_directions
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
+from lidarium.mapping.kernels.cell_blocks import fetch_block, update_block
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.vectors import LEVELS
 
 LOG_ODDS_UNIT = 0.05
-OCCUPIED, UNKNOWN, FREE = 0, 127, 255
+OCCUPIED, UNKNOWN, FREE = LEVELS
 WORD = 64
 MAX_CELLS = 400_000_000
 

@@ -10,9 +10,9 @@ at.
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.grids.cell_blocks import write_greatest
 from lidarium.mapping.grids.occupancy import WORD
 from lidarium.mapping.kernels.bit_words import first_bit
+from lidarium.mapping.kernels.cell_blocks import write_greatest
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_vector, vector_at
 

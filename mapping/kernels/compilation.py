@@ -39,7 +39,7 @@ def _sources_hash() -> str:
     for folder in _source_folders():
         for path in sorted(folder.rglob("*.py")):
             source = path.read_bytes()
-            if b"@kernel" in source:
+            if b"@kernel" in source or b"intrinsic(" in source:
                 digest.update(path.relative_to(folder.parent).as_posix().encode())
                 digest.update(source)
     return digest.hexdigest()[:16]
@@ -60,13 +60,19 @@ _FOLDER = None if _CHOSEN_BY_USER else _cache_folder()
 _CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
 
 
+def cache_folder() -> Path | None:
+    """Return the folder of the compiled kernels, or None where nothing can be cached."""
+    folder = os.environ.get("NUMBA_CACHE_DIR") or _FOLDER
+    return None if folder is None else Path(folder)
+
+
 def is_cache_empty() -> bool:
     """Whether the cache holds no compiled kernel yet, so that this start compiles.
 
     False where nothing can be cached.
     """
-    folder = os.environ.get("NUMBA_CACHE_DIR") or _FOLDER
-    return folder is not None and next(Path(folder).rglob("*.nbi"), None) is None
+    folder = cache_folder()
+    return folder is not None and next(folder.rglob("*.nbi"), None) is None
 
 
 def kernel(

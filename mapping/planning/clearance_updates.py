@@ -11,9 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarium.mapping.grids.cell_blocks import BLOCK
-from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.planning.clearance_blocks import (
+from lidarium.mapping.kernels.clearance_blocks import (
     cells_that_differ,
     count_rows,
     raise_block,
@@ -21,6 +19,8 @@ from lidarium.mapping.planning.clearance_blocks import (
     write_least_sums,
     write_squares,
 )
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.vectors import BLOCK
 
 Window = tuple[int, int, int, int]
 

@@ -7,15 +7,12 @@ them meets it, and where, is exact.
 """
 
 import math
-from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from lidarium.envs.simulation.kernels.ray_tables import TILE
 from lidarium.mapping.grids.scan_geometry import fast_angle
+from lidarium.mapping.kernels.beam_lanes import FLOAT, LANES, lower_lanes
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_grid, vector_at
 
@@ -24,55 +21,6 @@ CORNER_OVERLAP = 1e-9
 
 It makes rounding leave no gap between two faces.
 """
-
-LANES = 8
-"""Beams into which a face is drawn at once."""
-
-_FLOAT = 8
-"""Bytes of a float64."""
-
-_BEAMS = ir.VectorType(ir.DoubleType(), LANES)
-
-
-def _lower_lanes(
-    typing_context: Any,  # noqa: ANN401
-    inverses: Any,  # noqa: ANN401
-    directions: Any,  # noqa: ANN401
-    ranges: Any,  # noqa: ANN401
-    distance: Any,  # noqa: ANN401
-    run: Any,  # noqa: ANN401
-    low: Any,  # noqa: ANN401
-    high: Any,  # noqa: ANN401
-) -> Any:  # noqa: ANN401
-    """Lower the ranges of the beams in the lanes that meet a face."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-        nothing, zero = ir.Constant(_BEAMS, ir.Undefined), ir.Constant(_BEAMS, [0.0] * LANES)
-
-        def spread(value: Any) -> Any:  # noqa: ANN401
-            first = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
-            return builder.shuffle_vector(first, nothing, places)
-
-        inverse_at, direction_at, range_at = (
-            builder.inttoptr(address, _BEAMS.as_pointer()) for address in arguments[:3]
-        )
-        distances, runs, lows, highs = (spread(value) for value in arguments[3:])
-        nearest = builder.load(range_at, align=_FLOAT)
-        candidates = builder.fmul(distances, builder.load(inverse_at, align=_FLOAT))
-        along = builder.fadd(runs, builder.fmul(candidates, builder.load(direction_at, align=_FLOAT)))
-        is_met = builder.and_(
-            builder.and_(builder.fcmp_ordered("<=", lows, along), builder.fcmp_ordered("<=", along, highs)),
-            builder.and_(
-                builder.fcmp_ordered(">", candidates, zero), builder.fcmp_ordered("<", candidates, nearest)
-            ),
-        )
-        builder.store(builder.select(is_met, candidates, nearest), range_at, align=_FLOAT)
-
-    return types.void(*(types.int64,) * 3, *(types.float64,) * 4), generate
-
-
-_lower: Any = intrinsic(_lower_lanes)
 
 
 @kernel(inline=True, borrowing=True)
@@ -107,8 +55,8 @@ def _draw_face(
                 nearest[k] = candidate
         return
     for beam in range(first, last + 1, LANES):
-        offset = _FLOAT * min(beam, beams - LANES)
-        _lower(inverse + offset, direction + offset, ranges + offset, distance, run, low, high)
+        offset = FLOAT * min(beam, beams - LANES)
+        lower_lanes(inverse + offset, direction + offset, ranges + offset, distance, run, low, high)
 
 
 @kernel(inline=True, borrowing=True)
@@ -224,7 +172,7 @@ def cast_by_faces(
     beams = ranges.shape[0]
     for beam in range(beams):
         ranges[beam] = reach
-    ranges_at, directions_at, row_size = ranges.ctypes.data, directions.ctypes.data, _FLOAT * beams
+    ranges_at, directions_at, row_size = ranges.ctypes.data, directions.ctypes.data, FLOAT * beams
     most = 0
     for tile_row in range(window[0], window[1] + 1):
         first_group = (tile_row * tile_columns + window[2]) * 4

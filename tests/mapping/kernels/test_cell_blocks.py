@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.grids.cell_blocks import negative_cells, positive_cells, sum_blocks
+from lidarium.mapping.kernels.cell_blocks import negative_cells, positive_cells, sum_blocks
+from lidarium.mapping.kernels.clearance_blocks import count_rows, write_squares
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.planning.clearance_blocks import count_rows, write_squares
 
 
 @kernel

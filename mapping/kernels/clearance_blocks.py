@@ -11,7 +11,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from lidarium.mapping.grids.cell_blocks import (
+from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.vectors import (
     BLOCK,
     BYTES,
     INT16,
@@ -25,7 +26,6 @@ from lidarium.mapping.grids.cell_blocks import (
     splat,
     store_at,
 )
-from lidarium.mapping.kernels.compilation import kernel
 
 
 def _positive_differs(typing_context: Any, log_odds: Any, numbers: Any, number: Any) -> Any:  # noqa: ANN401

@@ -17,50 +17,24 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from lidarium.mapping.kernels.compilation import kernel
-
-BLOCK = 64
-"""Cells of a block."""
+from lidarium.mapping.kernels.vectors import (
+    BLOCK,
+    BYTES,
+    INT64,
+    LEVELS,
+    MASK,
+    NO_BYTES,
+    NO_SHORTS,
+    SHORTS,
+    alloca,
+    call_vectors,
+    load_at,
+    splat,
+    store_at,
+)
 
 HALF_BLOCK = 32
-"""Cells of which levels are told at a time where there are fewer than a block."""
-
-INT16, INT64 = ir.IntType(16), ir.IntType(64)
-BYTES, SHORTS = ir.VectorType(ir.IntType(8), BLOCK), ir.VectorType(INT16, BLOCK)
-_MASK = ir.VectorType(ir.IntType(1), BLOCK)
-NO_BYTES, NO_SHORTS = ir.Constant(BYTES, [0] * BLOCK), ir.Constant(SHORTS, [0] * BLOCK)
-
-
-def splat(builder: Any, value: Any, kind: Any) -> Any:  # noqa: ANN401
-    """Repeat an integer in all lanes of a kind of vector."""
-    nothing = ir.Constant(kind, ir.Undefined)
-    lane = value if value.type == kind.element else builder.trunc(value, kind.element)
-    first = builder.insert_element(nothing, lane, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(
-        first, nothing, ir.Constant(ir.VectorType(ir.IntType(32), BLOCK), [0] * BLOCK)
-    )
-
-
-def call_vectors(builder: Any, name: str, first: Any, second: Any) -> Any:  # noqa: ANN401
-    """Call one of LLVM's own functions of two vectors."""
-    kind = first.type
-    insert: Any = cgutils.get_or_insert_function
-    function = insert(
-        builder.module, ir.FunctionType(kind, [kind, kind]), f"llvm.{name}.v{BLOCK}i{kind.element.width}"
-    )
-    return builder.call(function, [first, second])
-
-
-alloca: Any = cgutils.alloca_once_value
-
-
-def load_at(builder: Any, address: Any, kind: Any) -> Any:  # noqa: ANN401
-    """Load a vector of a kind from any address."""
-    return builder.load(builder.inttoptr(address, kind.as_pointer()), align=1)
-
-
-def store_at(builder: Any, value: Any, address: Any) -> None:  # noqa: ANN401
-    """Store a vector at any address."""
-    builder.store(value, builder.inttoptr(address, value.type.as_pointer()), align=1)
+"""Cells of which levels are written at a time where there are fewer than a block."""
 
 
 def _update_block(
@@ -82,8 +56,8 @@ def _update_block(
         lowered = call_vectors(builder, "smax", lowered, splat(builder, least, BYTES))
         raised = call_vectors(builder, "sadd.sat", old, splat(builder, hit_step, BYTES))
         raised = call_vectors(builder, "smin", raised, splat(builder, greatest, BYTES))
-        missed = builder.select(builder.bitcast(seen_bits, _MASK), lowered, old)
-        new = builder.select(builder.bitcast(hit_bits, _MASK), raised, missed)
+        missed = builder.select(builder.bitcast(seen_bits, MASK), lowered, old)
+        new = builder.select(builder.bitcast(hit_bits, MASK), raised, missed)
         # Most cells are as sure as they may be: a line that is not written need not go back to memory.
         is_new = builder.bitcast(builder.icmp_signed("!=", new, old), INT64)
         with builder.if_then(builder.icmp_unsigned("!=", is_new, ir.Constant(INT64, 0))):
@@ -181,9 +155,9 @@ def _levels_of(cells: int) -> Any:  # noqa: ANN401
     def levels_of(typing_context: Any, log_odds: Any, levels: Any) -> Any:  # noqa: ANN401
         def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
             kind = ir.VectorType(ir.IntType(8), cells)
-            zero, unknown, free = (ir.Constant(kind, [level] * cells) for level in (0, 127, 255))
+            zero, occupied, unknown, free = (ir.Constant(kind, [level] * cells) for level in (0, *LEVELS))
             old = load_at(builder, arguments[0], kind)
-            known = builder.select(builder.icmp_signed(">", old, zero), zero, unknown)
+            known = builder.select(builder.icmp_signed(">", old, zero), occupied, unknown)
             store_at(builder, builder.select(builder.icmp_signed("<", old, zero), free, known), arguments[1])
 
         return types.void(types.int64, types.int64), generate

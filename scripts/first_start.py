@@ -1,0 +1,139 @@
+"""The kernels that a first start compiles, in several processes."""
+
+import importlib
+import json
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+from lidarium.scripts.common import counted, tell
+
+LIST = Path(__file__).with_name("data") / "kernels_of_run.json"
+"""The kernels that ``lidarium run`` calls from Python; ``scripts/dev/list_kernels.py`` writes it."""
+
+MOST_PROCESSES = 4
+"""The longest kernel takes a quarter of all the time: more processes gain little, and cost memory."""
+
+POLL_S = 0.5
+
+Entry = dict[str, Any]
+"""A kernel: ``name`` as ``module:name``, and ``signature``, a list of encoded types."""
+
+
+def compile_first(is_quiet: bool) -> None:
+    """Compile the kernels of a run where most of them are not yet in the cache.
+
+    Each process takes the next kernel of the list and keeps it in the cache, where this process finds it. A
+    kernel that cannot be compiled so is left to its first call.
+
+    Parameters
+    ----------
+    is_quiet : bool
+        No bar, lines only.
+    """
+    from lidarium.mapping.kernels.compilation import cache_folder
+
+    folder = cache_folder()
+    listed = json.loads(LIST.read_text())
+    processes = min(len(os.sched_getaffinity(0)), MOST_PROCESSES)
+    if folder is None or processes == 1 or 2 * count_compiled(folder) > listed["compiled"]:
+        return
+    tell(f"the first start compiles kernels in {processes} processes; later starts find them")
+    for _ in counted(
+        _compiled(folder, listed["kernels"], processes), listed["compiled"], "kernels compiled", is_quiet
+    ):
+        pass
+
+
+def count_compiled(folder: Path) -> int:
+    """Return how many compiled kernels a cache folder holds."""
+    return sum(1 for _ in folder.rglob("*.nbc"))
+
+
+def _compiled(folder: Path, kernels: Sequence[Entry], processes: int) -> Iterator[int]:
+    """Compile kernels side by side and yield a number for each that is new in the cache."""
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_begin_process)
+    count, is_whole = count_compiled(folder), False
+    try:
+        left: set[Future[None]] = {pool.submit(compile_kernel, each) for each in kernels}
+        while left:
+            left = wait(left, timeout=POLL_S).not_done
+            before, count = count, count_compiled(folder)
+            yield from range(before, count)
+        is_whole = True
+    except BrokenProcessPool:
+        return  # what is missing is compiled where it is called
+    finally:
+        pool.shutdown(wait=is_whole, cancel_futures=True)
+        if not is_whole:
+            for process in multiprocessing.active_children():
+                process.terminate()
+
+
+def _begin_process() -> None:
+    """Leave Ctrl-C to the process that waits."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def compile_kernel(entry: Entry) -> None:
+    """Compile a kernel for the types of its arguments; keep it in the cache.
+
+    Raises
+    ------
+    ValueError, AttributeError, ImportError
+        Where there is no such kernel or type.
+    """
+    module, name = entry["name"].split(":")
+    compiled = getattr(importlib.import_module(module), name)
+    compiled.compile(tuple(decode_type(each) for each in entry["signature"]))
+
+
+def encode_type(kind: Any) -> Any:  # noqa: ANN401
+    """Return the type of a kernel's argument as strings, lists and dicts.
+
+    Scalars are their names; arrays ``dtype:dimensions+layout``, with ``:readonly`` where they are; tuples
+    lists; named tuples ``{"class": "module:name", "of": list}``.
+
+    Raises
+    ------
+    ValueError
+        Where the type is none of these.
+    """
+    from numba.core import types
+
+    if isinstance(kind, types.Array):
+        return f"{kind.dtype}:{kind.ndim}{kind.layout}" + ("" if kind.mutable else ":readonly")
+    if isinstance(kind, types.BaseNamedTuple):
+        made = kind.instance_class
+        return {
+            "class": f"{made.__module__}:{made.__qualname__}",
+            "of": [encode_type(each) for each in kind.types],
+        }
+    if isinstance(kind, types.BaseTuple):
+        return [encode_type(each) for each in kind.types]
+    if isinstance(kind, types.Number | types.Boolean):
+        return str(kind)
+    raise ValueError(f"the type {kind!r} of a kernel's argument cannot be written; want numbers or arrays")
+
+
+def decode_type(text: Any) -> Any:  # noqa: ANN401
+    """Return the type that ``encode_type`` wrote."""
+    from numba.core import types
+
+    if isinstance(text, dict):
+        module, name = text["class"].split(":")
+        made = getattr(importlib.import_module(module), name)
+        return types.BaseTuple.from_types([decode_type(each) for each in text["of"]], made)
+    if isinstance(text, list):
+        return types.BaseTuple.from_types([decode_type(each) for each in text])
+    dtype, *shape = text.split(":")
+    scalar = {"bool": types.boolean}.get(dtype) or getattr(types, dtype)
+    if not shape:
+        return scalar
+    return types.Array(scalar, int(shape[0][:-1]), shape[0][-1], readonly=shape[1:] == ["readonly"])
