@@ -21,7 +21,7 @@ from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.radio.messages import DriveState, Target
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
-from lidarium.mapping.planning.frontiers import FRONTIER, IGNORED
+from lidarium.mapping.planning.frontier_kernels import FRONTIER, IGNORED
 from lidarium.mapping.planning.grid_planning import Cell, Footprint, cells_of, centres_of, search
 
 PATIENCE_S = 20.0

@@ -15,7 +15,8 @@ from pettingzoo import ParallelEnv
 
 from lidarium.envs.episode_start import EpisodeStart, begin, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.observations import ObservationWriter, action_space, observation_space
+from lidarium.envs.observation_spaces import action_space, observation_space
+from lidarium.envs.observations import ObservationWriter
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception

@@ -94,6 +94,13 @@ def compile_kernel(entry: Entry) -> None:
     compiled.compile(tuple(decode_type(each) for each in entry["signature"]))
 
 
+def _numba_types() -> Any:  # noqa: ANN401
+    """Return numba's module of types, which has no hints."""
+    from numba.core import types
+
+    return types
+
+
 def encode_type(kind: Any) -> Any:  # noqa: ANN401
     """Return the type of a kernel's argument as strings, lists and dicts.
 
@@ -105,8 +112,7 @@ def encode_type(kind: Any) -> Any:  # noqa: ANN401
     ValueError
         Where the type is none of these.
     """
-    from numba.core import types
-
+    types = _numba_types()
     if isinstance(kind, types.Array):
         return f"{kind.dtype}:{kind.ndim}{kind.layout}" + ("" if kind.mutable else ":readonly")
     if isinstance(kind, types.BaseNamedTuple):
@@ -124,8 +130,7 @@ def encode_type(kind: Any) -> Any:  # noqa: ANN401
 
 def decode_type(text: Any) -> Any:  # noqa: ANN401
     """Return the type that ``encode_type`` wrote."""
-    from numba.core import types
-
+    types = _numba_types()
     if isinstance(text, dict):
         module, name = text["class"].split(":")
         made = getattr(importlib.import_module(module), name)

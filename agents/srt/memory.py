@@ -15,7 +15,7 @@ from lidarium.agents.srt.tree import Node
 from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
-from lidarium.mapping.planning.frontiers import FRONTIER
+from lidarium.mapping.planning.frontier_kernels import FRONTIER
 from lidarium.mapping.planning.grid_planning import Cell, Until, centres_of, plan, search
 from lidarium.mapping.planning.search.search_targets import Targets
 

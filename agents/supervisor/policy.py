@@ -23,7 +23,7 @@ from lidarium.envs.driving.team_driver import footprint_of
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.radio.messages import DriveState, Order, OrderKind
-from lidarium.mapping.planning.frontiers import FRONTIER
+from lidarium.mapping.planning.frontier_kernels import FRONTIER
 from lidarium.mapping.planning.grid_planning import cells_of
 
 PATIENCE_S = 20.0

@@ -19,9 +19,9 @@ from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, fill_gau
 from lidarium.envs.simulation.kernels.masks import window_corner
 from lidarium.envs.simulation.kernels.motion import move_robots
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan
-from lidarium.mapping.grids.occupancy import SeenScan, integrate_scan
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import beam_directions
+from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_grid_at, word_grid_at

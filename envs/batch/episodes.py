@@ -27,7 +27,8 @@ from lidarium.envs.batch.running import (
 )
 from lidarium.envs.episode_start import EpisodeStart, begin, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.observations import ObservationWriter, observation_space
+from lidarium.envs.observation_spaces import observation_space
+from lidarium.envs.observations import ObservationWriter
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
 from lidarium.envs.outcome.endings import HORIZON, REASONS, make_rules, note_endings

@@ -14,9 +14,10 @@ from lidarium.envs.batch.running import DECIDES, STEPS
 from lidarium.envs.driving.drives import DRIVE_STATES, Drives, Following, no_drives
 from lidarium.envs.driving.safety_stop import FORESIGHT_TIMES
 from lidarium.envs.driving.team_driver import TeamDriver
-from lidarium.envs.levels.frontier_offers import CANDIDATES, REASONS, FrontierOffers
+from lidarium.envs.levels.frontier_choices import CANDIDATES
+from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
 from lidarium.envs.levels.frontiers import frontier_boxes
-from lidarium.envs.observations import action_space
+from lidarium.envs.observation_spaces import action_space
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.outcome.endings import FRONTIER_UNREACHABLE, NO_FRONTIER
 from lidarium.envs.radio.messages import Orders

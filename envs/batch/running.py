@@ -6,7 +6,7 @@ Each runs for one step or for a decision of its own length.
 import numba
 
 from lidarium.envs.driving.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
-from lidarium.envs.observations import Arrays, write_row
+from lidarium.envs.observation_kernels import Arrays, write_row
 from lidarium.envs.outcome.endings import Rules, ending_of
 from lidarium.envs.simulation.kernels.arrays import WorldArrays, world_at
 from lidarium.envs.simulation.kernels.stepping import step_episode

@@ -22,13 +22,12 @@ from lidarium.envs.driving.drives import (
 from lidarium.envs.driving.path_following import ARRIVED, BLOCKED, DRIVING, IDLE
 from lidarium.envs.driving.planning import (
     TEAMMATE_DISTANCE,
-    Destination,
-    Planning,
     drive_to,
     prepare_robot,
     prepare_teams_parallel,
     prepare_teams_serial,
 )
+from lidarium.envs.driving.planning_arrays import Destination, Planning
 from lidarium.envs.driving.safety_stop import FORESIGHT_TIMES
 from lidarium.envs.driving.traffic import find_refuge, obstructing
 from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT

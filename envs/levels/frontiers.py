@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.decisions import DecisionWrapper, boxes_of
-from lidarium.envs.levels.frontier_offers import CANDIDATES, FARTHEST, REASONS, FrontierOffers
+from lidarium.envs.levels.frontier_choices import CANDIDATES, FARTHEST
+from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
 from lidarium.envs.levels.waypoints import WaypointExploration
 
 

@@ -20,13 +20,10 @@ from lidarium.envs.onboard.navigation import (
     LOG_ODDS,
     RECORD,
     NavigationMap,
-    TeamMaps,
     extend_window,
     refresh_map,
-    refresh_team,
-    sum_maps,
-    sum_team,
 )
+from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team, sum_maps, sum_team
 from lidarium.envs.onboard.teammate import Teammate
 from lidarium.envs.radio.exchange import NEVER, Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -37,7 +34,7 @@ from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
 from lidarium.mapping.merging.fusion import FusedMap, overlay
 from lidarium.mapping.planning.clearance import limit_of, stamp_of
 from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed
-from lidarium.mapping.planning.frontiers import IGNORED
+from lidarium.mapping.planning.frontier_kernels import IGNORED
 from lidarium.mapping.planning.search.path_search import SearchMemory
 
 

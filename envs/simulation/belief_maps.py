@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
-from lidarium.mapping.grids.occupancy import WORD
 from lidarium.mapping.grids.pooled_maps import touch
+from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 LEAST_MARGIN = 8.0

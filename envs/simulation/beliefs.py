@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from lidarium.envs.simulation.belief_maps import blank, map_around_start, map_with_margin, wipe
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
-from lidarium.mapping.grids.occupancy import WORD, OccupancySettings
+from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.grids.pooled_maps import untouched
+from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.huge_pages import ArrayPool
 
 

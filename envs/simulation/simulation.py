@@ -31,7 +31,8 @@ from lidarium.envs.simulation.kernels.stepping import (
     render_row,
     score_and_localize,
 )
-from lidarium.mapping.grids.occupancy import WORD, OccupancySettings
+from lidarium.mapping.grids.occupancy import OccupancySettings
+from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.compilation import use_threads
 from lidarium.mapping.kernels.huge_pages import ArrayPool
 

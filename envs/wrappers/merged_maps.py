@@ -17,7 +17,7 @@ from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.decisions import boxes_of
 from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
-from lidarium.envs.observations import FARTHEST
+from lidarium.envs.observation_spaces import FARTHEST
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.station.team_mapping import Frames, TeamMapping, crop_around
 from lidarium.mapping.geometry.rigid import Transform

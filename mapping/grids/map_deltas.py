@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN, WORD
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.cell_blocks import sign_bits
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_at, word_grid_at

@@ -10,7 +10,7 @@ at.
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.grids.occupancy import WORD
+from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.bit_words import first_bit
 from lidarium.mapping.kernels.cell_blocks import write_greatest
 from lidarium.mapping.kernels.compilation import Array, kernel

@@ -8,19 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform, halfway
+from lidarium.mapping.merging.agreement_counts import disc_agreement
 from lidarium.mapping.merging.alignment import Candidate, distinct, find_inliers, refine
 from lidarium.mapping.merging.correlation import best_translations
 from lidarium.mapping.merging.correspondence import Matches, match_corners
 from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import (
-    Agreement,
-    compare,
-    disc_agreement,
-    has_contradiction,
-    is_rival,
-    why_refused,
-)
+from lidarium.mapping.merging.validation import Agreement, compare, has_contradiction, is_rival, why_refused
 from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_walls
 
 NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))

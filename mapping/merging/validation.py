@@ -10,19 +10,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.checks import check_from_zero
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.grids.occupancy import FREE, UNKNOWN
-from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.merging.description.described_map import FACING_DISTANCE_M, DescribedMap, faces_away
+from lidarium.mapping.merging.agreement_counts import count_overlap, count_walls, pose_numbers
+from lidarium.mapping.merging.description.described_map import DescribedMap
 
 OCCUPIED_WEIGHT = 10.0
 """How much more an occupied cell counts than a free one in the score."""
 
-STRIDE = 3
-"""Areas are counted on every so many-th cell."""
 
 TESTS = ("walls", "discs")
 
@@ -194,34 +190,34 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
     hit, miss = max(settings.hit_distance_m, 1.5 * side), max(settings.miss_distance_m, 2.5 * side)
     b_from_a = a_from_b.inverse()
     walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
-    _count_walls(
+    count_walls(
         a.levels,
         a.distance,
         a.is_open,
         1.0 / side,
         b.walls,
         b.normals,
-        _pose(a_from_b),
+        pose_numbers(a_from_b),
         hit,
         miss,
         walls[0],
         facing[0],
     )
-    _count_walls(
+    count_walls(
         b.levels,
         b.distance,
         b.is_open,
         1.0 / side,
         a.walls,
         a.normals,
-        _pose(b_from_a),
+        pose_numbers(b_from_a),
         hit,
         miss,
         walls[1],
         facing[1],
     )
     area = np.zeros(3)
-    _count_overlap(a.levels, b.levels, side, _pose(a_from_b), area)
+    count_overlap(a.levels, b.levels, side, pose_numbers(a_from_b), area)
     both = float(area[0])
     hits, soft, hard = (float(count) for count in walls.sum(axis=0))
     met = hits + soft + hard
@@ -288,120 +284,3 @@ def _excused(agreement: Agreement, settings: ValidationSettings) -> float:
     return settings.most_contradiction_m + settings.contradiction_share * max(
         agreement.wall_m - settings.plenty_of_wall_m, 0.0
     )
-
-
-def disc_agreement(
-    a: DescribedMap, b: DescribedMap, a_from_b: Transform, points: NDArray[np.float64], radius_cells: int
-) -> float:
-    """Return the share of map b's cells within discs whose state in map a agrees.
-
-    The discs are around points [m of map b].
-
-    Unknown is a state as others are; what lies outside of map a is unknown. A cell in several discs counts
-    once.
-    """
-    if len(points) == 0:
-        return 0.0
-    is_inside = np.zeros(b.levels.shape, np.bool_)
-    counts = np.zeros(2, np.int64)
-    _count_discs(a.levels, b.levels, a.resolution, _pose(a_from_b), points, radius_cells, is_inside, counts)
-    return float(counts[0]) / float(counts[1]) if counts[1] else 0.0
-
-
-def _pose(transform: Transform) -> tuple[float, float, float]:
-    return transform.x, transform.y, transform.theta
-
-
-@kernel
-def _count_walls(
-    levels: Array,
-    distance: Array,
-    is_open: Array,
-    scale: float,
-    walls: Array,
-    normals: Array,
-    pose: tuple[float, float, float],
-    hit: float,
-    miss: float,
-    counts: Array,
-    facing: Array,
-) -> None:
-    """Count the walls that agree, that miss by little, and that contradict.
-
-    Sum the squares of the normals of those that agree.
-    """
-    rows, columns = levels.shape
-    cosine, sine = math.cos(pose[2]) * scale, math.sin(pose[2]) * scale
-    x0, y0 = pose[0] * scale, pose[1] * scale
-    for i in range(walls.shape[0]):
-        column = cosine * walls[i, 0] - sine * walls[i, 1] + x0
-        row = sine * walls[i, 0] + cosine * walls[i, 1] + y0
-        x, y = int(math.floor(column)), int(math.floor(row))
-        if 0 <= x < columns and 0 <= y < rows:
-            if distance[y, x] <= hit:
-                ahead_x = FACING_DISTANCE_M * (cosine * normals[i, 0] - sine * normals[i, 1])
-                ahead_y = FACING_DISTANCE_M * (sine * normals[i, 0] + cosine * normals[i, 1])
-                if faces_away(levels, column, row, ahead_x, ahead_y):
-                    counts[1] += 1
-                    continue
-                counts[0] += 1
-                facing[0] += normals[i, 0] * normals[i, 0]
-                facing[1] += normals[i, 0] * normals[i, 1]
-                facing[2] += normals[i, 1] * normals[i, 1]
-            elif levels[y, x] == FREE:
-                counts[2 if is_open[y, x] != 0 and distance[y, x] > miss else 1] += 1
-
-
-@kernel
-def _count_overlap(a: Array, b: Array, side: float, pose: tuple[float, float, float], found: Array) -> None:
-    """Count the cells known in both maps, and find their centroid in b [m].
-
-    Every so many-th cell of every so many-th row is examined.
-    """
-    rows, columns = a.shape
-    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
-    count, column_sum, row_sum = 0, 0, 0
-    for row in range(STRIDE // 2, b.shape[0], STRIDE):
-        x = (cosine * 0.5 - sine * (row + 0.5)) + pose[0] / side
-        y = (sine * 0.5 + cosine * (row + 0.5)) + pose[1] / side
-        for column in range(STRIDE // 2, b.shape[1], STRIDE):
-            if b[row, column] != UNKNOWN:
-                c, r = int(math.floor(x + cosine * column)), int(math.floor(y + sine * column))
-                if 0 <= c < columns and 0 <= r < rows and a[r, c] != UNKNOWN:
-                    count += 1
-                    column_sum += column
-                    row_sum += row
-    found[0] = 1.0 * count * STRIDE**2
-    found[1] = (column_sum + 0.5 * count) * side * STRIDE**2
-    found[2] = (row_sum + 0.5 * count) * side * STRIDE**2
-
-
-@kernel
-def _count_discs(
-    a: Array,
-    b: Array,
-    side: float,
-    pose: tuple[float, float, float],
-    points: Array,
-    radius: int,
-    is_inside: Array,
-    counts: Array,
-) -> None:
-    """Count the cells of b in the discs that are the same in a, and all of them."""
-    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
-    for i in range(points.shape[0]):
-        middle_column, middle_row = int(math.floor(points[i, 0] / side)), int(math.floor(points[i, 1] / side))
-        for row in range(max(middle_row - radius, 0), min(middle_row + radius + 1, b.shape[0])):
-            for column in range(max(middle_column - radius, 0), min(middle_column + radius + 1, b.shape[1])):
-                if (
-                    is_inside[row, column]
-                    or (row - middle_row) ** 2 + (column - middle_column) ** 2 > radius * radius
-                ):
-                    continue
-                is_inside[row, column] = True
-                x = cosine * (column + 0.5) - sine * (row + 0.5) + pose[0] / side
-                y = sine * (column + 0.5) + cosine * (row + 0.5) + pose[1] / side
-                c, r = int(math.floor(x)), int(math.floor(y))
-                state = a[r, c] if 0 <= c < a.shape[1] and 0 <= r < a.shape[0] else np.uint8(UNKNOWN)
-                counts[0] += np.int64(state == b[row, column])
-                counts[1] += 1

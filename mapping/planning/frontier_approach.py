@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.grid_lines import line_is_open
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.frontiers import FRONTIER, Clusters, FrontierMap
+from lidarium.mapping.planning.frontier_kernels import FRONTIER
+from lidarium.mapping.planning.frontiers import Clusters, FrontierMap
 from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, Until, search
 from lidarium.mapping.planning.search.search_space import Search, SearchSpace
 from lidarium.mapping.planning.search.search_state import LEAVING, NO_ENTRY

@@ -14,7 +14,8 @@ import lidarium
 from lidarium.agents.random_walk import RandomWalk
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.observations import ObservationWriter, observation_space
+from lidarium.envs.observation_spaces import observation_space
+from lidarium.envs.observations import ObservationWriter
 from lidarium.envs.settings.exploration import OBSERVABLES
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode

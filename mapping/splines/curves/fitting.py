@@ -6,16 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.splines.curves.banded import factorize, solve
-from lidarium.mapping.splines.curves.basis import ORDER, basis_of_span, find_span, point_at
-from lidarium.mapping.splines.curves.bspline import Spline, curve_length
+from lidarium.mapping.splines.curves.basis import ORDER
+from lidarium.mapping.splines.curves.bspline import Spline
+from lidarium.mapping.splines.curves.curve_kernels import curve_length
+from lidarium.mapping.splines.curves.fit_kernels import average_knots, chord_lengths, fit_curve
 from lidarium.mapping.splines.curves.settings import FitSettings
 
 _SHORTEST = 1e-9
-_STEP_SIGMAS = 4.0
+
+
 _WINDOWS, _LEAST_WINDOW = 8, 6
-_MOST_BIAS = 3.5
+
+
 _FINE = 0.1
 
 
@@ -92,7 +95,7 @@ def fit_bspline(
         raise ValueError(f"sigmas have shape {deviations.shape} or are not positive; want ({len(places)},)")
     parameters = np.empty(len(places))
     noise = settings.explained * deviations if sigmas is not None else np.zeros(len(places))
-    length = float(_chord_lengths(places, noise, parameters))
+    length = float(chord_lengths(places, noise, parameters))
     if not _SHORTEST < length < math.inf:
         raise ValueError("points are all the same, or not finite; want points along a curve")
     is_noisy = sigmas is not None and settings.explained > 0.0
@@ -103,7 +106,7 @@ def fit_bspline(
     )
     window = max(len(places) // _WINDOWS, _LEAST_WINDOW) if is_noisy else 1
     scales = np.hypot(deviations, _FINE * settings.rms) if is_noisy else np.full(len(places), settings.rms)
-    control_points, knots, normal, rms = _fit(
+    control_points, knots, normal, rms = fit_curve(
         places,
         deviations,
         parameters,
@@ -130,201 +133,5 @@ def averaged_knots(parameters: ArrayLike, count: int) -> NDArray[np.float64]:
     Every span has its share of the parameters (m,).
     """
     knots = np.empty(count + ORDER)
-    _average_knots(np.ascontiguousarray(parameters, np.float64), count, knots)
+    average_knots(np.ascontiguousarray(parameters, np.float64), count, knots)
     return knots
-
-
-@kernel
-def _chord_lengths(points: Array, noise: Array, parameters: Array) -> float:
-    """Write how far along the way each point lies; return the length of the way [m].
-
-    Noise makes a way through the points longer, the more the denser they are. It is therefore measured from
-    point to point over steps that are long against the noise; within a step points are evenly spaced.
-    """
-    count = points.shape[0]
-    anchors = np.empty(count, np.int64)
-    anchors[0], used = 0, 1
-    for k in range(1, count):
-        x, y = points[k, 0] - points[anchors[used - 1], 0], points[k, 1] - points[anchors[used - 1], 1]
-        least = _STEP_SIGMAS * noise[k]
-        if x * x + y * y >= least * least:
-            anchors[used] = k
-            used += 1
-    if anchors[used - 1] != count - 1:
-        # The last step would be a short one: it joins the one before.
-        used = max(used, 2)
-        anchors[used - 1] = count - 1
-    parameters[0] = 0.0
-    for j in range(1, used):
-        first, last = anchors[j - 1], anchors[j]
-        x, y = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
-        length = math.sqrt(x * x + y * y)
-        begin = parameters[first]
-        for k in range(first + 1, last + 1):
-            parameters[k] = begin + length * (k - first) / (last - first)
-    return float(parameters[count - 1])
-
-
-@kernel
-def _average_knots(parameters: Array, count: int, knots: Array) -> None:
-    """Knots by averaging, after Piegl and Tiller, equations 9.68 and 9.69."""
-    total = parameters.shape[0]
-    knots[:ORDER], knots[count:] = parameters[0], parameters[total - 1]
-    share = total / (count - ORDER + 1)
-    for j in range(1, count - ORDER + 1):
-        i = int(j * share)
-        part = j * share - i
-        knots[ORDER - 1 + j] = (1.0 - part) * parameters[i - 1] + part * parameters[i]
-
-
-@kernel
-def _fit(
-    points: Array,
-    sigmas: Array,
-    parameters: Array,
-    length: float,
-    spacing: float,
-    finest: float,
-    wanted: float,
-    scales: Array,
-    window: int,
-    is_sparse: bool,
-    stiffness: float,
-) -> tuple[Array, Array, Array, float]:
-    """Fit with more and more control points until the curve follows.
-
-    Return control points, knots, normal matrix, rms.
-    """
-    total = points.shape[0]
-    enough = max(total // 2 + 1, ORDER) if is_sparse else total
-    usual = min(max(int(math.floor(length / spacing + 0.5)) + ORDER - 1, ORDER), enough)
-    most = max(min(int(length / finest) + ORDER - 1, enough), usual)
-    count = ORDER if is_sparse else usual
-    is_straight = is_sparse
-    while True:
-        knots = np.empty(count + ORDER)
-        _average_knots(parameters, count, knots)
-        normal, control_points = np.zeros((count, ORDER)), np.zeros((count, 2))
-        _accumulate(points, sigmas, parameters, knots, stiffness, normal, control_points)
-        if is_straight:
-            is_straight = False
-            line = _fit_straight(points, sigmas)
-            rms, bias = _misfit(points, parameters, knots, line, scales, window)
-            if rms <= wanted and bias <= _MOST_BIAS:
-                return line, knots, normal, rms
-        factor = normal.copy()
-        # With the stiffness there always is a solution; without, more control points than the points
-        # determine have none.
-        issolved = factorize(factor)
-        if issolved:
-            solve(factor, control_points)
-            rms, bias = _misfit(points, parameters, knots, control_points, scales, window)
-            if (rms <= wanted and bias <= _MOST_BIAS) or count >= most:
-                return control_points, knots, normal, rms
-            count = min(2 * count - ORDER + 1, most)
-        else:
-            most = count = max(count - 1, ORDER)
-
-
-@kernel
-def _fit_straight(points: Array, sigmas: Array) -> Array:
-    """Return control points of the straight curve nearest to the points.
-
-    They lie evenly along a line fitted by total least squares.
-    """
-    total, x, y = 0.0, 0.0, 0.0
-    for k in range(points.shape[0]):
-        weight = 1.0 / (sigmas[k] * sigmas[k])
-        total += weight
-        x += weight * points[k, 0]
-        y += weight * points[k, 1]
-    x, y = x / total, y / total
-    xx, xy, yy = 0.0, 0.0, 0.0
-    for k in range(points.shape[0]):
-        weight, dx, dy = 1.0 / (sigmas[k] * sigmas[k]), points[k, 0] - x, points[k, 1] - y
-        xx += weight * dx * dx
-        xy += weight * dx * dy
-        yy += weight * dy * dy
-    theta = 0.5 * math.atan2(2.0 * xy, xx - yy)
-    cosine, sine = math.cos(theta), math.sin(theta)
-    last = points.shape[0] - 1
-    begin = cosine * (points[0, 0] - x) + sine * (points[0, 1] - y)
-    end = cosine * (points[last, 0] - x) + sine * (points[last, 1] - y)
-    line = np.empty((ORDER, 2))
-    for r in range(ORDER):
-        along = begin + (end - begin) * r / (ORDER - 1.0)
-        line[r, 0], line[r, 1] = x + cosine * along, y + sine * along
-    return line
-
-
-@kernel
-def _accumulate(
-    points: Array,
-    sigmas: Array,
-    parameters: Array,
-    knots: Array,
-    stiffness: float,
-    normal: Array,
-    right: Array,
-) -> None:
-    """Sum up the normal matrix's lower band (n, 4) and the right side (n, 2).
-
-    Row i holds columns i .. i - 3.
-    """
-    count = normal.shape[0]
-    values = np.empty(ORDER)
-    total = 0.0
-    for k in range(points.shape[0]):
-        weight = 1.0 / (sigmas[k] * sigmas[k])
-        total += weight
-        span = find_span(knots, count, parameters[k])
-        basis_of_span(knots, span, parameters[k], 0, values)
-        first = span - ORDER + 1
-        for r in range(ORDER):
-            for s in range(r + 1):
-                normal[first + r, r - s] += weight * values[r] * values[s]
-            right[first + r, 0] += weight * values[r] * points[k, 0]
-            right[first + r, 1] += weight * values[r] * points[k, 1]
-    scale = stiffness * total / count
-    for i in range(1, count - 1):
-        normal[i - 1, 0] += scale
-        normal[i, 0] += 4.0 * scale
-        normal[i + 1, 0] += scale
-        normal[i, 1] -= 2.0 * scale
-        normal[i + 1, 1] -= 2.0 * scale
-        normal[i + 1, 2] += scale
-
-
-@kernel
-def _misfit(
-    points: Array, parameters: Array, knots: Array, control_points: Array, scales: Array, window: int
-) -> tuple[float, float]:
-    """Return how far points lie beside the curve at their parameters.
-
-    Along it, parameters are but estimates.
-
-    Returns
-    -------
-    rms : float
-        Root mean square of the distances [m].
-    bias : float
-        Greatest sum of so many neighbouring signed distances, each in units of its scale, over what it would
-        be for mere noise. A bend that is cut short shows here where the rest of a long curve hides it in the
-        root mean square.
-    """
-    count = points.shape[0]
-    values, ratios = np.empty(ORDER), np.empty(count)
-    total, in_window, greatest = 0.0, 0.0, 0.0
-    for k in range(count):
-        x, y = point_at(knots, control_points, parameters[k], 0, values)
-        dx, dy = point_at(knots, control_points, parameters[k], 1, values)
-        x, y = x - points[k, 0], y - points[k, 1]
-        speed = math.sqrt(dx * dx + dy * dy)
-        aside = (dx * y - dy * x) / speed if speed > 0.0 else math.sqrt(x * x + y * y)
-        total += aside * aside
-        ratios[k] = aside / scales[k]
-        in_window += ratios[k]
-        if k >= window:
-            in_window -= ratios[k - window]
-        greatest = max(greatest, abs(in_window))
-    return math.sqrt(total / count), greatest / math.sqrt(window)

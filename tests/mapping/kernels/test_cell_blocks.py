@@ -1,73 +1,79 @@
-"""Blocks of 64 cells told apart by their signs."""
+"""Blocks of 64 cells against their plain definitions."""
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.kernels.cell_blocks import negative_cells, positive_cells, sum_blocks
-from lidarium.mapping.kernels.clearance_blocks import count_rows, write_squares
+from lidarium.mapping.kernels import cell_blocks, plain
 from lidarium.mapping.kernels.compilation import kernel
+
+words = st.integers(0, 2**64 - 1)
+blocks = arrays(np.int8, 64)
 
 
 @kernel
-def signs_at(address):
-    return negative_cells(address), positive_cells(address)
+def update_at(address, seen, hits, steps, bounds):
+    return cell_blocks.update_block(address, seen, hits, steps[0], steps[1], bounds[0], bounds[1])
 
 
 @kernel
 def sum_at(first, second, result):
-    sum_blocks(first, second, result)
+    cell_blocks.sum_blocks(first, second, result)
 
 
 @kernel
-def squares_at(steps, far, cap, result):
-    return write_squares(steps, far, cap, result)
+def write_greatest_at(rows, stride, count, least, halvings, result):
+    cell_blocks.write_greatest(rows, stride, count, least, halvings, result)
 
 
 @kernel
-def count_at(log_odds, stride, rows, steps, largest, fewest, width):
-    count_rows(log_odds, stride, rows, steps, largest, fewest, width)
+def write_levels_at(log_odds, half, whole):
+    cell_blocks.write_levels(log_odds, half)
+    cell_blocks.write_block_of_levels(log_odds, whole)
 
 
-def bits_of(cells):
-    return sum(1 << k for k in np.flatnonzero(cells).tolist())
+@kernel
+def signs_at(bytes_at, shorts_at):
+    below, above = cell_blocks.sign_bits(shorts_at)
+    return cell_blocks.negative_cells(bytes_at), cell_blocks.positive_cells(bytes_at), below, above
 
 
-@given(arrays(np.int8, 67), st.integers(0, 3))
-def test_the_signs_of_a_block_are_told_wherever_it_lies(cells, offset):
-    block = cells[offset : offset + 64]
-    negative, positive = signs_at(block.ctypes.data)
-    assert int(negative) == bits_of(block < 0)
-    assert int(positive) == bits_of(block > 0)
+@given(blocks, words, words, st.integers(0, 127), st.integers(0, 127), st.integers(-127, 0))
+def test_seen_cells_are_lowered_and_hit_ones_raised(block, seen, hits, hit, miss, least):
+    bounds = (least, -least)
+    expected, changed = plain.update_block(block, seen, hits, (hit, miss), bounds)
+    signs = update_at(block.ctypes.data, np.uint64(seen), np.uint64(hits), (hit, miss), bounds)
+    assert np.array_equal(block, expected)
+    assert int(signs) == changed
 
 
-@given(arrays(np.int8, 64), arrays(np.int8, 64), arrays(np.int8, 64), st.booleans())
-def test_blocks_are_summed_without_running_over_also_into_one_of_them(first, second, result, is_same):
-    expected = np.clip(first.astype(int) + second, -127, 127)
+@given(blocks, blocks, blocks, st.booleans())
+def test_blocks_are_summed_without_overflow_also_into_one_of_them(first, second, result, is_same):
+    expected = plain.sum_blocks(first, second)
     target = first if is_same else result
     sum_at(first.ctypes.data, second.ctypes.data, target.ctypes.data)
     assert np.array_equal(target, expected)
 
 
-@given(arrays(np.uint16, 64, elements=st.integers(0, 91)), st.integers(1, 91))
-def test_steps_become_squared_half_cells_up_to_a_cap(steps, far):
-    cap, result = max((2 * far - 1) ** 2 - 3, 1), np.zeros(64, np.uint16)
-    assert squares_at(steps.ctypes.data, far, cap, result.ctypes.data) == steps.min()
-    squares = np.minimum(np.maximum(2 * steps.astype(int) - 1, 0) ** 2, cap)
-    assert np.array_equal(result, np.where(steps < far, squares, cap))
+@given(arrays(np.int8, (5, 70)), st.integers(1, 5), st.integers(0, 6), st.integers(-128, 127))
+def test_the_greatest_of_groups_is_found_over_rows_and_columns(rows, count, halvings, least):
+    result = np.zeros(64, np.int8)
+    write_greatest_at(rows[0, 3:].ctypes.data, 70, count, least, halvings, result.ctypes.data)
+    expected = plain.greatest_of_groups(rows[:count, 3:67], least, halvings)
+    assert np.array_equal(result[: len(expected)], expected)
 
 
-@given(arrays(np.int8, (7, 70), elements=st.integers(-1, 1)), st.booleans(), st.integers(1, 9))
-def test_rows_since_the_last_occupied_cell_are_counted_either_way(log_odds, is_back, largest):
-    steps, fewest = np.full(64, largest, np.uint16), np.full((7, 64), 3, np.uint16)
-    rows = range(6, -1, -1) if is_back else range(7)
-    begin = log_odds[rows[0], 2:].ctypes.data
-    sign = -1 if is_back else 1
-    count_at(begin, sign * 70, 7, steps.ctypes.data, largest, fewest[rows[0]].ctypes.data, sign * 128)
-    counted, expected = np.full(64, largest), np.full((7, 64), 3)
-    for row in rows:
-        counted = np.where(log_odds[row, 2:66] > 0, 0, np.minimum(counted + 1, largest))
-        expected[row] = np.minimum(expected[row], counted)
-    assert np.array_equal(fewest, expected)
-    assert np.array_equal(steps, counted)
+@given(blocks)
+def test_log_odds_are_written_as_levels(block):
+    half, whole = np.full(64, 9, np.uint8), np.zeros(64, np.uint8)
+    write_levels_at(block.ctypes.data, half.ctypes.data, whole.ctypes.data)
+    assert np.array_equal(whole, plain.levels_of(block))
+    assert np.array_equal(half, np.append(plain.levels_of(block[:32]), np.full(32, 9)))
+
+
+@given(arrays(np.int8, 67), arrays(np.int16, 64), st.integers(0, 3))
+def test_the_signs_of_a_block_are_found_at_any_address(cells, sums, offset):
+    block = cells[offset : offset + 64]
+    found = [int(word) for word in signs_at(block.ctypes.data, sums.ctypes.data)]
+    assert found == [plain.bits_of(cells) for cells in (block < 0, block > 0, sums < 0, sums > 0)]

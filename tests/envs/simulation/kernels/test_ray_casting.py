@@ -10,13 +10,9 @@ from hypothesis import strategies as st
 
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.simulation.kernels.face_casting import cast_by_faces
-from lidarium.envs.simulation.kernels.ray_casting import (
-    _cast_by_squares,
-    cast_scan,
-    cast_scans,
-    cut_by_disc,
-)
+from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cast_scans, cut_by_disc
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
+from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares
 from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, ScanGeometry, beam_directions
 
 TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025
@@ -134,7 +130,7 @@ def directions_of(geometry, heading):
 
 def by_squares(tables, x, y, directions, reach):
     ranges = np.full(directions.shape[1], np.nan)
-    _cast_by_squares(tables.squares.ravel(), tables.rows, tables.columns, x, y, directions, reach, ranges)
+    cast_by_squares(tables.squares.ravel(), tables.rows, tables.columns, x, y, directions, reach, ranges)
     return ranges
 
 

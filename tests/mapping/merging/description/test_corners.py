@@ -5,12 +5,8 @@ import pytest
 from drawn_maps import RESOLUTION, apartment, blank, room
 
 from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.description.corners import (
-    STEP,
-    CornerSettings,
-    detect_corners,
-    orientation_table,
-)
+from lidarium.mapping.merging.description.corner_orientation import orientation_table
+from lidarium.mapping.merging.description.corners import STEP, CornerSettings, detect_corners
 
 ALL = CornerSettings(separation_m=0.0, limit=0)
 

@@ -1,0 +1,269 @@
+"""Which frontiers are offered to robots, one kernel for a whole batch."""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.driving.drives import STATE_ARRIVED, STATE_GIVING_WAY, STATE_NO_PATH, Drives, drive_state
+from lidarium.envs.driving.planning import Planning, passage_in
+from lidarium.envs.onboard.navigation import (
+    COLUMNS,
+    ROWS,
+    closeness_of,
+    flags_of,
+    log_odds_of,
+    tiles_of,
+)
+from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.work_queue import take_next
+from lidarium.mapping.planning.frontier_approach import approach_places
+from lidarium.mapping.planning.frontiers import frontier_clusters, ignore_frontiers_near
+from lidarium.mapping.planning.search.path_search import clear_memory, search_all
+from lidarium.mapping.planning.search.search_state import LARGEST_BUDGET, STRAIGHT
+
+CANDIDATES = 16
+"""Most frontiers that a robot chooses among."""
+
+
+MINIMUM_SIZE = 0.1
+"""Shorter frontiers are offered only where there is no longer one [m]."""
+
+
+FARTHEST = 1000.0
+"""Largest number in a table of offers [m]."""
+
+
+PATIENCE_S = 20.0
+"""A frontier is given up where its robot has not moved for this long [s]."""
+
+
+MOVED = 0.15
+"""What counts as having moved [m]."""
+
+
+UNSEEN, BLOCKED, NO_PROGRESS = 1, 2, 3
+
+
+class Offers(NamedTuple):
+    """What each robot is offered; row = episode * robots + robot.
+
+    Attributes
+    ----------
+    tables : (rows, 16, 4) float32
+        Position along the axes of the map frame from where the robot believes to be, cost of the way and size
+        [m] of each frontier, cheapest way first, zeros behind the last.
+    masks : (rows, 17) int8
+        1 for what may be chosen; the last is to stay.
+    counts : (rows,) int64
+        Number of frontiers.
+    targets, headings : (rows, 16, 2), (rows, 16) float64
+        Where to stand in the map frame [m] and how to turn there [rad], nan for any.
+    cells : (rows, 16, 2) int64
+        The frontier cell (row, column) to look at.
+    """
+
+    tables: NDArray[np.float32]
+    masks: NDArray[np.int8]
+    counts: NDArray[np.int64]
+    targets: NDArray[np.float64]
+    headings: NDArray[np.float64]
+    cells: NDArray[np.int64]
+
+
+class Choices(NamedTuple):
+    """What each robot has chosen, and where it last got on with it.
+
+    Attributes
+    ----------
+    is_chosen : (rows,) bool
+        Whether the robot has chosen a frontier.
+    targets, headings, cells : (rows, 2), (rows,), (rows, 2)
+        As they were offered.
+    tried : (rows, 2) int64
+        The frontier cell that the robot was last seen at work on, -1 for none.
+    places, since : (rows, 2), (rows,) float64
+        Where it then last got on [m], and since when [s].
+    """
+
+    is_chosen: NDArray[np.bool_]
+    targets: NDArray[np.float64]
+    headings: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    tried: NDArray[np.int64]
+    places: NDArray[np.float64]
+    since: NDArray[np.float64]
+
+
+class Looking(NamedTuple):
+    """How robots look at frontiers.
+
+    Attributes
+    ----------
+    spans : (2 k + 1,) int64
+        The disc within which a robot is near enough to a frontier cell, see ``disc_spans``.
+    reach : float
+        Its radius [cells].
+    time_step : float
+        Length of a step [s].
+    """
+
+    spans: NDArray[np.int64]
+    reach: float
+    time_step: float
+
+
+@kernel
+def _why_in_vain(planning: Planning, drives: Drives, choices: Choices, row: int, time: float) -> int:
+    """Return the reason why a chosen frontier is not worth more driving, or 0.
+
+    The reason is a number. Where the robot makes progress is noted.
+    """
+    state = drive_state(drives, row)
+    if state == STATE_ARRIVED:
+        return UNSEEN
+    if state == STATE_NO_PATH:
+        return BLOCKED
+    x, y = (
+        planning.believed[row, 0] - planning.offsets[row, 0],
+        planning.believed[row, 1] - planning.offsets[row, 1],
+    )
+    cell, tried, place = choices.cells[row], choices.tried[row], choices.places[row]
+    is_same = tried[0] == cell[0] and tried[1] == cell[1]
+    if not is_same or math.hypot(place[0] - x, place[1] - y) > MOVED or state == STATE_GIVING_WAY:
+        tried[0], tried[1], place[0], place[1] = cell[0], cell[1], x, y
+        choices.since[row] = time
+    elif time - choices.since[row] > PATIENCE_S:
+        return NO_PROGRESS
+    return 0
+
+
+@kernel
+def _cheapest(left: Array, is_wanted: Array, ranked: Array) -> int:
+    """Rank the wanted clusters by what is left of the budget; return their number.
+
+    The budget is what is left at the cluster; the first of equals comes first.
+    """
+    count = 0
+    while count < len(ranked):
+        best = -1
+        for k in range(len(left)):
+            if is_wanted[k] and (best < 0 or left[k] > left[best]):
+                best = k
+        if best < 0:
+            break
+        is_wanted[best] = False
+        ranked[count] = best
+        count += 1
+    return count
+
+
+@kernel
+def _offer(
+    planning: Planning, looking: Looking, offers: Offers, row: int, cells: Array, starts: Array, piece: int
+) -> None:
+    """Offer a robot the frontier clusters that it can approach and see.
+
+    The cheapest path comes first.
+    """
+    table, mask = offers.tables[row], offers.masks[row]
+    table[:], mask[:], offers.counts[row] = 0.0, 0, 0
+    mask[CANDIDATES] = 1
+    if len(starts) < 2:
+        return
+    record, resolution = planning.records[row // planning.sharing], planning.resolution
+    log_odds, memory = log_odds_of(record), planning.memory[piece]
+    origin_x, origin_y = planning.origins[row, 0], planning.origins[row, 1]
+    start_row = int(math.floor((planning.believed[row, 1] - origin_y) / resolution))
+    start_column = int(math.floor((planning.believed[row, 0] - origin_x) / resolution))
+    if not (0 <= start_row < record[ROWS] and 0 <= start_column < record[COLUMNS]):
+        return
+    remaining, parent, touched, least = search_all(
+        log_odds, closeness_of(record), passage_in(planning), memory, start_row, start_column
+    )
+    places, left, is_near = approach_places(cells, starts, log_odds, remaining, parent, least, looking.spans)
+    clear_memory(memory, record[ROWS], record[COLUMNS], touched)
+    is_long = is_near.copy()
+    for k in range(len(is_long)):
+        is_long[k] &= (starts[k + 1] - starts[k]) * resolution >= MINIMUM_SIZE
+    ranked = np.empty(CANDIDATES, np.int64)
+    count = _cheapest(left, is_long if is_long.any() else is_near, ranked)
+    offset_x, offset_y = planning.offsets[row, 0], planning.offsets[row, 1]
+    x, y = planning.believed[row, 0] - offset_x, planning.believed[row, 1] - offset_y
+    for i in range(count):
+        k = ranked[i]
+        target_x = (places[k, 1] + 0.5) * resolution + (origin_x - offset_x)
+        target_y = (places[k, 0] + 0.5) * resolution + (origin_y - offset_y)
+        rise, run = places[k, 2] - places[k, 0], places[k, 3] - places[k, 1]
+        offers.targets[row, i, 0], offers.targets[row, i, 1] = target_x, target_y
+        offers.headings[row, i] = math.atan2(float(rise), float(run)) if rise != 0 or run != 0 else np.nan
+        offers.cells[row, i, 0], offers.cells[row, i, 1] = places[k, 2], places[k, 3]
+        cost = (LARGEST_BUDGET - left[k]) * (resolution / STRAIGHT)
+        table[i, 0], table[i, 1] = (
+            min(max(target_x - x, -FARTHEST), FARTHEST),
+            min(max(target_y - y, -FARTHEST), FARTHEST),
+        )
+        table[i, 2], table[i, 3] = (
+            min(cost, FARTHEST),
+            min((starts[k + 1] - starts[k]) * resolution, FARTHEST),
+        )
+        mask[i] = 1
+    offers.counts[row] = count
+
+
+@kernel
+def _give_up(
+    planning: Planning,
+    maps: TeamMaps,
+    drives: Drives,
+    looking: Looking,
+    choices: Choices,
+    episode: int,
+    is_live: Array,
+    reasons: Array,
+) -> None:
+    """Give up what live robots of a team chose in vain, on fresh maps."""
+    refresh_team(maps, episode)
+    time = maps.steps[episode] * looking.time_step
+    for row in range(episode * planning.robots, (episode + 1) * planning.robots):
+        if not (is_live[row] and choices.is_chosen[row]):
+            continue
+        reasons[row] = _why_in_vain(planning, drives, choices, row, time)
+        if reasons[row] != 0:
+            record, cell = planning.records[row // planning.sharing], choices.cells[row]
+            ignore_frontiers_near(flags_of(record), tiles_of(record), cell[0], cell[1], looking.reach)
+
+
+def renew_teams(
+    planning: Planning,
+    maps: TeamMaps,
+    drives: Drives,
+    looking: Looking,
+    offers: Offers,
+    choices: Choices,
+    episodes: Array,
+    is_live: Array,
+    is_offered: Array,
+    reasons: Array,
+    turns: Array,
+    pieces: int,
+) -> None:
+    """Give up what robots chose in vain, then offer anew, in so many pieces."""
+    for piece in numba.prange(pieces):
+        k = take_next(turns)
+        while k < len(episodes):
+            _give_up(planning, maps, drives, looking, choices, episodes[k], is_live, reasons)
+            cells, starts = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
+            listed = -1
+            for row in range(episodes[k] * planning.robots, (episodes[k] + 1) * planning.robots):
+                if not is_offered[row]:
+                    continue
+                if listed != row // planning.sharing:
+                    listed = row // planning.sharing
+                    record = planning.records[listed]
+                    cells, starts = frontier_clusters(flags_of(record), tiles_of(record), 1)
+                _offer(planning, looking, offers, row, cells, starts, piece)
+            k = take_next(turns)

@@ -1,0 +1,141 @@
+"""Kernels that integrate a scan into log-odds."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.grids.noisy_returns import settle_returns
+from lidarium.mapping.grids.scan_geometry import beam_directions
+from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
+from lidarium.mapping.kernels.cell_blocks import fetch_block, update_block
+from lidarium.mapping.kernels.compilation import Array, kernel
+
+WORD = 64
+
+
+ROWS_AHEAD = 12
+"""So many rows before a row of a map is updated it is fetched from memory."""
+
+
+@kernel(borrowing=True)
+def _note_hits(ends: Array, is_hit: Array, hit_bits: Array) -> None:
+    """Set the bits of the cells in which beams ended."""
+    flat, words = hit_bits.reshape(-1), hit_bits.shape[1]
+    for beam in range(is_hit.shape[0]):
+        row, column = int(ends[1, beam]), int(ends[0, beam])
+        flat[np.uintp(row * words + (column >> 6))] |= np.uint64(is_hit[beam]) << np.uint64(column & 63)
+
+
+class SeenScan(NamedTuple):
+    """What a scan has seen, in a window of bits.
+
+    Attributes
+    ----------
+    bits, hit_bits : (window rows, words) uint64
+        The seen area of ``fill_scan_polygon``, and zeros (the hits are noted).
+    box : tuple of int
+        The box of the window that may hold bits; the ends of the beams lie in it.
+    ends, is_hit : (2, beams) float64 and (beams,) bool
+        End points of the beams in the window [cells], and whether something ended them.
+    row_offset, column_offset : int
+        Place of the window's first cell in the map; column_offset a multiple of 64.
+    """
+
+    bits: NDArray[np.uint64]
+    hit_bits: NDArray[np.uint64]
+    box: tuple[int, int, int, int]
+    ends: NDArray[np.float64]
+    is_hit: NDArray[np.bool_]
+    row_offset: int
+    column_offset: int
+
+
+@kernel(borrowing=True)
+def integrate_scan(log_odds: Array, scan: SeenScan, increments: Array, touched: Array) -> None:
+    """Update a map by a scan.
+
+    Seen cells are lowered, and cells in which beams ended are raised, each once.
+
+    Parameters
+    ----------
+    log_odds : (rows, columns) int8
+        The map; columns a multiple of 64.
+    scan : SeenScan
+        What it has seen.
+    increments : (4,) int64
+        ``OccupancySettings.increments``.
+    touched : (rows + rows / 64, words) uint64
+        Bits of the words of 64 cells of each row in which a level has changed, and of these rows
+        (``pooled_maps.untouched``); added to. None are noted where it has no rows.
+    """
+    bits, hit_bits, box, ends, is_hit, row_offset, column_offset = scan
+    _note_hits(ends, is_hit, hit_bits)
+    hit, miss, minimum, maximum = increments[0], increments[1], increments[2], increments[3]
+    rows, columns = log_odds.shape
+    words, word_offset = columns // WORD, column_offset // WORD
+    word_low, word_high = max(box[2], -word_offset), min(box[3], words - word_offset)
+    is_noted = touched.shape[0] > 0
+    row_low, row_high = max(box[0], -row_offset), min(box[1], rows - row_offset)
+    for row in range(row_low, row_high):
+        address = log_odds.ctypes.data + (row + row_offset) * columns + word_offset * WORD
+        # The rows of a map lie too far apart for the processor to foresee them.
+        ahead = address + min(ROWS_AHEAD, row_high - 1 - row) * columns
+        changes = np.uint64(0)
+        for word in range(word_low, word_high):
+            seen, hits = bits[row, word], hit_bits[row, word]
+            fetch_block(ahead + word * WORD)
+            if seen | hits != np.uint64(0):
+                changed = update_block(address + word * WORD, seen, hits, hit, miss, minimum, maximum)
+                changes |= np.uint64(changed != np.uint64(0)) << np.uint64((word + word_offset) & 63)
+            is_last_of_group = word + 1 == word_high or (word + 1 + word_offset) & 63 == 0
+            if is_last_of_group and is_noted and changes != np.uint64(0):
+                of_map = row + row_offset
+                touched[of_map, (word + word_offset) >> 6] |= changes
+                touched[rows + (of_map >> 6), 0] |= np.uint64(1) << np.uint64(of_map & 63)
+                changes = np.uint64(0)
+
+
+@kernel
+def integrate_one(
+    log_odds: Array,
+    place: tuple[float, float, float],
+    ranges: Array,
+    geometry: tuple[float, float, float, float],
+    unit_vectors: Array,
+    increments: Array,
+    noise: tuple[float, float],
+    window: Array,
+) -> None:
+    """Update a map by one scan at x, y [cells], heading.
+
+    ``geometry`` is (increment, range_max [cells], cells per metre, full circle).
+    """
+    x, y, heading = place
+    reach, scale = geometry[1], geometry[2]
+    beams = ranges.shape[0]
+    directions = np.empty((4, beams))
+    beam_directions(heading, unit_vectors, directions)
+    lengths, ends = np.empty(beams), np.empty((2, beams))
+    is_hit = np.empty(beams, np.bool_)
+    for beam in range(beams):
+        value = float(ranges[beam])
+        is_hit[beam] = math.isfinite(value) and value * scale <= reach
+        lengths[beam] = 0.0 if math.isnan(value) else min(value * scale, reach)
+    if noise[0] > 0.0 or noise[1] > 0.0:
+        in_cells = (noise[0] * scale, noise[1])
+        settle_returns(log_odds, x, y, lengths, directions, is_hit, in_cells, increments[0])
+    bits = np.zeros((window_rows(reach), window_words(reach)), np.uint64)
+    margin = int(reach) + 3
+    row_offset = int(math.floor(y)) - margin
+    column_offset = ((int(math.floor(x)) - margin) >> 6) << 6
+    local_x, local_y = x - column_offset, y - row_offset
+    scan_ends(lengths, directions, local_x, local_y, ends)
+    box = fill_scan_polygon(
+        lengths, directions, ends, local_x, local_y, geometry[0], geometry[3] != 0.0, bits
+    )
+    window[0], window[1] = box[0] + row_offset, box[1] + row_offset
+    window[2], window[3] = 64 * box[2] + column_offset, 64 * box[3] + column_offset
+    seen = SeenScan(bits, np.zeros_like(bits), box, ends, is_hit, row_offset, column_offset)
+    integrate_scan(log_odds, seen, increments, np.empty((0, 1), np.uint64))
