@@ -16,7 +16,7 @@ import numpy as np
 from lidarium.agents.frontier_reach import Choice
 from lidarium.agents.policy import Action, Policy, Stop, Team
 from lidarium.agents.report import GivenUp
-from lidarium.envs.driving.team_driver import footprint_of
+from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.radio.messages import DriveState, Target

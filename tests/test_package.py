@@ -186,10 +186,8 @@ def test_every_public_function_outside_of_kernels_has_type_hints():
 TO_PART = {
     "agents/srt/explorer.py",
     "envs/batch/episodes.py",
-    "envs/driving/team_driver.py",
     "envs/exploration.py",
     "envs/levels/frontier_offers.py",
-    "envs/onboard/perception.py",
     "evaluation/truth/map_tally.py",
     "mapping/localization/slam/localizer.py",
     "mapping/merging/validation.py",

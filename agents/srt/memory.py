@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.tree import Node
-from lidarium.envs.driving.team_driver import footprint_of
+from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
 from lidarium.mapping.planning.frontier_kernels import FRONTIER

@@ -19,7 +19,7 @@ from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
-from lidarium.envs.driving.team_driver import footprint_of
+from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.radio.messages import DriveState, Order, OrderKind

@@ -135,7 +135,10 @@ class WaypointExploration(DecisionWrapper):
             raise ValueError(
                 f"waypoint is {waypoint}; want two finite numbers within [-1, 1], a Target or None"
             )
-        x, y = self.env.perception.pose_in_frame(row, row)[:2] + np.clip(share, -1.0, 1.0) * self._half_side
+        x, y = (
+            self.env.perception.poses.pose_in_frame(row, row)[:2]
+            + np.clip(share, -1.0, 1.0) * self._half_side
+        )
         return Target(float(x), float(y))
 
     def drive_state(self, agent: str) -> DriveState:

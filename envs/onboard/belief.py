@@ -32,7 +32,7 @@ class Belief:
     @property
     def pose(self) -> NDArray[np.float64]:
         """x, y, theta as the localizer believes [m, rad], shape (3,)."""
-        return self._perception.pose_in_frame(self._row, self._row)
+        return self._perception.poses.pose_in_frame(self._row, self._row)
 
     @property
     def velocity(self) -> NDArray[np.float64]:
@@ -45,7 +45,7 @@ class Belief:
 
         Zero where it claims to know.
         """
-        return self._perception.spread(self._row)
+        return self._perception.poses.spread(self._row)
 
     @property
     def radius(self) -> float:
@@ -73,7 +73,7 @@ class Belief:
 
         It is in the map frame.
         """
-        return self._perception.origin_in_frame(self._row)
+        return self._perception.poses.origin_in_frame(self._row)
 
     @property
     def shared_map(self) -> NavigationMap | None:
@@ -86,7 +86,7 @@ class Belief:
     @property
     def teammates(self) -> dict[str, Teammate]:
         """What is known of the others, by name."""
-        return self._perception.teammates(self._row)
+        return self._perception.poses.teammates(self._row)
 
     @property
     def energy_left_j(self) -> float | None:
@@ -97,4 +97,4 @@ class Belief:
     @property
     def goal(self) -> NDArray[np.float64] | None:
         """The goal in the map frame [m], shape (2,), or None."""
-        return self._perception.goal_of(self._row)
+        return self._perception.poses.goal_of(self._row)

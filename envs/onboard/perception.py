@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.onboard.forgotten_trails import STALE, ForgottenTrails
+from lidarium.envs.onboard.known_poses import KnownPoses
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.navigation import (
     CLEARANCE_LIMIT,
@@ -22,19 +24,15 @@ from lidarium.envs.onboard.navigation import (
     NavigationMap,
     extend_window,
     refresh_map,
+    refresh_team,
+    sum_team,
 )
-from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team, sum_maps, sum_team
-from lidarium.envs.onboard.teammate import Teammate
-from lidarium.envs.radio.exchange import NEVER, Exchange
+from lidarium.envs.onboard.received_maps import ReceivedMaps
+from lidarium.envs.radio.exchange import Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.kernels.compilation import use_threads
-from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
-from lidarium.mapping.merging.fusion import FusedMap, overlay
 from lidarium.mapping.planning.clearance import limit_of, stamp_of
-from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed
-from lidarium.mapping.planning.frontier_kernels import IGNORED
 from lidarium.mapping.planning.search.path_search import SearchMemory
 
 
@@ -56,14 +54,14 @@ class Perception:
     ----------
     memory : SearchMemory
         For the searches of kernels, a piece for each thread.
-    knows_mates : bool
-        Whether all teammates' poses are known at once.
-    hears : bool
-        Whether a robot's map of the team is what reached it by radio.
     exchanges : list of Exchange
         The radio traffic of each episode; none where the radio is ideal.
-    localizers : list of Localizer or None
-        What tells each robot's pose, by row; None where kernels do.
+    poses : KnownPoses
+        Where the robots know themselves and their teammates to be.
+    received : ReceivedMaps
+        What the robots know together with what reached them from others.
+    trails : ForgottenTrails
+        The trails of others along which robots forget the walls of their maps.
     meters : Meters or None
         Odometers and battery gauges of the robots of a lone episode; None in batches, which have none.
     """
@@ -77,55 +75,48 @@ class Perception:
         rows = self._robots * self._episodes
         self._own: list[NavigationMap | None] = [None] * rows
         self._shared: list[NavigationMap | None] = [None] * self._episodes
-        self._goals: list[tuple[float, float] | None] = [None] * self._episodes
         self._own_records = np.zeros((rows, RECORD), np.int64)
         self._shared_records = np.zeros((self._episodes, RECORD), np.int64)
         self._known = np.zeros((rows, 4), np.int64)
-        self._fresh_at = np.full(self._episodes, -2, np.int64)
+        self._fresh_at = np.full(self._episodes, STALE, np.int64)
         self._threads = min(settings.threads, int(os.cpu_count() or 1))
         self.memory = SearchMemory(self._threads)
-        is_team = settings.known_starts and settings.robots > 1
-        self._shares, self.hears = (
-            is_team and settings.radio.is_ideal,
-            is_team and not settings.radio.is_ideal,
-        )
-        self.knows_teammates = settings.known_starts and settings.radio.is_ideal
+        self._shares = settings.known_starts and settings.robots > 1 and settings.radio.is_ideal
         self.exchanges = (
             []
             if settings.radio.is_ideal
             else [Exchange(simulation, settings, episode) for episode in range(self._episodes)]
         )
-        self.localizers: list[Localizer | None] = [None] * rows
+        self.poses = KnownPoses(simulation, settings, offsets, self.exchanges)
+        self.received = ReceivedMaps(simulation, settings, self.poses, self.exchanges)
+        self.trails = ForgottenTrails(simulation, settings, self.poses, self._fresh_at)
         self.meters: Meters | None = None
-        self._heard: list[NavigationMap | None] = [None] * rows
-        self._heard_records = np.zeros((rows, RECORD), np.int64)
-        self._told: list[NDArray[np.int8] | None] = [None] * rows
-        self._trails: list[list[NDArray[np.float64]]] = [[] for _ in range(rows)]
-        # Whether robots plan on sums of their own map and of what came from others.
-        self._adds_up = self.hears
+
+    @property
+    def hears(self) -> bool:
+        """Whether a robot's map of the team is what reached it by radio."""
+        return self.received.hears
 
     def start(self, goal: tuple[float, float] | None = None, episode: int = 0) -> None:
         """Begin an episode."""
         first, last = episode * self._robots, (episode + 1) * self._robots
-        for navigation in (*self._own[first:last], *self._heard[first:last], self._shared[episode]):
+        for navigation in (*self._own[first:last], self._shared[episode]):
             if navigation is not None:
                 # Whoever still holds a map of the last episode may go on reading it.
                 navigation.keep_record_in(np.zeros(RECORD, np.int64))
         self._own[first:last], self._shared[episode] = [None] * self._robots, None
-        self._heard[first:last], self._heard_records[first:last] = [None] * self._robots, 0
-        self._told[first:last] = [None] * self._robots
-        self._trails[first:last] = [[] for _ in range(self._robots)]
-        self._adds_up = self.hears or any(told is not None for told in self._told)
         self._own_records[first:last], self._shared_records[episode] = 0, 0
         self._known[first:last] = [
             (rows, 0, columns, 0) for rows, columns in self.beliefs.belief_rows[first:last, 1:3]
         ]
-        self._goals[episode], self._fresh_at[episode] = goal, -2
+        self.received.start(range(first, last))
+        self.trails.start(range(first, last))
+        self.poses.goals[episode], self._fresh_at[episode] = goal, STALE
 
     @property
     def maps(self) -> TeamMaps:
         """The maps as kernels see them."""
-        if self._adds_up:
+        if self.received.adds_up:
             # What kernels bring up to date by themselves does not include what came from others.
             for episode in range(self._episodes):
                 self._refresh(episode)
@@ -196,7 +187,7 @@ class Perception:
         A lone robot's is its own, with unknown starts what it was told.
         """
         if not self.settings.known_starts:
-            return None if self._told[row] is None else self._heard_map(row)
+            return self._heard_map(row) if self.received.was_told(row) else None
         if self.hears:
             return self._heard_map(row)
         if not self._shares:
@@ -214,147 +205,17 @@ class Perception:
             self._shared[episode] = navigation
         return navigation
 
-    def tell(self, row: int, others: FusedMap | None) -> None:
-        """Let a robot that does not know its start know what others know.
-
-        It plans and explores on that as on its own map.
-
-        Parameters
-        ----------
-        row : int
-            Which robot.
-        others : FusedMap or None
-            What the others know, in the robot's map frame; it takes the place of what was told before. None
-            takes that back.
-
-        Raises
-        ------
-        ValueError
-            Where the starts are known, so that the team's map is there anyway, or the sides of the cells
-            differ.
-        """
-        resolution = self.settings.occupancy.resolution
-        if self.settings.known_starts:
-            raise ValueError(
-                "robots that know their starts have the team's map; want robots with unknown starts to be "
-                "told of others"
-            )
-        if others is not None and others.resolution != resolution:
-            raise ValueError(
-                f"the map that is told has cells of {others.resolution} m; want {resolution} m, as the "
-                "robots' own maps"
-            )
-        if others is None and self._told[row] is None:
-            return
-        told = np.zeros(self.beliefs.log_odds[row].shape, np.int8)
-        if others is not None:
-            overlay(told, others, self.origin_in_frame(row))
-        before = self._told[row]
-        is_other = told != 0 if before is None else told != before
-        self._told[row], self._adds_up = told, True
-        rows, columns = np.flatnonzero(is_other.any(axis=1)), np.flatnonzero(is_other.any(axis=0))
-        if self._heard[row] is not None and len(rows):
-            self._sum_heard(row, np.array([rows[0], rows[-1] + 1, columns[0], columns[-1] + 1]))
-
-    def forget_walls(self, row: int, trail: NDArray[np.float64]) -> None:
-        """Let a robot forget the walls along a trail.
-
-        They may be images of the robot that drove there. The robot senses the place for itself.
-
-        Parameters
-        ----------
-        row : int
-            Which robot.
-        trail : (N, 2) float64
-            Where the other one was, in the map frame of this [m]; what may show it where it stands at the end
-            is kept.
-
-        Raises
-        ------
-        ValueError
-            Where the trail is not that of a robot: of another shape, without a place, or not finite.
-        """
-        if trail.ndim != 2 or trail.shape[1] != 2 or not len(trail) or not np.isfinite(trail).all():
-            raise ValueError(
-                f"the trail has shape {trail.shape} and may not be finite; want places (N, 2) in metres, at "
-                "least one"
-            )
-        self._trails[row].append(trail)
-        self._forget(row, trail)
-
-    def forget_again(self, row: int) -> None:
-        """Forget the walls again along all trails that a robot has received.
-
-        This is done after its map was rendered anew.
-        """
-        for trail in self._trails[row]:
-            self._forget(row, trail)
-
-    def _forget(self, row: int, trail: NDArray[np.float64]) -> None:
-        resolution, radius = self.settings.occupancy.resolution, float(self.world.bodies[:, 0].max())
-        origin, whole = np.array(self.origin_in_frame(row)), self.beliefs.log_odds[row]
-        reach = radius + MARGIN_M + resolution
-        low = np.clip(
-            np.floor((trail.min(axis=0) - reach - origin) / resolution).astype(np.int64), 0, whole.shape[::-1]
-        )
-        high = np.clip(
-            np.ceil((trail.max(axis=0) + reach - origin) / resolution).astype(np.int64),
-            low,
-            whole.shape[::-1],
-        )
-        (left, bottom), (right, top) = low.tolist(), high.tolist()
-        part = whole[bottom:top, left:right]
-        x, y = (origin + low * resolution).tolist()
-        self.beliefs.forget(
-            row, passed(part.shape, (x, y), trail, radius, resolution) & (part > 0), (bottom, left)
-        )
-        self._fresh_at[self.episode_of(row)] = -2
-
     def _heard_map(self, row: int) -> NavigationMap:
         """Return the sum of a robot's own map and those received, up to date."""
         self._refresh(self.episode_of(row))
-        navigation = self._heard[row]
-        if navigation is None:
-            log_odds = np.zeros(self.beliefs.log_odds[row].shape, np.int8)
-            navigation = NavigationMap(log_odds, self.settings.occupancy.resolution)
-            navigation.keep_record_in(self._heard_records[row])
-            self._heard[row] = navigation
-            _, rows, columns = self.beliefs.belief_rows[row, :3]
-            self._sum_heard(row, np.array([0, rows, 0, columns]))
-            own = self._own[row]
-            if not self.hears and own is not None and own.record[FLAGS] != 0:
-                # What the robot gave up on its own map it does not try again.
-                navigation.frontiers.ignore(np.argwhere(own.frontiers.flags == IGNORED))
-        return navigation
-
-    def _sum_heard(self, row: int, window: NDArray[np.int64]) -> None:
-        """Bring the sum of what reached a robot up to date in a window (4,)."""
-        episode, first = self.episode_of(row), self.episode_of(row) * self._robots
-        told = self._told[row]
-        if self.hears:
-            copies = self.exchanges[episode].copies[row - first]
-            held = [
-                copy.ctypes.data
-                for teammate, copy in enumerate(copies)
-                if first + teammate != row and copy.size
-            ]
-        else:
-            held = [] if told is None else [told.ctypes.data]
-        beliefs = np.array(
-            [
-                (address, *self.beliefs.log_odds[row].shape)
-                for address in (self.beliefs.belief_rows[row, 0], *held)
-            ],
-            np.int64,
-        )
-        sum_maps(self._heard_records[row], beliefs, self._maps.limit, self._maps.stamp, window)
+        return self.received.sum_of(row, self._own[row])
 
     def planning_map(self, row: int, shares_map: bool) -> NavigationMap:
         """Return the map that a robot plans on, up to date.
 
         It is the team's where that reaches the robot, else the robot's own.
         """
-        if shares_map and self._adds_up:
+        if shares_map and self.received.adds_up:
             # Also that of a robot to which nothing came: kernels look the maps of all up in one table.
             return self._heard_map(row)
         shared = self.shared_map(row) if shares_map else None
@@ -375,8 +236,8 @@ class Perception:
         records, sharing = self._own_records, 1
         if shares_map and self._shares:
             records, sharing = self._shared_records, self._robots
-        elif shares_map and self._adds_up:
-            records = self._heard_records
+        elif shares_map and self.received.adds_up:
+            records = self.received.records
         places = np.unique(rows // sharing)
         for place in places[records[places, FLAGS if with_frontiers else LOG_ODDS] == 0]:
             navigation = self.planning_map(int(place) * sharing, shares_map)
@@ -385,10 +246,10 @@ class Perception:
         return records, sharing
 
     def _refresh(self, episode: int) -> None:
-        """Take in what the maps of a team have changed since the last look."""
+        """Take in what the maps of a team have changed since the last step."""
         if self._fresh_at[episode] == self.world.steps[episode]:
             return
-        if not self._adds_up:
+        if not self.received.adds_up:
             refresh_team(self._maps, episode)
             return
         first = episode * self._robots
@@ -397,98 +258,12 @@ class Perception:
         for robot, window in enumerate(windows):
             if self.hears:
                 extend_window(window, self.exchanges[episode].take_window(robot))
-            if self._heard[first + robot] is not None and window[0] < window[1] and window[2] < window[3]:
-                self._sum_heard(first + robot, window)
-
-    def offset(self, row: int) -> NDArray[np.float64]:
-        """Return the origin of a robot's map frame [m], shape (2,).
-
-        It is in the frame of the robot's believed pose.
-        """
-        return np.asarray(self.offsets[row])
-
-    def pose_in_frame(self, of: int, to: int) -> NDArray[np.float64]:
-        """Return the believed pose of a robot in a map frame, shape (3,).
-
-        The frame is another robot's or its own.
-        """
-        x, y, theta = self.beliefs.believed[of]
-        return np.array([x - self.offsets[to, 0], y - self.offsets[to, 1], theta])
-
-    def origin_in_frame(self, row: int) -> tuple[float, float]:
-        """Return the lower left corner of a robot's map in its map frame [m]."""
-        x, y = self.beliefs.origins[row] - self.offsets[row]
-        return float(x), float(y)
-
-    def spread(self, row: int) -> NDArray[np.float64]:
-        """Return the standard deviation of a robot's pose [m, m, rad], shape (3,).
-
-        The robot's localizer reports it.
-        """
-        localizer = self.localizers[row]
-        return np.zeros(3) if localizer is None else np.sqrt(np.maximum(np.diag(localizer.covariance), 0.0))
-
-    def pose_known_to(self, row: int, other: int) -> NDArray[np.float64]:
-        """Return the pose of a teammate as a robot knows it, shape (3,).
-
-        It is in the frame of believed poses.
-        """
-        if self.knows_teammates:
-            return np.asarray(self.beliefs.believed[other])
-        return np.asarray(self.beliefs.heard[row].reshape(-1, 3)[other % self._robots])
-
-    def teammates(self, row: int) -> dict[str, Teammate]:
-        """Return what a robot knows of its teammates.
-
-        With known starts and the ideal radio these are their current poses, else the last reported
-        ones.
-        """
-        if not self.settings.known_starts:
-            return {}
-        first = self.episode_of(row) * self._robots
-        if self.hears:
-            return self._heard_teammates(row, first)
-        return {
-            agent: Teammate(
-                self.pose_in_frame(other, row),
-                0.0,
-                self.settings.robot.radius,
-                bool(self.world.flags[other] & ENDED),
-            )
-            for other, agent in enumerate(self.settings.agents, first)
-            if other != row
-        }
-
-    def _heard_teammates(self, row: int, first: int) -> dict[str, Teammate]:
-        """Return what a robot heard of the others."""
-        exchange, robot = self.exchanges[self.episode_of(row)], row - first
-        step, radius = int(self.world.steps[self.episode_of(row)]), self.settings.robot.radius
-        known = {}
-        for teammate, agent in enumerate(self.settings.agents):
-            if teammate != robot and exchange.heard_at[robot, teammate] != NEVER:
-                x, y, theta = exchange.heard[robot, teammate]
-                pose = np.array([x - self.offsets[row, 0], y - self.offsets[row, 1], theta])
-                age_s = float(step - exchange.heard_at[robot, teammate]) * self.settings.time_step
-                known[agent] = Teammate(pose, age_s, radius, bool(exchange.heard_ended[robot, teammate]))
-        return known
-
-    def goal_of(self, row: int) -> NDArray[np.float64] | None:
-        """Return the goal in a robot's map frame.
-
-        None without a goal, and where the robot does not know its start.
-        """
-        goal = self._goals[self.episode_of(row)]
-        if goal is None or not self.settings.known_starts:
-            return None
-        return np.asarray(goal - self.offsets[row])
+            if self.received.has_sum(first + robot) and window[0] < window[1] and window[2] < window[3]:
+                self.received.sum_window(first + robot, window)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        kinds = (
-            (self._own, self._own_records),
-            (self._shared, self._shared_records),
-            (self._heard, self._heard_records),
-        )
+        kinds = ((self._own, self._own_records), (self._shared, self._shared_records))
         for maps, records in kinds:
             for navigation, record in zip(maps, records, strict=True):
                 if navigation is not None:

@@ -57,7 +57,7 @@ class Software:
                 )
                 draws = np.random.default_rng([seed, LOCALIZER_STREAM, robot])
                 localizer.reset(self._perception.beliefs.believed[row].copy(), int(draws.integers(2**63)))
-                self._perception.localizers[row] = localizer
+                self._perception.poses.localizers[row] = localizer
         if self._perception.exchanges:
             self._perception.exchanges[episode].start(seed)
 
@@ -88,7 +88,7 @@ class Software:
         world = simulation.world
         time_s = float(world.steps[episode]) * self._settings.time_step
         for row in range(episode * robots, (episode + 1) * robots):
-            localizer = self._perception.localizers[row]
+            localizer = self._perception.poses.localizers[row]
             if localizer is None or world.flags[row] & ENDED:
                 continue
             ranges_without_teammates(simulation.table, row, robots, self._beams)
@@ -98,7 +98,7 @@ class Software:
             correction = localizer.take_correction()
             if correction is not None:
                 simulation.render_anew(row, correction.poses, correction.ranges)
-                self._perception.forget_again(row)
+                self._perception.trails.forget_again(row)
 
     def _exchange(self, episode: int) -> None:
         """Let the robots of an episode exchange messages.

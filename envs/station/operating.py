@@ -142,7 +142,7 @@ class Operating:
 
         It leaves alone who is paused.
         """
-        self.driver, driver.held = driver, self.held
+        self.driver, driver.planner.held = driver, self.held
 
     def is_addressed(self, row: int) -> bool:
         """Whether a robot was ever given an order.
@@ -245,7 +245,7 @@ class Operating:
         navigation = self._perception.planning_map(row, self.driver.shares_map)
         place = np.array([order.target.x, order.target.y])
         cell_row, cell_column = np.asarray(
-            cells_of(place, self._perception.origin_in_frame(row), navigation.resolution)
+            cells_of(place, self._perception.poses.origin_in_frame(row), navigation.resolution)
         ).tolist()
         rows, columns = navigation.log_odds.shape
         if not (0 <= cell_row < rows and 0 <= cell_column < columns):

@@ -62,7 +62,7 @@ def _cut(
     """
     row_low, row_high, column_low, column_high = window
     resolution = perception.settings.occupancy.resolution
-    x, y = perception.origin_in_frame(row)
+    x, y = perception.poses.origin_in_frame(row)
     levels = three_levels(np.asarray(log_odds[row_low:row_high, column_low:column_high]))
     return GrowingMap(levels, (x + column_low * resolution, y + row_low * resolution))
 
@@ -128,7 +128,7 @@ class Station:
         return self._received[row]
 
     def tell(self, row: int, others: FusedMap | None) -> bool:
-        """Tell a robot what others know (`Perception.tell`), if the links to it stand.
+        """Tell a robot what others know (`ReceivedMaps.tell`), if the links to it stand.
 
         Return whether they do.
 
@@ -136,18 +136,18 @@ class Station:
         """
         if _order_delay(self._perception, row) is None:
             return False
-        self._perception.tell(row, others)
+        self._perception.received.tell(row, others)
         return True
 
     def forget_walls(self, row: int, trail: NDArray[np.float64]) -> bool:
         """Send a robot where another drove; return whether the links to it stand.
 
-        The robot forgets the walls there (`Perception.forget_walls`); nothing is sent where the links
+        The robot forgets the walls there (`ForgottenTrails.forget_walls`); nothing is sent where the links
         do not stand.
         """
         if _order_delay(self._perception, row) is None:
             return False
-        self._perception.forget_walls(row, trail)
+        self._perception.trails.forget_walls(row, trail)
         return True
 
     def _report(self, row: int, time_s: float, known: GrowingMap, status: Status) -> Report:
@@ -157,7 +157,7 @@ class Station:
     def _frame(self, row: int) -> Transform | None:
         """Return how a robot's map frame lies in the floor's, where it knows or is told."""
         if self._perception.settings.known_starts:
-            return Transform(*self._perception.offset(row).tolist())
+            return Transform(*self._perception.poses.offset(row).tolist())
         return (
             Transform(*self._perception.world.starts[row].tolist())
             if self._perception.settings.reveals_starts
@@ -183,7 +183,7 @@ class Station:
         return driver.state(row), driver.target(row), float(np.hypot(*np.diff(path, axis=0).T).sum())
 
     def _pose(self, row: int) -> Transform:
-        return Transform(*self._perception.pose_in_frame(row, row).tolist())
+        return Transform(*self._perception.poses.pose_in_frame(row, row).tolist())
 
 
 def _exchange_of(perception: Perception) -> Exchange | None:

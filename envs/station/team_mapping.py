@@ -121,7 +121,7 @@ class TeamMapping:
         agents = self.perception.settings.agents
         maps = {agent: known_map(self.perception, row) for row, agent in enumerate(agents)}
         poses = {
-            agent: Transform(*self.perception.pose_in_frame(row, row).tolist())
+            agent: Transform(*self.perception.poses.pose_in_frame(row, row).tolist())
             for row, agent in enumerate(agents)
         }
         pairs = [

@@ -266,7 +266,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         time_s, perception = self._base.scorer.time, self._base.perception
         for agent, observation in observations.items():
             row = self.possible_agents.index(agent)
-            x, y, _ = perception.pose_in_frame(row, row).tolist()
+            x, y, _ = perception.poses.pose_in_frame(row, row).tolist()
             observation["team_map"] = crop_around(self.team.fused[agent], x, y, self.settings.map_cells)[None]
             observation["teammates"] = self._teammates(agent, time_s)
         return observations
@@ -292,7 +292,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
 def true_frames(env: ExplorationEnv) -> Frames:
     """Return how the map frames of all robots of an environment truly lie."""
     if env.settings.known_starts:
-        offsets = (env.perception.offset(row) for row in range(env.settings.robots))
+        offsets = (env.perception.poses.offset(row) for row in range(env.settings.robots))
         frames = [Transform(float(offset[0]), float(offset[1])) for offset in offsets]
     else:
         frames = [Transform(*start) for start in env.world.starts.tolist()]

@@ -16,7 +16,7 @@ def in_floor_frame(env: ExplorationEnv, agent: str, x: float, y: float) -> tuple
     """Return a position of a robot's map frame in the floor's frame [m]."""
     row = env.possible_agents.index(agent)
     if env.settings.known_starts:
-        offset = env.perception.offset(row)
+        offset = env.perception.poses.offset(row)
         return float(x + offset[0]), float(y + offset[1])
     start_x, start_y, theta = env.world.starts[row]
     return (

@@ -45,7 +45,7 @@ def test_an_unreachable_room_is_named_and_does_not_count(name, robots):
     assert set(env.scorer.ended_because.values()) <= {"no_frontier", "frontier_unreachable"}
     assert "frontier_unreachable" in env.scorer.ended_because.values()
     assert env.world.collisions.sum() == 0
-    offset = env.perception.offset(0)
+    offset = env.perception.poses.offset(0)
     beyond = [entry for entry in episode.given_up if entry.agent == "robot_0" and entry.x + offset[0] > 3.0]
     assert beyond
     assert all(
@@ -170,7 +170,7 @@ def test_names_of_what_was_given_up_lie_on_the_floor_in_the_robots_frame():
     episode = run_episode(NearestFrontier(), env, 1)
     x_min, y_min, x_max, y_max = env.floor.bounds
     for entry in episode.given_up:
-        x, y = np.array([entry.x, entry.y]) + env.perception.offset(0)
+        x, y = np.array([entry.x, entry.y]) + env.perception.poses.offset(0)
         assert x_min - 0.2 <= x <= x_max + 0.2
         assert y_min - 0.2 <= y <= y_max + 0.2
         assert math.isfinite(entry.size_m)

@@ -104,7 +104,7 @@ class Watch(Watcher):
         self.wheels: list[NDArray[np.float64]] = []
         self.believed: list[NDArray[np.float64]] = []
         self.true: list[NDArray[np.float64]] = []
-        localizers = env.perception.localizers
+        localizers = env.perception.poses.localizers
         localizers[:] = [
             None if localizer is None else TimedLocalizer(localizer, self.seconds) for localizer in localizers
         ]

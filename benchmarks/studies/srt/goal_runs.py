@@ -106,7 +106,7 @@ def tracker_of(env: ExplorationEnv) -> SplineTracker:
     ValueError
         Where the robot has another one.
     """
-    localizer = env.perception.localizers[0]
+    localizer = env.perception.poses.localizers[0]
     if not isinstance(localizer, SplineTracker):
         raise ValueError(f"localization is {env.settings.localization!r}; want splines or splines_ekf")
     return localizer

@@ -8,7 +8,7 @@ from reported_halls import RADIUS, RESOLUTION, hall, report
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Supervisor
-from lidarium.envs.driving.team_driver import footprint_of
+from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.radio.messages import OperatingState, OrderKind
 from lidarium.mapping.merging.incremental import GrowingMap
 

@@ -234,7 +234,7 @@ def driven(floor, targets, decisions=60, robots=2, **options):
     env.reset(seed=0)
     base = env.unwrapped
     orders = {
-        agent: None if target is None else Target(*(np.asarray(target) - base.perception.offset(row)))
+        agent: None if target is None else Target(*(np.asarray(target) - base.perception.poses.offset(row)))
         for row, (agent, target) in enumerate(zip(env.agents, targets, strict=True))
     }
     states, tracks = [], []

@@ -81,7 +81,7 @@ def test_a_choice_drives_to_where_the_frontier_was_offered():
     env.step({"robot_0": 0})
     path = env.waypoints.driver.path(0)
     assert (
-        path[-1] + env.unwrapped.perception.offset(0) == pytest.approx(place + offered, abs=0.08)
+        path[-1] + env.unwrapped.perception.poses.offset(0) == pytest.approx(place + offered, abs=0.08)
         or len(path) == 1
     )
 

@@ -30,7 +30,7 @@ def test_walls_along_the_trail_become_unknown_and_nothing_else_changes(env):
     walls = np.argwhere(before > 0)
     middle = centres(belief, walls[len(walls) // 2][None])[0]
     trail = middle + np.array([(-0.4, 0.0), (0.4, 0.0), (0.4, 3.0)])
-    env.perception.forget_walls(0, trail)
+    env.perception.trails.forget_walls(0, trail)
     after = belief.map.log_odds
     where = swept(before.shape, belief.map_origin, trail, belief.radius, RESOLUTION, 0.0) & (before > 0)
     assert where[tuple(walls[len(walls) // 2])]
@@ -44,7 +44,7 @@ def test_what_stands_at_the_end_of_the_trail_stays(env):
     walls = np.argwhere(before > 0)
     places = centres(belief, walls)
     end = places[len(walls) // 2]
-    env.perception.forget_walls(0, end + np.array([(0.0, 1.0), (0.0, 0.0)]))
+    env.perception.trails.forget_walls(0, end + np.array([(0.0, 1.0), (0.0, 0.0)]))
     near = np.hypot(*(places - end).T) < belief.radius
     assert (belief.map.log_odds[tuple(walls[near].T)] > 0).all()
 
@@ -54,7 +54,7 @@ def test_frontiers_open_where_walls_were_forgotten(env):
     count = len(belief.map.frontiers.cells())
     walls = centres(belief, np.argwhere(belief.map.log_odds > 0))
     corner = walls[np.argmin(walls.sum(axis=1))]
-    env.perception.forget_walls(0, corner + np.array([(0.0, 0.5), (5.0, 0.5), (9.0, 9.0)]))
+    env.perception.trails.forget_walls(0, corner + np.array([(0.0, 0.5), (5.0, 0.5), (9.0, 9.0)]))
     assert len(belief.map.frontiers.cells()) > count
 
 
@@ -62,7 +62,7 @@ def test_a_wall_that_is_one_is_drawn_again_when_it_is_seen_again(env):
     belief = env.belief("robot_0")
     before = belief.map.log_odds > 0
     places = centres(belief, np.argwhere(before))
-    env.perception.forget_walls(0, np.array([*places, (50.0, 50.0)]))
+    env.perception.trails.forget_walls(0, np.array([*places, (50.0, 50.0)]))
     assert np.count_nonzero((belief.map.log_odds > 0) & before) < 0.2 * np.count_nonzero(before)
     for _ in range(5):
         env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
@@ -71,18 +71,18 @@ def test_a_wall_that_is_one_is_drawn_again_when_it_is_seen_again(env):
 
 def test_a_map_that_is_rendered_anew_forgets_them_again_until_the_next_episode(env):
     perception, belief = env.perception, env.belief("robot_0")
-    localizer, pose = perception.localizers[0], env.beliefs.believed[0]
+    localizer, pose = perception.poses.localizers[0], env.beliefs.believed[0]
     assert localizer is not None
     scan, poses = env.simulation.ranges[0][None].copy(), pose[None].copy()
     walls = np.argwhere(belief.map.log_odds > 0)
     middle = walls[len(walls) // 2]
     place = centres(belief, middle[None])[0]
-    perception.forget_walls(0, place + np.array([(0.0, 0.0), (20.0, 0.0)]))
+    perception.trails.forget_walls(0, place + np.array([(0.0, 0.0), (20.0, 0.0)]))
     env.simulation.render_anew(0, poses, scan)
-    perception.forget_again(0)
+    perception.trails.forget_again(0)
     assert belief.map.log_odds[tuple(middle)] == 0
     env.reset(seed=0)
-    perception.forget_again(0)
+    perception.trails.forget_again(0)
     assert env.belief("robot_0").map.log_odds[tuple(middle)] > 0
 
 
@@ -90,7 +90,7 @@ def test_a_trail_beyond_the_map_or_of_one_place_changes_nothing(env):
     belief = env.belief("robot_0")
     before = belief.map.log_odds.copy()
     for trail in ([[500.0, 500.0], [501.0, 500.0]], [[-500.0, 0.0]], [belief.pose[:2].tolist()]):
-        env.perception.forget_walls(0, np.array(trail))
+        env.perception.trails.forget_walls(0, np.array(trail))
     assert (belief.map.log_odds == before).all()
 
 
@@ -99,7 +99,7 @@ def test_a_trail_beyond_the_map_or_of_one_place_changes_nothing(env):
 )
 def test_what_is_no_trail_is_refused(env, trail):
     with pytest.raises(ValueError, match="want places"):
-        env.perception.forget_walls(0, trail)
+        env.perception.trails.forget_walls(0, trail)
 
 
 def test_a_wall_beside_the_trail_stays(env):
@@ -109,7 +109,7 @@ def test_a_wall_beside_the_trail_stays(env):
     corner = walls[np.argmin(walls.sum(axis=1))]
     beside = corner - (0.0, belief.radius + RESOLUTION)
     assert (np.hypot(*(walls - beside).T) > belief.radius).all()
-    env.perception.forget_walls(0, beside + np.array([(0.0, 0.0), (0.0, -5.0)]))
+    env.perception.trails.forget_walls(0, beside + np.array([(0.0, 0.0), (0.0, -5.0)]))
     assert (belief.map.log_odds == before).all()
 
 

@@ -77,7 +77,7 @@ def test_poses_of_all_are_told_in_each_robots_own_frame():
     env = driven()
     for row, agent in enumerate(env.agents):
         belief = env.belief(agent)
-        offset = env.perception.offset(row)
+        offset = env.perception.poses.offset(row)
         assert np.allclose(belief.pose[:2] + offset, env.world.poses[row, :2])
         assert set(belief.teammates) == set(env.agents) - {agent}
         for name, teammate in belief.teammates.items():

@@ -124,7 +124,7 @@ def test_localizers_draw_from_the_seed_of_the_episode(localizers):
     seeds = [
         [
             localizer.seed
-            for localizer in explored(1, seed=seed, localization="reckoner")[0].perception.localizers
+            for localizer in explored(1, seed=seed, localization="reckoner")[0].perception.poses.localizers
         ]
         for seed in (1, 1, 2)
     ]

@@ -65,7 +65,7 @@ def test_who_is_always_linked_knows_what_the_team_knew_at_the_last_exchange(monk
         assert np.array_equal(np.sign(env.belief(agent).shared_map.log_odds), np.sign(total))
     teammate = env.belief("robot_0").teammates["robot_2"]
     assert teammate.age_s == 0.0
-    assert np.allclose(teammate.pose[:2] + env.perception.offset(0), env.world.poses[2, :2])
+    assert np.allclose(teammate.pose[:2] + env.perception.poses.offset(0), env.world.poses[2, :2])
 
 
 def test_a_link_works_one_way_where_it_is_one_way(monkeypatch):

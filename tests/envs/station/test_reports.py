@@ -45,7 +45,7 @@ def is_as_now(env, row, report):
     perception, resolution = env.unwrapped.perception, env.unwrapped.settings.occupancy.resolution
     known = three_levels(np.asarray(perception.own_map(row).log_odds))
     low_x, low_y = np.rint(
-        (np.array(report.map.origin) - perception.origin_in_frame(row)) / resolution
+        (np.array(report.map.origin) - perception.poses.origin_in_frame(row)) / resolution
     ).astype(int)
     reported = np.full_like(known, UNKNOWN)
     rows, columns = report.map.levels.shape

@@ -1,0 +1,133 @@
+"""What the robots know of where they are, and where their teammates are."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.onboard.teammate import Teammate
+from lidarium.envs.radio.exchange import NEVER, Exchange
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.kernels.arrays import ENDED
+from lidarium.envs.simulation.simulation import Simulation
+from lidarium.mapping.localization.dead_reckoning.localizer import Localizer
+
+
+class KnownPoses:
+    """The believed poses of the robots of all episodes, in the frames of their maps.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Whose believed poses they are; row = episode * robots + robot.
+    settings : ExplorationSettings
+        The team of every episode.
+    offsets : (rows, 2) float64
+        Origin of each robot's map frame in the frame of its believed pose [m]; the environment's own array.
+    exchanges : list of Exchange
+        The radio traffic of each episode; none where the radio is ideal.
+
+    Attributes
+    ----------
+    knows_teammates : bool
+        Whether all teammates' poses are known at once.
+    localizers : list of Localizer or None
+        What tells each robot's pose, by row; None where kernels do.
+    goals : list of tuple or None
+        The goal of each episode in the frame of the floor (x, y) [m]; None where it has none.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        settings: ExplorationSettings,
+        offsets: NDArray[np.float64],
+        exchanges: list[Exchange],
+    ) -> None:
+        self._settings, self._offsets, self._exchanges = settings, offsets, exchanges
+        self._world, self._beliefs, self._robots = simulation.world, simulation.beliefs, settings.robots
+        # Without known starts no robot can tell where another is, whatever it hears.
+        self._hears = settings.known_starts and settings.robots > 1 and not settings.radio.is_ideal
+        self.knows_teammates = settings.known_starts and settings.radio.is_ideal
+        self.localizers: list[Localizer | None] = [None] * (settings.robots * simulation.episodes)
+        self.goals: list[tuple[float, float] | None] = [None] * simulation.episodes
+
+    def offset(self, row: int) -> NDArray[np.float64]:
+        """Return the origin of a robot's map frame [m], shape (2,).
+
+        It is in the frame of the robot's believed pose.
+        """
+        return np.asarray(self._offsets[row])
+
+    def pose_in_frame(self, of: int, to: int) -> NDArray[np.float64]:
+        """Return the believed pose of a robot in a map frame, shape (3,).
+
+        The frame is another robot's or its own.
+        """
+        x, y, theta = self._beliefs.believed[of]
+        return np.array([x - self._offsets[to, 0], y - self._offsets[to, 1], theta])
+
+    def origin_in_frame(self, row: int) -> tuple[float, float]:
+        """Return the lower left corner of a robot's map in its map frame [m]."""
+        x, y = self._beliefs.origins[row] - self._offsets[row]
+        return float(x), float(y)
+
+    def spread(self, row: int) -> NDArray[np.float64]:
+        """Return the standard deviation of a robot's pose [m, m, rad], shape (3,).
+
+        The robot's localizer reports it.
+        """
+        localizer = self.localizers[row]
+        return np.zeros(3) if localizer is None else np.sqrt(np.maximum(np.diag(localizer.covariance), 0.0))
+
+    def pose_known_to(self, row: int, other: int) -> NDArray[np.float64]:
+        """Return the pose of a teammate as a robot knows it, shape (3,).
+
+        It is in the frame of believed poses.
+        """
+        if self.knows_teammates:
+            return np.asarray(self._beliefs.believed[other])
+        return np.asarray(self._beliefs.heard[row].reshape(-1, 3)[other % self._robots])
+
+    def teammates(self, row: int) -> dict[str, Teammate]:
+        """Return what a robot knows of its teammates.
+
+        With known starts and the ideal radio these are their current poses, else the last reported
+        ones.
+        """
+        if not self._settings.known_starts:
+            return {}
+        first = row // self._robots * self._robots
+        if self._hears:
+            return self._heard_teammates(row, first)
+        return {
+            agent: Teammate(
+                self.pose_in_frame(other, row),
+                0.0,
+                self._settings.robot.radius,
+                bool(self._world.flags[other] & ENDED),
+            )
+            for other, agent in enumerate(self._settings.agents, first)
+            if other != row
+        }
+
+    def _heard_teammates(self, row: int, first: int) -> dict[str, Teammate]:
+        """Return what a robot heard of the others."""
+        exchange, robot = self._exchanges[row // self._robots], row - first
+        step, radius = int(self._world.steps[row // self._robots]), self._settings.robot.radius
+        known = {}
+        for teammate, agent in enumerate(self._settings.agents):
+            if teammate != robot and exchange.heard_at[robot, teammate] != NEVER:
+                x, y, theta = exchange.heard[robot, teammate]
+                pose = np.array([x - self._offsets[row, 0], y - self._offsets[row, 1], theta])
+                age_s = float(step - exchange.heard_at[robot, teammate]) * self._settings.time_step
+                known[agent] = Teammate(pose, age_s, radius, bool(exchange.heard_ended[robot, teammate]))
+        return known
+
+    def goal_of(self, row: int) -> NDArray[np.float64] | None:
+        """Return the goal in a robot's map frame.
+
+        None without a goal, and where the robot does not know its start.
+        """
+        goal = self.goals[row // self._robots]
+        if goal is None or not self._settings.known_starts:
+            return None
+        return np.asarray(goal - self._offsets[row])

@@ -1,0 +1,164 @@
+"""The sums of a robot's own map and those that it has received."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.onboard.known_poses import KnownPoses
+from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT, FLAGS, RECORD, NavigationMap, sum_maps
+from lidarium.envs.radio.exchange import Exchange
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.simulation import Simulation
+from lidarium.mapping.merging.fusion import FusedMap, overlay
+from lidarium.mapping.planning.clearance import limit_of, stamp_of
+from lidarium.mapping.planning.frontiers import IGNORED
+
+
+class ReceivedMaps:
+    """What the robots of all episodes know together with what reached them from others.
+
+    That is what came by radio where the starts are known, else what a robot was told.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Whose maps they are; row = episode * robots + robot.
+    settings : ExplorationSettings
+        The team of every episode.
+    poses : KnownPoses
+        Where the map frames of the robots are.
+    exchanges : list of Exchange
+        The radio traffic of each episode; none where the radio is ideal.
+
+    Attributes
+    ----------
+    hears : bool
+        Whether a robot's map of the team is what reached it by radio.
+    adds_up : bool
+        Whether robots plan on sums of their own map and of what came from others.
+    records : (rows, 10) int64
+        The sums as kernels see them, zeros where there is none yet.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        settings: ExplorationSettings,
+        poses: KnownPoses,
+        exchanges: list[Exchange],
+    ) -> None:
+        self._beliefs, self._settings, self._poses = simulation.beliefs, settings, poses
+        self._exchanges, self._robots = exchanges, settings.robots
+        rows = settings.robots * simulation.episodes
+        self.hears = settings.known_starts and settings.robots > 1 and not settings.radio.is_ideal
+        self.adds_up = self.hears
+        self.records = np.zeros((rows, RECORD), np.int64)
+        self._sums: list[NavigationMap | None] = [None] * rows
+        self._told: list[NDArray[np.int8] | None] = [None] * rows
+
+    def start(self, rows: range) -> None:
+        """Begin the episode of some rows: their robots have received nothing."""
+        for row in rows:
+            navigation = self._sums[row]
+            if navigation is not None:
+                # Whoever still holds a map of the last episode may go on reading it.
+                navigation.keep_record_in(np.zeros(RECORD, np.int64))
+            self._sums[row], self._told[row] = None, None
+            self.records[row] = 0
+        self.adds_up = self.hears or any(told is not None for told in self._told)
+
+    def has_sum(self, row: int) -> bool:
+        """Whether there is a sum for a robot yet."""
+        return self._sums[row] is not None
+
+    def was_told(self, row: int) -> bool:
+        """Whether a robot was told what others know."""
+        return self._told[row] is not None
+
+    def sum_of(self, row: int, own: NavigationMap | None) -> NavigationMap:
+        """Return the sum of a robot's own map and those received.
+
+        ``own`` is the robot's own map for navigation, None before there is one.
+        """
+        navigation = self._sums[row]
+        if navigation is None:
+            log_odds = np.zeros(self._beliefs.log_odds[row].shape, np.int8)
+            navigation = NavigationMap(log_odds, self._settings.occupancy.resolution)
+            navigation.keep_record_in(self.records[row])
+            self._sums[row] = navigation
+            _, rows, columns = self._beliefs.belief_rows[row, :3]
+            self.sum_window(row, np.array([0, rows, 0, columns]))
+            if not self.hears and own is not None and own.record[FLAGS] != 0:
+                # What the robot gave up on its own map it does not try again.
+                navigation.frontiers.ignore(np.argwhere(own.frontiers.flags == IGNORED))
+        return navigation
+
+    def sum_window(self, row: int, window: NDArray[np.int64]) -> None:
+        """Bring the sum of what reached a robot up to date in a window (4,)."""
+        episode, robot = divmod(row, self._robots)
+        told = self._told[row]
+        if self.hears:
+            copies = self._exchanges[episode].copies[robot]
+            held = [
+                copy.ctypes.data for teammate, copy in enumerate(copies) if teammate != robot and copy.size
+            ]
+        else:
+            held = [] if told is None else [told.ctypes.data]
+        beliefs = np.array(
+            [
+                (address, *self._beliefs.log_odds[row].shape)
+                for address in (self._beliefs.belief_rows[row, 0], *held)
+            ],
+            np.int64,
+        )
+        limit = limit_of(CLEARANCE_LIMIT, self._settings.occupancy.resolution)
+        sum_maps(self.records[row], beliefs, limit, stamp_of(limit), window)
+
+    def tell(self, row: int, others: FusedMap | None) -> None:
+        """Let a robot that does not know its start know what others know.
+
+        It plans and explores on that as on its own map.
+
+        Parameters
+        ----------
+        row : int
+            Which robot.
+        others : FusedMap or None
+            What the others know, in the robot's map frame; it takes the place of what was told before. None
+            takes that back.
+
+        Raises
+        ------
+        ValueError
+            Where the starts are known, so that the team's map is there anyway, or the sides of the cells
+            differ.
+        """
+        resolution = self._settings.occupancy.resolution
+        if self._settings.known_starts:
+            raise ValueError(
+                "robots that know their starts have the team's map; want robots with unknown starts to be "
+                "told of others"
+            )
+        if others is not None and others.resolution != resolution:
+            raise ValueError(
+                f"the map that is told has cells of {others.resolution} m; want {resolution} m, as the "
+                "robots' own maps"
+            )
+        if others is None and self._told[row] is None:
+            return
+        told = np.zeros(self._beliefs.log_odds[row].shape, np.int8)
+        if others is not None:
+            overlay(told, others, self._poses.origin_in_frame(row))
+        before = self._told[row]
+        is_other = told != 0 if before is None else told != before
+        self._told[row], self.adds_up = told, True
+        rows, columns = np.flatnonzero(is_other.any(axis=1)), np.flatnonzero(is_other.any(axis=0))
+        if self._sums[row] is not None and len(rows):
+            self.sum_window(row, np.array([rows[0], rows[-1] + 1, columns[0], columns[-1] + 1]))
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        for navigation, record in zip(self._sums, self.records, strict=True):
+            if navigation is not None:
+                navigation.keep_record_in(record)
