@@ -4,7 +4,6 @@ The team explores a floor.
 """
 
 import copy
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,29 +12,31 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from lidarium.envs.episode_start import EpisodeStart, begin, goal_of_robots, make_simulation, map_frames
+from lidarium.envs.agent_commands import AgentCommands
+from lidarium.envs.agent_endings import AgentEndings
+from lidarium.envs.agent_infos import AgentInfos
+from lidarium.envs.agent_observations import AgentObservations, Observation
+from lidarium.envs.episode_start import EpisodeStart, begin, make_simulation
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.observation_spaces import action_space, observation_space
-from lidarium.envs.observations import ObservationWriter
+from lidarium.envs.observations import action_space, observation_space
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
-from lidarium.envs.outcome.endings import COVERED, HORIZON, REASONS, make_rules, note_endings
 from lidarium.envs.outcome.scorer import Scorer
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, read_options
-from lidarium.envs.shares import scale_shares
-from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.station.reports import Station
-from lidarium.mapping.kernels.views import table_of
 
 if TYPE_CHECKING:
     from lidarium.envs.drawing.rendering import Scene
 
 
-Observation = dict[str, NDArray[Any]]
+Outcome = tuple[
+    dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
+]
+"""Observations, rewards, terminations, truncations, infos, each by agent."""
 
 
 class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
@@ -89,7 +90,6 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self.possible_agents = self.settings.agents
         self.agents: list[str] = []
-        self._image_resolution = image_resolution
         self._choice = FloorChoice(floor, image_resolution)
         self.has_goal = self._choice.has_goal
         space = observation_space(self.settings, self.has_goal)
@@ -106,32 +106,25 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self.simulation.beliefs,
             self.simulation.score,
         )
-        self._limits = np.array([self.settings.robot.max_speed, self.settings.robot.max_turn_rate])
-        self._rules = make_rules(self.simulation, self.settings)
-        self._rules_table: NDArray[np.int64] | None = None
-        self._reasons = np.zeros(self.settings.robots, np.int8)
         self._generator: np.random.Generator | None = None
-        self._offsets = np.zeros((self.settings.robots, 2))
-        self._goals = np.full((self.settings.robots, 2), np.nan)
-        self._writer = ObservationWriter(
-            self.simulation, self.settings, self._offsets, self._goals if self.has_goal else None
-        )
-        self._commands = np.zeros((self.settings.robots, 2))
+        self._observations = AgentObservations(self.simulation, self.settings, self.has_goal)
         self._window: Any = None
         self.floor: Floor | None = None
         self.goal: tuple[float, float] | None = None
         self.seed: int | None = None
         self.scorer = Scorer(self.world, self.score, self.settings)
-        self.perception = Perception(self.simulation, self.settings, self._offsets)
+        self.perception = Perception(self.simulation, self.settings, self._observations.offsets)
         self._software = Software(self.perception, self.settings)
         # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a
         # tenth of a step.
         self._step = self._software.step if self._software.is_staged else self.simulation.step
-        self._is_battery_limited = self.settings.battery.is_limited
         self._meters = self.perception.meters = Meters(self.world, self.settings)
         self.station = Station(self.perception, self._meters)
         self.operating = self.station.operating
-        self._stopping = self.operating.stopping
+        parts = (self.simulation, self.settings)
+        self._commands = AgentCommands(self.settings, self.operating)
+        self._endings = AgentEndings(*parts, self._meters, self.operating)
+        self._infos = AgentInfos(*parts, self.scorer, self.operating, self._meters)
 
     def belief(self, agent: str) -> Belief:
         """Return the handle on what an agent's onboard software knows.
@@ -181,28 +174,22 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.simulation.place(
             0, beginning.tables, beginning.starts, beginning.seed, self.settings.known_starts
         )
-        self._offsets[:] = map_frames(beginning, self.settings)
-        self._goals[:] = goal_of_robots(beginning, self.settings)
-        self._commands[:] = 0.0
+        self._observations.start(beginning)
+        self._commands.values[:] = 0.0
         self.agents = self.possible_agents[:]
-        self._rules.live[:], self._rules.is_empty[:] = True, False
-        self._rules.goals[0] = np.nan if self.goal is None else self.goal
+        self._endings.start(self.goal)
         self.perception.start(self.goal)
         self._software.start(0, beginning.seed)
         self._meters.start()
         self.station.start()
-        self._step(self._commands, moves_bodies=False)
+        self._step(self._commands.values, moves_bodies=False)
         self.scorer.start()
-        infos = self._infos(self.agents)
+        infos = self._infos.of(self.agents)
         if self.render_mode == "human":
             self.render()
-        return self._observations(self.agents), infos
+        return self._observations.of(self.agents), infos
 
-    def step(
-        self, actions: dict[str, Any]
-    ) -> tuple[
-        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
-    ]:
+    def step(self, actions: dict[str, Any]) -> Outcome:
         """Drive for one time step.
 
         Parameters
@@ -226,29 +213,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     def drive(self, actions: dict[str, Any]) -> None:
         """Run one time step of the world without building observations.
 
-        ``outcome`` tells what came of it.
+        ``outcome`` returns what came of it.
         """
-        commands, rows = self._commands, self._rows
-        for agent in self.agents:
-            row, action = rows[agent], actions.get(agent)
-            if action is None:
-                if agent in self._stopping or self.operating.is_addressed(row):
-                    commands[row] = 0.0
-                    continue
-                raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-            shares = action if isinstance(action, np.ndarray) else np.asarray(action, np.float64)
-            if shares.shape != (2,):
-                raise ValueError(
-                    f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and "
-                    "turn rate"
-                )
-            commands[row] = shares
-        if not scale_shares(commands, self._limits):
-            raise ValueError(
-                f"an action is nan or infinite ({actions}); want two finite numbers within [-1, 1] for each "
-                "agent"
-            )
-        self.drive_at(commands)
+        self.drive_at(self._commands.take(self.agents, actions))
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
         """Run one time step at speeds and turn rates (robots, 2) [m/s, rad/s].
@@ -278,68 +245,38 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     @property
     def stopping(self) -> dict[str, str]:
         """Agents that end at the next outcome, with the reasons that their policies gave."""
-        return dict(self._stopping)
+        return dict(self.operating.stopping)
 
-    def outcome(
-        self,
-    ) -> tuple[
-        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
-    ]:
+    def outcome(self) -> Outcome:
         """Return what ``step`` returns for the time since the last outcome.
 
         Ended agents leave.
         """
         live = self.agents
         self.operating.is_interrupting = False
-        observations = self._observations(live)
+        observations = self._observations.of(live)
         rows, rewards_of_rows = self._rows, self.scorer.take_rewards()
         rewards = {agent: rewards_of_rows[rows[agent]] for agent in live}
-        endings, is_truncated = self._endings(live)
-        infos = self._infos(live)
+        endings, is_truncated = self._endings.due(live)
+        infos = self._infos.of(live)
         terminations, truncations = dict.fromkeys(live, False), dict.fromkeys(live, is_truncated)
         if endings or is_truncated:
             for agent in live:
                 if agent in endings:
                     terminations[agent], truncations[agent] = True, False
                 if agent in endings or is_truncated:
-                    infos[agent]["ended_because"] = self.scorer.ended_because[agent] = endings.get(
-                        agent, "horizon"
-                    )
-                    self.world.moves[rows[agent]] = 0
-                    self.world.flags[rows[agent]] |= ENDED
-                    self._rules.live[rows[agent]] = False
-                    self._note_ending(agent, infos[agent])
+                    reason = endings.get(agent, "horizon")
+                    infos[agent]["ended_because"] = self.scorer.ended_because[agent] = reason
+                    self._endings.end(agent, reason)
+                    infos[agent]["state"] = self.operating.states[rows[agent]].value
             self.agents = [] if is_truncated else [agent for agent in live if agent not in endings]
         if self.render_mode == "human":
             self.render()
         return observations, rewards, terminations, truncations, infos
 
-    def _note_ending(self, agent: str, info: dict[str, Any]) -> None:
-        """Let a robot's state follow from why it ended.
-
-        An empty battery takes its sensors and its radio as well.
-        """
-        row = self._rows[agent]
-        self.operating.end(row, info["ended_because"])
-        info["state"] = self.operating.states[row].value
-        if info["ended_because"] == "battery":
-            self.world.failed[row] = 1
-
     def ends_now(self) -> bool:
         """Whether the next outcome ends an agent, or a robot has paused by itself."""
-        self._note_energy()
-        count = self._count_endings()
-        return bool(count) or self.operating.is_interrupting
-
-    def _count_endings(self) -> int:
-        """Note why robots end now, and return how many do."""
-        if self._rules_table is None:
-            self._rules_table = table_of(self._rules)
-        return int(note_endings(self.simulation.table, len(self._reasons), self._rules_table, self._reasons))
-
-    def _note_energy(self) -> None:
-        if self._is_battery_limited:
-            self._rules.is_empty[:] = self._meters.is_empty
+        return bool(self._endings.count()) or self.operating.is_interrupting
 
     def stop(self, agent: str, reason: str) -> None:
         """End an agent at its next step, with a reason.
@@ -348,7 +285,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         """
         if agent not in self.agents:
             raise ValueError(f"{agent} is not among the live agents {self.agents}")
-        self._stopping[agent] = reason
+        self.operating.stopping[agent] = reason
 
     def order(self, agent: str, order: Order) -> None:
         """Send an agent an order from the station.
@@ -367,57 +304,6 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         if agent not in self._rows:
             raise ValueError(f"{agent!r} is not among the agents {self.possible_agents}")
         self.operating.order(self._rows[agent], order)
-
-    def _endings(self, live: Sequence[str]) -> tuple[dict[str, str], bool]:
-        """Return why agents end now, and whether the horizon cuts the episode."""
-        self._note_energy()
-        count = self._count_endings()
-        if not count and not self._stopping:
-            return {}, False
-        endings = {agent: reason for agent, reason in self._stopping.items() if agent in live}
-        is_truncated = False
-        for agent in live:
-            number = int(self._reasons[self._rows[agent]])
-            is_truncated |= number == HORIZON
-            if number not in (0, HORIZON):
-                endings[agent] = REASONS[number]
-        if COVERED not in self._reasons:
-            self._stopping.clear()
-        return endings, is_truncated
-
-    def _observations(self, agents: Sequence[str]) -> dict[str, Observation]:
-        arrays = self._writer.write()
-        observations: dict[str, Observation] = {}
-        for agent in agents:
-            row, observation = self._rows[agent], {}
-            for name, array in arrays.items():
-                observation[name] = array[row]
-            observations[agent] = observation
-        return observations
-
-    def _infos(self, agents: Sequence[str]) -> dict[str, dict[str, Any]]:
-        """Return what a learner may not see, and the operating states, by agent."""
-        rows, coverage, poses, seen = (
-            self._rows,
-            self.scorer.coverage,
-            self.world.poses.copy(),
-            self.score.seen.tolist(),
-        )
-        states, orders, terms = self.operating.states, self.operating.orders, self.scorer.terms
-        infos: dict[str, dict[str, Any]] = {}
-        for agent in agents:
-            row = rows[agent]
-            order = orders[row]
-            infos[agent] = {
-                "truth": {"pose": poses[row], "coverage": coverage, "seen_cells": seen[row]},
-                "state": states[row]._value_,
-                "order": "" if order is None else order.kind._value_,
-                "reward_terms": terms[row],
-            }
-        if self._is_battery_limited:
-            for agent in agents:
-                infos[agent]["energy_j"] = float(self._meters.used_j[rows[agent]])
-        return infos
 
     def state(self) -> NDArray[np.float64]:
         """Return the true state of the team, shape (robots * 5,).
@@ -460,5 +346,5 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self._window = None
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy's arrays lie elsewhere.
-        return {**self.__dict__, "_window": None, "_rules_table": None}
+        # A copy has no window.
+        return {**self.__dict__, "_window": None}

@@ -1,0 +1,58 @@
+"""The observations of the agents of one episode."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.episode_start import EpisodeStart, goal_of_robots, map_frames
+from lidarium.envs.observations import ObservationWriter
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.simulation.simulation import Simulation
+
+Observation = dict[str, NDArray[Any]]
+
+
+class AgentObservations:
+    """Writes what the robots of one episode observe, each in its map frame.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Of the one episode.
+    settings : ExplorationSettings
+        The team and what it observes.
+    has_goal : bool
+        Whether the goal is observed.
+
+    Attributes
+    ----------
+    offsets : (robots, 2) float64
+        Origin of each robot's map frame in the frame of its believed pose [m].
+    """
+
+    def __init__(self, simulation: Simulation, settings: ExplorationSettings, has_goal: bool) -> None:
+        self._settings = settings
+        self._rows = {agent: row for row, agent in enumerate(settings.agents)}
+        self.offsets = np.zeros((settings.robots, 2))
+        self._goals = np.full((settings.robots, 2), np.nan)
+        self._writer = ObservationWriter(
+            simulation, settings, self.offsets, self._goals if has_goal else None
+        )
+
+    def start(self, beginning: EpisodeStart) -> None:
+        """Begin an episode: take in where the map frames and the goal are."""
+        self.offsets[:] = map_frames(beginning, self._settings)
+        self._goals[:] = goal_of_robots(beginning, self._settings)
+
+    def of(self, agents: Sequence[str]) -> dict[str, Observation]:
+        """Return what each agent observes now."""
+        arrays = self._writer.write()
+        observations: dict[str, Observation] = {}
+        for agent in agents:
+            row, observation = self._rows[agent], {}
+            for name, array in arrays.items():
+                observation[name] = array[row]
+            observations[agent] = observation
+        return observations
