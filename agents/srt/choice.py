@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
-from lidarium.agents.srt.drive import Limits
 from lidarium.agents.srt.frontier_tour import MOST, TEAMMATE_SAME, first_on_tour
-from lidarium.agents.srt.memory import Memory
+from lidarium.agents.srt.memories.memory import Memory
+from lidarium.agents.srt.motion.drive import Limits
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node, Tree, way_to

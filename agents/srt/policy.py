@@ -68,8 +68,8 @@ class SensorBasedRandomTree(Policy):
                 self._explorers[teammate] for teammate in self._contacts(agent) if teammate in observations
             ]
             for teammate in in_contact:
-                teammate.known |= explorer.known
-                explorer.known |= teammate.known
+                teammate.known.update(explorer.known)
+                explorer.known.update(teammate.known)
             targets = [teammate.target for teammate in in_contact if teammate.target is not None]
             memory = memory_of(
                 belief, [self.tree.nodes[number] for number in sorted(explorer.known)], self.settings

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.srt.memory import MapMemory, Memory, RegionMemory
+from lidarium.agents.srt.memories.map_memory import MapMemory
+from lidarium.agents.srt.memories.memory import Memory
+from lidarium.agents.srt.memories.region_memory import RegionMemory
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.exploration import Observation

@@ -12,7 +12,14 @@ from types import ModuleType
 from typing import Any
 
 MOVED: dict[str, tuple[str, ...]] = {
-    "agents.srt.intent": ("agents.srt.progress",),
+    "agents.srt.drive": ("agents.srt.motion.drive",),
+    "agents.srt.intent": ("agents.srt.motion.progress",),
+    "agents.srt.memory": (
+        "agents.srt.memories.memory",
+        "agents.srt.memories.map_memory",
+        "agents.srt.memories.region_memory",
+    ),
+    "agents.srt.progress": ("agents.srt.motion.progress",),
     "agents.srt.tour": ("mapping.planning.tours",),
     "envs.batch.endings": ("envs.outcome.endings",),
     "envs.coverage": (

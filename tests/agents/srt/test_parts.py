@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.agents.srt.candidates import CandidateSource
-from lidarium.agents.srt.drive import Drive, Limits, Phase, driven, free_way
 from lidarium.agents.srt.frontier_arcs import openings_of
-from lidarium.agents.srt.memory import RegionMemory
-from lidarium.agents.srt.progress import Progress
+from lidarium.agents.srt.memories.region_memory import RegionMemory
+from lidarium.agents.srt.motion.drive import Drive, Limits, Phase, driven, free_way
+from lidarium.agents.srt.motion.progress import Progress
 from lidarium.agents.srt.safe_region import (
     ANGLES,
     DIRECTIONS,

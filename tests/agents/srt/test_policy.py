@@ -9,7 +9,7 @@ import pytest
 import lidarium
 from lidarium.agents.policy import Stop
 from lidarium.agents.srt.explorer import Explorer
-from lidarium.agents.srt.memory import MapMemory
+from lidarium.agents.srt.memories.map_memory import MapMemory
 from lidarium.agents.srt.policy import SensorBasedRandomTree
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.evaluation.episodes.runner import run_episode

@@ -1,16 +1,11 @@
-"""Knowledge of which space was seen and where a straight path is clear.
-
-It comes from the robot's map, or from the regions of the tree's nodes alone.
-"""
+"""A memory that relies on the robot's map."""
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.srt.memories.memory import Frontiers, Legs, Place
 from lidarium.agents.srt.tree import Node
 from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.onboard.navigation import NavigationMap
@@ -22,87 +17,11 @@ from lidarium.mapping.planning.search.search_targets import Targets
 CLEAR_MARGIN = 0.02
 """Straight ways across the map keep the body this far from what is occupied [m]."""
 
-
 WALL = 0.08
 """What is unknown this near to something occupied may well be its inside [m]."""
 
 AHEAD = 0.5
 """Which way a way leads is told by the place this far along it [m]."""
-
-Place = NDArray[np.float64]
-Legs = list[Place]
-
-
-@dataclass(frozen=True, slots=True)
-class Frontiers:
-    """Frontiers that a robot can come to.
-
-    Attributes
-    ----------
-    focuses : (n, 2) float64
-        A place on each that is in sight from where the robot would stand [m].
-    cells : list of (m, 2) float64
-        The cells of each [m].
-    sizes : (n,) float64
-        Their lengths [m].
-    costs : (n,) float64
-        What the way to each costs [m], ascending.
-    ahead : (n, 2) float64
-        A place at the beginning of the way to each [m].
-    between : callable
-        Takes the numbers of some, shape (m,), and returns what the ways from place to place cost, shape (m,
-        m) [m].
-    legs : callable
-        Takes the number of one, and returns the ends of the straight legs of the way to it.
-    """
-
-    focuses: NDArray[np.float64]
-    cells: list[NDArray[np.float64]]
-    sizes: NDArray[np.float64]
-    costs: NDArray[np.float64]
-    ahead: NDArray[np.float64]
-    between: Callable[[NDArray[np.int64]], NDArray[np.float64]]
-    legs: Callable[[int], Legs]
-
-
-class Memory(Protocol):
-    """What a robot remembers.
-
-    Places (..., 2) are in the frame of the map's first cell [m].
-    """
-
-    def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
-        """Whether points (n, 2) beyond the border of a node were seen, shape (n,).
-
-        The border is that of what was seen from the node.
-        """
-        ...
-
-    def is_clear(self, start: Place, end: Place) -> bool:
-        """Whether the robot is known to get through on a straight way."""
-        ...
-
-    def way(self, start: Place, end: Place) -> Legs | None:
-        """Return the ends of the straight legs of a path across seen space.
-
-        The last end is ``end``; None where there is no path.
-        """
-        ...
-
-    def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
-        """Return the nearest frontiers of at least a length [m], so many at most.
-
-        None where there is none.
-        """
-        ...
-
-    def is_frontier(self, focus: Place) -> bool:
-        """Whether what a frontier was gone to for is not seen yet."""
-        ...
-
-    def give_up(self, focus: Place) -> None:
-        """Ask no more for a frontier that was looked at and cannot be seen through."""
-        ...
 
 
 class MapMemory:
@@ -267,48 +186,3 @@ class MapMemory:
         rows, columns = self._map.log_odds.shape
         row, column = np.clip(cells[..., 1], 0, rows - 1), np.clip(cells[..., 0], 0, columns - 1)
         return row, column, (row == cells[..., 1]) & (column == cells[..., 0])
-
-
-class RegionMemory:
-    """The nodes tell: space is seen where it lies in another node's safe region.
-
-    A way is clear within one node's safe region.
-
-    Parameters
-    ----------
-    nodes : iterable of Node
-        The nodes that the robot knows.
-    """
-
-    def __init__(self, nodes: Iterable[Node]) -> None:
-        self._nodes = list(nodes)
-
-    def is_seen(self, points: NDArray[np.float64], of: Node) -> NDArray[np.bool_]:
-        """Whether points (n, 2) lie where another node is safe."""
-        seen = np.zeros(len(points), np.bool_)
-        for node in self._nodes:
-            # A node made again at the same place sees what it saw before: its openings stay.
-            if node is not of and not np.array_equal(node.place, of.place):
-                seen |= node.safe.contains(points)
-        return seen
-
-    def is_clear(self, start: Place, end: Place) -> bool:
-        """Whether a way begins at a node and ends within its safe region."""
-        return any(
-            math.dist(node.place, start) <= 0.05 and bool(node.safe.contains(end)) for node in self._nodes
-        )
-
-    def way(self, start: Place, end: Place) -> Legs | None:
-        """Return None: regions know no way but the tree's."""
-        return None
-
-    def frontiers(self, start: Place, least: float, most: int) -> Frontiers | None:
-        """Return None: regions have openings alone."""
-        return None
-
-    def is_frontier(self, focus: Place) -> bool:
-        """Return False: there are no frontiers."""
-        return False
-
-    def give_up(self, focus: Place) -> None:
-        """Do nothing."""

@@ -1,0 +1,1 @@
+"""What a robot of the tree remembers of the space around it."""

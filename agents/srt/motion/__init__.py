@@ -1,0 +1,1 @@
+"""How one robot of the tree moves."""
