@@ -13,42 +13,25 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from lidarium.envs.batch.batch_run import BatchRun
+from lidarium.envs.batch.beginnings import Beginnings
 from lidarium.envs.batch.levels import make_level
-from lidarium.envs.batch.running import (
-    DECIDES,
-    LOOKS,
-    STEPS,
-    WAITS,
-    begin_decisions,
-    follow_some,
-    note_ends,
-    run_parallel,
-    run_serial,
-)
-from lidarium.envs.episode_start import EpisodeStart, begin, goal_of_robots, make_simulation, map_frames
+from lidarium.envs.batch.observation_buffers import Arrays, ObservationBuffers
+from lidarium.envs.batch.row_infos import RowInfos
+from lidarium.envs.batch.running import LOOKS, STEPS, WAITS
+from lidarium.envs.episode_start import EpisodeStart, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observation_spaces import observation_space
 from lidarium.envs.observations import ObservationWriter
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
-from lidarium.envs.outcome.endings import HORIZON, REASONS, make_rules, note_endings
+from lidarium.envs.outcome.endings import HORIZON, make_rules, note_endings
 from lidarium.envs.outcome.reward_terms import ExtraTerms
-from lidarium.envs.radio.messages import OperatingState
 from lidarium.envs.scoring.rewards import TERMS
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.envs.station.operating import state_after
 from lidarium.mapping.kernels.views import table_of
-from lidarium.mapping.kernels.work_queue import new_queue
-
-Arrays = dict[str, NDArray[Any]]
-
-
-def _frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """Return an array that cannot be written to any more."""
-    array.flags.writeable = False
-    return array
 
 
 class EpisodeBatch:
@@ -75,8 +58,6 @@ class EpisodeBatch:
         Episodes x robots.
     observation_space, action_space : Space
         Of one row.
-    observations : dict of arrays
-        One observation a row, (rows, ...).
     rewards : (rows,) float64
         What each row has earned in the last step.
     live : (rows,) bool
@@ -91,8 +72,6 @@ class EpisodeBatch:
         Whether a robot ended in the last step.
     infos : dict
         What the last step tells beside, in arrays over rows.
-    everyone : (rows,) bool
-        All true; cannot be written to.
     floors : list of Floor
         The floor of each episode.
 
@@ -122,7 +101,8 @@ class EpisodeBatch:
                 "want None and False: many episodes at once have no batteries and nobody to end a pause; or "
                 "use lidarium.parallel_env"
             )
-        self._choice = FloorChoice(floor, image_resolution)
+        choice = FloorChoice(floor, image_resolution)
+        self._beginnings = Beginnings(choice, settings, self.episodes)
         self.simulation = make_simulation(settings, self.episodes)
         self.world, self.score = self.simulation.world, self.simulation.score
         self._extra = ExtraTerms(settings.reward.more)
@@ -130,32 +110,33 @@ class EpisodeBatch:
         self.perception = Perception(self.simulation, settings, self._offsets)
         self._software = Software(self.perception, settings)
         self.level = make_level(level, self.perception, settings)
-        self._writer = ObservationWriter(
-            self.simulation, settings, self._offsets, self._goals if self._choice.has_goal else None
+        writer = ObservationWriter(
+            self.simulation, settings, self._offsets, self._goals if choice.has_goal else None
         )
-        known = observation_space(settings, self._choice.has_goal).spaces
+        known = observation_space(settings, choice.has_goal).spaces
         self.observation_space = spaces.Dict({**known, **self.level.boxes})
         self.action_space = self.level.action_space
-        self._copy = copy
-        self._buffers = [self._new_buffers(), self._new_buffers()]
-        self.observations = self._buffers[0]
+        self._buffers = ObservationBuffers(writer, self.rows, self.level.boxes, copy)
         self.acted = np.zeros(self.rows, np.bool_)
         self.reasons = np.zeros(self.rows, np.int8)
         self.infos: dict[str, Any] = {}
         self.is_whole, self.has_endings = False, False
         self.floors: list[Floor | None] = [None] * self.episodes
-        self._generators: list[np.random.Generator | None] = [None] * self.episodes
-        self._rules, self._waiting = make_rules(self.simulation, settings), np.zeros(self.rows, np.bool_)
+        self._rules = make_rules(self.simulation, settings)
         self.live = self._rules.live
         self._commands = np.zeros((self.rows, 2))
-        # What is told of all rows alike at most steps is one array that cannot be written to, not a new one
-        # each time.
-        self.everyone, self._no_orders = (
-            _frozen(np.ones(self.rows, np.bool_)),
-            _frozen(np.full(self.rows, "", object)),
-        )
-        self._states = _frozen(np.full(self.rows, OperatingState.OPERATING.value, object))
-        self._orders = [np.arange(self.episodes), np.arange(self.episodes)[::-1].copy()]
+        self._row_infos = RowInfos(self.simulation)
+        self._run = BatchRun(self.simulation, settings, self._software, self.level, self._rules, writer)
+
+    @property
+    def observations(self) -> Arrays:
+        """The observations of the last step, one a row, (rows, ...)."""
+        return self._buffers.latest
+
+    @property
+    def everyone(self) -> NDArray[np.bool_]:
+        """All true, (rows,); cannot be written to."""
+        return self._row_infos.everyone
 
     @property
     def rewards(self) -> NDArray[np.float64]:
@@ -180,7 +161,7 @@ class EpisodeBatch:
         options: Mapping[int, ResetOptions] | None = None,
         is_same_step: bool = False,
     ) -> None:
-        """Begin some episodes anew and run the other live ones for one step or decision.
+        """Begin some episodes and run the other live ones for one step or decision.
 
         Parameters
         ----------
@@ -213,19 +194,16 @@ class EpisodeBatch:
         acted = self.live.copy() if is_plain else self.live & np.repeat(modes == STEPS, robots)
         stopping = None if actions is None else self.level.take(actions, acted, self._commands, modes)
         if begins:
-            for episode, start in self._draw(beginning, seeds, options or {}).items():
+            for episode, start in self._beginnings.draw(beginning, seeds, options or {}).items():
                 self._place(episode, start)
             self.is_whole = bool(self.live.all())
-            self._note_states(
-                np.repeat(np.isin(np.arange(self.episodes), beginning), robots),
-                OperatingState.OPERATING.value,
-            )
+            self._row_infos.begin(np.repeat(np.isin(np.arange(self.episodes), beginning), robots))
             modes[beginning] = LOOKS
         seen = acted
         if begins:
             seen = acted.copy()
             seen.reshape(self.episodes, robots)[beginning] = True
-        self._turn_buffers(seen, is_same_step)
+        self._buffers.turn(seen, is_same_step)
         self.score.rewards[:], self.score.reward_terms[:] = 0.0, 0.0
         self.run_kernel(modes, self._commands, seen)
         earned = {} if self._extra.is_empty else self._extra.earned(self.world)
@@ -243,7 +221,9 @@ class EpisodeBatch:
             self.world.moves[ended] = 0
             self.world.flags[ended] |= ENDED
         terms = dict(zip(TERMS, self.score.reward_terms.T.copy(), strict=True))
-        self._tell(seen, {**terms, **earned})
+        self.infos = self._row_infos.of_step({**terms, **earned}, self.reasons, self.has_endings)
+        # Episodes that have not run in this call have nothing to be looked at again.
+        self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
 
     def _note_endings(self, acted: NDArray[np.bool_], stopping: NDArray[np.int8] | None) -> None:
         """Note why robots that took part in the step end.
@@ -275,82 +255,7 @@ class EpisodeBatch:
         seen : (rows,) bool
             Whose observations are written.
         """
-        if self._software.is_staged:
-            self._run_staged(modes.copy(), commands, seen)
-            return
-        threads = self.simulation.threads
-        self.simulation.use_threads()
-        # To and fro: the maps of the episodes that ran last are in the caches yet.
-        self._orders.reverse()
-        run = run_parallel if threads > 1 else run_serial
-        run(
-            self.simulation.table,
-            self.robots,
-            modes,
-            commands,
-            self.level.drives,
-            self.level.following,
-            self._rules,
-            self._waiting,
-            self.settings.decision_steps,
-            seen,
-            *self._writer.arguments(self.observations),
-            self._orders[0],
-            new_queue(),
-            threads,
-        )
-
-    def _run_staged(
-        self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]
-    ) -> None:
-        """Run episodes as the kernel does, step by step.
-
-        What runs on board runs between the stages of a step; ``modes`` is used up.
-        """
-        decides = modes == DECIDES
-        left = np.where(decides, self.settings.decision_steps, 1)
-        begin_decisions(decides, self.robots, self.level.drives, self._waiting)
-        looks = modes == LOOKS
-        if looks.any():
-            self._software.step(commands, moves_bodies=False, runs=looks)
-            modes[looks] = WAITS
-        while (runs := modes != WAITS).any():
-            follow_some(
-                runs & decides,
-                self.robots,
-                self.simulation.table,
-                self.level.drives,
-                self.level.following,
-                commands,
-            )
-            self._software.step(commands, runs=runs)
-            note_ends(
-                modes, self.robots, self.simulation.table, self.level.drives, self._rules, self._waiting
-            )
-            left[runs] -= 1
-            modes[left == 0] = WAITS
-        self._writer.write(self.observations, seen)
-
-    def _draw(
-        self,
-        beginning: NDArray[np.int64],
-        seeds: Sequence[int | None] | None,
-        options: Mapping[int, ResetOptions],
-    ) -> dict[int, EpisodeStart]:
-        """Draw how episodes begin, before anything of them is changed."""
-        drawn: dict[int, EpisodeStart] = {}
-        generators = dict(enumerate(self._generators))
-        for k, episode in enumerate(int(episode) for episode in beginning):
-            seed = None if seeds is None else seeds[k]
-            generator = generators[episode]
-            if seed is not None or generator is None:
-                generator = np.random.default_rng(seed)
-            drawn[episode] = begin(
-                generator, self._choice, options.get(episode, ResetOptions()), self.settings
-            )
-            generators[episode] = generator
-        self._generators = [generators[episode] for episode in range(self.episodes)]
-        return drawn
+        self._run.run(modes, commands, seen, self.observations)
 
     def _place(self, episode: int, start: EpisodeStart) -> None:
         """Put the robots of an episode where they begin."""
@@ -365,61 +270,6 @@ class EpisodeBatch:
         self.perception.start(start.goal, episode)
         self._software.start(episode, start.seed)
         self.level.start(episode)
-
-    def _new_buffers(self) -> Arrays:
-        arrays = self._writer.buffers()
-        return {
-            **arrays,
-            **{
-                name: np.zeros((self.rows, *(box.shape or ())), box.dtype)
-                for name, box in self.level.boxes.items()
-            },
-        }
-
-    def _turn_buffers(self, seen: NDArray[np.bool_], is_same_step: bool) -> None:
-        """Choose the arrays for the observations of this step.
-
-        Rows that are not seen repeat their last one.
-        """
-        before = self.observations
-        if self._copy:
-            self.observations = self._new_buffers()
-        elif not is_same_step:
-            self._buffers.reverse()
-            self.observations = self._buffers[0]
-        if self.observations is not before and not seen.all():
-            for name, array in self.observations.items():
-                array[~seen] = before[name][~seen]
-
-    def _tell(self, seen: NDArray[np.bool_], terms: dict[str, NDArray[np.float64]]) -> None:
-        """Put together the infos of the step: the truth, states, terms of the reward, endings."""
-        everyone = self.everyone
-        truth = {
-            "pose": self.world.poses.copy(),
-            "coverage": np.repeat(self.score.coverages(), self.robots),
-            "seen_cells": self.score.seen.copy(),
-        }
-        # Nobody gives orders here: states follow from the endings alone.
-        self.infos = {"truth": truth, "_truth": everyone, "order": self._no_orders, "_order": everyone}
-        self.infos["reward_terms"], self.infos["_reward_terms"] = terms, everyone
-        if self.has_endings:
-            ended = self.reasons != 0
-            names = np.full(self.rows, None, object)
-            names[ended] = [REASONS[number] for number in self.reasons[ended]]
-            self.infos["ended_because"], self.infos["_ended_because"] = names, ended
-            self._note_states(ended, [state_after(name).value for name in names[ended]])
-        self.infos["state"], self.infos["_state"] = self._states, everyone
-        # Episodes that have not run in this call have nothing to be looked at again.
-        self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
-
-    def _note_states(self, rows: NDArray[np.bool_], states: str | list[str]) -> None:
-        """Note the operating states of some rows.
-
-        Those that were told of before stay as they are.
-        """
-        changed = self._states.copy()
-        changed[rows] = states
-        self._states = _frozen(changed)
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
