@@ -22,7 +22,8 @@ from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.description.described_map import resampled
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
+from lidarium.mapping.merging.growing_maps import GrowingMap
+from lidarium.mapping.merging.incremental import IncrementalMerger
 from lidarium.mapping.merging.merger import Merged, placed
 from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings

@@ -15,7 +15,8 @@ from lidarium.envs.station.reports import known_map
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
+from lidarium.mapping.merging.growing_maps import GrowingMap
+from lidarium.mapping.merging.incremental import IncrementalMerger
 from lidarium.mapping.merging.merger import placed
 from lidarium.mapping.merging.settings import MergeSettings
 

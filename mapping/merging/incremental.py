@@ -12,35 +12,14 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.grids.occupancy import UNKNOWN
-from lidarium.mapping.merging.description.described_map import DescribedMap
 from lidarium.mapping.merging.frame_tree import FrameTree
+from lidarium.mapping.merging.growing_maps import DescribedMaps, GrowingMap
 from lidarium.mapping.merging.merger import Merged, joined_tree, placed
-from lidarium.mapping.merging.pair import PairResult, described, merge_pair, verify_pair
+from lidarium.mapping.merging.pair import PairResult, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.validation import ValidationSettings, why_refused
-
-
-class GrowingMap(NamedTuple):
-    """A robot's map as it is now.
-
-    Attributes
-    ----------
-    levels : (rows, columns) uint8
-        Occupancy, dark is occupied; row 0 at the lowest y.
-    origin : (x, y)
-        Lower left corner of cell (0, 0) in the robot's map frame [m].
-    """
-
-    levels: NDArray[np.uint8]
-    origin: tuple[float, float] = (0.0, 0.0)
-
 
 PLENTY_M2 = 30.0
 """From this overlap on, maps need know nothing else [m2]."""
@@ -119,13 +98,10 @@ class IncrementalMerger:
     searches_per_update: int | None = None
     searched: int = 0
     verified: int = 0
-    _maps: dict[str, GrowingMap] = field(default_factory=dict)
-    _features: dict[str, DescribedMap] = field(default_factory=dict)
-    _known_m2: dict[str, float] = field(default_factory=dict)
+    _described: DescribedMaps = field(default_factory=DescribedMaps)
     _pairs: dict[tuple[str, str], _Tried] = field(default_factory=dict)
     _tree: FrameTree[str] | None = None
     _updates: int = 0
-    _changed_at: dict[str, int] = field(default_factory=dict)
 
     def update(
         self,
@@ -162,7 +138,7 @@ class IncrementalMerger:
         if not maps:
             raise ValueError("there are no maps to merge; want at least one")
         self._updates += 1
-        self._describe(maps)
+        self._described.update(maps, self.resolution, self.settings, self._updates)
         self.searched = self.verified = 0
         every = list(itertools.combinations(maps, 2))
         most = self.searches_per_update if may_search else 0
@@ -178,30 +154,14 @@ class IncrementalMerger:
         results = {pair: tried.result for pair, tried in pairs.items()}
         believed = {pair: tried.result for pair, tried in pairs.items() if tried.is_confirmed}
         origins = {name: one.origin for name, one in maps.items()}
-        self._tree = joined_tree(self._features, believed, self.settings, origins, self._tree)
+        self._tree = joined_tree(self._described.features, believed, self.settings, origins, self._tree)
         return Merged(
-            {name: one.levels for name, one in self._features.items()},
+            {name: one.levels for name, one in self._described.features.items()},
             self.resolution,
             results,
             self._tree,
             origins,
         )
-
-    def _describe(self, maps: Mapping[str, GrowingMap]) -> None:
-        """Describe the maps that are new or have changed."""
-        changed = {name for name, one in maps.items() if not _is_same(self._maps.get(name), one)}
-        fresh = {
-            name: described(maps[name].levels, self.resolution, self.settings)
-            for name in maps
-            if name in changed
-        }
-        self._features = {name: fresh.get(name) or self._features[name] for name in maps}
-        for name in changed:
-            self._known_m2[name] = (
-                float(np.count_nonzero(self._features[name].levels != UNKNOWN)) * self.resolution**2
-            )
-            self._changed_at[name] = self._updates
-        self._maps = dict(maps)
 
     def _due(self, pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
         """Return the pairs whose turn it is to be verified or searched for."""
@@ -220,7 +180,7 @@ class IncrementalMerger:
     def _has_news(self, pair: tuple[str, str]) -> bool:
         """Whether maps have changed enough since a pair was last tried to retry it."""
         before = self._pairs.get(pair)
-        if before is not None and max(self._changed_at[name] for name in pair) <= before.at:
+        if before is not None and max(self._described.changed_at[name] for name in pair) <= before.at:
             return False
         if before is not None and before.frames is not None:
             return True
@@ -234,7 +194,7 @@ class IncrementalMerger:
         return tree.lookup(*pair) if tree is not None and set(pair) <= set(tree.names) else None
 
     def _known_of(self, pair: tuple[str, str]) -> float:
-        return sum(self._known_m2[name] for name in pair)
+        return sum(self._described.known_m2[name] for name in pair)
 
     def _kept(self, pair: tuple[str, str]) -> _Tried | None:
         """Return the known result of a pair that is not tried now.
@@ -244,7 +204,7 @@ class IncrementalMerger:
         before = self._pairs.get(pair)
         if before is None or before.frames is None:
             return before
-        first, second = (placed(self._maps[name].origin) for name in pair)
+        first, second = (placed(self._described.maps[name].origin) for name in pair)
         a_from_b = first.inverse() @ before.frames @ second
         if before.result.a_from_b == a_from_b or before.result.a_from_b is None:
             return before
@@ -264,8 +224,8 @@ class IncrementalMerger:
 
         Search where there is none, or it is refused by now. None where that has to wait.
         """
-        a, b = (self._features[name] for name in pair)
-        first, second = (placed(self._maps[name].origin) for name in pair)
+        a, b = (self._described.features[name] for name in pair)
+        first, second = (placed(self._described.maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
         if before is not None and before.frames is not None:
             result = verify_pair(a, b, first.inverse() @ before.frames @ second, self.settings)
@@ -324,17 +284,13 @@ class IncrementalMerger:
             or not self._convinces(pair, result)
         ):
             return False
-        at = placed(self._maps[pair[1]].origin).apply(result.agreement.centre)
+        at = placed(self._described.maps[pair[1]].origin).apply(result.agreement.centre)
         distance, angle = frames.difference(before.frames, at)
         return distance <= CONFIRMED_M and angle <= CONFIRMED_ANGLE
 
     def _convinces(self, pair: tuple[str, str], result: PairResult) -> bool:
         """Whether a pair may be confirmed."""
-        own_m2 = min(self._known_m2[name] for name in pair) - result.agreement.overlap_m2
+        own_m2 = min(self._described.known_m2[name] for name in pair) - result.agreement.overlap_m2
         if own_m2 < self.confirmation_own_m2 and result.agreement.overlap_m2 < PLENTY_M2:
             return False
         return self.confirmation is None or why_refused(result.agreement, self.confirmation) is None
-
-
-def _is_same(before: GrowingMap | None, now: GrowingMap) -> bool:
-    return before is not None and before.origin == now.origin and np.array_equal(before.levels, now.levels)

@@ -12,7 +12,7 @@ from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
 from lidarium.envs.radio.messages import OperatingState
-from lidarium.mapping.merging.incremental import GrowingMap
+from lidarium.mapping.merging.growing_maps import GrowingMap
 
 FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
 

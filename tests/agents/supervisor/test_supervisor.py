@@ -10,7 +10,7 @@ from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Supervisor
 from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.radio.messages import OperatingState, OrderKind
-from lidarium.mapping.merging.incremental import GrowingMap
+from lidarium.mapping.merging.growing_maps import GrowingMap
 
 WEST, EAST, NORTH = (0.0, 2.0), (7.95, 2.0), (4.0, 3.95)
 

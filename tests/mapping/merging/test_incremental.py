@@ -7,7 +7,8 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging import pair
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
-from lidarium.mapping.merging.incremental import GrowingMap, IncrementalMerger
+from lidarium.mapping.merging.growing_maps import GrowingMap
+from lidarium.mapping.merging.incremental import IncrementalMerger
 from lidarium.mapping.merging.pair import described, is_contradicted, verify_pair
 from lidarium.mapping.merging.settings import merge_settings
 from lidarium.mapping.merging.validation import ValidationSettings
