@@ -11,23 +11,20 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from lidarium.envs.floors.floor import Floor, Raster, Solid
-from lidarium.envs.floors.free_space import configuration_space
-from lidarium.envs.floors.generation.furnishing import Furnished, furnish
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.generation.furnishing import furnish
 from lidarium.envs.floors.generation.layouts import (
     Proportions,
     apartment_layout,
     corridor_layout,
     office_layout,
 )
+from lidarium.envs.floors.generation.passability import draw_starts, passable
 from lidarium.envs.floors.generation.plans import (
     OUTSIDE,
     Labels,
-    Rectangle,
     cells,
     choose_doors,
     metres,
@@ -35,23 +32,12 @@ from lidarium.envs.floors.generation.plans import (
     room_areas,
     wall_rectangles,
 )
+from lidarium.envs.floors.generation.solids import rotated, solid_of
 
 KINDS = ("apartment", "office", "corridors")
 
-ROBOT_RADIUS = 0.30
-"""Radius of the largest robot, which must be able to go everywhere [m]."""
-
-MARGIN = 0.05
-"""Clearance beyond that radius [m]."""
-
-START_CLEARANCE = 0.5
-"""Least distance of a start from everything that stands [m]."""
-
-STARTS = 3
-
 _ATTEMPTS = 8
 
-_CHECK_RESOLUTION = 0.05
 _AREAS = {"apartment": (40.0, 120.0), "office": (150.0, 600.0), "corridors": (80.0, 250.0)}
 _CORRIDORS = {"apartment": (1.3, 1.6), "office": (1.7, 2.3), "corridors": (1.5, 2.4)}
 _LAYOUTS: dict[str, Callable[[Proportions, np.random.Generator], Labels]] = {
@@ -167,7 +153,7 @@ def generate_building(seed: int, settings: BuildingSettings | None = None) -> Fl
             f"{kind}:{seed}", kind, proportions, clutter, settings, stages[4 * attempt : 4 * attempt + 4]
         )
         if floor is not None:
-            return _rotated(floor, settings.rotation)
+            return rotated(floor, settings.rotation)
     raise ValueError(
         f"no passable {kind} came out of seed {seed} and {settings}; try another seed, wider corridors or "
         "larger rooms"
@@ -192,16 +178,16 @@ def _attempt(
     if doors is None:
         return None
     walls = tuple(
-        _solid(r)
+        solid_of(r)
         for r in outside_rectangles(labels) + wall_rectangles(labels, doors, settings.wall_thickness)
     )
     bounds = (0.0, 0.0, metres(labels.shape[1]), metres(labels.shape[0]))
     furniture = furnish(kind, labels, doors, clutter, settings.wall_thickness, np.random.default_rng(pieces))
-    passable = _passable(bounds, walls, furniture, labels)
-    if passable is None:
+    found = passable(bounds, walls, furniture, labels)
+    if found is None:
         return None
-    furniture, clear, origin = passable
-    starts = _starts(clear, origin, np.random.default_rng(places))
+    furniture, clear, origin = found
+    starts = draw_starts(clear, origin, np.random.default_rng(places))
     return Floor(
         name, bounds, walls + tuple(solid for piece in furniture for solid in piece.solids), starts=starts
     )
@@ -253,130 +239,3 @@ def _layout(
         gross *= wanted / area
     assert best is not None
     return best[1]
-
-
-def _passable(
-    bounds: Rectangle, walls: tuple[Solid, ...], furniture: list[Furnished], labels: Labels
-) -> tuple[list[Furnished], NDArray[np.bool_], tuple[float, float]] | None:
-    """Leave out furniture until a disc can go everywhere; also where a start may be.
-
-    None where furniture is not what is in the way.
-    """
-    resolution = _CHECK_RESOLUTION
-    while True:
-        blocks = walls + tuple(_solid(piece.footprint, 1.0) for piece in furniture)
-        raster = Floor("check", bounds, blocks).raster(resolution, 0.0, 0.5)
-        space, reachable = _space(raster, ROBOT_RADIUS + MARGIN)
-        tight, tight_reachable = _space(raster, ROBOT_RADIUS)
-        room = _room_of_cells(labels, raster.solid.shape, raster.origin, resolution)
-        reached = np.bincount(room[reachable & (room >= 0)], minlength=int(labels.max()) + 1) > 0
-        missed = {k for k, area in enumerate(room_areas(labels)) if area > 0 and not reached[k]}
-        # With the margin passages are wide enough; without it nooks appear that are cut off.
-        stray = (space & ~reachable) | (tight & ~tight_reachable)
-        if not missed and not stray.any():
-            clear = configuration_space(raster, START_CLEARANCE + MARGIN)
-            return furniture, clear if clear.any() else space, raster.origin
-        if not furniture:
-            return None
-        guilty = _guilty(furniture, stray, missed, raster.origin)
-        furniture = furniture[:guilty] + furniture[guilty + 1 :]
-
-
-def _space(raster: Raster, radius: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return where a disc fits, and the largest connected part of that."""
-    space = configuration_space(raster, radius)
-    count, parts, stats, _ = cv2.connectedComponentsWithStats(space.astype(np.uint8), connectivity=4)
-    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])) if count > 1 else -1
-    return space, np.asarray(parts == largest)
-
-
-def _guilty(
-    furniture: list[Furnished], stray: NDArray[np.bool_], missed: set[int], origin: tuple[float, float]
-) -> int:
-    """Return the index of the last piece of furniture that obstructs the floor.
-
-    Such a piece is beside a part cut off or in a room that is not reached. Without one, the last piece is
-    returned.
-    """
-    reach = ROBOT_RADIUS + 3 * MARGIN
-    corner = np.tile(origin, 2) + np.array([reach, reach, -reach, -reach])
-    for k in range(len(furniture) - 1, -1, -1):
-        left, low, right, high = np.maximum(
-            (np.array(furniture[k].footprint) - corner) / _CHECK_RESOLUTION, 0.0
-        ).astype(int)
-        if furniture[k].room in missed or stray[low : high + 1, left : right + 1].any():
-            return k
-    return len(furniture) - 1
-
-
-def _room_of_cells(
-    labels: Labels, shape: tuple[int, ...], origin: tuple[float, float], resolution: float
-) -> Labels:
-    """Label of the room under each cell of a raster."""
-    index = []
-    for axis in (0, 1):
-        centres = origin[1 - axis] + (np.arange(shape[axis]) + 0.5) * resolution
-        index.append(np.clip(np.floor(centres / metres(1)).astype(int), 0, labels.shape[axis] - 1))
-    return labels[np.ix_(index[0], index[1])]
-
-
-def _starts(
-    clear: NDArray[np.bool_], origin: tuple[float, float], generator: np.random.Generator
-) -> NDArray[np.float64]:
-    """Choose starts well off all walls, each as far as can be from the others.
-
-    Headings are drawn.
-    """
-    rows, columns = np.nonzero(clear)
-    places = (np.column_stack([columns, rows]) + 0.5) * _CHECK_RESOLUTION + origin
-    anywhere = places[int(generator.integers(len(places)))]
-    chosen = [places[int(np.argmax(((places - anywhere) ** 2).sum(axis=1)))]]
-    while len(chosen) < STARTS:
-        nearest = np.min([((places - place) ** 2).sum(axis=1) for place in chosen], axis=0)
-        chosen.append(places[int(np.argmax(nearest))])
-    headings = generator.uniform(-math.pi, math.pi, STARTS)
-    return np.round(np.column_stack([np.array(chosen), headings]), 4)
-
-
-def _solid(rectangle: Rectangle, z_high: float = math.inf) -> Solid:
-    x_low, y_low, x_high, y_high = (round(value, 4) for value in rectangle)
-    return Solid(np.array([(x_low, y_low), (x_high, y_low), (x_high, y_high), (x_low, y_high)]), 0.0, z_high)
-
-
-def _rotated(floor: Floor, angle: float) -> Floor:
-    """Turn a floor about its corner and move it back to the first quadrant.
-
-    The corners that open are filled.
-    """
-    if angle == 0.0:
-        return floor
-    cosine, sine = math.cos(angle), math.sin(angle)
-    turn = np.array([[cosine, -sine], [sine, cosine]])
-    x_high, y_high = floor.bounds[2:]
-    corners = np.array([(0.0, 0.0), (x_high, 0.0), (x_high, y_high), (0.0, y_high)]) @ turn.T
-    shift = -corners.min(axis=0)
-    corners = corners + shift
-    extent = corners.max(axis=0)
-
-    def moved(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(np.round(points @ turn.T + shift, 4) + 0.0)
-
-    solids = [Solid(moved(solid.polygon), solid.z_low, solid.z_high) for solid in floor.solids]
-    for k in range(4):
-        a, b = corners[k], corners[(k + 1) % 4]
-        apex = next(
-            corner
-            for corner in ((a[0], b[1]), (b[0], a[1]))
-            if any(abs(corner[0] - x) < 1e-9 for x in (0.0, extent[0]))
-            and any(abs(corner[1] - y) < 1e-9 for y in (0.0, extent[1]))
-        )
-        if np.abs(a - apex).max() > 1e-3 and np.abs(b - apex).max() > 1e-3:
-            solids.append(Solid(np.asarray(np.round(np.array([a, b, apex]), 4) + 0.0, np.float64)))
-    headings = np.arctan2(np.sin(floor.starts[:, 2] + angle), np.cos(floor.starts[:, 2] + angle))
-    starts = np.asarray(np.column_stack([moved(floor.starts[:, :2]), np.round(headings, 4)]), np.float64)
-    return Floor(
-        floor.name,
-        (0.0, 0.0, round(float(extent[0]), 4), round(float(extent[1]), 4)),
-        tuple(solids),
-        starts=starts,
-    )

@@ -10,13 +10,9 @@ from hypothesis import strategies as st
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.free_space import configuration_space
-from lidarium.envs.floors.generation.buildings import (
-    KINDS,
-    START_CLEARANCE,
-    BuildingSettings,
-    generate_building,
-)
+from lidarium.envs.floors.generation.buildings import KINDS, BuildingSettings, generate_building
 from lidarium.envs.floors.generation.furniture import PIECES, place
+from lidarium.envs.floors.generation.passability import START_CLEARANCE
 from lidarium.envs.floors.measures import measure_building
 
 ROBOT_RADIUS = 0.30
