@@ -1,6 +1,5 @@
 """The tables of the page on supervised teams, as markdown."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,23 +14,22 @@ from lidarium.benchmarks.studies.supervisor.figures import (
     has_wrong_merge,
     median,
     overlap_points,
-    partners,
     path_of,
     path_shares,
     time_of,
     time_ratios,
     time_shares,
 )
-from lidarium.benchmarks.studies.supervisor.goals import SUPERVISED, Goal, covered_by_others, is_covered
+from lidarium.benchmarks.studies.supervisor.goals import Goal
 from lidarium.benchmarks.studies.supervisor.suites import ALONE, POLICIES
-from lidarium.evaluation.statistics import Interval
+from lidarium.benchmarks.studies.supervisor.table_cells import listed, reached, shown, table
 
 TOLD = "oracle_starts"
 
 
 def goals_table(goals: Sequence[Goal]) -> str:
     """Return what was to be reached, and whether it was."""
-    return _table(
+    return table(
         ("figure (`supervised`)", "found", "to reach", "runs", ""),
         [
             (
@@ -61,8 +59,8 @@ def alone_table(rows: Sequence[Row], names: Sequence[str] = ("A", "B", "C")) -> 
             runs = [row for row in rows if floor_of(row) == floor and str(row["starts"]) == start]
             times, ways = [time_of(row) for row in runs], [path_of(row) for row in runs]
             complete = f"{sum(np.isfinite(times))} of {len(runs)}"
-            lines.append((floor, name, complete, _listed(times), _listed(ways)))
-    return _table(("floor", "start", "maps of 99 %", "times to 99 % [s]", "ways [m]"), lines)
+            lines.append((floor, name, complete, listed(times), listed(ways)))
+    return table(("floor", "start", "maps of 99 %", "times to 99 % [s]", "ways [m]"), lines)
 
 
 def team_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
@@ -91,7 +89,7 @@ def team_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
         "wrong merges",
         "not correct",
     )
-    return _table(head, lines)
+    return table(head, lines)
 
 
 def one_table(rows: Sequence[Row]) -> str:
@@ -105,12 +103,12 @@ def one_table(rows: Sequence[Row]) -> str:
             (
                 f"`{Path(floor).name}`",
                 str(len(runs)),
-                _reached(runs),
+                reached(runs),
                 shown(median(times), 0),
                 shown(median(ways), 0),
             )
         )
-    return _table(("floor", "runs", "reached 99 %", "time to 99 % [s]", "way [m]"), lines)
+    return table(("floor", "runs", "reached 99 %", "time to 99 % [s]", "way [m]"), lines)
 
 
 def five_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
@@ -124,7 +122,7 @@ def five_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
             (
                 f"`{policy}`",
                 str(len(runs)),
-                _reached(runs),
+                reached(runs),
                 shown(median([time_of(row) for row in runs]), 0),
                 shown(median(time_shares(runs, alone))),
                 *found,
@@ -141,151 +139,7 @@ def five_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
         "merges between, p50 [ms]",
         "p95",
     )
-    return _table(head, lines)
-
-
-def failing_table(rows: Sequence[Row]) -> str:
-    """Return runs in which a robot fails at half time."""
-    lines = []
-    for robots in sorted({int(row["robots"]) for row in rows}):
-        for policy in POLICIES:
-            runs = chosen(rows, policy, robots)
-            if runs:
-                covered = [
-                    100.0 * float(row["c_others_final"]) for row in runs if row["c_others_final"] is not None
-                ]
-                count = sum(map(is_covered, runs))
-                ends = shown(median([float(row["time_s"]) for row in runs]), 0)
-                least = f"{min(covered):.1f}" if covered else "-"
-                lines.append(
-                    (
-                        str(robots),
-                        f"`{policy}`",
-                        f"{count} of {len(runs)}",
-                        shown(median(covered), 1),
-                        least,
-                        ends,
-                    )
-                )
-    return _table(
-        ("robots", "policy", "runs with 99 %", "covered by the others [%]", "least", "end [s]"), lines
-    )
-
-
-def left_table(rows: Sequence[Row]) -> str:
-    """Return the runs in which a supervised team left a dead robot's area uncovered.
-
-    The other policies' runs of the same death stand beside them.
-    """
-    lines = []
-    for row in chosen(rows, SUPERVISED):
-        if not is_covered(row):
-            same = [one for policy in POLICIES for _, one in partners([row], chosen(rows, policy))]
-            covered = {one["policy"]: f"{100.0 * covered_by_others(one):.2f}" for one in same}
-            ends = ", ".join(
-                sorted({str(why) for robot, why in row["ended_because"].items() if robot != "robot_0"})
-            )
-            case = f"`{Path(floor_of(row)).name}`", str(row["robots"]), str(row["seed"])
-            lines.append(
-                (*case, *(covered.get(policy, "-") for policy in POLICIES), ends, f"{row['time_s']:.0f}")
-            )
-    head = (
-        "floor",
-        "robots",
-        "seed",
-        *(f"`{policy}` [%]" for policy in POLICIES),
-        "others ended because",
-        "end [s]",
-    )
-    return _table(head, lines)
-
-
-def extension_table(rows: Sequence[Row]) -> str:
-    """Return runs with extensions switched on, beside `supervised`.
-
-    The floors and seeds are the same.
-    """
-    lines = []
-    for variant, policy in dict.fromkeys((str(row["variant"]), str(row["policy"])) for row in rows):
-        runs = chosen(rows, policy, variant=variant)
-        plain = chosen(rows, "supervised", variant=variant)
-        ends = [reason for row in runs for reason in row["ended_because"].values()]
-        home = "-" if not ends else f"{100.0 * ends.count('returned') / len(ends):.0f}"
-        empty = "-" if not ends else f"{100.0 * ends.count('battery') / len(ends):.0f}"
-        lines.append(
-            (
-                variant,
-                f"`{policy}`",
-                str(len(runs)),
-                _reached(runs),
-                shown(median([time_of(row) for row in runs]), 0),
-                shown(median(time_ratios(runs, plain))),
-                shown(median([path_of(row) for row in runs]), 0),
-                shown(median([100.0 * row["overlap"] for row in runs]), 0),
-                shown(median([row["time_s"] for row in runs]), 0),
-                home,
-                empty,
-            )
-        )
-    head = (
-        "world",
-        "policy",
-        "runs",
-        "reached 99 %",
-        "time to 99 % [s]",
-        "/ `supervised`",
-        "way of all [m]",
-        "overlap [%]",
-        "end [s]",
-        "robots home [%]",
-        "batteries empty [%]",
-    )
-    return _table(head, lines)
-
-
-def wrong_table(rows: Sequence[Row]) -> str:
-    """Return runs that used a wrong merge."""
-    lines = [
-        (
-            f"`{Path(floor_of(row)).name}`",
-            f"`{row['policy']}`",
-            f"{row['robots']}",
-            f"{row['seed']}",
-            f"{row['merges']['wrong']} of {row['merges']['accepted']}",
-            f"{row['merges']['worst_here_m']:.2f}",
-            f"{math.degrees(row['merges']['worst_here_rad']):.1f}",
-            f"{row['merges']['worst_m']:.2f}",
-            ", ".join(f"{error:.2f}" for error in row["ate_m"] or ()),
-        )
-        for row in rows
-    ]
-    return _table(
-        (
-            "floor",
-            "policy",
-            "robots",
-            "seed",
-            "merges",
-            "worst [m]",
-            "[deg]",
-            "by the starts [m]",
-            "trajectories of the robots [m]",
-        ),
-        lines,
-    )
-
-
-def shown(found: Interval | None, digits: int = 2) -> str:
-    """Return an estimate with its interval.
-
-    An end that the sample does not bound is left out.
-    """
-    if found is None:
-        return "-"
-    text = _number(found.estimate, digits)
-    if not np.isfinite(found.low) and not np.isfinite(found.high):
-        return text
-    return f"{text} ({_number(found.low, digits)} to {_number(found.high, digits)})"
+    return table(head, lines)
 
 
 def _team_line(
@@ -296,7 +150,7 @@ def _team_line(
         str(robots),
         f"`{policy}`",
         str(len(runs)),
-        _reached(runs),
+        reached(runs),
         shown(median([time_of(row) for row in runs]), 0),
         shown(median(time_shares(runs, alone))),
         "1" if is_bound else shown(median(time_ratios(runs, told))),
@@ -310,10 +164,6 @@ def _team_line(
     )
 
 
-def _reached(runs: Sequence[Row]) -> str:
-    return f"{100.0 * np.mean([np.isfinite(time_of(row)) for row in runs]):.0f} %" if runs else "-"
-
-
 def _of_ticks(ticks: Iterable[Mapping[str, Any]], name: str) -> str:
     return shown(median([float(one[name]) for one in ticks if one[name] is not None]), 0)
 
@@ -324,16 +174,3 @@ def _verdict(goal: Goal) -> str:
     if goal.wanted == "-":
         return ""
     return "reached" if goal.is_reached else "**missed**"
-
-
-def _listed(values: Iterable[float]) -> str:
-    return ", ".join(_number(value, 0) for value in values)
-
-
-def _number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if np.isfinite(value) else "never"
-
-
-def _table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    rows = [head, [":---" if number < 2 else "---:" for number in range(len(head))], *lines]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)

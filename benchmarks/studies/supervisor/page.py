@@ -1,0 +1,170 @@
+"""The page on supervised teams."""
+
+import platform
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+
+import lidarium
+from lidarium.benchmarks.studies.supervisor import tables
+from lidarium.benchmarks.studies.supervisor.event_tables import (
+    extension_table,
+    failing_table,
+    left_table,
+    wrong_table,
+)
+from lidarium.benchmarks.studies.supervisor.figures import Row, chosen, floor_of, has_wrong_merge
+from lidarium.benchmarks.studies.supervisor.goals import SUPERVISED, goals_of, is_covered
+from lidarium.benchmarks.studies.supervisor.logs import logs_section
+from lidarium.benchmarks.studies.supervisor.runs import FAILING, LOGS_FILE, asked_runs, read_json
+from lidarium.benchmarks.studies.supervisor.suites import (
+    FEWEST_SEEDS,
+    MARGIN,
+    SETTINGS,
+    area_m2,
+    floors_of,
+    suites,
+)
+
+EXTENSION_SUITES = ("extensions", "radio", "energy", "together")
+SECONDS_PER_HOUR = 3600.0
+
+
+def page(folder: Path, command: str) -> str:
+    """Return the results as markdown."""
+    rows = {name: asked_runs(folder, name) for name in suites(None)}
+    failing = asked_runs(folder, FAILING)
+    goals = goals_of(rows, failing)
+    every = [*(row for group in rows.values() for row in group), *failing]
+    hours = sum(float(row["wall_s"]) for row in every) / SECONDS_PER_HOUR
+    alone = rows["one"]
+    parts = [
+        "# Supervised teams",
+        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
+        f"{platform.python_version()}; "
+        f"{len(every)} runs, {hours:.2f} hours of one core, {hours / 2.0:.2f} of two.",
+        _about(alone),
+        "## What was to be reached\n\n" + tables.goals_table(goals),
+        _notes(),
+        *_wrong_section(every),
+        *logs_section(read_json(folder / LOGS_FILE)),
+        "## Test 1: each robot alone\n\n" + tables.alone_table(rows["alone"]),
+        *(
+            f"## Test 2: pairs, {floor}\n\nJade with Luna (starts A and B), and with Mars (A and C).\n\n"
+            + tables.team_table([row for row in rows["pairs"] if floor_of(row) == floor], rows["alone"])
+            for floor in dict.fromkeys(floor_of(row) for row in rows["pairs"])
+        ),
+        "## Test 3: three robots, apartment\n\n" + tables.team_table(rows["three"], rows["alone"]),
+        "## One robot on each floor\n\n" + tables.one_table(alone),
+    ]
+    generated = [row for row in rows["teams"] if _is_generated(row)]
+    real = [row for row in rows["teams"] if not _is_generated(row)]
+    for title, some in (
+        ("All floors", rows["teams"]),
+        ("Generated floors", generated),
+        ("Real floors, or what stands in for them", real),
+    ):
+        if some:
+            parts.append(f"## {title}\n\n" + tables.team_table(some, alone))
+    parts += [
+        "## Five robots\n\n" + tables.five_table(rows["five"], alone),
+        "## A robot fails\n\n" + _about_failing() + "\n\n" + failing_table(failing),
+        *_left_section(failing),
+        "## Extensions\n\n" + _about_extensions(),
+        *(extension_table(rows[name]) for name in EXTENSION_SUITES if rows[name]),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _wrong_section(rows: Sequence[Row]) -> list[str]:
+    """Return the runs that used a wrong merge, with what the robots' own maps err by."""
+    wrong = [row for row in rows if has_wrong_merge(row)]
+    if not wrong:
+        return []
+    words = (
+        "Runs with a merge that is wrong: how far off it is where the maps meet, how far by what the starts "
+        "say, and the error of each "
+        "robot's own trajectory."
+    )
+    return ["### Wrong merges\n\n" + words + "\n\n" + wrong_table(wrong)]
+
+
+def _left_section(failing: Sequence[Row]) -> list[str]:
+    """Return the runs in which the others left a dead robot's area uncovered.
+
+    They did not cover what the robot leaves; the other policies' runs stand beside them.
+    """
+    words = (
+        "Runs in which a supervised team covered less than 99 % of that, and what the others covered of it "
+        "at the same death."
+    )
+    is_left = not all(is_covered(row) for row in chosen(failing, SUPERVISED))
+    return ["### Runs that left more\n\n" + words + "\n\n" + left_table(failing)] if is_left else []
+
+
+def _is_generated(row: Row) -> bool:
+    return floor_of(row) in floors_of(None)["generated"]
+
+
+def _about(alone: Sequence[Row]) -> str:
+    floors = list(dict.fromkeys(floor_of(row) for row in alone))
+    large = [floor for floor in floors if area_m2(floor) >= 300.0]
+    is_real = any("/" in floor for floor in floors)
+    stand_ins = (
+        ""
+        if is_real
+        else " No folder of real floors was given: generated offices and corridors stand in for them."
+    )
+    return (
+        "Kobuki robots with the URG-04LX laser, noise as of its data sheet, typical wheel odometry, SLAM, "
+        "starts that nobody knows, maps "
+        f"of 5 cm, cut at {SETTINGS['horizon_s']:.0f} s. Scenario 1 is `apartment`, scenario 2 `clinic`; "
+        "Jade, Luna and Mars start at A, B "
+        f"and C. The others are {len(floors)} floors, {len(large)} of them over 300 m2; starts are drawn by "
+        "the seed, the same for every "
+        f"policy, and that of one robot is that of a team's first.{stand_ins} `independent` merges nothing, "
+        "`oracle_starts` is told how "
+        "the robots stand to each other ([supervisor](../reference/supervisor.md)). Entries are medians over "
+        "runs, ratios and differences "
+        "those of paired runs, with intervals of 95 %; what was not done by the horizon counts as never, and "
+        "as done then where others are "
+        "divided by it. Where a team starts at starts that robots tried alone, as in the scenarios, one "
+        "robot's figure is the mean of "
+        "theirs."
+    )
+
+
+def _notes() -> str:
+    return (
+        "A merge is wrong where the transform that was found is off by more than 0.3 m or 3 degrees at the "
+        "centroid of what both maps "
+        "know, from how the maps truly lie to each other there: a robot's map lies as its pose did when it "
+        "was nearest to there. Maps "
+        "that SLAM draws drift, and no merger can know by how much. Where a third robot's map lies between "
+        "two, its drift and the lever "
+        "of small angles come to what is between them, and the merges that join them are judged themselves. "
+        "So what the starts say of all "
+        "joined robots is counted beside it, within the same bounds and within those of `result.json`, 2 "
+        "cells and 0.01 rad. "
+        "A tick is a look at the tree every 10 s, with its merge and what robots are told, on one core of a "
+        "machine that others share."
+    )
+
+
+def _about_failing() -> str:
+    return (
+        "`robot_0` dies at half the time in which the whole supervised team of that floor and seed saw 99 %. "
+        "Its body stands where it is. "
+        "Its map is used no more, so the others cover its part, too: counted is what they have seen "
+        "themselves, of what the body "
+        "leaves in reach."
+    )
+
+
+def _about_extensions() -> str:
+    return (
+        f"Three robots, {FEWEST_SEEDS} seeds on each of two floors; runs are not ended at 99 %, since what "
+        "robots do then counts, too. "
+        f"`energy budget` turns back at {MARGIN:g} times what the way home costs. `all together` is every "
+        "one at once, with `utility`."
+    )
