@@ -6,7 +6,7 @@ A supervisor directs any policy that goes to goals.
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,40 +14,15 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import Action, Policy, Stop, Team
 from lidarium.agents.report import GivenOrder, GivenUp, Join, LogEntry, PolicyReport, Supervision
+from lidarium.agents.supervisor.errands import Errands
+from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.led_team import LedTeam
 from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Command, Supervisor
 from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.exploration import Observation
-from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.radio.messages import DriveState, Order, OrderKind
-from lidarium.mapping.planning.frontier_kernels import FRONTIER
-from lidarium.mapping.planning.grid_planning import cells_of
-
-PATIENCE_S = 20.0
-"""Time without motion after which a sent robot explores by itself again [s]."""
-
-
-MOVED_M = 0.15
-"""What counts as having moved [m]."""
-
-
-LOST_S = 2.0
-"""An order that a robot has not taken after this long has not reached it [s]."""
-
-
-@dataclass(slots=True)
-class _Errand:
-    """Where a robot is sent by an order, and where it was when it last had moved."""
-
-    command: Command
-    order: Order
-    since_s: float
-    place: tuple[float, float]
-    is_new: bool = True
-    is_taken: bool = False
+from lidarium.envs.radio.messages import Order, OrderKind
 
 
 class Supervised(Policy):
@@ -163,10 +138,10 @@ class Supervised(Policy):
                 "which tells the station"
             )
         self._supervisor = Supervisor(station, footprint_of(belief.radius))
-        self._tells = not knows_starts
-        self._errands: dict[str, _Errand] = {}
+        self._informs = not knows_starts
+        self._errands = Errands(team)
         self._given_up: dict[str, NDArray[np.float64]] = {}
-        self._told: set[str] = set()
+        self._informed: set[str] = set()
         self._look_due, self._merge_due = settings.period_s, 0.0
         self._exploring: set[str] = set()
         self.tick_seconds, self.merge_seconds = [], []
@@ -176,23 +151,25 @@ class Supervised(Policy):
         """Let the policy decide for all robots that the supervisor has not sent anywhere."""
         stops = self._supervise()
         for agent in observations:
-            self._review(agent)
+            self._errands.review(agent)
         standing = self._supervisor.standing_by
         free = {
             agent: observation
             for agent, observation in observations.items()
-            if agent not in stops and agent not in standing and not self._is_away(agent)
+            if agent not in stops and agent not in standing and not self._errands.is_away(agent)
         }
         actions: dict[str, Action] = self.policy.act(free) if free else {}
         self._exploring.clear()
         self._exploring.update(free)
-        is_work_left = any(not isinstance(action, Stop) for action in actions.values()) or bool(self._errands)
+        is_work_left = (
+            any(not isinstance(action, Stop) for action in actions.values()) or len(self._errands) > 0
+        )
         for agent in observations:
             if agent in stops:
                 actions[agent] = stops[agent]
-            elif self._is_away(agent):
+            elif self._errands.is_away(agent):
                 # Who is on his way needs no action: he goes on as he was told.
-                if (action := self._sent(agent)) is not None:
+                if (action := self._errands.action(agent)) is not None:
                     actions[agent] = action
             elif agent in standing:
                 actions[agent] = (
@@ -224,8 +201,8 @@ class Supervised(Policy):
         self._merge_due = _next(now, settings.merge_period_s)
         # A station that looks as often as it merges has no other time to search.
         station.merge(now, may_search=not is_look or settings.period_s <= settings.merge_period_s)
-        if self._tells:
-            self._tell()
+        if self._informs:
+            self._inform()
         if not is_look:
             return {}
         self._look_due = _next(now, settings.period_s)
@@ -248,7 +225,7 @@ class Supervised(Policy):
                 places = [(entry.x, entry.y) for entry in self.given_up if entry.agent == agent]
                 self._given_up[agent] = np.array(places, np.float64).reshape(-1, 2)
 
-    def _tell(self) -> None:
+    def _inform(self) -> None:
         """Tell each robot what the others of its group know.
 
         Take it back from one that is joined no more.
@@ -265,71 +242,20 @@ class Supervised(Policy):
         for group in station.groups():
             for agent in group:
                 others = [teammate for teammate in group if teammate != agent]
-                if not others and agent not in self._told:
+                if not others and agent not in self._informed:
                     continue
                 if self._team.tell(agent, station.fused(others, agent) if others else None):
-                    (self._told.add if others else self._told.discard)(agent)
+                    (self._informed.add if others else self._informed.discard)(agent)
 
     def _obey(self, command: Command, stops: dict[str, Action]) -> None:
         """Begin what a robot is ordered to do."""
         agent = command.agent
         if command.kind is OrderKind.STOP:
-            self._errands.pop(agent, None)
+            self._errands.cancel(agent)
             if agent not in self._supervisor.standing_by or self.settings.is_stop_final:
                 stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == 5 else "stopped")
-        elif command.target is not None:
-            under_way = self._errands.get(agent)
-            if under_way is not None and under_way.command.is_home and command.is_home:
-                return
-            x, y, _ = self._team.belief(agent).pose.tolist()
-            order = Order(OrderKind.GO_TO, command.target, f"rule {command.rule}: {command.why}")
-            self._errands[agent] = _Errand(command, order, self._team.time_s, (x, y))
-
-    def _review(self, agent: str) -> None:
-        """End an errand that is done, or that cannot be."""
-        errand = self._errands.get(agent)
-        if errand is None or errand.is_new:
-            return
-        if not errand.is_taken:
-            errand.is_taken = self._team.last_order(agent) is errand.order
-            if not errand.is_taken:
-                if self._team.time_s - errand.since_s > LOST_S:
-                    del self._errands[agent]
-                return
-        belief, state = self._team.belief(agent), self._team.drive_state(agent)
-        if errand.command.is_home:
-            return
-        x, y, _ = belief.pose.tolist()
-        if state is DriveState.GIVING_WAY or math.dist((x, y), errand.place) > MOVED_M:
-            errand.since_s, errand.place = self._team.time_s, (x, y)
-        is_stuck = self._team.time_s - errand.since_s > PATIENCE_S
-        if (
-            state in (DriveState.ARRIVED, DriveState.NO_PATH)
-            or is_stuck
-            or not _is_frontier(belief, errand.command.looks_at)
-        ):
-            del self._errands[agent]
-
-    def _is_away(self, agent: str) -> bool:
-        """Whether a robot is on an errand or gets the order now.
-
-        Until it has taken the order the policy drives it.
-        """
-        errand = self._errands.get(agent)
-        return errand is not None and (errand.is_new or errand.is_taken)
-
-    def _sent(self, agent: str) -> Action:
-        """Return the action of a robot on an errand.
-
-        It is its order at first, to end where it came home, else nothing.
-        """
-        errand, state = self._errands[agent], self._team.drive_state(agent)
-        if errand.is_new:
-            errand.is_new = False
-            return errand.order
-        if errand.command.is_home and state in (DriveState.ARRIVED, DriveState.NO_PATH):
-            return Stop("returned" if state is DriveState.ARRIVED else "unreachable")
-        return None
+        else:
+            self._errands.begin(command)
 
     def _rest(self, agent: str, observation: Observation) -> Action:
         return len(observation["frontiers"]) if self.level == "frontier" else None
@@ -341,19 +267,3 @@ def _trusting(settings: SupervisorSettings) -> SupervisorSettings:
 
 def _next(now: float, period_s: float) -> float:
     return (math.floor(now / period_s + 1e-9) + 1.0) * period_s
-
-
-def _is_frontier(belief: Belief, place: tuple[float, float] | None) -> bool:
-    """Whether there still is a frontier at a place of a robot's map frame [m].
-
-    The tolerance is that by which frames may differ.
-    """
-    if place is None:
-        return True
-    navigation = belief.map if belief.shared_map is None else belief.shared_map
-    row, column = cells_of(np.asarray(place), belief.map_origin, navigation.resolution).tolist()
-    reach = round(0.3 / navigation.resolution)
-    around = navigation.frontiers.flags[
-        max(row - reach, 0) : max(row + reach + 1, 0), max(column - reach, 0) : max(column + reach + 1, 0)
-    ]
-    return bool((around == FRONTIER).any())

@@ -5,25 +5,20 @@ What the station knows becomes a case, the tree decides it, and orders to go get
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.supervisor.assignment import NOBODY, assign_by_cost, assign_by_utility, best_goal
+from lidarium.agents.supervisor.assignment import NOBODY, assign_by_cost, assign_by_utility
+from lidarium.agents.supervisor.judging import Judge, Judged
+from lidarium.agents.supervisor.knowledge.station import MergeStation
+from lidarium.agents.supervisor.knowledge.survey import Survey
 from lidarium.agents.supervisor.log import Decision, StationEvent
-from lidarium.agents.supervisor.station import MergeStation
-from lidarium.agents.supervisor.survey import Survey
 from lidarium.agents.supervisor.tree import (
     HOME,
     OTHER,
-    RICH,
-    Case,
     Leaf,
-    Node,
-    RobotInputs,
-    decide,
-    decision_tree,
 )
 from lidarium.envs.radio.messages import OperatingState, OrderKind, Target
 from lidarium.mapping.planning.grid_planning import Footprint
@@ -33,9 +28,6 @@ STICKINESS_M = 1.0
 
 It applies where all robots get goals at once.
 """
-
-LEAST_WAY_M = 1.0
-"""What a metre costs a battery is told after a way of this length [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,17 +61,6 @@ class Command:
     is_home: bool = False
 
 
-@dataclass(slots=True)
-class _Judged:
-    """A case, what the tree said of it, and the goal that was chosen."""
-
-    case: Case
-    leaf: Leaf
-    answers: tuple[tuple[str, bool], ...]
-    goal: int = NOBODY
-    target: Target | None = None
-
-
 class Supervisor:
     """Leads the robots of a station.
 
@@ -100,11 +81,10 @@ class Supervisor:
 
     def __init__(self, station: MergeStation, footprint: Footprint) -> None:
         self.station, self.footprint, self._settings = station, footprint, station.settings
-        self._tree = decision_tree(station.settings)
         self.decisions: list[Decision] = []
         self.standing_by: set[str] = set()
         self._silent: set[str] = set()
-        self._full_j: dict[str, float] = {}
+        self._judge = Judge(station, self.standing_by)
 
     def look(self, time_s: float, given_up: Mapping[str, NDArray[np.float64]]) -> list[Command]:
         """Decide about all robots.
@@ -133,8 +113,7 @@ class Supervisor:
     def _pass_over(self, agent: str, time_s: float) -> None:
         """Log a robot that has failed, or of which nothing is known."""
         if agent in self.station.reports:
-            case = Case(self._inputs(agent, 0.0))
-            self._log(time_s, (agent,), _judged(case, self._tree))
+            self._log(time_s, (agent,), self._judge.judge_alone(agent))
         elif agent not in self._silent:
             self._silent.add(agent)
             self.station.events.append(
@@ -158,10 +137,10 @@ class Supervisor:
         ]
         all_given_up = np.concatenate(places) if places else np.zeros((0, 2))
         survey = Survey(fused, frames, station.reports, workers, all_given_up, self.footprint, self._settings)
-        judged: dict[str, _Judged] = {}
+        judged: dict[str, Judged] = {}
         taken: dict[str, int] = dict(survey.going)
         for agent in group:
-            one = self._judge(agent, group, workers, survey, taken)
+            one = self._judge.judge(agent, group, workers, survey, taken)
             judged[agent] = one
             if one.goal != NOBODY:
                 taken[agent] = one.goal
@@ -173,114 +152,7 @@ class Supervisor:
             if (command := self._command(one, survey, time_s, tuple(group))) is not None
         ]
 
-    def _judge(
-        self, agent: str, group: list[str], workers: list[str], survey: Survey, taken: Mapping[str, int]
-    ) -> _Judged:
-        """Put a robot before the tree, and choose its goal where it is to get another."""
-        inputs = self._inputs(agent, survey.known_area_m2)
-        if agent not in workers:
-            return _judged(Case(inputs), self._tree)
-        row = workers.index(agent)
-        rival = self._rival(agent, workers, survey)
-        if agent in self.standing_by and rival is not None:
-            # It has no path of its own; what counts is its way to the goal of the other.
-            goal = survey.going[rival.agent]
-            inputs = replace(
-                inputs, remaining_m=float(survey.goals.costs[row, goal]) if goal != NOBODY else math.inf
-            )
-        others = [teammate for teammate in workers if teammate != agent]
-        worth = np.where(survey.is_goal(), 1.0, -np.inf)
-        for teammate in others:
-            place = survey.places[teammate]
-            if place is not None:
-                worth = worth - survey.seen_at(place)
-            if taken[teammate] != NOBODY:
-                worth[taken[teammate]] = -np.inf
-        if survey.going[agent] != NOBODY and rival is not None:
-            worth[survey.going[agent]] = -np.inf
-        costs, weight = survey.goals.costs[row], self._settings.cost_weight
-        other = best_goal(costs, worth, weight)
-        areas = survey.goals.areas
-        richer = best_goal(
-            costs,
-            np.where(np.isfinite(worth), areas / max(float(areas.max(initial=0.0)), 1e-9), -np.inf),
-            weight,
-        )
-        going = survey.going[agent]
-        case = Case(
-            robot=inputs,
-            rival=rival,
-            opponent=self._opponent(agent, others, survey)
-            if rival is None and self._settings.avoids_rendezvous
-            else None,
-            has_frontier=survey.has_frontier(),
-            has_other_goal=other != NOBODY,
-            has_richer_goal=richer not in (NOBODY, going)
-            and (going == NOBODY or areas[richer] > areas[going]),
-            is_behind=self._is_behind(agent, group),
-            is_enclosed=self.station.is_enclosed(agent),
-            is_battery_low=self._settings.battery_margin > 0.0 and self._is_battery_low(agent, survey),
-        )
-        one = _judged(case, self._tree)
-        one.goal = {OTHER: other, RICH: richer}.get(one.leaf.aim, NOBODY)
-        return one
-
-    def _inputs(self, agent: str, area_m2: float) -> RobotInputs:
-        report = self.station.reports[agent]
-        share = self.station.known_m2(agent) / area_m2 if area_m2 > 0.0 else 0.0
-        return RobotInputs(agent, report.path_left_m, report.state, min(share, 1.0), report.travelled_m)
-
-    def _rival(self, agent: str, workers: list[str], survey: Survey) -> RobotInputs | None:
-        """Return the nearest other robot with the same goal.
-
-        To a robot that stands by, the nearest one that has any goal.
-        """
-        is_waiting = agent in self.standing_by
-        teammates = [
-            self._inputs(teammate, survey.known_area_m2)
-            for teammate in workers
-            if teammate != agent
-            and teammate not in self.standing_by
-            and (
-                survey.places[teammate] is not None
-                if is_waiting
-                else survey.is_same_goal(agent, teammate, self._settings.same_goal_m)
-            )
-        ]
-        return min(teammates, key=lambda teammate: (teammate.remaining_m, teammate.agent), default=None)
-
-    def _opponent(self, agent: str, others: list[str], survey: Survey) -> RobotInputs | None:
-        """Return the nearest robot that an agent is about to meet."""
-        teammates = [
-            self._inputs(teammate, survey.known_area_m2)
-            for teammate in others
-            if survey.are_meeting(agent, teammate)
-        ]
-        return min(teammates, key=lambda teammate: (teammate.remaining_m, teammate.agent), default=None)
-
-    def _is_behind(self, agent: str, group: list[str]) -> bool:
-        known = [self.station.known_m2(teammate) for teammate in group if teammate != agent]
-        return bool(known) and self.station.known_m2(agent) < self._settings.unbalanced_share * float(
-            np.mean(known)
-        )
-
-    def _is_battery_low(self, agent: str, survey: Survey) -> bool:
-        """Whether the battery left would soon not bring a robot home.
-
-        The estimate uses what metres have cost the robot until now.
-        """
-        report = self.station.reports[agent]
-        if report.energy_left_j is None:
-            return False
-        full = self._full_j.setdefault(agent, report.energy_left_j)
-        if report.travelled_m < LEAST_WAY_M:
-            return False
-        metre = (full - report.energy_left_j) / report.travelled_m
-        way = survey.way_home_m(agent, report.start)
-        # Where the merged map knows no way, the way that it came is one.
-        return report.energy_left_j < self._settings.battery_margin * metre * min(way, report.travelled_m)
-
-    def _assign_all(self, judged: Mapping[str, _Judged], workers: list[str], survey: Survey) -> None:
+    def _assign_all(self, judged: Mapping[str, Judged], workers: list[str], survey: Survey) -> None:
         """Give goals to all robots of a group at once that are to explore."""
         exploring = [agent for agent in workers if judged[agent].leaf.rule in (0, 3, 4, 7)]
         rows = [workers.index(agent) for agent in exploring]
@@ -310,7 +182,7 @@ class Supervisor:
             else:
                 one.leaf, one.goal = Leaf(6, OrderKind.GO_TO, "all robots got goals at once", OTHER), goal
 
-    def _command(self, one: _Judged, survey: Survey, time_s: float, group: tuple[str, ...]) -> Command | None:
+    def _command(self, one: Judged, survey: Survey, time_s: float, group: tuple[str, ...]) -> Command | None:
         """Return the order to a robot, and log the decision."""
         agent, leaf = one.case.robot.agent, one.leaf
         looks_at = None
@@ -330,7 +202,7 @@ class Supervisor:
             self.standing_by.discard(agent)
         return Command(agent, leaf.order, leaf.rule, leaf.why, one.target, looks_at, leaf.aim == HOME)
 
-    def _log(self, time_s: float, group: tuple[str, ...], one: _Judged) -> None:
+    def _log(self, time_s: float, group: tuple[str, ...], one: Judged) -> None:
         case, leaf, target = one.case, one.leaf, one.target
         pose = self.station.reports[case.robot.agent].pose
         self.decisions.append(
@@ -348,8 +220,3 @@ class Supervisor:
                 None if target is None else (target.x, target.y),
             )
         )
-
-
-def _judged(case: Case, tree: Node) -> _Judged:
-    leaf, answers = decide(tree, case)
-    return _Judged(case, leaf, tuple(answers))

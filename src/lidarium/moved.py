@@ -21,6 +21,9 @@ MOVED: dict[str, tuple[str, ...]] = {
     ),
     "agents.srt.progress": ("agents.srt.motion.progress",),
     "agents.srt.tour": ("mapping.planning.tours",),
+    "agents.supervisor.station": ("agents.supervisor.knowledge.station",),
+    "agents.supervisor.survey": ("agents.supervisor.knowledge.survey", "agents.supervisor.knowledge.goals"),
+    "agents.supervisor.trails": ("agents.supervisor.knowledge.trails",),
     "envs.batch.endings": ("envs.outcome.endings",),
     "envs.coverage": (
         "envs.scoring.coverage",

@@ -3,7 +3,6 @@
 It knows how the frames of the maps that it has joined lie.
 """
 
-from collections import deque
 from collections.abc import Mapping
 from itertools import combinations
 
@@ -11,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.report import Join
+from lidarium.agents.supervisor.knowledge.received_reports import ReceivedReports
+from lidarium.agents.supervisor.knowledge.trails import without_bodies, without_own_trail
 from lidarium.agents.supervisor.log import StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
 from lidarium.envs.radio.messages import OperatingState
 from lidarium.envs.station.reports import Report
 from lidarium.envs.wrappers.merged_maps import TEAM_VALIDATION
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.description.described_map import resampled
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
@@ -60,8 +59,6 @@ class MergeStation:
 
     Attributes
     ----------
-    reports : dict of str to Report
-        The latest of each robot that ever reported.
     joins : list of Join
         All transforms that were found, in their order in time.
     events : list of StationEvent
@@ -95,13 +92,24 @@ class MergeStation:
         self._tree: FrameTree[str] = FrameTree(merge.cycle_distance_m, merge.cycle_angle)
         self._found: set[Pair] = set()
         self._joined: set[Pair] = set()
-        self._tracks: dict[str, deque[tuple[float, float]]] = {agent: deque() for agent in agents}
         self._middles: dict[Pair, tuple[float, float]] = {}
-        self._trails: dict[str, list[tuple[float, float]]] = {agent: [] for agent in agents}
-        self.reports: dict[str, Report] = {}
+        self._received = ReceivedReports(self.agents, resolution, settings)
         self.joins: list[Join] = []
         self.events: list[StationEvent] = []
         self.left_behind: list[tuple[str, NDArray[np.float64]]] = []
+
+    @property
+    def reports(self) -> dict[str, Report]:
+        """The latest report of each robot that ever reported."""
+        return self._received.latest
+
+    def known_m2(self, agent: str) -> float:
+        """Return how much a robot's own map knows [m2], 0 where it never reported."""
+        return self._received.known_m2(agent)
+
+    def is_enclosed(self, agent: str) -> bool:
+        """Whether a robot has mapped too little on the last of its way."""
+        return self._received.is_enclosed(agent)
 
     def receive(self, agent: str, report: Report | None, time_s: float) -> None:
         """Take in a report.
@@ -119,13 +127,12 @@ class MergeStation:
         has_failed = report.state is OperatingState.FAILED and (
             before is None or before.state is not OperatingState.FAILED
         )
-        self.reports[agent] = report
-        self._trails[agent].append((report.pose.x, report.pose.y))
+        self._received.add(agent, report)
         if has_failed:
             self._note(time_s, "excluded", (agent,), "it has failed; its map is not used any more")
             # With its map goes what showed the others that their images of it, in doorways say, are no walls.
             teammates = [
-                teammate for teammate in self.agents if teammate != agent and self._is_used(teammate)
+                teammate for teammate in self.agents if teammate != agent and self._received.is_used(teammate)
             ]
             frames = {
                 teammate: frame
@@ -133,36 +140,15 @@ class MergeStation:
                 if (frame := self.lookup(teammate, agent)) is not None
             }
             self.left_behind += [
-                (teammate, frame.apply(self._trail(agent))) for teammate, frame in frames.items()
+                (teammate, frame.apply(self._received.trail(agent))) for teammate, frame in frames.items()
             ]
-        track = self._tracks[agent]
-        track.append((report.travelled_m, self.known_m2(agent)))
-        while len(track) > 1 and track[1][0] <= report.travelled_m - self.settings.enclosed_way_m:
-            track.popleft()
-
-    def known_m2(self, agent: str) -> float:
-        """Return how much a robot's own map knows [m2], 0 where it never reported."""
-        report = self.reports.get(agent)
-        return (
-            0.0
-            if report is None
-            else float(np.count_nonzero(report.map.levels != UNKNOWN)) * self.resolution**2
-        )
-
-    def is_enclosed(self, agent: str) -> bool:
-        """Whether a robot has mapped too little on the last of its way."""
-        track = self._tracks[agent]
-        if not track or track[-1][0] - track[0][0] < self.settings.enclosed_way_m:
-            return False
-        way, gain = (last - first for first, last in zip(track[0], track[-1], strict=True))
-        return gain < self.settings.enclosed_gain_m2_per_m * way
 
     def merge(self, time_s: float, may_search: bool = True) -> None:
         """Merge the maps of all robots that have not failed.
 
         What was found is verified alone where there is no time for searches.
         """
-        used = {agent: self.reports[agent] for agent in self.agents if self._is_used(agent)}
+        used = {agent: self.reports[agent] for agent in self.agents if self._received.is_used(agent)}
         if self.settings.trusts_starts:
             self._join_by_starts(used)
         elif used:
@@ -185,7 +171,7 @@ class MergeStation:
         """
         groups: list[list[str]] = []
         for agent in self.agents:
-            if not self._is_used(agent):
+            if not self._received.is_used(agent):
                 continue
             group = next((one for one in groups if self.lookup(one[0], agent) is not None), None)
             if group is None:
@@ -212,7 +198,7 @@ class MergeStation:
         frames = {
             agent: frame
             for agent in agents
-            if self._is_used(agent) and (frame := self.lookup(into, agent)) is not None
+            if self._received.is_used(agent) and (frame := self.lookup(into, agent)) is not None
         }
         if not frames:
             return None
@@ -227,7 +213,7 @@ class MergeStation:
         # A third robot's image on the one map would contradict the floor on which the other one saw it drive
         # on.
         bare = without_bodies(coarse, self._teammates_trails(agent), self._radius, self._merge_resolution)
-        return without_own_trail(bare, self._trail(agent), self._radius, self._merge_resolution)
+        return without_own_trail(bare, self._received.trail(agent), self._radius, self._merge_resolution)
 
     def _map_without_bodies(self, agent: str) -> GrowingMap:
         """Return a robot's map without the bodies of joined robots.
@@ -245,7 +231,7 @@ class MergeStation:
             for teammate in self.agents
             if teammate != agent and (frame := self.lookup(agent, teammate)) is not None
         }
-        return [frame.apply(self._trail(teammate)) for teammate, frame in teammates.items()]
+        return [frame.apply(self._received.trail(teammate)) for teammate, frame in teammates.items()]
 
     def _middle(self, pair: Pair, result: PairResult) -> tuple[float, float]:
         """Return the middle of what two maps both know [m].
@@ -254,25 +240,6 @@ class MergeStation:
         """
         x, y = placed(self.reports[pair[1]].map.origin).apply(result.agreement.centre).tolist()
         return x, y
-
-    def _place(self, agent: str) -> tuple[float, float]:
-        pose = self.reports[agent].pose
-        return pose.x, pose.y
-
-    def _trail(self, agent: str) -> NDArray[np.float64]:
-        return np.array(self._trails[agent], np.float64).reshape(-1, 2)
-
-    def _is_used(self, agent: str) -> bool:
-        """Whether a robot's map is used.
-
-        The robot has reported something, and has not failed (rules 1 and 2).
-        """
-        report = self.reports.get(agent)
-        return (
-            report is not None
-            and report.state is not OperatingState.FAILED
-            and bool((report.map.levels != UNKNOWN).any())
-        )
 
     def _join_by_starts(self, used: Mapping[str, Report]) -> None:
         """Join all robots that know how their frames lie in a common one."""
@@ -305,7 +272,7 @@ class MergeStation:
             self._note(time_s, "dropped", (a, b), why)
         for (a, b), frame in joined.items():
             if (a, b) not in self._joined:
-                middle = self._middles.get((a, b), self._place(b))
+                middle = self._middles.get((a, b), self._received.place(b))
                 self.joins.append(Join(time_s, a, b, frame, middle, True, self._tree.has_edge(a, b)))
                 self._note(
                     time_s,

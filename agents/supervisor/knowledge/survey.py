@@ -5,11 +5,11 @@ It holds the goals on offer, what each robot's path there costs, and what the tr
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.supervisor.knowledge.goals import NONE, find_goals
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.station.reports import Report
@@ -17,41 +17,10 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.grid_lines import visible
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.fusion import FusedMap
-from lidarium.mapping.planning.frontier_approach import approach, default_reach
+from lidarium.mapping.planning.frontier_approach import default_reach
 from lidarium.mapping.planning.grid_planning import Cell, Footprint, Until, cells_of, centres_of, search
 
-NONE = -1
 _MARGIN = 1
-
-
-@dataclass(frozen=True, slots=True)
-class Goals:
-    """The frontier clusters of a merged map as goals; K of them for R robots.
-
-    Attributes
-    ----------
-    cells, starts : (N, 2) int64, (K + 1,) int64
-        Cells (row, column) of all clusters, and where each begins.
-    seen_from : (K, 2) int64
-        The cell of each that is nearest to its middle.
-    sizes : (K,) float64
-        Lengths [m].
-    areas : (K,) float64
-        What is unknown around each, within the range of the laser [m2].
-    costs : (R, K) float64
-        Cost of each robot's way to where it sees the frontier [m], inf where there is none.
-    stands, looks : (R, K, 2) int64
-        Where it stands then, and the frontier cell that it looks at.
-    """
-
-    cells: NDArray[np.int64]
-    starts: NDArray[np.int64]
-    seen_from: NDArray[np.int64]
-    sizes: NDArray[np.float64]
-    areas: NDArray[np.float64]
-    costs: NDArray[np.float64]
-    stands: NDArray[np.int64]
-    looks: NDArray[np.int64]
 
 
 class Survey:
@@ -106,7 +75,8 @@ class Survey:
         for cell in cells_of(given_up, self.origin, fused.resolution):
             self._map.frontiers.ignore_near((int(cell[0]), int(cell[1])), reach)
         self._poses = {agent: frames[agent] @ reports[agent].pose for agent in self.workers}
-        self.goals = self._goals(reach)
+        cells = [self._cell_of(agent) for agent in self.workers]
+        self.goals = find_goals(self._map, self.origin, cells, footprint, reach, settings.sensor_range_m)
         targets = {agent: reports[agent].target for agent in self.workers}
         self.places = {
             agent: None if target is None else tuple(frames[agent].apply((target.x, target.y)).tolist())
@@ -219,41 +189,6 @@ class Survey:
         )
         return found.cost(self._inside((at.x, at.y)))
 
-    def _goals(self, reach: float) -> Goals:
-        clusters = self._map.frontiers.clusters(self.origin)
-        count, robots = len(clusters), len(self.workers)
-        costs = np.full((robots, count), math.inf)
-        stands, looks = (
-            np.full((robots, count, 2), NONE, np.int64),
-            np.full((robots, count, 2), NONE, np.int64),
-        )
-        for row, agent in enumerate(self.workers):
-            if not count:
-                break
-            found = search(
-                self._map.space,
-                self._map.log_odds,
-                self._map.clearance,
-                self._cell_of(agent),
-                self._footprint,
-            )
-            near = approach(clusters, found, self._map.log_odds, reach)
-            costs[row] = np.where(near.reachable, near.costs, math.inf)
-            stands[row], looks[row] = near.cells, near.frontier_cells
-        areas = _unknown_around(
-            self._map.log_odds, clusters.representatives, self._settings.sensor_range_m / 2.0, self.resolution
-        )
-        return Goals(
-            clusters.cells,
-            clusters.starts,
-            clusters.representatives,
-            clusters.sizes,
-            areas,
-            costs,
-            stands,
-            looks,
-        )
-
     def _goal_at(self, place: tuple[float, ...] | None) -> int:
         """Return the goal that a robot at a place [m] looks at, -1 for none."""
         if place is None or not len(self.goals.cells):
@@ -285,24 +220,3 @@ class Survey:
         cell = cells_of(np.asarray(place), self.origin, self.resolution)
         rows, columns = self._map.log_odds.shape
         return min(max(int(cell[0]), 0), rows - 1), min(max(int(cell[1]), 0), columns - 1)
-
-
-def _unknown_around(
-    log_odds: NDArray[np.int8], cells: NDArray[np.int64], half_side_m: float, resolution: float
-) -> NDArray[np.float64]:
-    """Return the unknown area in the square around each cell [m2].
-
-    What lies beyond the map is unknown.
-    """
-    half = max(round(half_side_m / resolution), 1)
-    sums = np.zeros((log_odds.shape[0] + 1, log_odds.shape[1] + 1), np.int64)
-    sums[1:, 1:] = (log_odds != 0).cumsum(axis=0, dtype=np.int64).cumsum(axis=1)
-    low = np.maximum(cells - half, 0)
-    high = np.minimum(cells + half + 1, log_odds.shape)
-    known = (
-        sums[high[:, 0], high[:, 1]]
-        - sums[low[:, 0], high[:, 1]]
-        - sums[high[:, 0], low[:, 1]]
-        + sums[low[:, 0], low[:, 1]]
-    )
-    return np.asarray(((2 * half + 1) ** 2 - known) * resolution**2, np.float64)

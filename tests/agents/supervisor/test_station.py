@@ -8,9 +8,9 @@ import pytest
 from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
 from reported_halls import RADIUS, hall, report
 
+from lidarium.agents.supervisor.knowledge.station import MergeStation
+from lidarium.agents.supervisor.knowledge.trails import without_bodies, without_own_trail
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.station import MergeStation
-from lidarium.agents.supervisor.trails import without_bodies, without_own_trail
 from lidarium.envs.radio.messages import OperatingState
 from lidarium.mapping.merging.growing_maps import GrowingMap
 

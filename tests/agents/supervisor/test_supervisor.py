@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from reported_halls import RADIUS, RESOLUTION, hall, report
 
+from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.settings import SupervisorSettings
-from lidarium.agents.supervisor.station import MergeStation
 from lidarium.agents.supervisor.supervisor import Supervisor
 from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.radio.messages import OperatingState, OrderKind

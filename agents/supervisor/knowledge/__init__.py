@@ -1,0 +1,1 @@
+"""What the station knows of its robots."""
