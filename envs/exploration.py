@@ -18,7 +18,7 @@ from lidarium.envs.agent_infos import AgentInfos
 from lidarium.envs.agent_observations import AgentObservations, Observation
 from lidarium.envs.episode_start import EpisodeStart, begin, make_simulation
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.observations import action_space, observation_space
+from lidarium.envs.observation_spaces import action_space, observation_space
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception

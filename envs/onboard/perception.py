@@ -24,10 +24,9 @@ from lidarium.envs.onboard.navigation import (
     NavigationMap,
     extend_window,
     refresh_map,
-    refresh_team,
-    sum_team,
 )
 from lidarium.envs.onboard.received_maps import ReceivedMaps
+from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team, sum_team
 from lidarium.envs.radio.exchange import Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation

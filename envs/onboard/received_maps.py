@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.known_poses import KnownPoses
-from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT, FLAGS, RECORD, NavigationMap, sum_maps
+from lidarium.envs.onboard.navigation import CLEARANCE_LIMIT, FLAGS, RECORD, NavigationMap
+from lidarium.envs.onboard.team_maps import sum_maps
 from lidarium.envs.radio.exchange import Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.agreement_counts import disc_agreement
 from lidarium.mapping.merging.alignment import Candidate, refine
 from lidarium.mapping.merging.candidates import (
     NO_INLIERS,
@@ -22,12 +23,7 @@ from lidarium.mapping.merging.candidates import (
 from lidarium.mapping.merging.correspondence import Matches, match_corners
 from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import (
-    Agreement,
-    compare,
-    disc_agreement,
-    has_contradiction,
-)
+from lidarium.mapping.merging.validation import Agreement, compare, has_contradiction
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
 NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))
