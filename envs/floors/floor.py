@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.drawing import draw_segments, fill_shapes, ring_edges
+from lidarium.envs.floors.extent import check_extent
 
 MAX_RASTER_CELLS = 200_000_000
 
@@ -129,6 +130,11 @@ class Floor:
                 f"floor {self.name!r} has bounds {self.bounds}; want finite x_min < x_max and y_min < y_max "
                 "in metres"
             )
+        check_extent(
+            f"floor {self.name!r}",
+            self.bounds,
+            (ring for solid in self.solids for ring in (solid.polygon, *solid.holes)),
+        )
         if self.solids and self.cells is not None:
             raise ValueError(
                 f"floor {self.name!r} has {len(self.solids)} solids and cells too; want one or the other"

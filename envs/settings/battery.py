@@ -7,9 +7,10 @@ Kobuki: lithium-ion battery of 2400 mAh at 14.8 V nominal, which lasts 4.5 h (us
 by its data sheet), the rest for driving at 0.33 m/s.
 """
 
-import math
 from dataclasses import dataclass
+from typing import Annotated
 
+from lidarium.mapping.geometry.bounds import above, check_settings, within
 from lidarium.registry import Registry
 
 
@@ -30,22 +31,13 @@ class Battery:
         m off the middle, so far.
     """
 
-    capacity_j: float | None = None
-    idle_w: float = 4.6
-    per_metre_j: float = 10.0
-    per_radian_j: float = 1.15
+    capacity_j: Annotated[float, above(0.0, 1e12)] | None = None
+    idle_w: Annotated[float, within(0.0, 1e6)] = 4.6
+    per_metre_j: Annotated[float, within(0.0, 1e6)] = 10.0
+    per_radian_j: Annotated[float, within(0.0, 1e6)] = 1.15
 
     def __post_init__(self) -> None:
-        if self.capacity_j is not None and not 0.0 < self.capacity_j < math.inf:
-            raise ValueError(
-                f"capacity_j of the battery is {self.capacity_j}; want a number of joules above 0, or None "
-                "for no limit"
-            )
-        for name in ("idle_w", "per_metre_j", "per_radian_j"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(
-                    f"{name} of the battery is {getattr(self, name)}; want a number of 0 or more"
-                )
+        check_settings(self, "the battery")
 
     @property
     def is_limited(self) -> bool:

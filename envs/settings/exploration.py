@@ -1,32 +1,43 @@
 """Every knob of the exploration environments, with its unit and default."""
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass
-from numbers import Integral
-from typing import Any, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 from lidarium.envs.settings.battery import BATTERIES, Battery
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
 from lidarium.envs.settings.lidar import LIDARS, Lidar
+from lidarium.envs.settings.limits import OBSERVABLES as OBSERVABLES
+from lidarium.envs.settings.limits import check_workload, egocentric_scales_of, observed_names
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.radio import RADIO, RadioSettings
 from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS, Robot
+from lidarium.mapping.geometry.bounds import (
+    above,
+    check_anything,
+    check_settings,
+    inner,
+    share,
+    shown,
+    within,
+)
 from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.localization.registry import LOCALIZERS
-from lidarium.registry import REGISTRIES, registry, unknown
+from lidarium.registry import REGISTRIES, registry
 
 MAX_ROBOTS = 64
 MAX_MAP_CELLS = 4096
 MAX_EGOCENTRIC_CELLS = 1024
-MAX_EGOCENTRIC_SCALE = 64
 
-OBSERVABLES = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
-"""What a robot can observe, in the order in which observations have it.
-
-A goal is observed wherever the floor has one.
-"""
+OCCUPANCY = inner(
+    resolution=within(1e-3, 10.0),
+    hit=above(0.0, 127.0),
+    miss=above(0.0, 127.0),
+    minimum=within(-127.0, 0.0),
+    maximum=within(0.0, 127.0),
+)
+"""Bounds of the maps, whose own class only says how its numbers fit together."""
 
 TRUE_POSE = "truth"
 """The localization that is none: the robot is given its true pose."""
@@ -103,56 +114,42 @@ class ExplorationSettings:
         Threads of the kernels; the result does not depend on it.
     """
 
-    robots: int = 3
+    robots: Annotated[int, within(1, MAX_ROBOTS)] = 3
     robot: Robot = field(default_factory=lambda: ROBOTS["kobuki"])
     lidar: Lidar = field(default_factory=lambda: LIDARS["urg"])
-    occupancy: OccupancySettings = field(default_factory=OccupancySettings)
+    occupancy: Annotated[OccupancySettings, OCCUPANCY] = field(default_factory=OccupancySettings)
     reward: RewardSettings = field(default_factory=RewardSettings)
     known_starts: bool = True
     reveals_starts: bool = False
     localization: str = TRUE_POSE
-    localizer: Any = None
+    localizer: Annotated[Any, inner(particles=within(1, 20_000))] = None
     odometry: OdometrySettings = ODOMETRY["ideal"]
     radio: RadioSettings = RADIO["all"]
     faults: FaultSettings = NO_FAULTS
     battery: Battery = BATTERIES["none"]
     pauses_when_blocked: bool = False
     backend: str = "kinematic"
-    time_step: float = 0.1
-    horizon_s: float | None = 600.0
-    stop_coverage: float | None = 0.99
+    time_step: Annotated[float, within(1e-4, 10.0)] = 0.1
+    horizon_s: Annotated[float, above(0.0, 1e8)] | None = 600.0
+    stop_coverage: Annotated[float, share(has_least=False)] | None = 0.99
     stop_on_contact: bool = False
-    goal_radius: float = 0.3
+    goal_radius: Annotated[float, above(0.0, 1e4)] = 0.3
     observe: tuple[str, ...] = ("scan", "pose", "velocity", "bumper", "map")
-    map_cells: int = 256
-    egocentric_cells: int = 64
+    map_cells: Annotated[int, within(2, MAX_MAP_CELLS)] = 256
+    egocentric_cells: Annotated[int, within(2, MAX_EGOCENTRIC_CELLS)] = 64
     egocentric_scales: tuple[int, ...] = (1, 4)
-    raster_resolution: float = 0.025
-    decision_period_s: float = 2.0
-    threads: int = 1
+    raster_resolution: Annotated[float, within(1e-3, 10.0)] = 0.025
+    decision_period_s: Annotated[float, above(0.0, 1e6)] = 2.0
+    threads: Annotated[int, within(1, 1024)] = 1
 
     def __post_init__(self) -> None:
-        for name, kind in (
-            ("robots", Integral),
-            ("map_cells", Integral),
-            ("egocentric_cells", Integral),
-            ("threads", Integral),
-        ):
-            if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), kind):
-                raise ValueError(
-                    f"{name} is {getattr(self, name)!r}; want a whole "
-                    f"number{' from 1 to 64' if name == 'robots' else ''}"
-                )
         for name, wanted in PARTS.items():
             if not isinstance(getattr(self, name), wanted):
                 raise ValueError(
-                    f"{name} is {getattr(self, name)!r}; want "
+                    f"{name} is {shown(getattr(self, name))}; want "
                     f"{wanted.__name__}{' or its name' if name in REGISTRIES else ''}"
                 )
-        if not 1 <= self.robots <= MAX_ROBOTS:
-            raise ValueError(f"robots is {self.robots}; a team has 1 to {MAX_ROBOTS}")
-        if not (math.isfinite(self.goal_radius) and self.goal_radius > 0.0):
-            raise ValueError(f"goal_radius is {self.goal_radius} m; want more than 0")
+        check_settings(self)
         if self.localization not in localizations():
             raise ValueError(
                 f"localization is {self.localization!r}; want one of {', '.join(localizations())}"
@@ -161,39 +158,24 @@ class ExplorationSettings:
             self._check_localizer()
         if self.backend != "kinematic" and self.backend not in registry("backend"):
             raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(registry('backend'))}")
-        if not (math.isfinite(self.time_step) and self.time_step > 0.0):
-            raise ValueError(f"time_step is {self.time_step} s; want more than 0")
-        if self.horizon_s is not None and not 0.0 < self.horizon_s < math.inf:
-            raise ValueError(f"horizon_s is {self.horizon_s}; want more than 0 s, or None for no horizon")
-        if self.stop_coverage is not None and not 0.0 < self.stop_coverage <= 1.0:
-            raise ValueError(
-                f"stop_coverage is {self.stop_coverage}; want a share in (0, 1], or None for off"
-            )
-        if not 2 <= self.map_cells <= MAX_MAP_CELLS or self.map_cells % 2:
-            raise ValueError(f"map_cells is {self.map_cells}; want an even number from 2 to {MAX_MAP_CELLS}")
-        if not 2 <= self.egocentric_cells <= MAX_EGOCENTRIC_CELLS or self.egocentric_cells % 2:
-            raise ValueError(
-                f"egocentric_cells is {self.egocentric_cells}; want an even number from 2 to "
-                f"{MAX_EGOCENTRIC_CELLS}"
-            )
+        for name in ("map_cells", "egocentric_cells"):
+            if getattr(self, name) % 2:
+                raise ValueError(f"{name} is {getattr(self, name)}; want an even number")
         # Lists, as files of settings have them, become tuples: settings can be compared and hashed.
-        object.__setattr__(self, "observe", _observed(self.observe))
-        object.__setattr__(self, "egocentric_scales", _scales(self.egocentric_scales))
-        if not (math.isfinite(self.raster_resolution) and self.raster_resolution > 0.0):
-            raise ValueError(f"raster_resolution is {self.raster_resolution} m; want more than 0")
+        object.__setattr__(self, "observe", observed_names(self.observe))
+        object.__setattr__(self, "egocentric_scales", egocentric_scales_of(self.egocentric_scales))
         multiple = self.occupancy.resolution / self.raster_resolution
         if round(multiple) < 1 or abs(multiple - round(multiple)) > 1e-6:
             raise ValueError(
                 f"resolution of the maps is {self.occupancy.resolution} m; "
                 f"want a whole multiple of raster_resolution {self.raster_resolution} m"
             )
-        if not self.time_step <= self.decision_period_s < math.inf:
+        if not self.time_step <= self.decision_period_s:
             raise ValueError(
                 f"decision_period_s is {self.decision_period_s} s; want at least the time step of "
                 f"{self.time_step} s"
             )
-        if self.threads < 1:
-            raise ValueError(f"threads is {self.threads}; want at least 1")
+        check_workload(self)
 
     def _check_localizer(self) -> None:
         if self.localization not in LOCALIZERS:
@@ -203,9 +185,10 @@ class ExplorationSettings:
         wanted = LOCALIZERS[self.localization].Settings
         if not isinstance(self.localizer, wanted):
             raise ValueError(
-                f"localizer is {self.localizer!r}; want {wanted.__name__} for localization "
+                f"localizer is {shown(self.localizer)}; want {wanted.__name__} for localization "
                 f"{self.localization!r}"
             )
+        check_anything(self.localizer, f"localizer {self.localization!r}")
 
     @property
     def is_ideal(self) -> bool:
@@ -275,37 +258,3 @@ def with_parts(kind: type, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
         for name, value in values.items()
     }
     return kind(**made)
-
-
-def _observed(names: Iterable[str]) -> tuple[str, ...]:
-    """Return names of what is observed in the order of ``OBSERVABLES``, checked."""
-    wanted = f"want one or more of {', '.join(OBSERVABLES)}"
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        raise ValueError(f"observe is {names!r}; {wanted}, in a list or tuple")
-    names = tuple(names)
-    for name in names:
-        if name not in OBSERVABLES:
-            raise ValueError(f"observe has an {unknown('name', name, OBSERVABLES)}")
-        if names.count(name) > 1:
-            raise ValueError(f"observe is {names}; want {name!r} once")
-    if not names:
-        raise ValueError(f"observe is empty ({names}); {wanted}")
-    return tuple(name for name in OBSERVABLES if name in names)
-
-
-def _scales(scales: Iterable[int]) -> tuple[int, ...]:
-    """Return the scales of the egocentric map as a tuple, checked."""
-    wanted = f"want one or more whole numbers from 1 to {MAX_EGOCENTRIC_SCALE}, in a list or tuple"
-    if isinstance(scales, str) or not isinstance(scales, Iterable):
-        raise ValueError(f"egocentric_scales is {scales!r}; {wanted}")
-    scales = tuple(scales)
-    for scale in scales:
-        if (
-            isinstance(scale, bool)
-            or not isinstance(scale, Integral)
-            or not 1 <= scale <= MAX_EGOCENTRIC_SCALE
-        ):
-            raise ValueError(f"egocentric_scales is {scales}; {wanted}")
-    if not scales:
-        raise ValueError(f"egocentric_scales is empty ({scales}); {wanted}")
-    return tuple(int(scale) for scale in scales)

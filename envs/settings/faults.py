@@ -1,10 +1,24 @@
 """Settings of faults: at set times or at a rate."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
+from typing import Annotated, Any
+
+from lidarium.mapping.geometry.bounds import Bounds, above, check_settings, shown, within
 
 KINDS = ("", "laser_dropout", "blind_sector", "stuck_wheel", "kidnapping", "dead_robot", "dead_radio")
 """Kinds of faults by name, in the order of their numbers."""
+
+Rate = Annotated[float, within(0.0, 1e6, "a number an hour")]
+"""How often a fault befalls a robot [1/h]."""
+
+LASTING = Bounds(0.0, 1e9, has_least=False, what="a time", never=True)
+"""How long a fault may last [s]."""
+
+MOST_SCHEDULED = 10_000
+"""Most faults of a schedule."""
 
 MOST_DRAWN = 32
 """Most faults that rates bring a robot in an episode."""
@@ -34,10 +48,10 @@ class Fault:
     """
 
     kind: str
-    robot: int = 0
-    at_s: float = 0.0
-    lasts_s: float | None = None
-    bearing: float = 0.0
+    robot: Annotated[int, within(0, 63)] = 0
+    at_s: Annotated[float, within(0.0, 1e9)] = 0.0
+    lasts_s: Annotated[float, LASTING] | None = None
+    bearing: Annotated[float, within(-1000.0, 1000.0)] = 0.0
     width: float = math.radians(60.0)
     wheel: str = "left"
     place: tuple[float, float, float] | None = None
@@ -45,13 +59,8 @@ class Fault:
     def __post_init__(self) -> None:
         if self.kind not in KINDS[1:]:
             raise ValueError(f"kind of the fault is {self.kind!r}; want one of {', '.join(KINDS[1:])}")
-        if isinstance(self.robot, bool) or not isinstance(self.robot, int) or self.robot < 0:
-            raise ValueError(f"robot of the fault is {self.robot!r}; want the number of a robot, from 0")
-        if not (math.isfinite(self.at_s) and self.at_s >= 0.0):
-            raise ValueError(f"at_s of the fault is {self.at_s}; want a time of 0 s or more")
-        if self.lasts_s is not None and not self.lasts_s > 0.0:
-            raise ValueError(f"lasts_s of the fault is {self.lasts_s}; want more than 0 s, or None for ever")
-        if not (math.isfinite(self.bearing) and 0.0 < self.width <= 2.0 * math.pi):
+        check_settings(self, "the fault")
+        if not (isinstance(self.width, Real) and 0.0 < self.width <= 2.0 * math.pi):
             raise ValueError(
                 f"the blind sector is {self.width} rad wide at {self.bearing} rad; want a width above 0 and "
                 "at most 2 pi"
@@ -59,12 +68,7 @@ class Fault:
         if self.wheel not in ("left", "right"):
             raise ValueError(f"wheel of the fault is {self.wheel!r}; want left or right")
         if self.place is not None:
-            place = tuple(float(value) for value in self.place)
-            if len(place) != 3 or not all(math.isfinite(value) for value in place):
-                raise ValueError(
-                    f"place of the fault is {self.place!r}; want x, y [m] and theta [rad], or None"
-                )
-            object.__setattr__(self, "place", place)
+            object.__setattr__(self, "place", _place(self.place))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,26 +86,17 @@ class FaultSettings:
     """
 
     schedule: tuple[Fault, ...] = ()
-    laser_dropout: float = 0.0
-    blind_sector: float = 0.0
-    stuck_wheel: float = 0.0
-    kidnapping: float = 0.0
-    dead_robot: float = 0.0
-    dead_radio: float = 0.0
-    lasts_s: float = 3.0
+    laser_dropout: Rate = 0.0
+    blind_sector: Rate = 0.0
+    stuck_wheel: Rate = 0.0
+    kidnapping: Rate = 0.0
+    dead_robot: Rate = 0.0
+    dead_radio: Rate = 0.0
+    lasts_s: Annotated[float, above(0.0, 1e6)] = 3.0
 
     def __post_init__(self) -> None:
-        faults = tuple(Fault(**fault) if isinstance(fault, dict) else fault for fault in self.schedule)
-        if not all(isinstance(fault, Fault) for fault in faults):
-            raise ValueError(f"schedule of faults is {self.schedule!r}; want faults")
-        object.__setattr__(self, "schedule", faults)
-        for kind in KINDS[1:]:
-            if not 0.0 <= getattr(self, kind) < math.inf:
-                raise ValueError(
-                    f"rate of {kind} is {getattr(self, kind)}; want a number an hour of 0 or more"
-                )
-        if not 0.0 < self.lasts_s < math.inf:
-            raise ValueError(f"lasts_s of faults is {self.lasts_s}; want more than 0 s")
+        object.__setattr__(self, "schedule", _schedule(self.schedule))
+        check_settings(self, "faults")
 
     @property
     def rates(self) -> tuple[float, ...]:
@@ -118,6 +113,30 @@ class FaultSettings:
         return max((robots.count(robot) for robot in robots), default=0) + (
             MOST_DRAWN if any(self.rates) else 0
         )
+
+
+def _place(place: Any) -> tuple[float, float, float]:  # noqa: ANN401
+    """Return where a kidnapped robot is put, checked."""
+    is_pose = isinstance(place, Sequence) and len(place) == 3
+    if not is_pose or not all(isinstance(value, Real) and abs(value) <= 1e6 for value in place):
+        raise ValueError(
+            f"place of the fault is {shown(place)}; want x, y [m] and theta [rad] within a million, or None"
+        )
+    return float(place[0]), float(place[1]), float(place[2])
+
+
+def _schedule(faults: Any) -> tuple[Fault, ...]:  # noqa: ANN401
+    """Return the faults of a schedule, checked; those of files are mappings."""
+    wanted = f"want a list of faults, {MOST_SCHEDULED:,} at most"
+    if not isinstance(faults, Sequence) or isinstance(faults, str) or len(faults) > MOST_SCHEDULED:
+        raise ValueError(f"schedule of faults is {shown(faults)}; {wanted}")
+    try:
+        made = tuple(Fault(**fault) if isinstance(fault, Mapping) else fault for fault in faults)
+    except TypeError as error:
+        raise ValueError(f"schedule of faults has one that cannot be used: {error}") from error
+    if not all(isinstance(fault, Fault) for fault in made):
+        raise ValueError(f"schedule of faults is {shown(faults)}; {wanted}")
+    return made
 
 
 NO_FAULTS = FaultSettings()

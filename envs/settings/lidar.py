@@ -2,9 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.geometry.bounds import Distance, above, check_settings, within
+from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, ScanGeometry
 from lidarium.registry import Registry
+
+MOST_RANGE_M = 200.0
+"""Farthest that a simulated laser may reach [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,18 +24,18 @@ class Lidar(ScanGeometry):
         Height of the laser's plane above the floor [m].
     """
 
-    noise_floor: float = 0.0
-    noise_share: float = 0.0
-    height: float = 0.3
+    # The first four are those of a scan; here they have the bounds of what can be simulated.
+    beams: Annotated[int, within(1, MOST_BEAMS)] = 727
+    field_of_view: Annotated[float, above(0.0, 2.0 * math.pi + 1e-9)] = math.radians(240.0)
+    range_min: Distance = 0.02
+    range_max: Annotated[float, above(0.0, MOST_RANGE_M)] = 5.6
+    noise_floor: Annotated[float, within(0.0, 100.0)] = 0.0
+    noise_share: Annotated[float, within(0.0, 10.0)] = 0.0
+    height: Annotated[float, above(0.0, 100.0)] = 0.3
 
     def __post_init__(self) -> None:
+        check_settings(self, "the laser")
         ScanGeometry.__post_init__(self)
-        if not (self.noise_floor >= 0.0 and self.noise_share >= 0.0):
-            raise ValueError(
-                f"noise_floor is {self.noise_floor} and noise_share is {self.noise_share}; want 0 or more"
-            )
-        if not self.height > 0.0:
-            raise ValueError(f"height of the laser's plane is {self.height} m; want more than 0")
 
     @property
     def is_noisy(self) -> bool:

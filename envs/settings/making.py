@@ -5,10 +5,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from lidarium.envs.settings.exploration import PARTS, ExplorationSettings, localizer_settings
-from lidarium.envs.settings.lidar import NOISE
+from lidarium.envs.settings.exploration import OCCUPANCY, PARTS, ExplorationSettings, localizer_settings
+from lidarium.envs.settings.lidar import NOISE, Lidar
 from lidarium.envs.settings.realism import REALISM
+from lidarium.mapping.geometry.bounds import Rule, check_values, rules_of, shown, within
+from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.registry import REGISTRIES, registry, unknown
+
+CYCLES = Rule(int, bounds=within(1, 10**9))
+"""How many steps an episode may have."""
+
+TIME_STEP = rules_of(ExplorationSettings)["time_step"]
 
 SHORT_OPTIONS = ("assigned", "max_cycles", "noise", "realism", "resolution")
 """Options of ``make_settings`` that are no attributes of the settings."""
@@ -47,18 +54,23 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     options = {name: _part(name, value) for name, value in options.items()}
     lidar = options.pop("lidar", base.lidar)
     noise = options.pop("noise", None)
-    if noise is not None:
+    if noise is not None and isinstance(lidar, Lidar):
         noise_floor, noise_share = NOISE[noise]
         lidar = replace(lidar, noise_floor=noise_floor, noise_share=noise_share)
     options["lidar"] = lidar
     resolution = options.pop("resolution", None)
     if resolution is not None:
-        options["occupancy"] = replace(options.get("occupancy", base.occupancy), resolution=resolution)
+        check_values({"resolution": resolution}, OCCUPANCY.bounds, "the maps")
+        occupancy = options.get("occupancy", base.occupancy)
+        if isinstance(occupancy, OccupancySettings):
+            options["occupancy"] = replace(occupancy, resolution=resolution)
     max_cycles = options.pop("max_cycles", None)
     if max_cycles is not None:
-        if max_cycles < 1:
-            raise ValueError(f"max_cycles is {max_cycles}; want at least 1 step")
-        options["horizon_s"] = max_cycles * options.get("time_step", base.time_step)
+        time_step = options.get("time_step", base.time_step)
+        for name, value, rule in (("max_cycles", max_cycles, CYCLES), ("time_step", time_step, TIME_STEP)):
+            if not rule.hold(value):
+                raise ValueError(f"{name} is {shown(value)}; want {rule.wanted}")
+        options["horizon_s"] = max_cycles * time_step
     known = ExplorationSettings.__dataclass_fields__
     for name in options:
         if name not in known:
@@ -72,6 +84,7 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
 def _part(name: str, value: Any) -> Any:  # noqa: ANN401
     """Return the value of an option, where it is a part by its name or by its values."""
     if name in PARTS and isinstance(value, Mapping):
+        check_values(value, rules_of(ExplorationSettings)[name].inner, name)
         return PARTS[name](**value)
     if name in PARTS and name in REGISTRIES and isinstance(value, str):
         return registry(name)[value]
@@ -97,7 +110,7 @@ def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> Explora
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         if not equals:
-            raise ValueError(f"{assignment!r} sets nothing; want NAME=VALUE, such as reward.time=0.02")
+            raise ValueError(f"{shown(assignment)} sets nothing; want NAME=VALUE, such as reward.time=0.02")
         path = name.strip().split(".")
         if path[0] == "localizer" and settings.localizer is None:
             settings = replace(settings, localizer=localizer_settings(settings.localization, {}))
@@ -117,7 +130,7 @@ def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa
     try:
         return replace(part, **{path[0]: value})
     except TypeError as error:
-        raise ValueError(f"{name} cannot be {value!r}: {error}") from error
+        raise ValueError(f"{name} cannot be {shown(value)}: {error}") from error
 
 
 def _value(text: str) -> Any:  # noqa: ANN401
@@ -125,5 +138,5 @@ def _value(text: str) -> Any:  # noqa: ANN401
         return None
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # text needs no quotes
         return text

@@ -1,11 +1,12 @@
 """Settings of wheel odometry: bias, noise, whole ticks."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.checks import check_from_zero
+from lidarium.mapping.geometry.bounds import check_settings, share, within
 from lidarium.registry import Registry
 
 
@@ -32,22 +33,19 @@ class OdometrySettings:
         [1].
     """
 
-    distance_bias: float = 0.0
-    turn_bias: float = 0.0
-    drift: float = 0.0
-    turn_noise_of_turn: float = 0.0
-    turn_noise_of_distance: float = 0.0
-    distance_noise_of_distance: float = 0.0
-    distance_noise_of_turn: float = 0.0
+    distance_bias: Annotated[float, share(has_most=False)] = 0.0
+    turn_bias: Annotated[float, share(has_most=False)] = 0.0
+    drift: Annotated[float, within(0.0, 10.0)] = 0.0
+    turn_noise_of_turn: Annotated[float, within(0.0, 10.0)] = 0.0
+    turn_noise_of_distance: Annotated[float, within(0.0, 10.0)] = 0.0
+    distance_noise_of_distance: Annotated[float, within(0.0, 10.0)] = 0.0
+    distance_noise_of_turn: Annotated[float, within(0.0, 10.0)] = 0.0
     counts_ticks: bool = False
-    speed_noise: float = 0.0
-    turn_rate_noise: float = 0.0
+    speed_noise: Annotated[float, within(0.0, 10.0)] = 0.0
+    turn_rate_noise: Annotated[float, within(0.0, 10.0)] = 0.0
 
     def __post_init__(self) -> None:
-        check_from_zero(self, "the odometry", (field.name for field in fields(self)))
-        for name in ("distance_bias", "turn_bias"):
-            if getattr(self, name) >= 1.0:
-                raise ValueError(f"{name} of the odometry is {getattr(self, name)}; want a share below 1")
+        check_settings(self, "the odometry")
 
     @property
     def is_ideal(self) -> bool:

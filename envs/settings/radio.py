@@ -6,10 +6,10 @@ Parameters of ``signal``: IR2 (Tan et al., "IR2: Implicit Rendezvous for Robotic
 Sparse Intermittent Connectivity", IROS 2024); its pixels are taken as 0.1 m.
 """
 
-import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from lidarium.mapping.geometry.checks import check_from_zero, check_positive
+from lidarium.mapping.geometry.bounds import above, check_settings, share, within
 from lidarium.registry import Registry
 
 RADIO_KINDS = ("all", "none", "range", "line_of_sight", "signal")
@@ -46,31 +46,23 @@ class RadioSettings:
     """
 
     kind: str = "all"
-    reach: float = 10.0
-    power: float = -20.0
-    threshold: float = -70.0
-    reference_distance: float = 3.5
-    reference_loss: float = 31.0
-    free_exponent: float = 2.0
-    wall_exponent: float = 4.0
-    wall_loss: float = 6.5
-    shadowing: float = 0.0
-    loss: float = 0.0
-    latency_s: float = 0.0
-    period_s: float = 1.0
+    reach: Annotated[float, above(0.0, 1e6)] = 10.0
+    power: Annotated[float, within(-1000.0, 1000.0)] = -20.0
+    threshold: Annotated[float, within(-1000.0, 1000.0)] = -70.0
+    reference_distance: Annotated[float, above(0.0, 1e6)] = 3.5
+    reference_loss: Annotated[float, within(-1000.0, 1000.0)] = 31.0
+    free_exponent: Annotated[float, within(0.0, 100.0)] = 2.0
+    wall_exponent: Annotated[float, within(0.0, 100.0)] = 4.0
+    wall_loss: Annotated[float, within(0.0, 1e4)] = 6.5
+    shadowing: Annotated[float, within(0.0, 1000.0)] = 0.0
+    loss: Annotated[float, share(has_most=False, what="a probability")] = 0.0
+    latency_s: Annotated[float, within(0.0, 1e6)] = 0.0
+    period_s: Annotated[float, above(0.0, 1e6)] = 1.0
 
     def __post_init__(self) -> None:
+        check_settings(self, "the radio")
         if self.kind not in RADIO_KINDS:
             raise ValueError(f"kind of the radio is {self.kind!r}; want one of {', '.join(RADIO_KINDS)}")
-        check_positive(self, "the radio", ("reach", "reference_distance", "period_s"))
-        check_from_zero(
-            self, "the radio", ("free_exponent", "wall_exponent", "wall_loss", "shadowing", "latency_s")
-        )
-        for name in ("power", "threshold", "reference_loss"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"{name} of the radio is {getattr(self, name)}; want a finite number")
-        if not 0.0 <= self.loss < 1.0:
-            raise ValueError(f"loss of the radio is {self.loss}; want a probability in [0, 1)")
 
     @property
     def is_ideal(self) -> bool:

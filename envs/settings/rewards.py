@@ -1,8 +1,13 @@
 """Weights of the reward."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
+
+from lidarium.mapping.geometry.bounds import Rule, check_settings, shown, within
+
+WEIGHT = Rule(float, bounds=within(-1e6, 1e6))
+"""What the weight of a registered term has to be."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,23 +29,21 @@ class RewardSettings:
         Registered terms (`lidarium show rewards`) with their weights; a mapping is taken as well.
     """
 
-    area: float = 1.0
-    time: float = 0.01
-    contact: float = 0.1
-    energy: float = 0.01
+    area: Annotated[float, within(-1e6, 1e6)] = 1.0
+    time: Annotated[float, within(-1e6, 1e6)] = 0.01
+    contact: Annotated[float, within(-1e6, 1e6)] = 0.1
+    energy: Annotated[float, within(-1e6, 1e6)] = 0.01
     more: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("area", "time", "contact", "energy"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(
-                    f"weight {name} of the reward is {getattr(self, name)}; want a finite number"
-                )
+        check_settings(self, "the reward")
         # Settings can be compared and hashed, so a mapping becomes pairs.
         if not isinstance(self.more, Mapping | tuple | list):
             raise ValueError(f"more of the reward is {self.more!r}; want a mapping of names to weights")
         pairs = self.more.items() if isinstance(self.more, Mapping) else self.more
+        if not all(isinstance(pair, tuple | list) and len(pair) == 2 for pair in pairs):
+            raise ValueError(f"more of the reward is {shown(self.more)}; want a mapping of names to weights")
         object.__setattr__(self, "more", tuple((str(name), weight) for name, weight in pairs))
         for name, weight in self.more:
-            if isinstance(weight, bool) or not isinstance(weight, int | float) or not math.isfinite(weight):
-                raise ValueError(f"weight {name} of the reward is {weight!r}; want a finite number")
+            if not WEIGHT.hold(weight):
+                raise ValueError(f"weight {name} of the reward is {shown(weight)}; want {WEIGHT.wanted}")

@@ -6,11 +6,13 @@ Pioneer P3-DX: data sheet of Adept MobileRobots. Kobuki: user guide of Yujin Rob
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.bounds import above, check_settings
 from lidarium.registry import Registry
 
 
@@ -38,23 +40,20 @@ class Robot:
         Outline of the body [m].
     """
 
-    radius: float = 0.18
-    height: float = 0.52
-    cruise_speed: float = 0.33
-    max_speed: float = 0.77
-    max_turn_rate: float = 3.14
-    max_acceleration: float = 1.0
-    max_turn_acceleration: float = 6.0
-    wheel_base: float = 0.23
-    ticks_per_metre: float = 11724.0
-    length: float = 0.352
-    width: float = 0.352
+    radius: Annotated[float, above(0.0, 10.0)] = 0.18
+    height: Annotated[float, above(0.0, 100.0)] = 0.52
+    cruise_speed: Annotated[float, above(0.0, 50.0)] = 0.33
+    max_speed: Annotated[float, above(0.0, 50.0)] = 0.77
+    max_turn_rate: Annotated[float, above(0.0, 1000.0)] = 3.14
+    max_acceleration: Annotated[float, above(0.0, 1e6)] = 1.0
+    max_turn_acceleration: Annotated[float, above(0.0, 1e6)] = 6.0
+    wheel_base: Annotated[float, above(0.0, 20.0)] = 0.23
+    ticks_per_metre: Annotated[float, above(0.0, 1e7)] = 11724.0
+    length: Annotated[float, above(0.0, 20.0)] = 0.352
+    width: Annotated[float, above(0.0, 20.0)] = 0.352
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (0.0 < value < float("inf")):
-                raise ValueError(f"{field.name} of the robot is {value}; want a number above 0")
+        check_settings(self, "the robot")
         if self.cruise_speed > self.max_speed:
             raise ValueError(f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s")
 

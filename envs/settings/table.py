@@ -3,10 +3,11 @@
 import inspect
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.mapping.geometry.bounds import rules_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +24,15 @@ class Setting:
         Its default.
     summary : str
         What it is, with its unit.
+    bounds : str
+        Where it may be, as an interval; empty for what is no number.
     """
 
     name: str
     kind: str
     default: Any
     summary: str
+    bounds: str = ""
 
 
 def settings_table(settings: Any = None, prefix: str = "") -> Iterator[Setting]:  # noqa: ANN401
@@ -42,14 +46,19 @@ def settings_table(settings: Any = None, prefix: str = "") -> Iterator[Setting]:
         What precedes the names.
     """
     settings = ExplorationSettings() if settings is None else settings
-    documented = documented_attributes(type(settings))
+    documented, rules = documented_attributes(type(settings)), rules_of(type(settings))
     for each in fields(settings):
         value = getattr(settings, each.name)
         if is_dataclass(value):
-            yield from settings_table(value, f"{prefix}{each.name}.")
+            declared = rules[each.name].inner
+            for row in settings_table(value, f"{prefix}{each.name}."):
+                own = declared.get(row.name.rpartition(".")[2])
+                yield row if own is None else replace(row, bounds=own.interval)
         else:
             kind, summary = documented[each.name]
-            yield Setting(f"{prefix}{each.name}", kind, value, summary)
+            rule = rules[each.name]
+            bounds = rule.bounds.interval if rule.kind in (int, float) else ""
+            yield Setting(f"{prefix}{each.name}", kind, value, summary, bounds)
 
 
 def documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
@@ -72,9 +81,13 @@ def documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
 def markdown_table() -> str:
     """Return the table of all settings as Markdown."""
     rows = [
-        f"| `{row.name}` | {row.kind} | `{_shown(row.default)}` | {row.summary} |" for row in settings_table()
+        f"| `{row.name}` | {row.kind} | `{_shown(row.default)}` | {row.bounds} | {row.summary} |"
+        for row in settings_table()
     ]
-    return "\n".join(["| setting | type | default | what it is |", "|---|---|---|---|", *rows]) + "\n"
+    return (
+        "\n".join(["| setting | type | default | bounds | what it is |", "|---|---|---|---|---|", *rows])
+        + "\n"
+    )
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401

@@ -4,35 +4,35 @@ Episodes that do not belong together are refused.
 """
 
 import json
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lidarium.evaluation.suites.episodes_file import TIMINGS, read_lines
+from lidarium.mapping.geometry.bounds import Rule, shown, within
 
 Row = dict[str, Any]
 """A line of ``episodes.jsonl``: what `evaluation.result.result_of` returns."""
 
 FILE = "episodes.jsonl"
 
-_WANTED: dict[str, type | tuple[type, ...]] = {
-    "floor": str,
-    "floor_sha256": str,
-    "robots": int,
-    "policy": str,
-    "seed": int,
-    "interrupted": bool,
-    "coverage_final": (int, float),
-    "time_s": (int, float),
-    "path_m": list,
-    "overlap": (int, float),
-    "collisions": int,
-    "ended_because": dict,
-    "version": str,
-    "settings_sha256": str,
+_TEXT, _FIGURE, _COUNT = Rule(str), Rule(float, bounds=within(0.0, 1e12)), Rule(int, bounds=within(0, 1e12))
+_WANTED: dict[str, Rule] = {
+    "floor": _TEXT,
+    "floor_sha256": _TEXT,
+    "robots": Rule(int, bounds=within(1, 64)),
+    "policy": _TEXT,
+    "seed": Rule(int, bounds=within(0, 2**63)),
+    "interrupted": Rule(bool),
+    "coverage_final": _FIGURE,
+    "time_s": _FIGURE,
+    "overlap": _FIGURE,
+    "collisions": _COUNT,
+    "version": _TEXT,
+    "settings_sha256": _TEXT,
 }
+_GROUPS = ("path_m", "ended_because")
 _MAY_BE_NULL = ("horizon_s", "t90_s", "t99_s")
 _OF_SETTINGS = ("backend", "localization", "realism", "horizon_s")
 """Keys of a line that tell something of the settings behind their hash."""
@@ -127,17 +127,24 @@ def name_of(row: Row) -> str:
 
 
 def _check_row(row: Row, where: str) -> None:
-    for key in (*_WANTED, *_MAY_BE_NULL):
+    for key in (*_WANTED, *_GROUPS, *_MAY_BE_NULL):
         if key not in row:
             raise ValueError(f"{where} has no key {key!r}; want what `lidarium run` writes to result.json")
-    for key, kinds in _WANTED.items():
-        if not isinstance(row[key], kinds) or (isinstance(row[key], bool) and kinds is not bool):
+    for key, rule in _WANTED.items():
+        if not rule.hold(row[key]):
+            raise ValueError(f"{where} has {key} {shown(row[key])}; want {rule.wanted}")
+    paths = row["path_m"] if isinstance(row["path_m"], list) else [None]
+    for key, is_good in (
+        ("path_m", len(paths) > 0 and all(_FIGURE.hold(path) for path in paths)),
+        ("ended_because", isinstance(row["ended_because"], dict)),
+    ):
+        if not is_good:
             raise ValueError(
-                f"{where} has {key} {row[key]!r}; want what `lidarium run` writes to result.json"
+                f"{where} has {key} {shown(row[key])}; want what `lidarium run` writes to result.json"
             )
     for key in _MAY_BE_NULL:
-        if row[key] is not None and not (isinstance(row[key], int | float) and 0.0 <= row[key] < math.inf):
-            raise ValueError(f"{where} has {key} {row[key]!r}; want seconds or null")
+        if row[key] is not None and not _FIGURE.hold(row[key]):
+            raise ValueError(f"{where} has {key} {shown(row[key])}; want seconds or null")
 
 
 def _without_doubles(

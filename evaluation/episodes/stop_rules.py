@@ -5,10 +5,11 @@ They apply beside what the environment's settings say.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.episodes.history import History
+from lidarium.mapping.geometry.bounds import Count, check_settings, shown, within
 
 _FIGURES: dict[str, Callable[[ExplorationEnv, History], float]] = {
     "c_free": lambda env, _: env.scorer.coverage,
@@ -46,12 +47,13 @@ class StopRule:
     """
 
     figure: str | None = None
-    at_least: float | None = None
-    above: float | None = None
-    at_most: float | None = None
-    decisions: int | None = None
+    at_least: Annotated[float, within(-1e12, 1e12)] | None = None
+    above: Annotated[float, within(-1e12, 1e12)] | None = None
+    at_most: Annotated[float, within(-1e12, 1e12)] | None = None
+    decisions: Count | None = None
 
     def __post_init__(self) -> None:
+        check_settings(self, "the stop rule")
         bounds = [bound for bound in (self.at_least, self.above, self.at_most) if bound is not None]
         if self.figure is not None and self.figure not in _FIGURES:
             raise ValueError(f"figure of the stop rule is {self.figure!r}; want one of {', '.join(_FIGURES)}")
@@ -60,8 +62,6 @@ class StopRule:
                 f"the stop rule asks for {self.figure!r} with {len(bounds)} bounds; want a figure with one "
                 "of at_least, above, at_most"
             )
-        if self.decisions is not None and self.decisions < 1:
-            raise ValueError(f"decisions of the stop rule is {self.decisions}; want at least 1")
         if self.figure is None and self.decisions is None:
             raise ValueError("the stop rule ends nothing; want a figure with its bound, decisions, or both")
 
@@ -104,6 +104,8 @@ def stop_rule_of(content: Mapping[str, Any] | None) -> StopRule | None:
     """
     if content is None:
         return None
+    if not isinstance(content, Mapping):
+        raise ValueError(f"the stop rule is {shown(content)}; want a table, as in [stop]")
     known = StopRule.__dataclass_fields__
     unknown = sorted(set(content) - set(known))
     if unknown:

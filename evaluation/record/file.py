@@ -5,10 +5,7 @@
 
 import io
 import json
-import struct
-import tokenize
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +14,9 @@ from numpy.typing import NDArray
 
 from lidarium.evaluation.episodes.output import whole_file
 from lidarium.evaluation.record.display import DisplayTrack, MapChanges
-from lidarium.evaluation.record.episode_record import EpisodeRecord, NewerFormatError, check_header
-from lidarium.mapping.files.map_files import check_file
+from lidarium.evaluation.record.episode_record import TIME, EpisodeRecord, NewerFormatError, check_header
+from lidarium.mapping.files.guarded_arrays import GuardedArchive
+from lidarium.mapping.files.guarded_reading import read_bytes, reading
 
 _HEADER, _EVENTS = "header.json", "events.json"
 _ARRAYS = (
@@ -33,21 +31,8 @@ _ARRAYS = (
     "map_occupied",
 )
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-_DAMAGE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    struct.error,
-    tokenize.TokenError,
-    SyntaxError,
-    EOFError,
-    KeyError,
-    ValueError,
-    RuntimeError,
-)
-"""Errors that readers raise on damaged bytes.
-
-The readers are those of zips, arrays and JSON.
-"""
+MOST_COMMAND = 1e6
+"""Highest speed or turn rate that a record may command [m/s, rad/s]."""
 
 _UNITS = 1e3
 """Steps of positions and headings in a metre and a radian."""
@@ -95,22 +80,18 @@ def read_record(path: Path) -> EpisodeRecord:
         Where it is no record, damaged, cut short, or of a newer format than this version knows.
     """
     path = Path(path)
-    check_file(path)
-    content = path.read_bytes()
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            header = json.loads(archive.read(_HEADER))
+    content = read_bytes(path)
+    with reading(path, "a whole episode record", "want a file that lidarium run --record wrote"):
+        archive = GuardedArchive(content)
+        header = json.loads(archive.read(_HEADER))
+        try:
             check_header(header)
-            events = json.loads(archive.read(_EVENTS))
-            arrays = {name: _array(archive, name) for name in _ARRAYS}
-            return _unpacked(header, events, arrays)
-    except NewerFormatError as error:
-        raise ValueError(f"{path} {error}") from error
-    except _DAMAGE as error:
-        raise ValueError(
-            f"{path} is not a whole episode record: {_reason(error)}; want a file that lidarium run --record "
-            "wrote"
-        ) from error
+        except NewerFormatError as error:
+            raise ValueError(f"{path} {error}") from error
+        events = json.loads(archive.read(_EVENTS))
+        # Members are read as a whole first, which looks at the checksum: nothing damaged is parsed.
+        arrays = {name: archive.array(f"{name}.npy") for name in _ARRAYS}
+        return _unpacked(header, events, arrays)
 
 
 def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -121,16 +102,9 @@ def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 def _json(content: Any) -> bytes:  # noqa: ANN401
     try:
-        return json.dumps(content, allow_nan=False, ensure_ascii=False).encode()
+        return json.dumps(content, allow_nan=False, ensure_ascii=False).encode("utf-8", "surrogatepass")
     except TypeError as error:
         raise ValueError(f"an event or the header of the record holds what JSON cannot: {error}") from error
-
-
-def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    # Read as a whole first, which looks at the checksum: nothing damaged is parsed.
-    with io.BytesIO(archive.read(f"{name}.npy")) as member:
-        array: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
-    return array
 
 
 def _packed(record: EpisodeRecord) -> dict[str, NDArray[Any]]:
@@ -187,6 +161,8 @@ def _unpacked(header: dict[str, Any], events: Any, arrays: dict[str, NDArray[Any
                 f"{name} has shape {arrays[name].shape} of {arrays[name].dtype}; want {shape} of "
                 f"{np.dtype(kind)}"
             )
+    if not (np.abs(arrays["commands"]) <= MOST_COMMAND).all():
+        raise ValueError(f"commands are not all numbers of at most {MOST_COMMAND:,.0f}")
     places = np.cumsum(arrays["map_places"], dtype=np.int64)
     if int(arrays["map_counts"].sum()) != changed or (
         changed and not 0 <= int(places.min()) <= int(places.max()) < rows * words
@@ -227,14 +203,6 @@ def _is_event(event: Any) -> bool:  # noqa: ANN401
     return (
         isinstance(event, dict)
         and isinstance(event.get("kind"), str)
-        and isinstance(event.get("time_s"), int | float)
+        and TIME.hold(event.get("time_s"))
         and "agent" in event
-    )
-
-
-def _reason(error: Exception) -> str:
-    return (
-        str(error.args[0])
-        if isinstance(error, KeyError) and error.args
-        else str(error) or type(error).__name__
     )

@@ -132,7 +132,7 @@ def settings_of(header: dict[str, Any]) -> ExplorationSettings:
         )
     try:
         settings = make_settings(**header["settings"])
-    except TypeError as error:
+    except (TypeError, AttributeError) as error:
         raise ValueError(
             f"the settings of the record are not those of lidarium {lidarium.__version__}: {error}"
         ) from error

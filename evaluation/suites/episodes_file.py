@@ -15,6 +15,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from lidarium.mapping.files.guarded_reading import read_bytes, reason
+from lidarium.mapping.geometry.bounds import shown
+
 KEY = "key"
 """What tells an episode from all others of its file."""
 
@@ -69,7 +72,7 @@ def read_lines(path: Path) -> Lines:
     path = Path(path)
     if not path.exists():
         return Lines([], 0)
-    lines = path.read_bytes().split(b"\n")
+    lines = read_bytes(path).split(b"\n")
     numbered: list[tuple[int, dict[str, Any]]] = []
     whole = 0
     for number, line in enumerate(lines, 1):
@@ -77,12 +80,12 @@ def read_lines(path: Path) -> Lines:
         if line.strip():
             try:
                 episode = json.loads(line)
-            except ValueError as error:
+            except (ValueError, RecursionError) as error:
                 # Without a line feed behind it, writing was broken off there.
                 if is_last:
                     return Lines(numbered, whole, (number, len(line)))
                 raise ValueError(
-                    f"{path}, line {number} is not JSON ({error}); want one episode a line"
+                    f"{path}, line {number} is not JSON ({reason(error)}); want one episode a line"
                 ) from error
             if not isinstance(episode, dict):
                 raise ValueError(f"{path}, line {number} is not a JSON object; want one episode a line")
@@ -104,7 +107,7 @@ def _parsed(path: Path) -> tuple[list[dict[str, Any]], int]:
     for number, episode in lines.numbered:
         if not isinstance(episode.get(KEY), str):
             raise ValueError(
-                f"{path}, line {number} has the key {episode.get(KEY)!r}; want text that tells its episode "
+                f"{path}, line {number} has the key {shown(episode.get(KEY))}; want text that tells its episode "
                 "from all others"
             )
         known = episodes.setdefault(episode[KEY], episode)

@@ -16,8 +16,23 @@ from lidarium.envs.floors.catalogue.names import is_generated, load_floor, set_f
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.stop_rules import stop_rule_of
-
-Starts = tuple[tuple[float, float, float], ...]
+from lidarium.evaluation.suites.content import (
+    MOST_SUITE_BYTES,
+    ROBOTS,
+    SEED,
+    SIDE,
+    Starts,
+    check_members,
+    check_numbers,
+    check_texts,
+    check_trials,
+    listed,
+    seeds_of,
+    starts_of,
+    tables_of,
+)
+from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.mapping.geometry.bounds import shown
 
 DEFAULT_VARIANT = "default"
 
@@ -114,18 +129,14 @@ class Suite:
 
     def __post_init__(self) -> None:
         for name in ("policies", "floors", "robots", "seeds", "variants"):
-            values = list(getattr(self, name))
-            if not values:
-                raise ValueError(f"the suite has no {name}; want at least one")
-            twice = next((value for value in values if values.count(value) > 1), None)
-            if twice is not None:
-                raise ValueError(f"the suite names {twice!r} twice among its {name}")
-        for numbers, least, what in ((self.robots, 1, "robots"), (self.seeds, 0, "seeds")):
-            for number in numbers:
-                if isinstance(number, bool) or not isinstance(number, int) or number < least:
-                    raise ValueError(
-                        f"{what} of the suite has {number!r}; want whole numbers of at least {least}"
-                    )
+            check_members(name, list(getattr(self, name)))
+        for name in ("policies", "floors", "variants"):
+            check_texts(name, getattr(self, name))
+        check_numbers("robots", self.robots, ROBOTS)
+        check_numbers("seeds", self.seeds, SEED)
+        check_numbers("image_resolution", [self.image_resolution], SIDE)
+        teams = max((len(teams) for teams in self.starts.values()), default=1)
+        check_trials(*map(len, (self.policies, self.floors, self.robots, self.seeds, self.variants)), teams)
         for name in self.policy_settings:
             if name not in self.policies:
                 raise ValueError(
@@ -163,7 +174,7 @@ class Suite:
                 raise ValueError(f"variant {variant!r} sets {name}, which is fixed by {why}; leave it out")
         try:
             return make_settings(robots=robots, **options)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"variant {variant!r} with {robots} robots cannot be used: {error}") from error
 
     def make_policy(self, name: str) -> Policy:
@@ -177,7 +188,7 @@ class Suite:
         options = dict(self.policy_settings.get(name, {}))
         try:
             return make_policy(options.pop("policy", name), **options)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, AttributeError, OverflowError) as error:
             if name not in self.policy_settings:
                 raise
             raise ValueError(f"policy {name!r} of the suite cannot be made: {error}") from error
@@ -218,16 +229,13 @@ def read_suite(path: Path) -> Suite:
         Where there is no such file, or what it holds cannot be used; the message names the file.
     """
     path = Path(path)
-    if not path.is_file():
+    if not path.exists():
         raise FileNotFoundError(f"no suite {path}; want a TOML file, as docs/reference/files.md shows one")
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} is not TOML: {error}") from error
-    try:
+    text = read_text(path, MOST_SUITE_BYTES)
+    with reading(path, "TOML"):
+        content = tomllib.loads(text)
+    with reading(path, "a suite that can be used"):
         return suite_of(content)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from error
 
 
 def suite_of(content: Mapping[str, Any]) -> Suite:
@@ -248,50 +256,33 @@ def suite_of(content: Mapping[str, Any]) -> Suite:
     known = {each.name for each in fields(Suite)} | {"settings"}
     unknown = sorted(set(content) - known)
     if unknown:
-        raise ValueError(f"a suite has no {unknown[0]!r}; it has {', '.join(sorted(known))}")
+        raise ValueError(f"a suite has no {shown(unknown[0])}; it has {', '.join(sorted(known))}")
     for name in ("policies", "floors"):
         if name not in content:
             raise ValueError(f"the suite has no {name}; want a list of names")
-    common = content.get("settings", {})
-    variants = content.get("variants", {DEFAULT_VARIANT: {}})
-    if not isinstance(common, Mapping) or not all(
-        isinstance(variant, Mapping) for variant in dict(variants).values()
-    ):
+    common, draws = content.get("settings", {}), content.get("draws_starts", True)
+    if not isinstance(common, Mapping) or not isinstance(draws, bool):
         raise ValueError(
-            "settings and each of the variants are tables, as in [settings] and [variants.noisy]"
+            f"settings of the suite is {shown(common)} and draws_starts {shown(draws)}; want tables, as in "
+            "[settings], and true or false"
         )
-    seeds = content.get("seeds", 1)
-    starts = {
-        floor: tuple(tuple(tuple(start) for start in team) for team in teams)
-        for floor, teams in content.get("starts", {}).items()
-    }
+    variants = tables_of(content.get("variants", {DEFAULT_VARIANT: {}}), "variants")
     return Suite(
-        policies=_listed(content, "policies"),
-        floors=_listed(content, "floors"),
-        robots=_listed(content, "robots") if "robots" in content else (1,),
-        seeds=tuple(range(seeds)) if isinstance(seeds, int) else _listed(content, "seeds"),
+        policies=listed(content, "policies"),
+        floors=listed(content, "floors"),
+        robots=listed(content, "robots") if "robots" in content else (1,),
+        seeds=seeds_of(content.get("seeds", 1), content),
         variants={name: {**common, **variant} for name, variant in variants.items()},
-        starts=starts,
-        draws_starts=bool(content.get("draws_starts", True)),
+        starts=starts_of(content.get("starts", {})),
+        draws_starts=draws,
         stop=content.get("stop"),
         image_resolution=content.get("image_resolution"),
-        policy_settings=content.get("policy_settings", {}),
+        policy_settings=tables_of(content.get("policy_settings", {}), "policy_settings"),
     )
-
-
-def _listed(content: Mapping[str, Any], name: str) -> tuple[Any, ...]:
-    values = content[name]
-    if isinstance(values, list | tuple):
-        return tuple(values)
-    if isinstance(values, str | int):
-        return (values,)
-    raise ValueError(f"{name} of the suite is {values!r}; want a list")
 
 
 def _check_floor(floor: str, image_resolution: float | None) -> None:
     """Check that there is such a floor, without generating any."""
-    if not isinstance(floor, str):
-        raise ValueError(f"floors of the suite has {floor!r}; want names or paths")
     if floor.startswith("set:"):
         set_floors(floor)
     elif not is_generated(floor):

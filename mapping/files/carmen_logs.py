@@ -19,12 +19,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.files.guarded_reading import read_lines, reading
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
-from lidarium.mapping.files.map_files import check_file
 from lidarium.mapping.geometry.rigid import composed, relative
 
 _QUIET = ("#", "NEFF", "PARAM", "SYNC", "MARKER", "RLASER", "REMISSION", "TRUEPOS")
 """Messages that tell nothing that is needed here."""
+
+MOST_LINE_BYTES = 1 << 20
+"""Longest line of a log; one of 16,384 ranges has some 150,000 bytes."""
 
 SICK_MAX_M = 80.0
 """What a SICK LMS gives from here on is no range but the absence of one [m]."""
@@ -78,23 +81,21 @@ def read_carmen_log(path: Path) -> LaserLog:
         If it holds no usable scan.
     """
     path = Path(path)
-    check_file(path)
     content = _Content()
     for line in _lines(path, content.skipped):
         _read_line(line, content)
     if not content.scans:
         raise ValueError(f"{path} holds no scans; want a CARMEN log with FLASER or ROBOTLASER1 lines")
-    return made_usable(_log(path, content), str(path))
+    with reading(path, "a CARMEN log"):
+        return made_usable(_log(path, content), str(path))
 
 
 def _lines(path: Path, skipped: Counter[str]) -> Iterator[str]:
     """Yield the lines of a file; where it is cut off or damaged, those before."""
-    unpack = gzip.open if path.suffix == ".gz" else open
-    with unpack(path, "rt", encoding="utf-8", errors="replace") as file:
-        try:
-            yield from file
-        except (EOFError, zlib.error, gzip.BadGzipFile):
-            skipped["rest of a file that is cut off or damaged"] += 1
+    try:
+        yield from read_lines(path, MOST_LINE_BYTES)
+    except (EOFError, zlib.error, gzip.BadGzipFile):
+        skipped["rest of a file that is cut off or damaged"] += 1
 
 
 def _read_line(line: str, content: _Content) -> None:
@@ -117,7 +118,7 @@ def _read_line(line: str, content: _Content) -> None:
                 content.is_corrected = True
             case kind if kind not in _QUIET:
                 content.skipped[f"{kind[:30]} lines"] += 1
-    except (ValueError, IndexError):
+    except (ValueError, IndexError, OverflowError):
         content.skipped[f"damaged {words[0]} lines"] += 1
 
 

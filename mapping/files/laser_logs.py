@@ -21,8 +21,6 @@ last of these before each scan, -1 for none
 
 import io
 import math
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -31,9 +29,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.map_files import check_file
+from lidarium.mapping.files.guarded_arrays import read_arrays
+from lidarium.mapping.files.guarded_reading import reading
 from lidarium.mapping.files.output import write_whole
-from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.geometry.bounds import shown
+from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, ScanGeometry
+
+MOST_REACH_M = 10_000.0
+"""Longest range of a laser that a log may tell of [m]."""
+
+MOST_POSE_M = 1e8
+"""Farthest that a log may lead [m]."""
 
 _NEEDED = ("ranges", "angle_min", "angle_increment")
 
@@ -117,6 +123,9 @@ def made_usable(log: LaserLog, where: str) -> LaserLog:
     ValueError
         Where no scan is left.
     """
+    for poses in (log.odometry, log.corrected, log.readings, log.laser_pose):
+        if poses is not None and poses.size and not np.nanmax(np.abs(poses), initial=0.0) <= MOST_POSE_M:
+            raise ValueError(f"{where} has poses beyond {MOST_POSE_M:,.0f} m; want metres and radians")
     stamps, skipped = log.stamps, dict(log.skipped)
     if len(stamps) > 2 and not (np.diff(stamps) > 0.0).mean() > 0.5:
         stamps = np.arange(len(stamps), dtype=np.float64)
@@ -181,6 +190,11 @@ def symmetric_scans(
             f"{beams} beams from {angle_min} rad in steps of {increment} rad; want steps of more than 0 "
             "within a circle"
         )
+    if not abs(2.0 * angle_min / increment) + 2 * beams <= 2 * MOST_BEAMS or not reach[1] <= MOST_REACH_M:
+        raise ValueError(
+            f"{beams} beams from {angle_min} rad in steps of {increment} rad reach {reach[1]:g} m; want at most "
+            f"{MOST_BEAMS:,} about the heading, and {MOST_REACH_M:,.0f} m"
+        )
     if beams * increment > 2.0 * math.pi + 1e-6:
         # The last beam repeats the first.
         ranges, beams = ranges[:, :-1], beams - 1
@@ -211,18 +225,14 @@ def read_npz_log(path: Path) -> LaserLog:
         If it is no such file or holds no usable scan.
     """
     path = Path(path)
-    check_file(path)
-    if not zipfile.is_zipfile(path):
+    arrays = read_arrays(path, "an npz file that can be read")
+    if not isinstance(arrays, dict):
         raise ValueError(f"{path} is not an npz file; want the archive of arrays that numpy writes")
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {key: np.asarray(archive[key]) for key in archive.files}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise ValueError(f"{path} is not an npz file that can be read: {error}") from error
     missing = [key for key in _NEEDED if key not in arrays]
     if missing:
         raise ValueError(f"{path} has no array {', '.join(missing)}; a log has {', '.join(_NEEDED)}")
-    return made_usable(_from_arrays(path, arrays), str(path))
+    with reading(path, "a log"):
+        return made_usable(_from_arrays(path, arrays), str(path))
 
 
 def _from_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> LaserLog:
@@ -288,7 +298,7 @@ def _number(path: Path, arrays: Mapping[str, NDArray[Any]], key: str, otherwise:
     except (TypeError, ValueError):
         value = math.nan
     if not math.isfinite(value):
-        raise ValueError(f"{path}: {key} is {arrays[key]}; want a number")
+        raise ValueError(f"{path}: {key} is {shown(arrays[key])}; want a number")
     return value
 
 

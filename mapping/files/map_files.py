@@ -6,7 +6,9 @@ The interpretation of pixels follows ROS map_server (trinary, scale, raw), http:
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +17,24 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from lidarium.mapping.files.guarded_reading import read_bytes, reading
+from lidarium.mapping.files.guarded_yaml import read_yaml
+from lidarium.mapping.files.image_headers import check_picture_size, picture_size
 from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.geometry.bounds import Rule, shown, within
 
 OCCUPIED, UNKNOWN, FREE = 0, 127, 255
 
+RESOLUTION = Rule(float, bounds=within(1e-4, 100.0, "a positive number"))
+"""What the side of a cell has to be [m]."""
+
+MOST_COORDINATE_M = 1e8
+"""Farthest that a map may lie from the origin of its frame [m]."""
+
+MOST_IMAGE_BYTES = 1 << 29
+"""Longest file of a picture."""
+
+_BLOCK_PIXELS = 1 << 20
 _MODES = ("trinary", "scale", "raw")
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _PGM_LEVELS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
@@ -67,7 +83,6 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     header = _read_header(yaml_path)
     image_path = yaml_path.parent / str(header["image"])
     pixels = read_image(image_path)
-    shades, opacity = _shades(pixels)
     low, high = _number(yaml_path, header, "free_thresh"), _number(yaml_path, header, "occupied_thresh")
     if not 0.0 <= low < high <= 1.0:
         raise ValueError(
@@ -76,14 +91,10 @@ def read_ros_map(yaml_path: Path) -> MapImage:
         )
     mode = str(header.get("mode", "trinary"))
     if mode not in _MODES:
-        raise ValueError(f"{yaml_path}: mode is {mode!r}; want one of {', '.join(_MODES)}")
-    levels = (
-        _raw_levels(shades, low, high)
-        if mode == "raw"
-        else _levels(shades, bool(_number(yaml_path, header, "negate")), low, high)
-    )
-    if mode == "scale":
-        levels[opacity < 1.0] = UNKNOWN
+        raise ValueError(f"{yaml_path}: mode is {shown(mode)}; want one of {', '.join(_MODES)}")
+    negate = bool(_number(yaml_path, header, "negate"))
+    rule = _raw_levels if mode == "raw" else partial(_levels, negate=negate)
+    levels = _by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), mode == "scale")
     return MapImage(
         np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header)
     )
@@ -113,11 +124,10 @@ def read_grey_map(path: Path, resolution: float) -> MapImage:
     ValueError
         If it cannot be read, or the resolution is not a positive number.
     """
-    if not (math.isfinite(resolution) and resolution > 0.0):
-        raise ValueError(f"{path}: resolution is {resolution} m; want a positive number")
-    shades, opacity = _shades(read_image(Path(path)))
-    levels = _levels(shades, negate=False, low=0.196, high=0.65)
-    levels[opacity < 1.0] = UNKNOWN
+    if not RESOLUTION.hold(resolution):
+        raise ValueError(f"{path}: resolution is {resolution} m; want {RESOLUTION.wanted}")
+    rule = partial(_levels, negate=False, low=0.196, high=0.65)
+    levels = _by_blocks(read_image(Path(path)), rule, True)
     return MapImage(np.ascontiguousarray(levels[::-1]), (0.0, 0.0, 0.0), resolution)
 
 
@@ -231,31 +241,28 @@ def read_image(path: Path) -> NDArray[Any]:
         If it is a folder or not an image.
     """
     path = Path(path)
-    check_file(path)
-    content = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    content = read_bytes(path, MOST_IMAGE_BYTES)
+    if picture_size(content) is not None:
+        with reading(path, "an image that can be read"):
+            check_picture_size(content)
     try:
-        pixels = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
+        pixels = _decoded(content)
     except cv2.error:
         pixels = None
-    if pixels is None:
+    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"{path} is not an image that can be read; want png, pgm, bmp, jpg or tif")
     return pixels
 
 
-def check_file(path: Path) -> None:
-    """Raise FileNotFoundError where nothing is, ValueError where a folder is."""
-    if not path.exists():
-        raise FileNotFoundError(f"there is no file {path}")
-    if path.is_dir():
-        raise ValueError(f"{path} is a folder; want a file")
+def _decoded(content: bytes) -> NDArray[Any] | None:
+    """Return the pixels of a picture whose header is known; None where it is not or cannot be read."""
+    if picture_size(content) is None:
+        return None
+    return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
 
 
 def _read_header(path: Path) -> dict[str, Any]:
-    check_file(path)
-    try:
-        header = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} is not a yaml file: {' '.join(str(error).split())}") from error
+    header = read_yaml(path)
     if not isinstance(header, dict):
         raise ValueError(f"{path} has no keys; want the yaml file of a ROS map with {', '.join(_REQUIRED)}")
     missing = [key for key in _REQUIRED if key not in header]
@@ -267,27 +274,30 @@ def _read_header(path: Path) -> dict[str, Any]:
 def _number(path: Path, header: dict[str, Any], key: str) -> float:
     try:
         value = float(header[key])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         value = math.nan
     if not math.isfinite(value):
-        raise ValueError(f"{path}: {key} is {header[key]!r}; want a number")
+        raise ValueError(f"{path}: {key} is {shown(header[key])}; want a number")
     return value
 
 
 def _resolution(path: Path, header: dict[str, Any]) -> float:
     resolution = _number(path, header, "resolution")
-    if resolution <= 0.0:
-        raise ValueError(f"{path}: resolution is {resolution} m; want a positive number")
+    if not RESOLUTION.hold(resolution):
+        raise ValueError(f"{path}: resolution is {resolution} m; want {RESOLUTION.wanted}")
     return resolution
 
 
 def _origin(path: Path, header: dict[str, Any]) -> tuple[float, float, float]:
     try:
         x, y, yaw = (float(value) for value in header["origin"])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         x = y = yaw = math.nan
-    if not np.isfinite([x, y, yaw]).all():
-        raise ValueError(f"{path}: origin is {header['origin']!r}; want [x, y, yaw] in metres and radians")
+    if not (np.isfinite([x, y, yaw]).all() and max(abs(x), abs(y), abs(yaw)) <= MOST_COORDINATE_M):
+        raise ValueError(
+            f"{path}: origin is {shown(header['origin'])}; want [x, y, yaw] in metres and radians, "
+            f"{MOST_COORDINATE_M:,.0f} at most"
+        )
     return x, y, yaw
 
 
@@ -295,13 +305,30 @@ def _shades(pixels: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float
     """Return the mean of the colour channels in 0..255 and the opacity in 0..1."""
     scaled = pixels.astype(np.float64) * (255.0 / np.iinfo(pixels.dtype).max)
     if scaled.ndim == 2:
-        return scaled, np.ones(scaled.shape)
+        return scaled, np.ones((1, 1))
     if scaled.shape[2] in (2, 4):
         return scaled[..., :-1].mean(axis=2), scaled[..., -1] / 255.0
-    return scaled.mean(axis=2), np.ones(scaled.shape[:2])
+    return scaled.mean(axis=2), np.ones((1, 1))
 
 
-def _levels(shades: NDArray[np.float64], negate: bool, low: float, high: float) -> NDArray[np.uint8]:
+def _by_blocks(
+    pixels: NDArray[Any], rule: Callable[[NDArray[np.float64]], NDArray[np.uint8]], sees_through: bool
+) -> NDArray[np.uint8]:
+    """Return the levels of pixels by a rule for shades, block by block, as shades take much memory.
+
+    ``sees_through`` makes unknown what is not opaque.
+    """
+    levels = np.empty(pixels.shape[:2], np.uint8)
+    rows = max(_BLOCK_PIXELS // max(pixels.shape[1], 1), 1)
+    for row in range(0, len(pixels), rows):
+        shades, opacity = _shades(pixels[row : row + rows])
+        levels[row : row + rows] = rule(shades)
+        if sees_through:
+            levels[row : row + rows][np.broadcast_to(opacity < 1.0, shades.shape)] = UNKNOWN
+    return levels
+
+
+def _levels(shades: NDArray[np.float64], *, negate: bool, low: float, high: float) -> NDArray[np.uint8]:
     occupancy = (shades if negate else 255.0 - shades) / 255.0
     levels = np.full(shades.shape, UNKNOWN, dtype=np.uint8)
     levels[occupancy > high] = OCCUPIED

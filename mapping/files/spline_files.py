@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.files.guarded_arrays import read_arrays
+from lidarium.mapping.files.guarded_reading import check_file, read_text, reading
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.splines.curve import make_curve
 from lidarium.mapping.splines.curves.basis import ORDER
@@ -22,6 +24,13 @@ from lidarium.mapping.splines.curves.settings import SplineSettings
 from lidarium.mapping.splines.spline_map import Landmarks, SplineMap
 
 VERSION = 1
+MOST_LENGTH_M = 10_000.0
+"""Longest curve of a map [m]."""
+
+MOST_COORDINATE_M = 1e6
+"""Farthest that a curve may lie from the origin [m]."""
+
+MOST_JSON_BYTES = 64 << 20
 UNIT = 0.001
 _STEPS = 65535
 _WEIGHT_STEP = 0.25
@@ -66,15 +75,14 @@ def read_spline_map(path: Path, settings: SplineSettings | None = None) -> Splin
     ValueError
         Where it is no such file.
     """
-    if not path.is_file():
-        raise FileNotFoundError(f"no spline map at {path}")
-    try:
+    check_file(path)
+    with reading(path, "a spline map"):
         if path.suffix == ".json":
-            return _from_json(json.loads(path.read_text(encoding="utf-8")), settings)
-        with np.load(path, allow_pickle=False) as arrays:
-            return from_compact_arrays({name: arrays[name] for name in arrays.files}, settings)
-    except (KeyError, TypeError, ValueError, EOFError, IndexError, OSError) as error:
-        raise ValueError(f"{path} is not a spline map: {error}") from error
+            return _from_json(json.loads(read_text(path, MOST_JSON_BYTES)), settings)
+        arrays = read_arrays(path, "a spline map")
+        if not isinstance(arrays, dict):
+            raise ValueError("it is a single array")
+        return from_compact_arrays(arrays, settings)
 
 
 def compact_arrays(spline_map: SplineMap) -> dict[str, NDArray[Any]]:
@@ -130,7 +138,7 @@ def from_compact_arrays(arrays: dict[str, NDArray[Any]], settings: SplineSetting
     for size, (count, last_seen) in zip(arrays["sizes"].tolist(), arrays["counts"].tolist(), strict=True):
         controls = max(size, ORDER)
         shares = arrays["inner_knots"][knot : knot + controls - ORDER].astype(np.float64) / _STEPS
-        spline = _restored(points[point : point + size], shares)
+        spline = _checked(_restored(points[point : point + size], shares))
         curve_weights = weights[weight : weight + controls]
         spline_map.curves.append(
             make_curve(spline, curve_weights, count, last_seen, spline_map.settings.map.sample_spacing)
@@ -173,6 +181,18 @@ def _restored(points: NDArray[np.float64], shares: NDArray[np.float64]) -> Splin
     return Spline(knots * spline.length(), points)
 
 
+def _checked(spline: Spline) -> Spline:
+    """Return a curve that is no longer than walls are."""
+    first, last = spline.domain
+    farthest = float(np.abs(spline.control_points).max())
+    if not (last - first <= MOST_LENGTH_M and farthest <= MOST_COORDINATE_M):
+        raise ValueError(
+            f"a curve is {last - first:g} m long, up to {farthest:g} m away; want at most "
+            f"{MOST_LENGTH_M:,.0f} m, up to {MOST_COORDINATE_M:,.0f} m"
+        )
+    return spline
+
+
 def _knots_to_shares(spline: Spline) -> NDArray[np.uint16]:
     inner = spline.knots[ORDER : len(spline.control_points)]
     return np.rint(inner / spline.domain[1] * _STEPS).astype(np.uint16)
@@ -209,7 +229,9 @@ def _from_json(content: dict[str, Any], settings: SplineSettings | None) -> Spli
         raise ValueError(f"version is {content['version']}; want {VERSION}")
     spline_map = SplineMap(settings)
     for curve in content["curves"]:
-        spline = Spline(np.array(curve["knots"], np.float64), np.array(curve["control_points"], np.float64))
+        spline = _checked(
+            Spline(np.array(curve["knots"], np.float64), np.array(curve["control_points"], np.float64))
+        )
         weights = np.array(curve["weights"], np.float64)
         spacing = spline_map.settings.map.sample_spacing
         spline_map.curves.append(

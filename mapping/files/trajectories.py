@@ -10,9 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.map_files import check_file
+from lidarium.mapping.files.guarded_reading import read_lines, reading
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.rigid import composed, relative
+
+MOST_LINE_BYTES = 1 << 16
+"""Longest line of a file of numbers."""
 
 
 def write_tum(path: Path, stamps: NDArray[np.float64], poses: NDArray[np.float64]) -> None:
@@ -69,13 +72,10 @@ def read_numbers(path: Path, columns: int, what: str) -> NDArray[np.float64]:
         If it holds anything else, or nothing.
     """
     path = Path(path)
-    check_file(path)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of a file without numbers, which is told below
-            table = np.loadtxt(path, np.float64, ndmin=2)
-    except (ValueError, OSError, EOFError) as error:
-        raise ValueError(f"{path} is not {what}: {error}") from error
+    lines = read_lines(path, MOST_LINE_BYTES)
+    with reading(path, what), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of a file without numbers, which is told below
+        table = np.loadtxt(lines, np.float64, ndmin=2)
     if table.shape[0] == 0 or table.shape[1] != columns or not np.isfinite(table).all():
         raise ValueError(f"{path} is not {what}: want lines of {columns} numbers, at least one")
     return table

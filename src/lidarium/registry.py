@@ -5,6 +5,7 @@ is imported when the item is first asked for, so a name costs nothing until it i
 """
 
 import difflib
+import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
@@ -104,7 +105,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return dict(self._summaries)
 
     def _check(self, name: str) -> None:
-        if name not in self._items:
+        if not isinstance(name, str) or name not in self._items:
             raise UnknownNameError(unknown(self.kind, name, self._items))
 
 
@@ -118,9 +119,15 @@ class UnknownNameError(KeyError, ValueError):
 def unknown(kind: str, name: object, known: Iterable[str]) -> str:
     """Return the message for an unknown name: the nearest known one, and all of them."""
     names = list(known)
-    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.3)
+    near = difflib.get_close_matches(_shown(name)[:100], names, n=1, cutoff=0.3)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"unknown {kind} {name!r}{hint} (known: {', '.join(names) or 'none'})"
+    return f"unknown {kind} {_shown(name)}{hint} (known: {', '.join(names) or 'none'})"
+
+
+def _shown(name: object) -> str:
+    """Return a name as it was given, never longer than a line."""
+    text = repr(name) if isinstance(name, str) else reprlib.repr(name)
+    return text if len(text) <= 100 else f"{text[:100]}..."
 
 
 def registry(kind: str) -> Registry[Any]:

@@ -29,7 +29,9 @@ import numpy as np
 from lidarium.envs.floors.drawing import strip
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.generation.furniture import place
+from lidarium.mapping.files.guarded_reading import read_text, reading
 
+MOST_JSON_BYTES = 1 << 20
 DATA = Path(__file__).parent / "data"
 INNER_WALL = 0.1
 DOOR_WIDTH = 0.9
@@ -64,8 +66,9 @@ def load_drawn(path: Path) -> Floor:
     ValueError
         If it is not a drawn floor; the message says what is wrong.
     """
-    try:
-        plan = json.loads(path.read_text(encoding="utf-8"))
+    text = read_text(path, MOST_JSON_BYTES)
+    with reading(path, "a drawn floor"):
+        plan = json.loads(text)
         bounds = tuple(float(value) for value in plan["bounds"])
         if len(bounds) != 4:
             raise ValueError(f"bounds are {plan['bounds']}; want x, y, x, y")
@@ -98,8 +101,6 @@ def load_drawn(path: Path) -> Floor:
             np.array(starts).reshape(-1, 3),
             None if goal is None else (goal[0], goal[1]),
         )
-    except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"{path} is not a drawn floor: {error}") from error
 
 
 def _wall(wall: list[float], doors: list[list[float]]) -> list[Solid]:

@@ -6,7 +6,9 @@ from pathlib import Path
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import amrl, arrays, houseexpo, images, kth, lifull, ros_map
-from lidarium.mapping.files.map_files import check_file
+from lidarium.mapping.files.guarded_reading import check_file, reading
+from lidarium.mapping.files.map_files import RESOLUTION
+from lidarium.mapping.geometry.bounds import shown
 from lidarium.registry import Registry
 
 
@@ -81,11 +83,12 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     """
     path = Path(path)
     check_file(path)
-    if resolution is not None and not 0.0 < resolution < float("inf"):
-        raise ValueError(f"resolution is {resolution} m; want a positive number of metres per pixel")
+    if resolution is not None and not RESOLUTION.hold(resolution):
+        raise ValueError(f"resolution is {shown(resolution)} m; want {RESOLUTION.wanted} of metres per pixel")
     lower = path.name.lower()
-    for known in FORMATS.values():
-        if lower.endswith(known.suffixes) and known.matches(path):
-            return known.load(path, resolution)
+    with reading(path, "a floor"):
+        for known in FORMATS.values():
+            if lower.endswith(known.suffixes) and known.matches(path):
+                return known.load(path, resolution)
     suffixes = sorted({suffix for known in FORMATS.values() for suffix in known.suffixes})
     raise ValueError(f"{path} is of no known floor format; want a file that ends in {', '.join(suffixes)}")

@@ -1,6 +1,5 @@
 """Numpy arrays as floors: grey levels (KTH floors of MapEx) or solid cells."""
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,9 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells, refuse_resolution
+from lidarium.mapping.files.guarded_arrays import read_arrays
+from lidarium.mapping.files.map_files import RESOLUTION
+from lidarium.mapping.geometry.bounds import shown
 
 _FREE_ABOVE = 127
 
@@ -19,15 +21,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     needs a resolution. ``.npz`` holds ``solid`` (row 0 at the lowest y), ``origin`` (x, y) and ``resolution``
     [m].
     """
-    try:
-        loaded = np.load(path, allow_pickle=False)
-        content = (
-            {name: loaded[name] for name in loaded.files}
-            if isinstance(loaded, np.lib.npyio.NpzFile)
-            else np.asarray(loaded)
-        )
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{path} is not a numpy array that can be read: {error}") from error
+    content = read_arrays(path, "a numpy array that can be read")
     if isinstance(content, dict):
         return _load_named(path, content, resolution)
     if resolution is None:
@@ -45,9 +39,10 @@ def _load_named(path: Path, named: dict[str, NDArray[np.generic]], resolution: f
     _check_grid(path, named["solid"])
     origin = np.asarray(named["origin"], dtype=np.float64).ravel()
     side = np.asarray(named["resolution"], dtype=np.float64).ravel()
-    if origin.size != 2 or not np.isfinite(origin).all() or side.size != 1 or not 0.0 < side[0] < np.inf:
+    if origin.size != 2 or not np.isfinite(origin).all() or side.size != 1 or not RESOLUTION.hold(side[0]):
         raise ValueError(
-            f"{path} has origin {origin} and resolution {side}; want (x, y) and a positive number in metres"
+            f"{path} has origin {shown(origin)} and resolution {shown(side)}; want (x, y) in metres and "
+            f"{RESOLUTION.wanted}"
         )
     return floor_of_cells(path, named["solid"] == 0, (float(origin[0]), float(origin[1])), float(side[0]))
 

@@ -3,9 +3,7 @@
 They read text, find the free areas of pixel floors and put walls around line drawings.
 """
 
-import gzip
 import itertools
-import zlib
 from pathlib import Path
 
 import cv2
@@ -13,7 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip
+from lidarium.envs.floors.extent import check_extent
 from lidarium.envs.floors.floor import Floor, Raster, Solid
+from lidarium.mapping.files.guarded_reading import read_text as read_guarded
+from lidarium.mapping.files.image_headers import MOST_PIXELS
+
+MOST_TEXT_BYTES = 32 << 20
+"""Longest text of a floor, unpacked: parsed it takes some twenty times as much."""
 
 # Where a drawing has walls without thickness [m].
 WALL_THICKNESS = 0.1
@@ -24,6 +28,7 @@ _GAPS = (0.0, 0.2, 0.5, 1.0, 2.0)
 _CLOSED_SHARE = 0.85
 _OUTLINE_RESOLUTION = 0.02
 _MAX_OUTLINE_CELLS = 50_000_000
+_FAR_CELLS = 8_000_000
 
 
 def read_text(path: Path) -> str:
@@ -32,24 +37,19 @@ def read_text(path: Path) -> str:
     Raises
     ------
     ValueError
-        If the packed file is damaged or truncated, or it is not text.
+        If the packed file is damaged or truncated, too long, or it is not text.
     """
-    content = path.read_bytes()
-    try:
-        return (gzip.decompress(content) if path.suffix.lower() == ".gz" else content).decode("utf-8-sig")
-    except (OSError, EOFError, zlib.error) as error:
-        raise ValueError(f"{path} is damaged or truncated: {error}") from error
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path} is not a text file: {error.reason} at byte {error.start}") from error
+    return read_guarded(path, MOST_TEXT_BYTES)
 
 
 def floor_name(path: Path) -> str:
     """Return the file's name without what says its format."""
-    name = path.name
+    # Bytes that are no UTF-8 could be printed nowhere.
+    name = path.name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     for suffix in (".gz", ".txt", ".vectormap", ".xml", ".json"):
         if name.lower().endswith(suffix):
             name = name[: -len(suffix)]
-    return Path(name).stem if name == path.name else name
+    return Path(name).stem if len(name) == len(path.name) else name
 
 
 def refuse_resolution(path: Path, resolution: float | None) -> None:
@@ -86,6 +86,8 @@ def floor_of_cells(
     ValueError
         If no cell, or all, are free, or the seed cell is not.
     """
+    if free.size > MOST_PIXELS:
+        raise ValueError(f"{path} has {free.size:,} cells; want at most {MOST_PIXELS:,}")
     if not free.any() or free.all():
         raise ValueError(
             f"{path} is {'all free' if free.any() else 'all solid'}; want a floor with free space and walls"
@@ -124,6 +126,7 @@ def floor_of_lines(path: Path, walls: NDArray[np.float64], openings: NDArray[np.
     """
     everything = np.concatenate([walls, openings])
     low, high = everything.reshape(-1, 2).min(axis=0), everything.reshape(-1, 2).max(axis=0)
+    check_extent(str(path), (*low.tolist(), *high.tolist()), everything.reshape(-1, 2, 2))
     solids = [Solid(strip(wall, WALL_THICKNESS, overhang=WALL_THICKNESS / 2.0)) for wall in walls]
     half = WALL_THICKNESS / 2.0
     bounds = (low[0] - half, low[1] - half, high[0] + half, high[1] + half)
@@ -151,7 +154,9 @@ def _enclosed(
     """
     widest = max(_GAPS) + WALL_THICKNESS
     size = high - low + 2.0 * widest
-    resolution = max(_OUTLINE_RESOLUTION, float(np.sqrt(size.prod() / _MAX_OUTLINE_CELLS)))
+    is_building = size.prod() <= _MAX_OUTLINE_CELLS * _OUTLINE_RESOLUTION**2
+    # Beyond any building it is a matter of seconds, not of outlines.
+    resolution = _OUTLINE_RESOLUTION if is_building else float(np.sqrt(size.prod() / _FAR_CELLS))
     origin = (float(low[0] - widest), float(low[1] - widest))
     drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
     fill_shapes(

@@ -13,6 +13,7 @@ import numpy as np
 
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.importers.common import floor_name, read_text, refuse_resolution
+from lidarium.mapping.files.guarded_reading import reading
 
 _SURROUND = 1.0
 
@@ -20,17 +21,16 @@ _SURROUND = 1.0
 def load(path: Path, resolution: float | None) -> Floor:
     """Read a HouseExpo file: everything outside of ``verts`` is solid."""
     refuse_resolution(path, resolution)
-    try:
-        house = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise ValueError(f"{path} is not JSON: {error}") from error
+    text = read_text(path)
+    with reading(path, "JSON"):
+        house = json.loads(text)
     if not isinstance(house, dict) or "verts" not in house:
         raise ValueError(
             f"{path} has no key verts; want a HouseExpo file, with the corners of its free space in metres"
         )
     try:
         corners = np.asarray(house["verts"], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         corners = np.zeros((0, 2))
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
         raise ValueError(f"{path}: verts has shape {corners.shape}; want at least 3 points (x, y) in metres")

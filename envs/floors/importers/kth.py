@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip
+from lidarium.envs.floors.extent import check_extent
 from lidarium.envs.floors.floor import MAX_RASTER_CELLS, Floor
 from lidarium.envs.floors.importers.common import floor_of_cells, read_text, refuse_resolution
+from lidarium.mapping.geometry.bounds import shown
 
 RESOLUTION = 0.025
 
@@ -52,6 +54,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     spaces = _spaces(path)
     points = np.concatenate([space.segments for space in spaces]).reshape(-1, 2)
     low = points.min(axis=0) - _MARGIN
+    check_extent(str(path), (*low.tolist(), *points.max(axis=0).tolist()), points.reshape(-1, 2, 2))
     columns, rows = (int(size) + 1 for size in (points.max(axis=0) + _MARGIN - low) / RESOLUTION)
     if rows * columns > MAX_RASTER_CELLS:
         raise ValueError(
@@ -104,7 +107,9 @@ def _scale(path: Path, root: ElementTree.Element) -> float:
     except ValueError:
         pixels = metres = 0.0
     if not (0.0 < pixels < np.inf and 0.0 < metres < np.inf):
-        raise ValueError(f"{path} has Scale {element.attrib}; want positive PixelDistance and RealDistance")
+        raise ValueError(
+            f"{path} has Scale {shown(element.attrib)}; want positive PixelDistance and RealDistance"
+        )
     return metres / pixels
 
 
@@ -119,7 +124,7 @@ def _space(path: Path, element: ElementTree.Element, scale: float) -> _Space:
     except (KeyError, ValueError):
         segments = np.full((1, 4), np.nan)
     if not np.isfinite(segments).all():
-        raise ValueError(f"{path}: space {name!r} has a linesegment without numbers x1, y1, x2, y2")
+        raise ValueError(f"{path}: space {shown(name)} has a linesegment without numbers x1, y1, x2, y2")
     return _Space(segments * to_metres, tuple(line.get("type", "Wall") for line in lines))
 
 

@@ -18,6 +18,8 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import WALL_THICKNESS, floor_of_lines, read_text, refuse_resolution
 
 OPENING_WIDTH = 0.8
+MOST_PIXEL = 1e9
+"""Farthest coordinate of an annotation [pixels]."""
 
 # Shorter pieces of wall than this beside an opening are slips of the annotation [m].
 _SLIP = 0.02
@@ -36,6 +38,8 @@ def load(path: Path, resolution: float | None) -> Floor:
         raise ValueError(
             f"{path} has {len(walls)} walls and {len(doors)} doors; want both, as doors give the scale"
         )
+    if np.abs(np.concatenate([walls, doors])).max() > MOST_PIXEL:
+        raise ValueError(f"{path} has coordinates beyond {MOST_PIXEL:g} pixels; want an annotation")
     scale = OPENING_WIDTH / float(np.median(widths))
     everything = np.concatenate([walls, doors])
     left, bottom = everything[:, [0, 2]].min(), everything[:, [1, 3]].max()

@@ -8,7 +8,11 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells, refuse_resolution
+from lidarium.mapping.files.image_headers import MOST_PIXELS
 from lidarium.mapping.files.map_files import FREE, MapImage, read_ros_map
+
+# Indices of a whole map would take sixteen times its memory.
+_BLOCK_ROWS = 256
 
 
 def load(path: Path, resolution: float | None) -> Floor:
@@ -41,11 +45,15 @@ def _turned(image: MapImage, free: NDArray[np.bool_]) -> tuple[NDArray[np.bool_]
     low, high = corners.min(axis=0), corners.max(axis=0)
     resolution = image.resolution / 2.0
     width, height = (math.ceil(side / resolution) for side in high - low)
+    if width * height > MOST_PIXELS:
+        raise ValueError(f"a map turned by {yaw} rad has {width:,} x {height:,} cells; want {MOST_PIXELS:,}")
     along_x = low[0] + (np.arange(width) + 0.5) * resolution
-    along_y = low[1] + (np.arange(height) + 0.5)[:, None] * resolution
-    j = np.floor((cosine * along_x + sine * along_y) / image.resolution).astype(np.int64)
-    i = np.floor((cosine * along_y - sine * along_x) / image.resolution).astype(np.int64)
-    on_image = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
     turned = np.zeros((height, width), dtype=np.bool_)
-    turned[on_image] = free[i[on_image], j[on_image]]
+    for first in range(0, height, _BLOCK_ROWS):
+        block = np.arange(first, min(first + _BLOCK_ROWS, height))
+        along_y = low[1] + (block + 0.5)[:, None] * resolution
+        j = np.floor((cosine * along_x + sine * along_y) / image.resolution).astype(np.int64)
+        i = np.floor((cosine * along_y - sine * along_x) / image.resolution).astype(np.int64)
+        on_image = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
+        turned[block[0] : block[-1] + 1][on_image] = free[i[on_image], j[on_image]]
     return turned, (float(x + low[0]), float(y + low[1])), resolution

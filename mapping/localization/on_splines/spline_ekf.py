@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.checks import check_from_zero
+from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_settings
 from lidarium.mapping.geometry.rigid import Transform, wrapped
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.on_splines.spline_matches import Matches
@@ -38,12 +38,12 @@ class SplineEkfSettings:
     """
 
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
-    gate_sigmas: float = 3.0
-    start_distance: float = 0.0
-    start_turn: float = 0.0
+    gate_sigmas: FromZero = 3.0
+    start_distance: Distance = 0.0
+    start_turn: Turn = 0.0
 
     def __post_init__(self) -> None:
-        check_from_zero(self, "the filter", ("gate_sigmas", "start_distance", "start_turn"))
+        check_settings(self, "the filter")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

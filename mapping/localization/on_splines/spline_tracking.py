@@ -10,7 +10,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.checks import check_from_zero, check_positive
+from lidarium.mapping.geometry.bounds import (
+    Angle,
+    Count,
+    Counted,
+    FromZero,
+    Positive,
+    Turn,
+    check_settings,
+)
 from lidarium.mapping.geometry.rigid import Transform, wrapped
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
@@ -56,47 +64,26 @@ class TrackingSettings:
     """
 
     splines: SplineSettings = field(default_factory=SplineSettings)
-    turn_per_turn: float = 0.15
-    turn_per_metre: float = 0.06
-    slip_per_metre: float = 0.10
-    slip_per_turn: float = 0.03
-    feature_sigma: float = 0.02
-    line_angle_sigma: float = math.radians(1.0)
-    curve_sigma: float = 0.03
-    curve_distance: float = 0.3
-    ray_stride: int = 8
-    ray_share: float = 0.5
-    least_sightings: int = 3
-    least_features: int = 2
-    least_rays: int = 20
-    still_distance: float = 0.001
-    still_turn: float = math.radians(0.1)
-    map_distance: float = 0.1
-    map_turn: float = math.radians(5.0)
+    turn_per_turn: FromZero = 0.15
+    turn_per_metre: FromZero = 0.06
+    slip_per_metre: FromZero = 0.10
+    slip_per_turn: FromZero = 0.03
+    feature_sigma: Positive = 0.02
+    line_angle_sigma: Angle = math.radians(1.0)
+    curve_sigma: Positive = 0.03
+    curve_distance: Positive = 0.3
+    ray_stride: Count = 8
+    ray_share: Positive = 0.5
+    least_sightings: Count = 3
+    least_features: Counted = 2
+    least_rays: Counted = 20
+    still_distance: FromZero = 0.001
+    still_turn: Turn = math.radians(0.1)
+    map_distance: Positive = 0.1
+    map_turn: Angle = math.radians(5.0)
 
     def __post_init__(self) -> None:
-        positive = (
-            "feature_sigma",
-            "line_angle_sigma",
-            "curve_sigma",
-            "curve_distance",
-            "ray_share",
-            "map_distance",
-            "map_turn",
-        )
-        from_zero = (
-            "turn_per_turn",
-            "turn_per_metre",
-            "slip_per_metre",
-            "slip_per_turn",
-            "still_distance",
-            "still_turn",
-        )
-        check_positive(self, "tracking", positive)
-        check_from_zero(self, "tracking", from_zero)
-        for name in ("ray_stride", "least_sightings"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} of tracking is {getattr(self, name)}; want at least 1")
+        check_settings(self, "tracking")
 
 
 class SplineTracker(ABC):

@@ -2,8 +2,19 @@
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
-from lidarium.mapping.geometry.checks import check_from_zero, check_positive
+from lidarium.mapping.geometry.bounds import (
+    Angle,
+    Count,
+    Duration,
+    FromZero,
+    Positive,
+    Turn,
+    above,
+    check_settings,
+    within,
+)
 
 MODES = ("default", "thesis")
 BREAKPOINT_TESTS = ("adaptive", "dietmayer", "pedraza")
@@ -25,16 +36,13 @@ class PointSettings:
         Standard deviation of a range: max(noise_floor, noise_share * range) [m, 1].
     """
 
-    beam_interval_s: float = 0.0
-    laser_x: float = 0.0
-    noise_floor: float = 0.01
-    noise_share: float = 0.01
+    beam_interval_s: Duration = 0.0
+    laser_x: Annotated[float, within(-100.0, 100.0)] = 0.0
+    noise_floor: Positive = 0.01
+    noise_share: FromZero = 0.01
 
     def __post_init__(self) -> None:
-        check_from_zero(self, "points", ("beam_interval_s", "noise_share"))
-        check_positive(self, "points", ("noise_floor",))
-        if not math.isfinite(self.laser_x):
-            raise ValueError(f"laser_x of points is {self.laser_x} m; want a finite number")
+        check_settings(self, "points")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,44 +85,25 @@ class SegmentationSettings:
     """
 
     test: str = "adaptive"
-    incidence: float = math.radians(10.0)
-    noise_sigmas: float = 3.0
-    dietmayer_floor: float = 0.03
-    dietmayer_share: float = 0.03
-    step_ratio: float = 1.75
-    most_turn: float = math.pi / 4.0
-    least_points: int = 4
-    split_distance: float = 0.04
-    split_sigmas: float = 4.0
-    collinear_angle: float = math.radians(5.0)
-    corner_angle: float = math.radians(20.0)
+    incidence: Annotated[float, above(0.0, math.pi / 2.0)] = math.radians(10.0)
+    noise_sigmas: FromZero = 3.0
+    dietmayer_floor: FromZero = 0.03
+    dietmayer_share: FromZero = 0.03
+    step_ratio: Positive = 1.75
+    most_turn: Angle = math.pi / 4.0
+    least_points: Annotated[int, within(4, 1_000_000)] = 4
+    split_distance: Positive = 0.04
+    split_sigmas: FromZero = 4.0
+    collinear_angle: Turn = math.radians(5.0)
+    corner_angle: Angle = math.radians(20.0)
     corner_rule: str = "angle"
-    corner_reach: float = 0.25
-    line_points: int = 8
+    corner_reach: Positive = 0.25
+    line_points: Annotated[int, within(2, 1_000_000)] = 8
 
     def __post_init__(self) -> None:
         _check_name(self.test, "test of breakpoints", BREAKPOINT_TESTS)
         _check_name(self.corner_rule, "rule of corners", CORNER_RULES)
-        if not 0.0 < self.incidence < math.pi / 2.0:
-            raise ValueError(
-                f"incidence of segmentation is {self.incidence} rad; want more than 0 and less than a right "
-                "angle"
-            )
-        check_from_zero(
-            self,
-            "segmentation",
-            ("noise_sigmas", "dietmayer_floor", "dietmayer_share", "split_sigmas", "collinear_angle"),
-        )
-        check_positive(
-            self,
-            "segmentation",
-            ("step_ratio", "most_turn", "split_distance", "corner_angle", "corner_reach"),
-        )
-        if self.least_points < 4 or self.line_points < 2:
-            raise ValueError(
-                f"least_points is {self.least_points} and line_points is {self.line_points}; want at least 4 "
-                "(a cubic curve) and 2"
-            )
+        check_settings(self, "segmentation")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,16 +128,15 @@ class FitSettings:
         Weight of the second differences of control points; keeps what no point determines in line.
     """
 
-    spacing: float = 0.25
-    finest_spacing: float = 0.08
-    rms: float = 0.02
-    explained: float = 1.25
+    spacing: Annotated[float, within(1e-3, 1000.0)] = 0.25
+    finest_spacing: Annotated[float, within(1e-3, 1000.0)] = 0.08
+    rms: Annotated[float, within(1e-6, 1000.0)] = 0.02
+    explained: FromZero = 1.25
     is_sparse: bool = True
-    stiffness: float = 1e-6
+    stiffness: FromZero = 1e-6
 
     def __post_init__(self) -> None:
-        check_positive(self, "the fit", ("spacing", "finest_spacing", "rms"))
-        check_from_zero(self, "the fit", ("explained", "stiffness"))
+        check_settings(self, "the fit")
         if self.finest_spacing > self.spacing:
             raise ValueError(
                 f"finest_spacing of the fit is {self.finest_spacing} m, above its spacing {self.spacing} m"
@@ -177,27 +165,18 @@ class AssociationSettings:
         perpendicular from the ``robot``, as in the thesis, which moves with it.
     """
 
-    control_distance: float = 0.30
-    mean_distance: float = 0.10
-    mean_turn: float = math.radians(20.0)
-    least_overlap: float = 0.20
-    point_distance: float = 0.15
-    line_distance: float = 0.10
-    line_angle: float = math.radians(5.0)
+    control_distance: Positive = 0.30
+    mean_distance: Positive = 0.10
+    mean_turn: Angle = math.radians(20.0)
+    least_overlap: Positive = 0.20
+    point_distance: Positive = 0.15
+    line_distance: Positive = 0.10
+    line_angle: Angle = math.radians(5.0)
     line_origin: str = "segment"
 
     def __post_init__(self) -> None:
         _check_name(self.line_origin, "line_origin of association", LINE_ORIGINS)
-        names = (
-            "control_distance",
-            "mean_distance",
-            "mean_turn",
-            "least_overlap",
-            "point_distance",
-            "line_distance",
-            "line_angle",
-        )
-        check_positive(self, "association", names)
+        check_settings(self, "association")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,30 +208,20 @@ class MapSettings:
         without seeing them [m].
     """
 
-    sample_spacing: float = 0.05
-    rms: float = 0.004
-    most_weight: float = 40.0
-    least_extension: float = 0.08
-    blend_length: float = 0.5
-    least_length: float = 0.1
-    least_sigmas: float = 6.0
-    explained_distance: float = 0.1
-    trusted_count: int = 3
-    trusted_length: float = 0.3
-    trial_updates: int = 20
+    sample_spacing: Annotated[float, within(1e-3, 1000.0)] = 0.05
+    rms: Annotated[float, within(1e-6, 1000.0)] = 0.004
+    most_weight: Positive = 40.0
+    least_extension: FromZero = 0.08
+    blend_length: Positive = 0.5
+    least_length: FromZero = 0.1
+    least_sigmas: FromZero = 6.0
+    explained_distance: FromZero = 0.1
+    trusted_count: Count = 3
+    trusted_length: FromZero = 0.3
+    trial_updates: Count = 20
 
     def __post_init__(self) -> None:
-        check_positive(self, "the map", ("sample_spacing", "rms", "most_weight", "blend_length"))
-        check_from_zero(
-            self,
-            "the map",
-            ("least_extension", "least_length", "least_sigmas", "explained_distance", "trusted_length"),
-        )
-        if self.trusted_count < 1 or self.trial_updates < 1:
-            raise ValueError(
-                f"trusted_count is {self.trusted_count} and trial_updates is {self.trial_updates}; want at "
-                "least 1 each"
-            )
+        check_settings(self, "the map")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

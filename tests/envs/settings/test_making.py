@@ -80,7 +80,7 @@ def test_single_values_are_assigned_by_their_names():
         ("reward.tme=1", "'reward.tme' is no setting: unknown setting 'tme'; did you mean 'time'"),
         ("speed=1", "'speed' is no setting"),
         ("robots=1.5", "robots is 1.5"),
-        ("reward.time=inf", "weight time of the reward is inf"),
+        ("reward.time=inf", "time of the reward is inf"),
         ("localizer.particles=5", "localization 'truth' has no settings"),
     ],
 )

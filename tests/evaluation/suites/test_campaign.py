@@ -135,7 +135,7 @@ def test_a_rule_stops_an_episode_and_says_so():
         ({"figure": "beauty", "above": 0.5}, "'beauty'; want one of"),
         ({"figure": "c_free"}, "with 0 bounds"),
         ({"figure": "c_free", "above": 0.5, "at_most": 1.0}, "with 2 bounds"),
-        ({"decisions": 0}, "at least 1"),
+        ({"decisions": 0}, "from 1 to"),
         ({}, "ends nothing"),
         ({"when": 3}, "no 'when'"),
     ],

@@ -140,7 +140,7 @@ def test_a_blank_map_is_kept_too(tmp_path):
 def test_files_that_are_no_maps_are_refused(room_map, tmp_path):
     with pytest.raises(ValueError, match=r"\.json or \.npz"):
         write_spline_map(tmp_path / "room.txt", room_map)
-    with pytest.raises(FileNotFoundError, match="no spline map"):
+    with pytest.raises(FileNotFoundError, match="there is no file"):
         read_spline_map(tmp_path / "none.json")
     (tmp_path / "other.json").write_text(json.dumps({"version": 1}))
     (tmp_path / "broken.npz").write_bytes(b"PK not really")

@@ -2,8 +2,20 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from lidarium.mapping.localization.matching.settings.checks import check_numbers
+from lidarium.mapping.geometry.bounds import (
+    Angle,
+    Count,
+    Counted,
+    Duration,
+    FromZero,
+    Length,
+    Positive,
+    above,
+    check_settings,
+    within,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,35 +69,35 @@ class ClosureSettings:
         By how much they may differ [m, rad]; less than the thickness of walls, lest both sides of one agree.
     """
 
-    delay_s: float = 1.0
-    candidates: int = 1
-    path_m: float = 10.0
-    near_m: float = 4.0
-    search_m: float = 0.25
-    search_angle: float = math.radians(4.0)
-    most_m: float = 4.0
-    most_angle: float = math.radians(20.0)
-    deviations: float = 2.5
-    evaluations: int = 60_000
-    least_score: float = 0.3
-    least_share: float = 0.85
-    least_overlap: float = 0.75
-    most_contradiction: float = 0.12
-    as_good: float = 0.8
-    ambiguity: float = 0.9
-    apart_m: float = 0.5
-    apart_angle: float = math.radians(15.0)
-    least_deviation_m: float = 0.03
-    least_deviation_angle: float = math.radians(0.4)
-    confirmed_beyond_m: float = 0.15
-    confirmed_beyond_deviations: float = 2.5
+    delay_s: Duration = 1.0
+    candidates: Counted = 1
+    path_m: FromZero = 10.0
+    near_m: Length = 4.0
+    search_m: Annotated[float, above(0.0, 50.0)] = 0.25
+    search_angle: Angle = math.radians(4.0)
+    most_m: Annotated[float, above(0.0, 50.0)] = 4.0
+    most_angle: Angle = math.radians(20.0)
+    deviations: Positive = 2.5
+    evaluations: Count = 60_000
+    least_score: Positive = 0.3
+    least_share: Positive = 0.85
+    least_overlap: Positive = 0.75
+    most_contradiction: Positive = 0.12
+    as_good: Positive = 0.8
+    ambiguity: Positive = 0.9
+    apart_m: Length = 0.5
+    apart_angle: Angle = math.radians(15.0)
+    least_deviation_m: Length = 0.03
+    least_deviation_angle: Angle = math.radians(0.4)
+    confirmed_beyond_m: Length = 0.15
+    confirmed_beyond_deviations: Positive = 2.5
     doubts_one_map: bool = True
-    confirmations: int = 3
-    agree_m: float = 0.1
-    agree_angle: float = math.radians(3.0)
+    confirmations: Count = 3
+    agree_m: Length = 0.1
+    agree_angle: Angle = math.radians(3.0)
 
     def __post_init__(self) -> None:
-        check_numbers(self, zero=("delay_s", "path_m", "candidates", "doubts_one_map"))
+        check_settings(self, type(self).__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,20 +126,20 @@ class GraphSettings:
         At most so many steps of Gauss and Newton.
     """
 
-    start_path_m: float = 7.0
-    distance_m: float = 0.5
-    angle: float = math.radians(30.0)
-    deviation_m: float = 0.005
-    deviation_per_metre: float = 0.01
-    deviation_angle: float = math.radians(0.05)
-    robust_scale: float = 2.0
-    correct_beyond_m: float = 0.05
-    correct_beyond_angle: float = math.radians(1.0)
-    waiting: int = 20
-    iterations: int = 10
+    start_path_m: Positive = 7.0
+    distance_m: Length = 0.5
+    angle: Angle = math.radians(30.0)
+    deviation_m: Length = 0.005
+    deviation_per_metre: Positive = 0.01
+    deviation_angle: Angle = math.radians(0.05)
+    robust_scale: Positive = 2.0
+    correct_beyond_m: Length = 0.05
+    correct_beyond_angle: Angle = math.radians(1.0)
+    waiting: Count = 20
+    iterations: Count = 10
 
     def __post_init__(self) -> None:
-        check_numbers(self)
+        check_settings(self, type(self).__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,11 +165,11 @@ class CompassSettings:
         tell [rad].
     """
 
-    spacing_m: float = 0.01
-    deviation_angle: float = math.radians(0.1)
-    drift: float = 0.4
-    deviations: float = 3.0
-    most_deviation: float = math.radians(3.0)
+    spacing_m: Annotated[float, within(1e-4, 100.0)] = 0.01
+    deviation_angle: Angle = math.radians(0.1)
+    drift: Positive = 0.4
+    deviations: Positive = 3.0
+    most_deviation: Positive = math.radians(3.0)
 
     def __post_init__(self) -> None:
-        check_numbers(self)
+        check_settings(self, type(self).__name__)

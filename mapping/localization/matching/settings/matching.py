@@ -2,8 +2,21 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from lidarium.mapping.localization.matching.settings.checks import check_numbers
+from lidarium.mapping.geometry.bounds import (
+    Angle,
+    Count,
+    Distance,
+    Duration,
+    FromZero,
+    Length,
+    Positive,
+    Turn,
+    above,
+    check_settings,
+    within,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,50 +83,39 @@ class MatchingSettings:
         Standard deviation of the motion into such a new local map [m, rad].
     """
 
-    distance_m: float = 0.1
-    angle: float = math.radians(5.0)
-    beam_interval_s: float = 0.0
-    range_m: float = 20.0
-    spacing_m: float = 0.05
-    points: int = 350
-    least_points: int = 15
-    search_m: float = 0.05
-    search_angle: float = math.radians(1.0)
-    search_deviations: float = 2.0
-    blind_m: float = 1.2
-    blind_angle: float = math.radians(50.0)
-    wide_share: float = 0.08
-    blind_overlap: float = 0.7
-    evaluations: int = 100_000
-    independent_points: float = 50.0
-    independent_share: float = 0.15
-    deviation: float = 0.2
-    surface_m: float = 0.25
-    unseen: float = 0.3
-    least_score: float = 0.15
-    least_share: float = 0.5
-    least_overlap: float = 0.2
-    most_contradiction: float = 0.25
-    convincing_share: float = 0.75
-    better_by: float = 0.1
-    wide_after: int = 3
-    lost_after: int = 8
-    lost_m: float = 2.0
-    lost_angle: float = 0.5
+    distance_m: Distance = 0.1
+    angle: Turn = math.radians(5.0)
+    beam_interval_s: Duration = 0.0
+    range_m: Length = 20.0
+    spacing_m: Annotated[float, within(1e-4, 100.0)] = 0.05
+    points: Count = 350
+    least_points: Count = 15
+    search_m: Annotated[float, within(0.0, 50.0)] = 0.05
+    search_angle: Turn = math.radians(1.0)
+    search_deviations: Positive = 2.0
+    blind_m: Annotated[float, above(0.0, 50.0)] = 1.2
+    blind_angle: Angle = math.radians(50.0)
+    wide_share: Positive = 0.08
+    blind_overlap: Positive = 0.7
+    evaluations: Count = 100_000
+    independent_points: Positive = 50.0
+    independent_share: Positive = 0.15
+    deviation: Positive = 0.2
+    surface_m: Distance = 0.25
+    unseen: FromZero = 0.3
+    least_score: Positive = 0.15
+    least_share: Positive = 0.5
+    least_overlap: Positive = 0.2
+    most_contradiction: Positive = 0.25
+    convincing_share: Positive = 0.75
+    better_by: Positive = 0.1
+    wide_after: Count = 3
+    lost_after: Count = 8
+    lost_m: Length = 2.0
+    lost_angle: Angle = 0.5
 
     def __post_init__(self) -> None:
-        check_numbers(
-            self,
-            zero=(
-                "beam_interval_s",
-                "distance_m",
-                "angle",
-                "search_m",
-                "search_angle",
-                "surface_m",
-                "unseen",
-            ),
-        )
+        check_settings(self, type(self).__name__)
 
     def weight(self, points: int) -> float:
         """Return how much full disagreement of all of so many points counts."""
@@ -140,11 +142,11 @@ class SubmapSettings:
         A local map holds at least so many scans.
     """
 
-    resolution: float = 0.035
-    behind_m: float = 0.025
-    behind_share: float = 0.025
-    path_m: float = 16.0
-    least_scans: int = 10
+    resolution: Annotated[float, within(1e-3, 10.0)] = 0.035
+    behind_m: Distance = 0.025
+    behind_share: FromZero = 0.025
+    path_m: Positive = 16.0
+    least_scans: Count = 10
 
     def __post_init__(self) -> None:
-        check_numbers(self, zero=("behind_m", "behind_share"))
+        check_settings(self, type(self).__name__)

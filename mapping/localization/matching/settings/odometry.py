@@ -1,11 +1,12 @@
 """What is known of dead reckoning: by how much it may err."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.localization.matching.settings.checks import check_numbers
+from lidarium.mapping.geometry.bounds import FromZero, Positive, check_settings, share
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,21 +34,19 @@ class OdometryUncertainty:
         By at most so many of the standard deviations above a robot corrects its odometry.
     """
 
-    distance_share: float = 0.1
-    turn_share: float = 0.1
-    turn_per_metre: float = 0.05
-    distance_floor: float = 0.005
-    turn_floor: float = 0.002
-    distance_noise: float = 0.03
-    turn_noise: float = 0.04
-    turn_noise_of_distance: float = 0.03
-    fading: float = 0.0005
-    most_deviations: float = 2.0
+    distance_share: Positive = 0.1
+    turn_share: Positive = 0.1
+    turn_per_metre: Positive = 0.05
+    distance_floor: Positive = 0.005
+    turn_floor: Positive = 0.002
+    distance_noise: Positive = 0.03
+    turn_noise: Positive = 0.04
+    turn_noise_of_distance: Positive = 0.03
+    fading: Annotated[float, share(has_most=False)] = 0.0005
+    most_deviations: FromZero = 2.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, zero=("fading", "most_deviations"))
-        if self.fading >= 1.0:
-            raise ValueError(f"fading of OdometryUncertainty is {self.fading}; want a share below 1")
+        check_settings(self, type(self).__name__)
 
     def covariance(self, distance: float, turn: float) -> NDArray[np.float64]:
         """Return the covariance (3, 3) of a motion of a given size.

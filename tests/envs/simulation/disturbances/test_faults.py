@@ -192,5 +192,5 @@ def test_faults_that_cannot_be_are_refused(values, message):
 
 
 def test_rates_below_zero_are_refused():
-    with pytest.raises(ValueError, match=r"rate of dead_robot is -1.0; want a number an hour of 0 or more"):
+    with pytest.raises(ValueError, match=r"dead_robot of faults is -1.0; want a number an hour of 0 or more"):
         FaultSettings(dead_robot=-1.0)

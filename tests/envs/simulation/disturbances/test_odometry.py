@@ -154,9 +154,9 @@ def test_presets_grow_worse_by_their_names():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"distance_bias": -0.1}, "distance_bias of the odometry is -0.1; want a number of 0 or more"),
+        ({"distance_bias": -0.1}, "distance_bias of the odometry is -0.1; want a share of 0 or more"),
         ({"drift": math.nan}, "drift of the odometry is nan"),
-        ({"turn_bias": 1.0}, "turn_bias of the odometry is 1.0; want a share below 1"),
+        ({"turn_bias": 1.0}, "turn_bias of the odometry is 1.0; want a share of 0 or more and below 1"),
     ],
 )
 def test_numbers_that_make_no_sense_are_refused(values, message):

@@ -1,0 +1,94 @@
+"""Sizes of pictures from their headers, before any pixel is asked for."""
+
+import struct
+
+MOST_PIXELS = 1 << 26
+"""Most pixels of a picture: 8,192 x 8,192."""
+
+_JPEG_SIZES = (*range(0xC0, 0xC4), *range(0xC5, 0xC8), *range(0xC9, 0xCC), *range(0xCD, 0xD0))
+
+
+def check_picture_size(content: bytes) -> None:
+    """Check that a picture is of a known format and not too large to be unpacked.
+
+    Raises
+    ------
+    ValueError
+        Where it is not.
+    """
+    size = picture_size(content)
+    if size is None:
+        raise ValueError("it is no picture that is known; want png, pgm, bmp, jpg or tif")
+    width, height = size
+    if not (width > 0 and height > 0 and width * height <= MOST_PIXELS):
+        raise ValueError(f"it has {width:,} x {height:,} pixels; want at most {MOST_PIXELS:,} in all")
+
+
+def picture_size(content: bytes) -> tuple[int, int] | None:
+    """Return width and height of a picture; None where its format is not known or its header damaged."""
+    try:
+        if content[:8] == b"\x89PNG\r\n\x1a\n":
+            width, height = struct.unpack(">II", content[16:24])
+            return width, height
+        if content[:2] == b"BM":
+            return _bmp(content)
+        if content[:1] == b"P" and content[1:2] in b"123456":
+            return _pnm(content)
+        if content[:2] == b"\xff\xd8":
+            return _jpeg(content)
+        if content[:4] in (b"II*\x00", b"MM\x00*"):
+            return _tiff(content)
+    except (struct.error, ValueError, IndexError):
+        return None
+    return None
+
+
+def _bmp(content: bytes) -> tuple[int, int]:
+    if struct.unpack("<I", content[14:18])[0] == 12:
+        width, height = struct.unpack("<HH", content[18:22])
+        return width, height
+    width, height = struct.unpack("<ii", content[18:26])
+    return abs(width), abs(height)
+
+
+def _pnm(content: bytes) -> tuple[int, int]:
+    """Return the size of a PBM, PGM or PPM: two numbers among remarks."""
+    numbers: list[int] = []
+    for line in content[2:65536].splitlines():
+        numbers += [int(word) for word in line.split(b"#")[0].split()[: 2 - len(numbers)]]
+        if len(numbers) == 2:
+            return numbers[0], numbers[1]
+    raise ValueError("no size")
+
+
+def _jpeg(content: bytes) -> tuple[int, int]:
+    """Return the size that the first frame header says; segments before it are passed over."""
+    place = 2
+    while place + 9 <= len(content):
+        if content[place] != 0xFF:
+            raise ValueError("no marker")
+        marker = content[place + 1]
+        if marker in _JPEG_SIZES:
+            height, width = struct.unpack(">HH", content[place + 5 : place + 9])
+            return width, height
+        stands_alone = marker in (0x01, 0xFF) or 0xD0 <= marker <= 0xD8
+        step = 0 if stands_alone else struct.unpack(">H", content[place + 2 : place + 4])[0]
+        place += (1 if marker == 0xFF else 2) + step
+    raise ValueError("no frame")
+
+
+def _tiff(content: bytes) -> tuple[int, int]:
+    """Return the size that the first directory says."""
+    order = "<" if content[:2] == b"II" else ">"
+    (start,) = struct.unpack(f"{order}I", content[4:8])
+    (count,) = struct.unpack(f"{order}H", content[start : start + 2])
+    found: dict[int, int] = {}
+    for k in range(count):
+        tag, kind = struct.unpack(f"{order}HH", content[start + 2 + 12 * k : start + 6 + 12 * k])
+        place = start + 10 + 12 * k
+        if tag in (256, 257):
+            width = 2 if kind == 3 else 4
+            found[tag] = struct.unpack(f"{order}{'H' if kind == 3 else 'I'}", content[place : place + width])[
+                0
+            ]
+    return found[256], found[257]

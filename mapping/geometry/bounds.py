@@ -1,0 +1,231 @@
+"""Types and bounds of settings: declared in their annotations, checked alike wherever values come from.
+
+A number is declared as ``Annotated[float, within(0.0, 10.0)]``, one that may be left out as that ``| None``,
+and a part whose class declares none as ``Annotated[Part, inner(name=within(...))]``.
+"""
+
+import math
+import reprlib
+import types
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import lru_cache
+from numbers import Integral, Real
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+UNBOUNDED = 1e9
+"""What a number without bounds of its own may be at most, to both sides of zero."""
+
+_MOST_LETTERS = 80
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """From where to where a number may be.
+
+    Attributes
+    ----------
+    least, most : float
+        The ends.
+    has_least, has_most : bool
+        Whether the ends themselves are allowed.
+    what : str
+        What such a number is called in messages.
+    never : bool
+        Whether infinity is allowed as well, for a limit that is none.
+    """
+
+    least: float = -UNBOUNDED
+    most: float = UNBOUNDED
+    has_least: bool = True
+    has_most: bool = True
+    what: str = "a number"
+    never: bool = False
+
+    def hold(self, value: Any) -> bool:  # noqa: ANN401
+        """Whether a number is within."""
+        if self.never and value == math.inf:
+            return True
+        above = value >= self.least if self.has_least else value > self.least
+        return bool(above and (value <= self.most if self.has_most else value < self.most))
+
+    @property
+    def interval(self) -> str:
+        """The bounds as an interval: a square bracket where the end is allowed."""
+        low, high = ("[" if self.has_least else "("), ("]" if self.has_most else ")")
+        return f"{low}{self.least:.6g}, {self.most:.6g}{high}"
+
+    def __str__(self) -> str:
+        if self.has_least and self.has_most and self.least != 0.0:
+            return f"from {self.least:,.10g} to {self.most:,.10g}"
+        low = f"of {self.least:g} or more" if self.has_least else f"above {self.least:g}"
+        high = f"at most {self.most:,.10g}" if self.has_most else f"below {self.most:,.10g}"
+        return f"{low} and {high}{', or inf' if self.never else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class Inner:
+    """Bounds of the numbers of a part, by their names."""
+
+    bounds: Mapping[str, Bounds]
+
+
+def within(least: float, most: float, what: str = "a number") -> Bounds:
+    """Return bounds whose ends are allowed."""
+    return Bounds(least, most, what=what)
+
+
+def above(least: float, most: float, what: str = "a number") -> Bounds:
+    """Return bounds of which the lower end is not allowed."""
+    return Bounds(least, most, has_least=False, what=what)
+
+
+def share(has_least: bool = True, has_most: bool = True, what: str = "a share") -> Bounds:
+    """Return the bounds of a share, from 0 to 1."""
+    return Bounds(0.0, 1.0, has_least, has_most, what)
+
+
+def inner(**bounds: Bounds) -> Inner:
+    """Return bounds of the numbers of a part."""
+    return Inner(bounds)
+
+
+Length = Annotated[float, above(0.0, 1000.0)]
+"""A length of something that is there [m]."""
+Distance = Annotated[float, within(0.0, 1000.0)]
+"""A distance that may be zero [m]."""
+Angle = Annotated[float, above(0.0, 2.0 * math.pi)]
+"""An angle of something that is there [rad]."""
+Turn = Annotated[float, within(0.0, 2.0 * math.pi)]
+"""An angle that may be zero [rad]."""
+Duration = Annotated[float, within(0.0, 1e7)]
+"""A time that may be zero [s]."""
+Positive = Annotated[float, above(0.0, 1e6)]
+"""A number above zero."""
+FromZero = Annotated[float, within(0.0, 1e6)]
+"""A number that may be zero."""
+Count = Annotated[int, within(1, 1_000_000)]
+"""How many there are, at least one."""
+Counted = Annotated[int, within(0, 1_000_000)]
+"""How many there are, or none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What a setting has to be.
+
+    Attributes
+    ----------
+    kind : type
+        ``int``, ``float``, ``bool`` or ``str``; ``object`` for what its class checks itself.
+    is_optional : bool
+        Whether it may be None.
+    bounds : Bounds
+        Where a number may be.
+    inner : mapping of str to Bounds
+        Bounds of the numbers of a part.
+    """
+
+    kind: type = object
+    is_optional: bool = False
+    bounds: Bounds = field(default_factory=Bounds)
+    inner: Mapping[str, Bounds] = field(default_factory=dict)
+
+    @property
+    def wanted(self) -> str:
+        """What it has to be, in words."""
+        kind = {int: "a whole number", bool: "true or false", str: "text"}.get(self.kind, self.bounds.what)
+        bounds = f" {self.bounds}" if self.kind in (int, float) else ""
+        return f"{kind}{bounds}{', or None' if self.is_optional else ''}"
+
+    def hold(self, value: Any) -> bool:  # noqa: ANN401
+        """Whether a value is what the setting has to be."""
+        if self.kind is object or (value is None and self.is_optional):
+            return True
+        is_logical = isinstance(value, bool | np.bool_)
+        if self.kind in (bool, str):
+            return is_logical if self.kind is bool else isinstance(value, str)
+        number = Integral if self.kind is int else Real
+        return isinstance(value, number) and not is_logical and self.bounds.hold(value)
+
+
+@lru_cache(maxsize=256)
+def rules_of(kind: type) -> dict[str, Rule]:
+    """Return what each setting of a class has to be, as its annotations declare it."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {each.name: _rule(hints[each.name]) for each in fields(kind)}
+
+
+def check_settings(settings: Any, whose: str = "") -> None:  # noqa: ANN401
+    """Check the types and bounds of all settings of a dataclass.
+
+    Parameters
+    ----------
+    settings : dataclass instance
+        The settings.
+    whose : str
+        Whose they are, for messages: ``the robot``.
+
+    Raises
+    ------
+    ValueError
+        Where one is of another type or out of its bounds; the message names it, its value and what to want.
+    """
+    of = f" of {whose}" if whose else ""
+    for name, rule in rules_of(type(settings)).items():
+        value = getattr(settings, name)
+        if not rule.hold(value):
+            raise ValueError(f"{name}{of} is {shown(value)}; want {rule.wanted}")
+        found = {part: getattr(value, part) for part in rule.inner if hasattr(value, part)}
+        check_values(found, rule.inner, name)
+
+
+def check_values(values: Mapping[str, Any], bounds: Mapping[str, Bounds], whose: str) -> None:
+    """Check numbers by name, those that have bounds.
+
+    Raises
+    ------
+    ValueError
+        Where one is no number, or out of its bounds.
+    """
+    for name, value in values.items():
+        rule = Rule(float, False, bounds.get(name, Bounds()))
+        if name in bounds and not rule.hold(value):
+            raise ValueError(f"{name} of {whose} is {shown(value)}; want {rule.wanted}")
+
+
+def check_anything(settings: Any, whose: str) -> None:  # noqa: ANN401
+    """Check settings of a class that may declare no bounds, and those of its parts.
+
+    Its numbers have to be of their type and within `UNBOUNDED`, unless it declares something else.
+    """
+    check_settings(settings, whose)
+    for each in fields(settings):
+        part = getattr(settings, each.name)
+        if hasattr(part, "__dataclass_fields__"):
+            check_anything(part, f"{each.name} of {whose}")
+
+
+def shown(value: Any) -> str:  # noqa: ANN401
+    """Return a value for a message, never longer than a line."""
+    try:
+        text = str(value) if isinstance(value, Real) else reprlib.repr(value)
+    except (ValueError, RecursionError):
+        return f"a {type(value).__name__} too long to be shown"
+    return text if len(text) <= _MOST_LETTERS else f"{text[:_MOST_LETTERS]}..."
+
+
+def _rule(hint: Any) -> Rule:  # noqa: ANN401
+    if get_origin(hint) is Annotated:
+        kind, *extras = get_args(hint)
+        plain = _rule(kind)
+        bounds = next((extra for extra in extras if isinstance(extra, Bounds)), plain.bounds)
+        parts = next((extra.bounds for extra in extras if isinstance(extra, Inner)), {})
+        return Rule(plain.kind, plain.is_optional, bounds, parts)
+    if get_origin(hint) in (Union, types.UnionType):
+        kinds = [each for each in get_args(hint) if each is not type(None)]
+        rule = _rule(kinds[0]) if len(kinds) == 1 else Rule()
+        return Rule(rule.kind, len(kinds) < len(get_args(hint)), rule.bounds, rule.inner)
+    return Rule(hint) if hint in (int, float, bool, str) else Rule()

@@ -1,0 +1,188 @@
+"""Valid files of every reader, small ones, from which damaged ones are made."""
+
+import gzip
+import json
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import yaml
+
+import lidarium
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration
+from lidarium.evaluation.record import Recorder, write_record
+from lidarium.evaluation.suites.campaign import Campaign
+from lidarium.evaluation.suites.suite import read_suite
+from lidarium.mapping.files.laser_logs import LaserLog, write_npz_log
+from lidarium.mapping.files.map_files import write_ros_map
+from lidarium.mapping.files.spline_files import write_spline_map
+from lidarium.mapping.files.trajectories import write_tum
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.splines.features import observe
+from lidarium.mapping.splines.scan_points import scan_points
+from lidarium.mapping.splines.spline_map import SplineMap
+
+PLAN = {
+    "name": "two rooms",
+    "about": "Two rooms with a door.",
+    "bounds": [0, 0, 6, 4],
+    "outer_wall": 0.2,
+    "walls": [[3, 0, 3, 4]],
+    "blocks": [[1, 1, 1.5, 1.5]],
+    "doors": [[3, 2]],
+    "obstacles": [{"corners": [[4, 1], [5, 1], [4.5, 2]], "height": 1.2}],
+    "wall_height": 2.5,
+    "furniture": [["bed", 2, 3, 90]],
+    "starts": [[1, 2, 0]],
+    "goal": [5, 3],
+}
+SUITE = """
+policies = ["random_walk", "greedy"]
+floors = ["apartment"]
+robots = [1, 2]
+seeds = 2
+draws_starts = true
+
+[settings]
+horizon_s = 2.0
+robot = "pioneer"
+lidar = { beams = 90, range_max = 4.0 }
+radio = { kind = "range", reach = 5.0 }
+
+[variants.plain]
+[variants.noisy]
+noise = "datasheet"
+
+[policy_settings.greedy]
+policy = "nearest_frontier"
+
+[stop]
+figure = "c_free"
+at_least = 0.9
+"""
+KTH = """<?xml version="1.0"?>
+<floor><Scale PixelDistance="10" RealDistance="1.0"/>
+<space name="a"><contour>{}</contour></space><space name="b"><contour>{}</contour></space></floor>
+"""
+
+
+def make_samples(folder: Path) -> None:
+    """Write a valid file of each kind into a folder; its name begins with the name of the reader."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _maps(folder)
+    _floors(folder)
+    _logs(folder)
+    _results(folder)
+
+
+def _room() -> np.ndarray:
+    pixels = np.full((40, 60), 254, np.uint8)
+    pixels[[0, -1]] = pixels[:, [0, -1]] = 0
+    pixels[20, :40] = 0
+    pixels[25:30, 50:55] = 205
+    return pixels
+
+
+def _maps(folder: Path) -> None:
+    levels = np.where(_room() == 254, 255, np.where(_room() == 0, 0, 127)).astype(np.uint8)
+    write_ros_map(folder, "map", levels, (1.0, -2.0, 0.3), 0.1)
+    for suffix in ("png", "bmp", "jpg", "tif"):
+        cv2.imwrite(str(folder / f"image.{suffix}"), _room())
+    (folder / "image.pgm").write_bytes(b"P5\n# a remark\n60 40\n255\n" + _room().tobytes())
+    rows = "\n".join(" ".join(map(str, row)) for row in _room())
+    (folder / "image_ascii.pgm").write_text(f"P2\n60 40\n255\n{rows}\n")
+    dungeon = np.where(_room() == 0, 100, 200).astype(np.uint8)
+    dungeon[5:8, 5:8] = 208
+    cv2.imwrite(str(folder / "dungeon.png"), dungeon)
+    header = {"image": "map.pgm", "resolution": 0.1, "origin": [0.0, 0.0, 0.0], "negate": 0}
+    header |= {"occupied_thresh": 0.65, "free_thresh": 0.196, "mode": "scale"}
+    (folder / "map_scale.yaml").write_text(yaml.safe_dump(header))
+
+
+def _floors(folder: Path) -> None:
+    ring = [(0, 0, 60, 0), (60, 0, 60, 40), (60, 40, 0, 40), (0, 40, 0, 0)]
+    tags = "".join(
+        f'<linesegment x1="{a}" y1="{b}" x2="{c}" y2="{d}" type="{"Portal" if a == c == 60 else "Wall"}"/>'
+        for a, b, c, d in ring
+    )
+    moved = tags.replace('"60"', '"130"').replace('"0"', '"65"')
+    lines = [(0, 0, 6, 0), (6, 0, 6, 4), (6, 4, 0, 4), (0, 4, 0, 0), (3, 0, 3, 3)]
+    texts = {
+        "kth.xml": KTH.format(tags, moved),
+        "amrl.vectormap.txt": "".join(f"{a}, {b}, {c}, {d}\n" for a, b, c, d in lines),
+        "lifull.txt": "".join(f"{10 * a} {10 * b} {10 * c} {10 * d} wall\n" for a, b, c, d in lines)
+        + "30 30 30 40 door\n",
+        "houseexpo.json": json.dumps({"id": "h", "verts": [[0, 0], [6, 0], [6, 4], [3, 5], [0, 4], [0, 0]]}),
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+        (folder / f"{name}.gz").write_bytes(gzip.compress(text.encode()))
+    (folder / "drawn.json").write_text(json.dumps(PLAN, indent=1))
+    np.save(folder / "array.npy", _room())
+    np.savez_compressed(
+        folder / "array.npz", solid=_room() == 0, origin=np.array([0.0, 1.0]), resolution=np.array(0.1)
+    )
+
+
+def _logs(folder: Path) -> None:
+    geometry = ScanGeometry(beams=90, field_of_view=math.pi, range_max=8.0)
+    steps = np.arange(12)
+    poses = np.stack([0.1 * steps, 0.02 * steps, 0.03 * steps], axis=1)
+    angles = geometry.angles
+    # A room of 6 m x 4 m about the start.
+    ranges = np.array(
+        [
+            np.minimum(
+                (3.0 - x * np.sign(np.cos(angles + t))) / np.abs(np.cos(angles + t)),
+                (2.0 - y * np.sign(np.sin(angles + t))) / np.maximum(np.abs(np.sin(angles + t)), 1e-6),
+            )
+            for x, y, t in poses
+        ],
+        np.float32,
+    )
+    log = LaserLog(
+        stamps=0.2 * steps,
+        ranges=ranges,
+        geometry=geometry,
+        odometry=poses,
+        readings_stamps=0.2 * steps,
+        readings=poses,
+        reading_of_scan=steps.astype(np.int64),
+    )
+    write_npz_log(folder / "log.npz", log)
+    lines = ["PARAM robot_frontlaser_offset 0.1"]
+    for scan, (x, y, theta), stamp in zip(ranges, poses, log.stamps, strict=True):
+        pose = f"{x:.4f} {y:.4f} {theta:.4f}"
+        told = " ".join(f"{value:.2f}" for value in scan)
+        lines += [
+            f"ODOM {pose} 0.1 0.0 0.0 {stamp:.3f} host {stamp:.3f}",
+            f"FLASER {len(scan)} {told} {pose} {pose} {stamp:.3f} host {stamp:.3f}",
+        ]
+    (folder / "carmen.log").write_text("\n".join(lines) + "\n")
+    (folder / "carmen.log.gz").write_bytes(gzip.compress((folder / "carmen.log").read_bytes()))
+    write_tum(folder / "trajectory.tum", log.stamps, poses)
+    (folder / "relations.txt").write_text("0.0 1.0 0.5 0.1 0 0 0 0.1\n0.4 2.0 0.8 0.1 0 0 0 0.2\n")
+    spline_map = SplineMap()
+    for scan, pose in zip(ranges, poses, strict=True):
+        spline_map.update(observe(scan_points(scan, geometry)), Transform(*pose))
+    write_spline_map(folder / "splines.json", spline_map)
+    write_spline_map(folder / "splines.npz", spline_map)
+
+
+def _results(folder: Path) -> None:
+    recorder = Recorder("nearest_frontier", 3, "apartment")
+    settings = make_settings(robots=2, horizon_s=3.0, lidar={"beams": 90}, noise="datasheet")
+    env = WatchedExploration("apartment", settings, watchers=[recorder])
+    run_episode(lidarium.policy("nearest_frontier"), env, 3)
+    write_record(folder / "record.npz", recorder.finish())
+    (folder / "suite.toml").write_text(SUITE)
+    evaluated = folder / "evaluated"
+    campaign = Campaign(read_suite(folder / "suite.toml"), evaluated, 1, False)
+    for _ in campaign.run():
+        pass
+    (folder / "episodes.jsonl").write_bytes((evaluated / "episodes.jsonl").read_bytes())
+    (folder / "kept_suite.json").write_bytes((evaluated / "suite.json").read_bytes())

@@ -1,0 +1,136 @@
+"""What is done with a file of each kind: it is read, and used for the first time."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from lidarium.agents import make_policy
+from lidarium.envs.floors.catalogue.drawn import load_drawn
+from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.envs.floors.floor import Floor
+from lidarium.evaluation.analysis.episodes import read_episodes as read_rows
+from lidarium.evaluation.analysis.groups import grouped
+from lidarium.evaluation.metrics.relations import read_relations
+from lidarium.evaluation.record import read_record
+from lidarium.evaluation.record.replay import drive_again
+from lidarium.evaluation.suites.campaign import _kept_suite
+from lidarium.evaluation.suites.episodes_file import read_episodes
+from lidarium.evaluation.suites.suite import read_suite
+from lidarium.mapping.files.carmen_logs import read_carmen_log
+from lidarium.mapping.files.laser_logs import LaserLog, read_npz_log
+from lidarium.mapping.files.map_files import cropped, read_grey_map, read_ros_map
+from lidarium.mapping.files.spline_files import compact_arrays, read_spline_map
+from lidarium.mapping.files.trajectories import interpolated, read_tum
+from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
+from lidarium.mapping.localization.registry import make_localizer
+from lidarium.scripts.evaluate import summary_of
+
+SCANS = 3
+
+
+def _use_floor(floor: Floor) -> None:
+    floor.raster(0.05, 0.2, 0.2)
+    _ = floor.sha256, floor.geometry_sha256
+
+
+def _floor(path: Path) -> None:
+    _use_floor(load_floor(path))
+
+
+def _image(path: Path) -> None:
+    _use_floor(load_floor(path, 0.1))
+    read_grey_map(path, 0.05)
+
+
+def _map(path: Path) -> None:
+    found = read_ros_map(path)
+    cropped(found.levels, found.origin[:2], found.resolution)
+    _use_floor(load_floor(path))
+
+
+def _drawn(path: Path) -> None:
+    _use_floor(load_drawn(path))
+
+
+def _array(path: Path) -> None:
+    _use_floor(load_floor(path, None if path.suffix == ".npz" else 0.1))
+
+
+def _log(read: Callable[[Path], LaserLog], path: Path) -> None:
+    log = read(path).limited(20.0, True)
+    slam = make_localizer("slam", log.geometry)
+    slam.reset(log.laser_pose, 0)
+    poses = np.zeros((len(log.stamps), 3)) if log.odometry is None else log.odometry
+    for k in range(min(SCANS, len(log.stamps))):
+        if np.isfinite(poses[k]).all():
+            slam.localize(Sensing(float(log.stamps[k]), poses[k], log.ranges[k]))
+
+
+def _trajectory(path: Path) -> None:
+    stamps, poses = read_tum(path)
+    interpolated(stamps, poses, np.linspace(stamps[0], stamps[-1], 5))
+
+
+def _splines(path: Path) -> None:
+    spline_map = read_spline_map(path)
+    compact_arrays(spline_map)
+    spline_map.sample()
+
+
+def _record(path: Path) -> None:
+    record = read_record(path)
+    display = record.display
+    display.map_at(float(display.times[-1]))
+    display.poses_at(1.0)
+    display.coverage_at(1.0)
+    drive_again(record)
+
+
+def _suite(path: Path) -> None:
+    suite = read_suite(path)
+    suite.as_dict()
+    for _, trial in zip(range(20), suite.trials(), strict=False):
+        suite.starts_of(trial)
+        make_policy("random_walk") if trial.policy == "" else suite.make_policy(trial.policy)
+        suite.settings(trial.variant, trial.robots)
+
+
+def _episodes(path: Path) -> None:
+    folder = path.parent / "folder"
+    folder.mkdir(exist_ok=True)
+    shutil.copy(path, folder / "episodes.jsonl")
+    rows = read_rows(folder).rows
+    for group in grouped(rows):
+        _ = group.title, group.slug, group.floors
+    summary_of([{"variant": "", **row} for row in rows])
+    read_episodes(path)
+
+
+USES: dict[str, Callable[[Path], None]] = {
+    "map": _map,
+    "image": _image,
+    "dungeon": _image,
+    "kth": _floor,
+    "amrl": _floor,
+    "lifull": _floor,
+    "houseexpo": _floor,
+    "drawn": _drawn,
+    "array": _array,
+    "log": lambda path: _log(read_npz_log, path),
+    "carmen": lambda path: _log(read_carmen_log, path),
+    "trajectory": _trajectory,
+    "relations": read_relations,
+    "splines": _splines,
+    "record": _record,
+    "suite": _suite,
+    "episodes": _episodes,
+    "kept": _kept_suite,
+}
+"""By the beginning of a sample's name."""
+
+
+def use(path: Path) -> None:
+    """Read a file and use it, as its name says."""
+    USES[path.name.replace("_", ".").split(".")[0]](path)

@@ -1,0 +1,85 @@
+"""Runs cases one after the other in a process of its own, and tells of each on standard output.
+
+A line ``begin N`` precedes case N, a line ``end N OUTCOME`` follows it; who reads the lines sees which case
+a process died of, or never came back from.
+"""
+
+import json
+import os
+import random
+import resource
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+MOST_MESSAGE = 500
+MEMORY = 6 << 30
+"""What a worker may ask for: more is told as lack of memory [bytes]."""
+
+
+def outcome_of(action: Callable[[], object]) -> dict[str, object]:
+    """Return how a case ended: ``fine``, ``refused`` by a clear error, or ``wrong``."""
+    began = time.process_time()
+    try:
+        action()
+        found: dict[str, object] = {"kind": "fine"}
+    except Exception as error:
+        is_clear = isinstance(error, ValueError | OSError) and not isinstance(error, UnicodeError)
+        is_clear = is_clear and 0 < len(str(error)) <= MOST_MESSAGE
+        found = {"kind": "refused"}
+        if not is_clear:
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            place = f"{Path(where.filename).name}:{where.lineno}"
+            found = {"kind": "wrong", "error": f"{type(error).__name__}: {str(error)[:200]}", "at": place}
+    return {**found, "cpu_s": round(time.process_time() - began, 3)}
+
+
+def file_case(samples: list[Path], folder: Path, seed: int, number: int) -> Callable[[], object]:
+    """Return what reads and uses the damaged file of a case."""
+    from robustness.mutations import mutated
+    from robustness.uses import use
+
+    chance = random.Random(f"{seed} {number}")
+    sample = samples[number % len(samples)]
+    content = mutated(sample.read_bytes(), sample.name, chance)
+    path = folder / sample.name
+    path.write_bytes(content)
+    for other in samples:  # pictures that headers name
+        if other.stem == "map" and other.name != sample.name:
+            (folder / other.name).unlink(missing_ok=True)
+            os.link(other, folder / other.name)
+    # The picture of a map is read by way of its header.
+    return lambda: use(path.with_suffix(".yaml") if path.name == "map.pgm" else path)
+
+
+def setting_case(seed: int, number: int) -> Callable[[], object]:
+    """Return what makes and steps an environment of extreme settings."""
+    from robustness.extremes import try_settings
+
+    return lambda: try_settings(random.Random(f"{seed} {number}"))
+
+
+def main(kind: str, samples_folder: str, seed: int, first: int, last: int) -> None:
+    """Run the cases of a range."""
+    warnings.simplefilter("ignore")
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    samples = sorted(path for path in Path(samples_folder).iterdir() if path.is_file())
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(first, last):
+            print(f"begin {number}", flush=True)
+            if kind == "files":
+                action = file_case(samples, Path(folder), seed, number)
+            else:
+                action = setting_case(seed, number)
+            found = outcome_of(action)
+            found["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+            print(f"end {number} {json.dumps(found)}", flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], *map(int, sys.argv[3:6]))
