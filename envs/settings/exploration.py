@@ -31,7 +31,7 @@ MAX_MAP_CELLS = 4096
 MAX_EGOCENTRIC_CELLS = 1024
 
 OCCUPANCY = inner(
-    resolution=within(1e-3, 10.0),
+    resolution=within(0.005, 10.0),
     hit=above(0.0, 127.0),
     miss=above(0.0, 127.0),
     minimum=within(-127.0, 0.0),
@@ -138,7 +138,7 @@ class ExplorationSettings:
     map_cells: Annotated[int, within(2, MAX_MAP_CELLS)] = 256
     egocentric_cells: Annotated[int, within(2, MAX_EGOCENTRIC_CELLS)] = 64
     egocentric_scales: tuple[int, ...] = (1, 4)
-    raster_resolution: Annotated[float, within(1e-3, 10.0)] = 0.025
+    raster_resolution: Annotated[float, within(0.005, 10.0)] = 0.025
     decision_period_s: Annotated[float, above(0.0, 1e6)] = 2.0
     threads: Annotated[int, within(1, 1024)] = 1
 

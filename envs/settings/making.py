@@ -125,6 +125,8 @@ def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa
         raise ValueError(f"{name!r} is no setting: {unknown('setting', path[0], known)}")
     if len(path) > 1:
         value = _replaced(getattr(part, path[0]), path[1:], value, name)
+    elif isinstance(part, OccupancySettings):
+        check_values({path[0]: value}, OCCUPANCY.bounds, "occupancy")
     elif isinstance(part, ExplorationSettings):
         return make_settings(part, **{path[0]: value})
     try:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.evaluation.suites.episodes_file import TIMINGS, read_lines
+from lidarium.mapping.files.names import printable
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 
 Row = dict[str, Any]
@@ -32,6 +33,10 @@ _WANTED: dict[str, Rule] = {
     "version": _TEXT,
     "settings_sha256": _TEXT,
 }
+_NAMES = ("floor", "floor_sha256", "policy", "version", "settings_sha256")
+MOST_LETTERS = 1000
+"""Longest name of a line."""
+
 _GROUPS = ("path_m", "ended_because")
 _MAY_BE_NULL = ("horizon_s", "t90_s", "t99_s")
 _OF_SETTINGS = ("backend", "localization", "realism", "horizon_s")
@@ -133,6 +138,10 @@ def _check_row(row: Row, where: str) -> None:
     for key, rule in _WANTED.items():
         if not rule.hold(row[key]):
             raise ValueError(f"{where} has {key} {shown(row[key])}; want {rule.wanted}")
+    for key in (*_NAMES, *({"variant"} & row.keys())):
+        row[key] = printable(str(row[key] or ""))
+        if len(row[key]) > MOST_LETTERS:
+            raise ValueError(f"{where} has {key} {shown(row[key])}; want at most {MOST_LETTERS} letters")
     paths = row["path_m"] if isinstance(row["path_m"], list) else [None]
     for key, is_good in (
         ("path_m", len(paths) > 0 and all(_FIGURE.hold(path) for path in paths)),

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.rendering import Colour, team_colours
+from lidarium.evaluation.drawing.plain_words import plain_words
 from lidarium.evaluation.episodes.output import whole_file
 from lidarium.mapping.files.map_files import FREE, OCCUPIED
 from lidarium.mapping.merging.fusion import FusedMap
@@ -48,7 +49,7 @@ def save_merge_picture(path: Path, merged: Merged) -> None:
     axes_of_groups = figure.subplots(1, len(groups), width_ratios=widths, squeeze=False)[0]
     for axes, group, one in zip(axes_of_groups, groups, fused, strict=True):
         _draw_group(axes, merged, group, one, colours)
-    with whole_file(path) as beside:
+    with whole_file(path) as beside, plain_words(figure):
         figure.savefig(beside)
 
 

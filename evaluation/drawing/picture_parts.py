@@ -19,6 +19,7 @@ from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.frame_parts import team_colours
+from lidarium.evaluation.drawing.plain_words import plain_words
 from lidarium.evaluation.episodes.output import whole_file
 
 INK, FAINT, SOLID = "#1f2937", "#6b7280", "#b6bec9"
@@ -102,7 +103,8 @@ def save_figure(path: Path, figure: Figure) -> None:
     """Write a figure as a PNG file, whole or not at all."""
     FigureCanvasAgg(figure)
     content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=DPI, facecolor="white")
+    with plain_words(figure):
+        figure.savefig(content, format="png", dpi=DPI, facecolor="white")
     with whole_file(path) as beside:
         beside.write_bytes(content.getvalue())
 

@@ -51,7 +51,9 @@ def as_json(content: Mapping[str, Any]) -> str:
     ValueError
         Where a number is not finite: JSON has no such numbers.
     """
-    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    # Bytes of names that are no UTF-8 are escaped as JSON does it.
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

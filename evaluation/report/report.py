@@ -16,6 +16,7 @@ from lidarium.evaluation.analysis.episodes import Episodes, name_of, read_episod
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
 from lidarium.evaluation.episodes.output import check_writable, write_text
+from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.report.sections import Section, tell_group
 
 
@@ -60,8 +61,12 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
         "confidence": 0.95,
         "seed": seed,
         "warnings": [
-            *warnings,
-            *(f"{section.group.title}: {warning}" for section in sections for warning in section.warnings),
+            *map(plain, warnings),
+            *(
+                f"{plain(section.group.title)}: {warning}"
+                for section in sections
+                for warning in section.warnings
+            ),
         ],
         "groups": [section.numbers for section in sections],
     }
@@ -131,7 +136,7 @@ def _page(result: dict[str, Any], sections: Sequence[Section]) -> str:
         "# Report",
         f"{result['episodes']} episodes of lidarium {result['episodes_version']}, {result['records']} of "
         "them recorded; baseline "
-        f"`{result['baseline']}`. Times are simulated. In brackets stand 95 % intervals: medians by "
+        f"{code(result['baseline'])}. Times are simulated. In brackets stand 95 % intervals: medians by "
         "interpolated order statistics, "
         "shares by Wilson, means, differences and ratios by the studentised bootstrap (10,000 resamples, "
         f"seed {result['seed']}). "
@@ -147,7 +152,7 @@ def _page(result: dict[str, Any], sections: Sequence[Section]) -> str:
         seeds = len({row["seed"] for rows in group.runs.values() for row in rows})
         runs = sum(len(rows) for rows in group.runs.values())
         paragraphs += [
-            f"## {group.title}",
+            f"## {plain(group.title)}",
             f"{runs} runs of {len(group.runs)} policies on {len(group.floors)} "
             f"floor{'s' if len(group.floors) != 1 else ''}, "
             f"{seeds} seed{'s' if seeds != 1 else ''}; times count up to {group.horizon_s:.0f} s.",

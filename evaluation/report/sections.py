@@ -3,6 +3,7 @@
 It has numbers, tables, plots, and cautions.
 """
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,7 +33,10 @@ from lidarium.evaluation.drawing.plots import (
     save_profiles,
 )
 from lidarium.evaluation.report import tables
+from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.statistics import FEWEST_FOR_NOMINAL, median_interval
+
+_LONGEST_STEM = 60
 
 PICTURED_FLOORS = 3
 """Floors of each group of which paths and visits are drawn."""
@@ -115,10 +119,12 @@ def _tell_times(section: Section, seed: int) -> None:
         ]:
             section.warnings.append(f"{title} was not reached in {', '.join(missed)}.")
     few = [
-        f"`{policy}` ({len(rows)})" for policy, rows in group.runs.items() if len(rows) < FEWEST_FOR_NOMINAL
+        f"{code(policy)} ({len(rows)})"
+        for policy, rows in group.runs.items()
+        if len(rows) < FEWEST_FOR_NOMINAL
     ]
     if again := [
-        f"{repeats(rows)} of {len(rows)} of `{policy}`"
+        f"{repeats(rows)} of {len(rows)} of {code(policy)}"
         for policy, rows in group.runs.items()
         if repeats(rows)
     ]:
@@ -134,9 +140,8 @@ def _tell_times(section: Section, seed: int) -> None:
 def _missed(policy: str, figure: TimeFigure) -> str:
     missed = figure.size - figure.reached
     cut = f", {figure.cut} cut before the horizon" if figure.cut else ""
-    return (
-        f"{missed} of {figure.size} runs of `{policy}` ({100.0 * missed / figure.size:.0f} % censored{cut})"
-    )
+    censored = f"{100.0 * missed / figure.size:.0f} % censored{cut}"
+    return f"{missed} of {figure.size} runs of {code(policy)} ({censored})"
 
 
 def _tell_values(section: Section, seed: int) -> None:
@@ -161,7 +166,7 @@ def _tell_comparisons(section: Section, baseline: str, seed: int) -> None:
     others = [policy for policy in group.runs if policy != baseline]
     if baseline not in group.runs:
         section.warnings.append(
-            f"there are no runs of the baseline `{baseline}` here, so policies are not compared."
+            f"there are no runs of the baseline {code(baseline)} here, so policies are not compared."
         )
         return
     if not others:
@@ -171,7 +176,7 @@ def _tell_comparisons(section: Section, baseline: str, seed: int) -> None:
     _warn_of_pairs(section, others, baseline)
     if comparisons:
         section.markdown += [
-            f"### Compared with `{baseline}`, pair by pair",
+            f"### Compared with {code(baseline)}, pair by pair",
             tables.comparisons_table(comparisons),
         ]
         section.markdown.append(
@@ -189,12 +194,12 @@ def _warn_of_pairs(section: Section, others: Sequence[str], baseline: str) -> No
         ours = section.group.runs[policy]
         pairs = len(paired(ours, theirs)[0])
         if pairs < FEWEST_FOR_NOMINAL:
-            few.append(f"`{policy}` ({pairs})")
+            few.append(f"{code(policy)} ({pairs})")
         if left := len(ours) + len(theirs) - 2 * pairs:
-            unpaired.append(f"{left} of `{policy}` or `{baseline}`")
+            unpaired.append(f"{left} of {code(policy)} or {code(baseline)}")
     if few:
         section.warnings.append(
-            f"fewer than {FEWEST_FOR_NOMINAL} pairs with `{baseline}`: {', '.join(few)}: {_OF_FEW}"
+            f"fewer than {FEWEST_FOR_NOMINAL} pairs with {code(baseline)}: {', '.join(few)}: {_OF_FEW}"
         )
     if unpaired:
         section.warnings.append(
@@ -226,9 +231,9 @@ def _draw_floors(section: Section, records: dict[Key, Entry], out: Path) -> None
     section.numbers["visits"] = {}
     recorded = [floor for floor in group.floors if recorded_pair(group, floor, records)]
     for floor in recorded[:PICTURED_FLOORS]:
-        name = "".join(letter if letter.isalnum() else "_" for letter in floor)
+        name = _file_stem(floor, group.floors)
         save_paths(
-            _picture(section, out, f"paths_{name}_{group.robots}.png", f"Paths on {floor}"),
+            _picture(section, out, f"paths_{name}_{group.robots}.png", f"Paths on {plain(floor)}"),
             group,
             floor,
             records,
@@ -239,7 +244,7 @@ def _draw_floors(section: Section, records: dict[Key, Entry], out: Path) -> None
             for policy, each in visits.items()
         }
         save_visits(
-            _picture(section, out, f"visits_{name}_{group.robots}.png", f"Visits on {floor}"),
+            _picture(section, out, f"visits_{name}_{group.robots}.png", f"Visits on {plain(floor)}"),
             group,
             floor,
             visits,
@@ -249,6 +254,16 @@ def _draw_floors(section: Section, records: dict[Key, Entry], out: Path) -> None
         section.markdown.append(
             f"Paths and visits are drawn of the first {PICTURED_FLOORS} of {len(recorded)} recorded floors."
         )
+
+
+def _file_stem(floor: str, floors: Sequence[str]) -> str:
+    """Return a part of a file's name for a floor, no other floor's."""
+    stems = ["".join(letter if letter.isalnum() else "_" for letter in each) for each in floors]
+    stem = stems[list(floors).index(floor)]
+    if len(stem) <= _LONGEST_STEM and stems.count(stem) == 1:
+        return stem
+    digest = hashlib.sha256(floor.encode("utf-8", "replace")).hexdigest()
+    return f"{stem[-_LONGEST_STEM:]}_{digest[:8]}"
 
 
 def _picture(section: Section, out: Path, name: str, title: str) -> Path:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from lidarium.evaluation.analysis.figures import TIMES, VALUES, Comparison, TimeFigure, ValueFigure
 from lidarium.evaluation.analysis.groups import Group, times_to
+from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.statistics import Interval, median_interval
 
 NONE = "–"  # noqa: RUF001
@@ -54,7 +55,7 @@ def times_table(figures: dict[str, TimeFigure], horizon_s: float) -> str:
     header = ("policy", "runs", "reached", "success [%]", "median [s]", f"mean up to {horizon_s:.0f} s [s]")
     rows = [
         (
-            f"`{policy}`",
+            code(policy),
             str(figure.size),
             str(figure.reached),
             interval(figure.success, scale=100.0),
@@ -80,7 +81,7 @@ def values_table(figures: dict[str, dict[str, ValueFigure]]) -> str:
             for value in VALUES
         ]
         cells = [interval(found, digits=digits) for found, digits in shown]
-        rows.append([f"`{policy}`", *cells])
+        rows.append([code(policy), *cells])
     return markdown_table(header, rows)
 
 
@@ -89,10 +90,10 @@ def further_table(figures: dict[str, dict[str, Interval]], horizon_s: float) -> 
     policies = list(figures)
     keys = [key for key in figures[policies[0]] if all(key in by_key for by_key in figures.values())]
     rows = [
-        [f"`{key}`", *(interval(figures[policy][key], horizon_s, digits=_digits(key)) for policy in policies)]
+        [code(key), *(interval(figures[policy][key], horizon_s, digits=_digits(key)) for policy in policies)]
         for key in keys
     ]
-    return markdown_table(["figure, median", *(f"`{policy}`" for policy in policies)], rows) if rows else ""
+    return markdown_table(["figure, median", *(code(policy) for policy in policies)], rows) if rows else ""
 
 
 def _digits(key: str) -> int:
@@ -114,7 +115,7 @@ def comparisons_table(comparisons: Sequence[Comparison]) -> str:
     )
     rows = [
         (
-            f"`{each.policy}`",
+            code(each.policy),
             f"{TITLES[each.key]} [{UNITS[each.key]}]",
             str(each.pairs),
             interval(each.difference),
@@ -146,5 +147,5 @@ def floors_table(group: Group, key: str) -> str:
                 f"{number(median_interval(found.or_never).estimate, group.horizon_s)} "
                 f"({found.is_reached.sum()}/{len(found.times)})"
             )
-        rows.append([floor, *cells])
-    return markdown_table(["floor", *(f"`{policy}`" for policy in group.runs)], rows)
+        rows.append([plain(floor), *cells])
+    return markdown_table(["floor", *(code(policy) for policy in group.runs)], rows)

@@ -107,8 +107,8 @@ def _parsed(path: Path) -> tuple[list[dict[str, Any]], int]:
     for number, episode in lines.numbered:
         if not isinstance(episode.get(KEY), str):
             raise ValueError(
-                f"{path}, line {number} has the key {shown(episode.get(KEY))}; want text that tells its episode "
-                "from all others"
+                f"{path}, line {number} has the key {shown(episode.get(KEY))}; want text that tells its "
+                "episode from all others"
             )
         known = episodes.setdefault(episode[KEY], episode)
         if known is not episode:

@@ -192,8 +192,8 @@ def symmetric_scans(
         )
     if not abs(2.0 * angle_min / increment) + 2 * beams <= 2 * MOST_BEAMS or not reach[1] <= MOST_REACH_M:
         raise ValueError(
-            f"{beams} beams from {angle_min} rad in steps of {increment} rad reach {reach[1]:g} m; want at most "
-            f"{MOST_BEAMS:,} about the heading, and {MOST_REACH_M:,.0f} m"
+            f"{beams} beams from {angle_min} rad in steps of {increment} rad reach {reach[1]:g} m; want at "
+            f"most {MOST_BEAMS:,} about the heading, and {MOST_REACH_M:,.0f} m"
         )
     if beams * increment > 2.0 * math.pi + 1e-6:
         # The last beam repeats the first.

@@ -153,7 +153,8 @@ def _step(settings: ExplorationSettings, chance: random.Random) -> None:
         if not env.agents:
             break
         actions = {
-            agent: np.array([chance.uniform(-1, 1), chance.uniform(-1, 1)], np.float32) for agent in env.agents
+            agent: np.array([chance.uniform(-1, 1), chance.uniform(-1, 1)], np.float32)
+            for agent in env.agents
         }
         observations, rewards, *_ = env.step(actions)
         _check(observations)

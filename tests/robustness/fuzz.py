@@ -3,8 +3,8 @@
 ``python -m robustness.fuzz files --count 100000``
 
 Run it in the folder ``tests``. Every case is drawn from the seed and its number alone, so that one can be
-repeated: ``--first N --count 1``. A case counts as wrong where anything but a clear error of the package comes
-out, where its process dies of a signal, or where it takes more than five seconds.
+repeated: ``--first N --count 1``. A case counts as wrong where anything but a clear error of the package
+comes out, where its process dies of a signal, or where it takes more than five seconds.
 """
 
 import argparse
@@ -144,8 +144,8 @@ def main() -> int:
     for number, fault in tally.faults[:200]:
         print(f"case {number}: {fault}")
     print(
-        f"{sum(tally.kinds.values())} cases in {time.monotonic() - began:.0f} s: {dict(tally.kinds)}; slowest "
-        f"{tally.slowest_s:.2f} s of CPU (case {tally.slowest}), peak {tally.peak_mb:.0f} MB"
+        f"{sum(tally.kinds.values())} cases in {time.monotonic() - began:.0f} s: {dict(tally.kinds)}; "
+        f"slowest {tally.slowest_s:.2f} s of CPU (case {tally.slowest}), peak {tally.peak_mb:.0f} MB"
     )
     return 1 if tally.faults else 0
 

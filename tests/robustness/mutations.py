@@ -9,8 +9,9 @@ import zlib
 from collections.abc import Callable
 
 NUMBERS = (
-    b"0 -1 1 1e-308 -1e308 1e308 1e18 1e9 -1e9 65536 4294967296 9223372036854775808 nan inf -inf NaN Infinity "
-    b"-Infinity 0.0 -0.0 1e-9 100000 2147483647 true false null none [] {} \"\" '' 1_0 0x10 99999999999999999999999"
+    b"0 -1 1 1e-308 -1e308 1e308 1e18 1e9 -1e9 65536 4294967296 9223372036854775808 nan inf -inf NaN "
+    b"Infinity -Infinity 0.0 -0.0 1e-9 100000 2147483647 true false null none [] {} \"\" '' 1_0 0x10 "
+    b"99999999999999999999999"
 ).split()
 PIECES = (
     b"[" * 5000,

@@ -30,6 +30,7 @@ from lidarium.envs.floors.drawing import strip
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.generation.furniture import place
 from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.mapping.files.names import printable
 
 MOST_JSON_BYTES = 1 << 20
 DATA = Path(__file__).parent / "data"
@@ -94,7 +95,7 @@ def load_drawn(path: Path) -> Floor:
         starts = [(x, y, math.radians(degrees)) for x, y, degrees in plan.get("starts", [])]
         goal = plan.get("goal")
         return Floor(
-            plan["name"],
+            printable(str(plan["name"])),
             bounds,
             tuple(solids),
             None,

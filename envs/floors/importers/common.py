@@ -15,6 +15,7 @@ from lidarium.envs.floors.extent import check_extent
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.mapping.files.guarded_reading import read_text as read_guarded
 from lidarium.mapping.files.image_headers import MOST_PIXELS
+from lidarium.mapping.files.names import printable
 
 MOST_TEXT_BYTES = 32 << 20
 """Longest text of a floor, unpacked: parsed it takes some twenty times as much."""
@@ -44,8 +45,7 @@ def read_text(path: Path) -> str:
 
 def floor_name(path: Path) -> str:
     """Return the file's name without what says its format."""
-    # Bytes that are no UTF-8 could be printed nowhere.
-    name = path.name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    name = printable(path.name)
     for suffix in (".gz", ".txt", ".vectormap", ".xml", ".json"):
         if name.lower().endswith(suffix):
             name = name[: -len(suffix)]

@@ -38,7 +38,7 @@ from lidarium.mapping.grids.occupancy import OccupancySettings
         ("stop_coverage", 1.01, "or None"),
         ("map_cells", 255, "even number"),
         ("map_cells", 0, "from 2 to 4,096"),
-        ("raster_resolution", 0.0, "from 0.001 to 10"),
+        ("raster_resolution", 0.0, "from 0.005 to 10"),
         ("raster_resolution", 0.03, "whole multiple"),
         ("decision_period_s", 0.05, "time step"),
         ("decision_period_s", math.nan, "above 0"),
