@@ -137,7 +137,7 @@ def settings_of(command: Slam) -> "SlamSettings":
 def _log(command: Slam) -> "LaserLog":
     """Read the log and tell what was left out of it."""
     from lidarium.mapping.files.carmen_logs import read_carmen_log
-    from lidarium.mapping.files.laser_logs import read_npz_log
+    from lidarium.mapping.files.npz_logs import read_npz_log
 
     log = read_npz_log(command.log) if command.log.suffix == ".npz" else read_carmen_log(command.log)
     for reason, count in log.skipped.items():

@@ -124,4 +124,4 @@ def array_of(content: bytes) -> NDArray[Any]:
     if min(shape, default=0) < 0 or size != there:
         raise ValueError(f"its array claims {size:,} bytes of shape {shape}, there are {there:,}")
     flat = np.frombuffer(content, kind, offset=file.tell())
-    return np.array(flat.reshape(shape, order="F" if is_fortran else "C"))
+    return np.array(flat.reshape(shape, order="F" if is_fortran else "C"), order="C")

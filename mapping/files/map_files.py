@@ -6,24 +6,29 @@ The interpretation of pixels follows ROS map_server (trinary, scale, raw), http:
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from lidarium.mapping.files.guarded_reading import read_bytes, reading
 from lidarium.mapping.files.guarded_yaml import read_yaml
-from lidarium.mapping.files.image_headers import check_picture_size, picture_size
+from lidarium.mapping.files.images import read_image
+from lidarium.mapping.files.map_levels import (
+    FREE as FREE,
+)
+from lidarium.mapping.files.map_levels import (
+    OCCUPIED,
+    UNKNOWN,
+    levels_by_blocks,
+    levels_of,
+    raw_levels,
+)
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.bounds import Rule, shown, within
-
-OCCUPIED, UNKNOWN, FREE = 0, 127, 255
 
 RESOLUTION = Rule(float, bounds=within(1e-4, 100.0, "a positive number"))
 """What the side of a cell has to be [m]."""
@@ -31,10 +36,6 @@ RESOLUTION = Rule(float, bounds=within(1e-4, 100.0, "a positive number"))
 MOST_COORDINATE_M = 1e8
 """Farthest that a map may lie from the origin of its frame [m]."""
 
-MOST_IMAGE_BYTES = 1 << 29
-"""Longest file of a picture."""
-
-_BLOCK_PIXELS = 1 << 20
 _MODES = ("trinary", "scale", "raw")
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _PGM_LEVELS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
@@ -93,8 +94,8 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     if mode not in _MODES:
         raise ValueError(f"{yaml_path}: mode is {shown(mode)}; want one of {', '.join(_MODES)}")
     negate = bool(_number(yaml_path, header, "negate"))
-    rule = _raw_levels if mode == "raw" else partial(_levels, negate=negate)
-    levels = _by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), mode == "scale")
+    rule = raw_levels if mode == "raw" else partial(levels_of, negate=negate)
+    levels = levels_by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), mode == "scale")
     return MapImage(
         np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header)
     )
@@ -126,8 +127,8 @@ def read_grey_map(path: Path, resolution: float) -> MapImage:
     """
     if not RESOLUTION.hold(resolution):
         raise ValueError(f"{path}: resolution is {resolution} m; want {RESOLUTION.wanted}")
-    rule = partial(_levels, negate=False, low=0.196, high=0.65)
-    levels = _by_blocks(read_image(Path(path)), rule, True)
+    rule = partial(levels_of, negate=False, low=0.196, high=0.65)
+    levels = levels_by_blocks(read_image(Path(path)), rule, True)
     return MapImage(np.ascontiguousarray(levels[::-1]), (0.0, 0.0, 0.0), resolution)
 
 
@@ -220,47 +221,6 @@ def cropped(
     return np.ascontiguousarray(part), (origin[0] + column * resolution, origin[1] + row * resolution)
 
 
-def read_image(path: Path) -> NDArray[Any]:
-    """Read an image file with all its channels.
-
-    Parameters
-    ----------
-    path : Path
-        Any format that OpenCV reads (png, pgm, bmp, jpg, tif, ...).
-
-    Returns
-    -------
-    (rows, columns) or (rows, columns, channels) uint8 or uint16
-        The pixels, row 0 at the top, channels in OpenCV's order (blue first).
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is a folder or not an image.
-    """
-    path = Path(path)
-    content = read_bytes(path, MOST_IMAGE_BYTES)
-    if picture_size(content) is not None:
-        with reading(path, "an image that can be read"):
-            check_picture_size(content)
-    try:
-        pixels = _decoded(content)
-    except cv2.error:
-        pixels = None
-    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
-        raise ValueError(f"{path} is not an image that can be read; want png, pgm, bmp, jpg or tif")
-    return pixels
-
-
-def _decoded(content: bytes) -> NDArray[Any] | None:
-    """Return the pixels of a picture whose header is known; None where it is not or cannot be read."""
-    if picture_size(content) is None:
-        return None
-    return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
-
-
 def _read_header(path: Path) -> dict[str, Any]:
     header = read_yaml(path)
     if not isinstance(header, dict):
@@ -301,44 +261,8 @@ def _origin(path: Path, header: dict[str, Any]) -> tuple[float, float, float]:
     return x, y, yaw
 
 
-def _shades(pixels: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the mean of the colour channels in 0..255 and the opacity in 0..1."""
-    scaled = pixels.astype(np.float64) * (255.0 / np.iinfo(pixels.dtype).max)
-    if scaled.ndim == 2:
-        return scaled, np.ones((1, 1))
-    if scaled.shape[2] in (2, 4):
-        return scaled[..., :-1].mean(axis=2), scaled[..., -1] / 255.0
-    return scaled.mean(axis=2), np.ones((1, 1))
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
 
-
-def _by_blocks(
-    pixels: NDArray[Any], rule: Callable[[NDArray[np.float64]], NDArray[np.uint8]], sees_through: bool
-) -> NDArray[np.uint8]:
-    """Return the levels of pixels by a rule for shades, block by block, as shades take much memory.
-
-    ``sees_through`` makes unknown what is not opaque.
-    """
-    levels = np.empty(pixels.shape[:2], np.uint8)
-    rows = max(_BLOCK_PIXELS // max(pixels.shape[1], 1), 1)
-    for row in range(0, len(pixels), rows):
-        shades, opacity = _shades(pixels[row : row + rows])
-        levels[row : row + rows] = rule(shades)
-        if sees_through:
-            levels[row : row + rows][np.broadcast_to(opacity < 1.0, shades.shape)] = UNKNOWN
-    return levels
-
-
-def _levels(shades: NDArray[np.float64], *, negate: bool, low: float, high: float) -> NDArray[np.uint8]:
-    occupancy = (shades if negate else 255.0 - shades) / 255.0
-    levels = np.full(shades.shape, UNKNOWN, dtype=np.uint8)
-    levels[occupancy > high] = OCCUPIED
-    levels[occupancy < low] = FREE
-    return levels
-
-
-def _raw_levels(shades: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
-    """Read pixels as occupancy in percent; above 100 is unknown."""
-    levels = np.full(shades.shape, UNKNOWN, dtype=np.uint8)
-    levels[(shades > high * 100.0) & (shades <= 100.0)] = OCCUPIED
-    levels[shades < low * 100.0] = FREE
-    return levels
+    return moved_name(__name__, name)

@@ -16,8 +16,9 @@ from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder, write_record
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.suite import read_suite
-from lidarium.mapping.files.laser_logs import LaserLog, write_npz_log
+from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.map_files import write_ros_map
+from lidarium.mapping.files.npz_logs import write_npz_log
 from lidarium.mapping.files.spline_files import write_spline_map
 from lidarium.mapping.files.trajectories import write_tum
 from lidarium.mapping.geometry.rigid import Transform

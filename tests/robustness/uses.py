@@ -19,8 +19,9 @@ from lidarium.evaluation.suites.campaign import _kept_suite
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.suite import read_suite
 from lidarium.mapping.files.carmen_logs import read_carmen_log
-from lidarium.mapping.files.laser_logs import LaserLog, read_npz_log
+from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.map_files import cropped, read_grey_map, read_ros_map
+from lidarium.mapping.files.npz_logs import read_npz_log
 from lidarium.mapping.files.spline_files import compact_arrays, read_spline_map
 from lidarium.mapping.files.trajectories import interpolated, read_tum
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing

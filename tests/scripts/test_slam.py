@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from driven_rooms import GEOMETRY, driven, odd_room
 
-from lidarium.mapping.files.laser_logs import LaserLog, write_npz_log
+from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.map_files import read_ros_map
+from lidarium.mapping.files.npz_logs import write_npz_log
 from lidarium.mapping.files.trajectories import read_tum, write_tum
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.scripts.main import main

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from lidarium.evaluation.metrics.poses import absolute_error, best_transform, moved, relative_error
 from lidarium.evaluation.metrics.relations import RelationErrors, log_relation_errors, read_relations
 from lidarium.mapping.files.carmen_logs import read_carmen_log
-from lidarium.mapping.files.laser_logs import LaserLog, read_npz_log
+from lidarium.mapping.files.laser_logs import LaserLog
+from lidarium.mapping.files.npz_logs import read_npz_log
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.slam.following import Followed
 

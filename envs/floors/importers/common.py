@@ -14,7 +14,7 @@ from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip
 from lidarium.envs.floors.extent import check_extent
 from lidarium.envs.floors.floor import Floor, Raster, Solid
 from lidarium.mapping.files.guarded_reading import read_text as read_guarded
-from lidarium.mapping.files.image_headers import MOST_PIXELS
+from lidarium.mapping.files.images import MOST_PIXELS
 from lidarium.mapping.files.names import printable
 
 MOST_TEXT_BYTES = 32 << 20

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells
-from lidarium.mapping.files.map_files import read_image
+from lidarium.mapping.files.images import read_image
 
 SUFFIXES = (".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff")
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells, refuse_resolution
-from lidarium.mapping.files.image_headers import MOST_PIXELS
+from lidarium.mapping.files.images import MOST_PIXELS
 from lidarium.mapping.files.map_files import FREE, MapImage, read_ros_map
 
 # Indices of a whole map would take sixteen times its memory.

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from lidarium.mapping.files.carmen_logs import read_carmen_log
-from lidarium.mapping.files.laser_logs import LaserLog, read_npz_log, symmetric_scans, write_npz_log
+from lidarium.mapping.files.laser_logs import LaserLog, symmetric_scans
+from lidarium.mapping.files.npz_logs import read_npz_log, write_npz_log
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 

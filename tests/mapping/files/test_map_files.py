@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from lidarium.mapping.files.map_files import read_image, read_ros_map, write_ros_map
+from lidarium.mapping.files.images import read_image
+from lidarium.mapping.files.map_files import read_ros_map, write_ros_map
 
 HEADER = {
     "image": "map.png",

@@ -1,11 +1,63 @@
-"""Sizes of pictures from their headers, before any pixel is asked for."""
+"""Pictures as files: their sizes are found from headers before any pixel is asked for."""
 
 import struct
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.files.guarded_reading import read_bytes, reading
+
+MOST_IMAGE_BYTES = 1 << 29
+"""Longest file of a picture."""
 
 MOST_PIXELS = 1 << 26
 """Most pixels of a picture: 8,192 x 8,192."""
 
 _JPEG_SIZES = (*range(0xC0, 0xC4), *range(0xC5, 0xC8), *range(0xC9, 0xCC), *range(0xCD, 0xD0))
+
+
+def read_image(path: Path) -> NDArray[Any]:
+    """Read an image file with all its channels.
+
+    Parameters
+    ----------
+    path : Path
+        Any format that OpenCV reads (png, pgm, bmp, jpg, tif, ...).
+
+    Returns
+    -------
+    (rows, columns) or (rows, columns, channels) uint8 or uint16
+        The pixels, row 0 at the top, channels in OpenCV's order (blue first).
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is a folder or not an image.
+    """
+    path = Path(path)
+    content = read_bytes(path, MOST_IMAGE_BYTES)
+    if picture_size(content) is not None:
+        with reading(path, "an image that can be read"):
+            check_picture_size(content)
+    try:
+        pixels = _decoded(content)
+    except cv2.error:
+        pixels = None
+    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"{path} is not an image that can be read; want png, pgm, bmp, jpg or tif")
+    return pixels
+
+
+def _decoded(content: bytes) -> NDArray[Any] | None:
+    """Return the pixels of a picture whose header is known; None where it is not or cannot be read."""
+    if picture_size(content) is None:
+        return None
+    return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
 
 
 def check_picture_size(content: bytes) -> None:
