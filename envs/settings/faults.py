@@ -118,7 +118,7 @@ class FaultSettings:
 def _place(place: Any) -> tuple[float, float, float]:  # noqa: ANN401
     """Return where a kidnapped robot is put, checked."""
     is_pose = isinstance(place, Sequence) and len(place) == 3
-    if not is_pose or not all(isinstance(value, Real) and abs(value) <= 1e6 for value in place):
+    if not is_pose or not all(isinstance(value, Real) and abs(float(value)) <= 1e6 for value in place):
         raise ValueError(
             f"place of the fault is {shown(place)}; want x, y [m] and theta [rad] within a million, or None"
         )

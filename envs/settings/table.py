@@ -46,7 +46,8 @@ def settings_table(settings: Any = None, prefix: str = "") -> Iterator[Setting]:
         What precedes the names.
     """
     settings = ExplorationSettings() if settings is None else settings
-    documented, rules = documented_attributes(type(settings)), rules_of(type(settings))
+    kind: Any = type(settings)
+    documented, rules = documented_attributes(kind), rules_of(kind)
     for each in fields(settings):
         value = getattr(settings, each.name)
         if is_dataclass(value):

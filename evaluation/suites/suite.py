@@ -150,10 +150,10 @@ class Suite:
             for robots in self.robots:
                 self.settings(variant, robots)
         stop_rule_of(self.stop)
-        for floor, teams in self.starts.items():
+        for floor, given in self.starts.items():
             if floor not in self.floors:
                 raise ValueError(f"the suite has starts on {floor!r}, which is not among its floors")
-            for team in teams:
+            for team in given:
                 if len(team) < max(self.robots) or any(len(start) != 3 for start in team):
                     raise ValueError(
                         f"a team of starts on {floor!r} is {team}; want x, y, theta of at least "

@@ -174,7 +174,8 @@ def check_settings(settings: Any, whose: str = "") -> None:  # noqa: ANN401
         Where one is of another type or out of its bounds; the message names it, its value and what to want.
     """
     of = f" of {whose}" if whose else ""
-    for name, rule in rules_of(type(settings)).items():
+    kind: Any = type(settings)
+    for name, rule in rules_of(kind).items():
         value = getattr(settings, name)
         if not rule.hold(value):
             raise ValueError(f"{name}{of} is {shown(value)}; want {rule.wanted}")
