@@ -126,8 +126,7 @@ class ObservationWriter:
         arrays = list(starmap(np.empty, self._kinds)) if out is None else self.check(out)
         sources = self._table() if self._sources is None else self._sources
         chosen, observed = self._everyone if active is None else active, self._in_order(arrays + self._absent)
-        if self._threads > 1:
-            use_threads(self._threads)
+        if use_threads(self._threads) > 1:
             write_parallel(chosen, sources, observed)
         else:
             write_serial(chosen, sources, observed)

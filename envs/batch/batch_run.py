@@ -80,8 +80,7 @@ class BatchRun:
         if self._software.is_staged:
             self._run_staged(modes.copy(), commands, seen, observations)
             return
-        threads = self._simulation.threads
-        self._simulation.use_threads()
+        threads = self._simulation.use_threads()
         # To and fro: the maps of the episodes that ran last are in the caches yet.
         self._orders.reverse()
         run = run_parallel if threads > 1 else run_serial

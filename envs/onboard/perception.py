@@ -143,10 +143,7 @@ class Perception:
 
         Parallel kernels are set to run on as many.
         """
-        threads = min(self._threads, episodes)
-        if threads > 1:
-            use_threads(self._threads)
-        return threads
+        return min(use_threads(self._threads), episodes) if episodes > 1 else 1
 
     def episode_of(self, row: int) -> int:
         """Return the episode of a row."""

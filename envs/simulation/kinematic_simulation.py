@@ -58,9 +58,6 @@ class KinematicSimulation(Simulation):
         runs: NDArray[np.bool_] | None = None,
     ) -> None:
         """Run a step of all episodes in one call; see ``Simulation.step``."""
-        step = step_serial
-        if self._is_parallel:
-            self.use_threads()
-            step = step_rows
+        step = step_rows if self._is_parallel and self.use_threads() > 1 else step_serial
         chosen = self._everywhere if runs is None else runs
         step(self._table, self.robots, commands, chosen, moves_bodies, perceives)

@@ -191,10 +191,9 @@ class Simulation:
         """Threads that kernels over the rows may use: 1 where there are too few rows to share out."""
         return self._threads if self.robots * self.episodes >= ROWS_FOR_THREADS else 1
 
-    def use_threads(self) -> None:
-        """Let numba's parallel kernels run on the threads of this simulation."""
-        if self.threads > 1:
-            use_threads(self.threads)
+    def use_threads(self) -> int:
+        """Let parallel kernels run on the threads of this simulation, and return how many they may use."""
+        return use_threads(self.threads)
 
     def step(
         self,
@@ -230,8 +229,7 @@ class Simulation:
         runs : (episodes,) bool or None
             Of which episodes; all where None.
         """
-        self.use_threads()
-        perceive = perceive_parallel if self.threads > 1 else perceive_serial
+        perceive = perceive_parallel if self.use_threads() > 1 else perceive_serial
         perceive(self._table, self.robots, self._everywhere if runs is None else runs)
 
     def render_anew(self, row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:

@@ -146,7 +146,31 @@ def available_threads() -> int:
     return int(_numba_config.NUMBA_NUM_THREADS)
 
 
-def use_threads(threads: int) -> None:
-    """Let parallel kernels run on so many threads of this process from now on."""
+_process_of_threads = 0
+
+
+def use_threads(threads: int) -> int:
+    """Let parallel kernels run on so many threads, and return how many they may use.
+
+    Parameters
+    ----------
+    threads : int
+        How many are wanted.
+
+    Returns
+    -------
+    int
+        As many, or 1 in a process that was forked after threads had started. They do not live on in it, and
+        a parallel kernel would wait for them forever; serial forms give the same.
+    """
+    global _process_of_threads  # noqa: PLW0603 (threads belong to the process)
+    if threads <= 1:
+        return 1
+    process = os.getpid()
+    if _process_of_threads == 0:
+        _process_of_threads = process
+    if _process_of_threads != process:
+        return 1
     if numba.get_num_threads() != threads:
         numba.set_num_threads(threads)
+    return threads
