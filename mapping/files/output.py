@@ -1,25 +1,40 @@
 """Files that are there whole or not at all."""
 
 import os
-import tempfile
+import secrets
 from pathlib import Path
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes, *, is_lasting: bool = True) -> None:
     """Write a file beside and rename it, so that nobody ever reads half of it.
 
-    Of several writers the last one stays.
+    Of several writers the last one stays. Who may read it is as the user's mask says. A link of that name is
+    replaced, not followed.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its folder is there.
+    content : bytes
+        What it shall hold.
+    is_lasting : bool
+        Whether to wait until it is on the disk: some disks tell only then that they are full. For all but
+        what can be made anew.
 
     Raises
     ------
     OSError
         Where nothing can be written there.
     """
-    handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    # Made here rather than by tempfile, whose files are for their owner alone: the system applies the mask.
+    handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-        os.chmod(beside, 0o644)
+            if is_lasting:
+                file.flush()
+                os.fsync(file.fileno())
         os.replace(beside, path)
     except BaseException:
         Path(beside).unlink(missing_ok=True)

@@ -1,18 +1,114 @@
-"""Folders in which caches can be kept."""
+"""Folders in which caches can be kept: ours alone, or none.
+
+What lies in a cache is loaded as code (numba's index files are pickles) or believed. A folder is therefore
+taken only where nobody else could have put anything into it: a folder and no link, of this user, which no
+other may write to. The same holds for each folder above that was made for the cache, and the one in which
+they lie must keep others from renaming them.
+"""
 
 import os
+import stat
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
+PRIVATE = 0o700
+"""Mode of the folders that are made for caches."""
 
-def user_cache_folder() -> Path:
-    """Return the folder in which the user's programs keep what they can make anew."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_HAS_OWNERS = hasattr(os, "geteuid")
+_ROOT = 0
 
 
-def is_writable(folder: Path) -> bool:
+def user_cache_folder() -> Path | None:
+    """Return the folder in which the user's programs keep what they can make anew.
+
+    None where the user has no home.
+    """
+    chosen = os.environ.get("XDG_CACHE_HOME", "")
+    # The specification of these folders has a relative one ignored: it would be another in every folder.
+    if os.path.isabs(chosen):
+        return Path(chosen)
+    try:
+        return Path.home() / ".cache"
+    except (RuntimeError, KeyError):  # neither HOME nor an entry of the user in the system's list
+        return None
+
+
+def cache_folder(*names: str, beside: Path | None = None) -> Path | None:
+    """Return a folder for a cache that can be written to and that is ours alone, made if absent.
+
+    Parameters
+    ----------
+    *names : str
+        What is kept, from the outer folder to the inner.
+    beside : Path or None
+        A source file whose compiled form it is. The cache is then kept beside it, if possible, as those of
+        Python are; who owns the source may own the cache as well, since his code is run already.
+
+    Returns
+    -------
+    Path or None
+        The first that is good of: beside the source, in the user's cache folder, in the temporary folder.
+    """
+    return next(
+        (
+            folder
+            for base, inner, owners in _candidates(names, beside)
+            if (folder := trusted_folder(base, inner, owners)) is not None and is_writable(folder)
+        ),
+        None,
+    )
+
+
+def trusted_folder(base: Path, names: Collection[str], owners: Collection[int] = ()) -> Path | None:
+    """Return a folder below ``base`` that is ours alone, made if absent.
+
+    Parameters
+    ----------
+    base : Path
+        Where it lies; may be shared where others cannot rename what is ours there, as in ``/tmp``.
+    names : collection of str
+        The folders below that were made for the cache, from the outer to the inner.
+    owners : collection of int
+        Numbers of users who are trusted beside this one.
+
+    Returns
+    -------
+    Path or None
+        None where it cannot be made, or where it, or one above it that was made for it, is a link, belongs to
+        someone else, or can be written to by others.
+    """
+    trusted = {*owners, os.geteuid()} if _HAS_OWNERS else set()
+    try:
+        base.mkdir(parents=True, exist_ok=True)
+        base = base.resolve(strict=True)
+        if not _keeps_names(base, trusted):
+            return None
+        folder = base
+        for place, name in enumerate(names, 1):
+            folder = folder / name
+            if not _is_made_ours(folder, trusted, is_inner=place == len(names)):
+                return None
+    except (OSError, RuntimeError):  # RuntimeError: links that lead in a circle
+        return None
+    return folder
+
+
+def is_private(told: os.stat_result, trusted: Collection[int]) -> bool:
+    """Whether what was found (without following links) is a folder of trusted users only.
+
+    That is one of them owns it, and nobody else can write to it.
+    """
+    if not stat.S_ISDIR(told.st_mode):
+        return False
+    return not _HAS_OWNERS or (told.st_uid in trusted and not told.st_mode & _BY_OTHERS)
+
+
+def is_writable(folder: Path | None) -> bool:
     """Return whether files can be written to a folder, which is made if absent."""
+    if folder is None:
+        return False
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -21,6 +117,48 @@ def is_writable(folder: Path) -> bool:
         return False
 
 
-def first_writable(candidates: Iterable[Path]) -> Path | None:
-    """Return the first folder that can be written to, or None."""
-    return next((folder for folder in candidates if is_writable(folder)), None)
+def _candidates(
+    names: tuple[str, ...], beside: Path | None
+) -> Iterator[tuple[Path, tuple[str, ...], tuple[int, ...]]]:
+    """Yield where a cache could lie: base, folders below, owners that are trusted."""
+    if beside is not None:
+        owners = (beside.stat().st_uid,) if _HAS_OWNERS else ()
+        yield beside.parent / "__pycache__", names, owners
+    if (cache := user_cache_folder()) is not None:
+        yield cache, ("lidarium", *names), ()
+    try:
+        temporary = Path(tempfile.gettempdir())
+    except OSError:  # there is none that can be written to
+        return
+    user = os.geteuid() if _HAS_OWNERS else "user"
+    yield temporary, (f"lidarium-{user}", *names), ()
+
+
+def _keeps_names(base: Path, trusted: Collection[int]) -> bool:
+    """Whether nobody else can rename our folders in it, nor it or one above it.
+
+    Who may write to a folder may rename what is in it, unless it is sticky, as ``/tmp`` is: there only its
+    owner may, and the owner of what is renamed.
+    """
+    if not _HAS_OWNERS:
+        return True
+    modes = [folder.stat().st_mode for folder in (base, *base.parents)]
+    is_closed = all(not mode & _BY_OTHERS or mode & stat.S_ISVTX for mode in modes)
+    return is_closed and base.stat().st_uid in {*trusted, _ROOT}
+
+
+def _is_made_ours(folder: Path, trusted: Collection[int], *, is_inner: bool) -> bool:
+    """Make a folder if absent, and return whether it is ours alone.
+
+    An outer one of ours to which others can write, as some masks leave them, is closed to them: what they
+    could have put there is another folder, and that is looked at by itself. The inner one may hold files of
+    theirs, and is not taken.
+    """
+    try:
+        os.mkdir(folder, PRIVATE)
+    except FileExistsError:
+        told = os.lstat(folder)
+        is_mine = stat.S_ISDIR(told.st_mode) and _HAS_OWNERS and told.st_uid == os.geteuid()
+        if is_mine and told.st_mode & _BY_OTHERS and not is_inner:
+            os.chmod(folder, stat.S_IMODE(told.st_mode) & ~_BY_OTHERS)
+    return is_private(os.lstat(folder), trusted)

@@ -3,13 +3,13 @@
 Arithmetic is exact, and kernels are cached where a directory can be written.
 
 Numba caches compiled code per source file and does not see a change in another file that the kernel calls
-into. The cache directory is therefore keyed by a hash of all sources with kernels, and is the first writable
-one of: the package's own folder, the user's cache folder, the temporary folder.
+into. The cache directory is therefore keyed by a hash of all sources with kernels. It lies in the package's
+own folder, the user's cache folder or the temporary folder: the first that this user can write to, and
+nobody else.
 """
 
 import hashlib
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ import numba
 from numba.core import config
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels.cache_folders import first_writable, user_cache_folder
+from lidarium.mapping.kernels.cache_folders import cache_folder
 
 Array = NDArray[Any]
 """An array in the signature of a kernel; its docstring gives shape and type."""
@@ -46,13 +46,8 @@ def _sources_hash() -> str:
 
 
 def _cache_folder() -> Path | None:
-    """Return the first writable cache folder, or None where nothing can be written."""
-    candidates = (
-        Path(__file__).resolve().parent / "__pycache__" / "kernels",
-        user_cache_folder() / "lidarium" / "kernels",
-        Path(tempfile.gettempdir()) / "lidarium-kernels",
-    )
-    return first_writable(candidate / _sources_hash() for candidate in candidates)
+    """Return the folder of the compiled kernels, or None where none is good."""
+    return cache_folder("kernels", _sources_hash(), beside=Path(__file__).resolve())
 
 
 _CHOSEN_BY_USER = bool(os.environ.get("NUMBA_CACHE_DIR"))

@@ -5,6 +5,7 @@ It has arrays that are expensive to make and small to keep, found by what determ
 An entry is one file of compressed arrays. It is written beside and renamed, so that it appears whole; it
 carries a hash of its key and content, so that one that is damaged, cut short or another's is seen and made
 anew. Keys hold a hash of the code and libraries that make the arrays, so that a stale entry is never found.
+Only files with names of entries are read and removed, and nothing is reached through links.
 
 The entries lie in a few folders, each bounded by its share of the whole: a process that writes makes room in
 one of them without looking at the others, and no process has to know what others write. The entry used
@@ -16,7 +17,8 @@ import hashlib
 import json
 import os
 import platform
-import tempfile
+import re
+import stat
 import zlib
 from collections.abc import Mapping
 from functools import lru_cache
@@ -29,7 +31,7 @@ import scipy
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.output import write_whole
-from lidarium.mapping.kernels.cache_folders import first_writable, user_cache_folder
+from lidarium.mapping.kernels.cache_folders import cache_folder
 
 Arrays = Mapping[str, NDArray[Any]]
 """Arrays by name, as entries hold them."""
@@ -52,6 +54,9 @@ They are chosen by the first digit of the hash of their keys.
 _MAGIC = b"lidarium"
 _DIGEST_BYTES = 32
 _BLOCK = 4096
+_NAME = re.compile(r"[0-9a-f]{32}|\.[0-9a-f]{32}\.\w{1,16}")
+"""Names that the store makes: of entries, and of those that are being written."""
+
 _PACKAGE = Path(__file__).resolve().parents[3]
 
 
@@ -79,7 +84,7 @@ class Store:
             return None
         path = self._path(key)
         try:
-            content = path.read_bytes()
+            content = _content(path)
         except OSError:
             return None
         head = len(_MAGIC) + _DIGEST_BYTES
@@ -100,8 +105,9 @@ class Store:
             return
         with contextlib.suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
-            _shrink(path.parent, room)
-            write_whole(path, content)
+            if not path.parent.is_symlink():
+                _shrink(path.parent, room)
+                write_whole(path, content, is_lasting=False)
 
     def size(self) -> int:
         """Return how many bytes the entries take."""
@@ -133,13 +139,18 @@ def _store(folder: str, max_bytes: int) -> Store:
     if folder == "off":
         return Store(None, max_bytes)
     if folder:
-        return Store(Path(folder).expanduser().absolute(), max_bytes)
-    return Store(
-        first_writable(
-            (user_cache_folder() / "lidarium" / "floors", Path(tempfile.gettempdir()) / "lidarium-floors")
-        ),
-        max_bytes,
-    )
+        return Store(_chosen(folder), max_bytes)
+    return Store(cache_folder("floors"), max_bytes)
+
+
+def _chosen(folder: str) -> Path:
+    try:
+        return Path(folder).expanduser().absolute()
+    except RuntimeError as error:
+        raise ValueError(
+            f"environment variable {FOLDER_VARIABLE} is {folder!r}, and this user has no home; want a folder "
+            "without '~', or off"
+        ) from error
 
 
 def mebibytes(variable: str, default: float) -> int:
@@ -210,17 +221,30 @@ def _on_disk(length: int) -> int:
     return -(-length // _BLOCK) * _BLOCK
 
 
-def _files(folder: Path) -> list[tuple[float, int, Path]]:
-    """Return time of last use, size and path of the files of a folder.
+def _content(path: Path) -> bytes:
+    """Read an entry: a plain file, in a folder, neither of them a link."""
+    if path.parent.is_symlink() or not stat.S_ISREG(os.lstat(path).st_mode):
+        raise FileNotFoundError(f"{path} is no entry")
+    return path.read_bytes()
 
-    Unfinished writes of broken processes are included.
+
+def _files(folder: Path) -> list[tuple[float, int, Path]]:
+    """Return time of last use, size and path of the files of a folder that the store has made.
+
+    Unfinished writes of broken processes are included; what else lies there is nobody's to remove, and what
+    a link leads to is another's.
     """
-    files = []
+    files: list[tuple[float, int, Path]] = []
+    if folder.is_symlink():
+        return files
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
+            if not _NAME.fullmatch(entry.name):
+                continue
             with contextlib.suppress(OSError):
-                told = entry.stat()
-                files.append((told.st_mtime, _on_disk(told.st_size), Path(entry.path)))
+                told = entry.stat(follow_symlinks=False)
+                if stat.S_ISREG(told.st_mode):
+                    files.append((told.st_mtime, _on_disk(told.st_size), Path(entry.path)))
     return files
 
 

@@ -1,4 +1,4 @@
-"""Folders that can be written to, and files that are there whole or not at all."""
+"""Files that are there whole or not at all."""
 
 import os
 
@@ -6,7 +6,6 @@ import pytest
 
 from lidarium.mapping.files import output as files
 from lidarium.mapping.files.output import write_whole
-from lidarium.mapping.kernels.cache_folders import first_writable, is_writable, user_cache_folder
 
 
 def test_a_file_is_whole_and_nothing_is_left_beside(tmp_path):
@@ -31,16 +30,34 @@ def test_where_renaming_fails_the_old_file_stays(tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_a_folder_is_writable_where_it_can_be_made(tmp_path):
-    (tmp_path / "file").write_bytes(b"")
-    assert is_writable(tmp_path / "new" / "folder")
-    assert not is_writable(tmp_path / "file" / "folder")
-    assert first_writable([tmp_path / "file", tmp_path / "other"]) == tmp_path / "other"
-    assert first_writable([tmp_path / "file"]) is None
+@pytest.mark.skipif(os.name == "nt", reason="modes of files are those of Unix")
+@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o077, 0o600), (0o002, 0o664)])
+def test_who_may_read_a_file_is_as_the_users_mask_says(tmp_path, mask, mode):
+    before = os.umask(mask)
+    try:
+        write_whole(tmp_path / "file", b"one")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == mode
 
 
-def test_the_users_cache_is_where_the_system_says(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert user_cache_folder() == tmp_path
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    assert user_cache_folder().name == ".cache"
+def test_a_link_is_replaced_and_what_it_leads_to_stays(tmp_path):
+    (tmp_path / "theirs").write_bytes(b"theirs")
+    (tmp_path / "file").symlink_to(tmp_path / "theirs")
+    write_whole(tmp_path / "file", b"ours")
+    assert (tmp_path / "theirs").read_bytes() == b"theirs"
+    assert not (tmp_path / "file").is_symlink()
+
+
+def test_what_cannot_be_brought_to_the_disk_leaves_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "file"
+    write_whole(path, b"one")
+
+    def refuse(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files.os, "fsync", refuse)
+    with pytest.raises(OSError, match="No space"):
+        write_whole(path, b"two")
+    assert os.listdir(tmp_path) == ["file"]
+    assert path.read_bytes() == b"one"

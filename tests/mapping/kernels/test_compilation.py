@@ -195,13 +195,11 @@ def test_kernels_are_made_by_the_one_decorator_only():
             assert "fastmath" not in text, path
 
 
-def test_the_first_writable_folder_is_taken_and_none_where_there_is_none(monkeypatch):
-    monkeypatch.setattr(
-        cache_folders, "is_writable", lambda folder: "tmp" in str(folder) or "lidarium-kernels" in str(folder)
-    )
+def test_the_cache_lies_beside_the_sources_and_nowhere_where_nothing_can_be_written(monkeypatch):
     folder = compilation._cache_folder()
     assert folder is not None
     assert folder.name == compilation._sources_hash()
+    assert folder.parent.parent == Path(compilation.__file__).resolve().parent / "__pycache__"
     monkeypatch.setattr(cache_folders, "is_writable", lambda folder: False)
     assert compilation._cache_folder() is None
 

@@ -16,6 +16,7 @@ from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.catalogue.store import PARTS, Store, floor_store, hash_of_code
 from lidarium.envs.floors.generation.buildings import generate_building
 from lidarium.envs.simulation.kernels import floor_cache
+from lidarium.mapping.kernels import cache_folders
 
 ROOT = Path(store.__file__).resolve().parents[3]
 ARRAYS = {
@@ -115,7 +116,7 @@ def test_leftovers_of_broken_writers_are_removed_in_their_turn(tmp_path):
     kept = Store(tmp_path, PARTS * 2 * 4096)
     folder = kept._path("a").parent
     folder.mkdir(parents=True)
-    for name in (".left.x", ".left.y"):
+    for name in (f".{32 * 'a'}.left_x", f".{32 * 'b'}.left_y"):
         (folder / name).write_bytes(b"half")
         os.utime(folder / name, (1000, 1000))
     kept.save("a", ARRAYS)
@@ -156,21 +157,58 @@ def test_the_environment_chooses_folder_and_size(tmp_path, monkeypatch):
             floor_store()
 
 
-def test_without_a_wish_the_store_is_in_the_users_cache_or_the_temporary_folder_or_nowhere(
-    tmp_path, monkeypatch
-):
+def test_without_a_wish_the_store_is_in_the_users_cache_or_nowhere(tmp_path, monkeypatch):
     monkeypatch.delenv(store.FOLDER_VARIABLE)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(store.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
-    for wanted in ("cache/lidarium/floors", "temporary/lidarium-floors"):
-        store._store.cache_clear()
-        assert floor_store().folder == tmp_path / wanted
-        top = tmp_path / wanted.split("/")[0]
-        top.rename(tmp_path / f"{top.name}.old")
-        top.write_bytes(b"")
+    monkeypatch.setattr(cache_folders.tempfile, "gettempdir", lambda: str(tmp_path / "file"))
+    (tmp_path / "file").write_bytes(b"")
+    store._store.cache_clear()
+    assert floor_store().folder == tmp_path / "cache" / "lidarium" / "floors"
+    floor_store().save("a", ARRAYS)
+    assert floor_store().load("a") is not None
+    floor_store().folder.chmod(0o777)
     store._store.cache_clear()
     assert floor_store().folder is None
     store._store.cache_clear()
+
+
+def test_a_home_that_is_not_there_is_told(monkeypatch):
+    monkeypatch.setenv(store.FOLDER_VARIABLE, "~nobody-of-that-name/floors")
+    with pytest.raises(ValueError, match=r"~nobody-of-that-name/floors.*no home"):
+        floor_store()
+
+
+def test_only_what_the_store_made_is_removed(tmp_path):
+    """The fault that was found: files of others went, through a link in place of a part."""
+    kept = Store(tmp_path / "store", PARTS * 4096)
+    part = kept._path("a").parent
+    part.mkdir(parents=True)
+    foreign = [part / name for name in ("thesis.tex", ".git", "a" * 31, "A" * 32, ".left.x")]
+    for path in foreign:
+        path.write_bytes(bytes(3 * 4096))
+    aim = tmp_path / "aim"
+    aim.write_bytes(bytes(3 * 4096))
+    (part / ("f" * 32)).symlink_to(aim)
+    kept.save("a", ARRAYS)
+    assert kept.load("a") is not None
+    assert all(path.exists() for path in (*foreign, aim, part / ("f" * 32)))
+    assert kept.size() == 4096
+
+
+def test_nothing_is_read_written_or_removed_through_links(tmp_path):
+    kept, theirs = Store(tmp_path / "store", PARTS * 4096), tmp_path / "theirs"
+    theirs.mkdir()
+    (theirs / ("e" * 32)).write_bytes(bytes(3 * 4096))
+    kept.folder.mkdir()
+    kept._path("a").parent.symlink_to(theirs)
+    kept.save("a", ARRAYS)
+    assert [path.name for path in theirs.iterdir()] == ["e" * 32]
+    other = Store(tmp_path / "other", 2**24)
+    other.save("a", ARRAYS)
+    other._path("a").rename(theirs / kept._path("a").name)
+    assert kept.load("a") is None
+    other._path("a").symlink_to(theirs / kept._path("a").name)
+    assert other.load("a") is None
 
 
 def test_generated_floors_are_kept_and_come_back_the_same(own_store, monkeypatch):
