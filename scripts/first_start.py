@@ -36,9 +36,9 @@ def compile_first(is_quiet: bool) -> None:
     is_quiet : bool
         No bar, lines only.
     """
-    from lidarium.mapping.kernels.compilation import cache_folder
+    from lidarium.mapping.kernels.compilation import kernel_cache
 
-    folder = cache_folder()
+    folder = kernel_cache()
     listed = json.loads(LIST.read_text())
     processes = min(len(os.sched_getaffinity(0)), MOST_PROCESSES)
     if folder is None or processes == 1 or 2 * count_compiled(folder) > listed["compiled"]:

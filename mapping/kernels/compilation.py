@@ -55,7 +55,7 @@ _FOLDER = None if _CHOSEN_BY_USER else _cache_folder()
 _CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
 
 
-def cache_folder() -> Path | None:
+def kernel_cache() -> Path | None:
     """Return the folder of the compiled kernels, or None where nothing can be cached."""
     folder = os.environ.get("NUMBA_CACHE_DIR") or _FOLDER
     return None if folder is None else Path(folder)
@@ -66,7 +66,7 @@ def is_cache_empty() -> bool:
 
     False where nothing can be cached.
     """
-    folder = cache_folder()
+    folder = kernel_cache()
     return folder is not None and next(folder.rglob("*.nbi"), None) is None
 
 
@@ -158,7 +158,7 @@ def use_threads(threads: int) -> int:
         As many, or 1 in a process that was forked after threads had started. They do not live on in it, and
         a parallel kernel would wait for them forever; serial forms give the same.
     """
-    global _process_of_threads  # noqa: PLW0603 (threads belong to the process)
+    global _process_of_threads  # threads belong to the process
     if threads <= 1:
         return 1
     process = os.getpid()
