@@ -7,6 +7,7 @@ from typing import get_args
 import pytest
 
 from lidarium.envs.simulation.kernels.arrays import WorldArrays
+from lidarium.evaluation.suites.suite import read_suite
 from lidarium.registry import REGISTRIES
 from lidarium.scripts.main import Choice
 
@@ -16,6 +17,16 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 
 def text_of(name):
     return (ROOT / name).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if "```toml" in page.read_text(encoding="utf-8")])
+def test_suites_of_the_pages_are_read(page, tmp_path):
+    for number, block in enumerate(
+        re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    ):
+        path = tmp_path / f"suite_{number}.toml"
+        path.write_text(block, encoding="utf-8")
+        assert next(iter(read_suite(path).trials()))
 
 
 def test_the_architecture_names_all_arrays_of_the_kernels():
