@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import relative
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
-from lidarium.mapping.localization.matching.branch_and_bound import place, pyramid
-from lidarium.mapping.localization.matching.scan_matching import Match, refine
-from lidarium.mapping.localization.matching.scan_search import search
+from lidarium.mapping.localization.matching.local_matching import LocalMatcher
+from lidarium.mapping.localization.matching.scan_matching import Match
 from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.matching.submaps import AgreementGrid, Submap
 
@@ -75,21 +74,13 @@ class LocalMapper:
         How.
     geometry : ScanGeometry
         Which way the beams look.
-
-    Attributes
-    ----------
-    usual_score : float
-        Agreement of matches of late.
-    contradiction : float
-        Share of the last scan's returns that lay, from where odometry led, in what the local map knows to be
-        free.
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
         self._matching, self._submaps = settings.matching, settings.submaps
-        self._uses_odometry, self._geometry = settings.uses_odometry, geometry
+        self._geometry = geometry
         self._active: list[_Active] = []
-        self.usual_score, self.contradiction = 0.0, 0.0
+        self._matcher = LocalMatcher(settings, geometry)
 
     @property
     def node(self) -> int:
@@ -97,7 +88,7 @@ class LocalMapper:
         return self._active[0].node
 
     def begin(self, node: int, ranges: NDArray[np.float32]) -> list[Finished]:
-        """Begin anew at a node, by the scan taken there.
+        """Begin again at a node, by the scan taken there.
 
         Return the local maps that this ends.
         """
@@ -105,6 +96,16 @@ class LocalMapper:
         self._active = []
         self._add(node, np.zeros(3), ranges)
         return ended
+
+    @property
+    def usual_score(self) -> float:
+        """Agreement of matches of late."""
+        return self._matcher.usual_score
+
+    @property
+    def contradiction(self) -> float:
+        """How much the last scan contradicted the local map, see ``LocalMatcher``."""
+        return self._matcher.contradiction
 
     def match(
         self,
@@ -114,138 +115,15 @@ class LocalMapper:
         uncertainty: NDArray[np.float64],
         failed: int,
     ) -> Match | None:
-        """Return where a scan lies on the older local map; None where it does not match.
-
-        Near what odometry says it is searched first, weighing both. Where that does not convince, odometry
-        may be wrong (a wheel slips, the robot was pushed), and the search goes farther, without it, for scans
-        of enough returns; what is found there has to be clearly better. On new ground, and where a scan
-        hardly has a return, nothing but odometry tells where the robot is.
-
-        Parameters
-        ----------
-        points : (n, 2) float64
-            Points in the robot's frame [m].
-        predicted : (3,) float64
-            Where the robot should be, in the local map's frame [m, rad].
-        moved : (3,) float64
-            The motion since the last match that led there.
-        uncertainty : (3, 3) float64
-            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2].
-        failed : int
-            How many scans in a row did not match before.
-        """
-        settings = self._matching
-        is_blind = not self._uses_odometry or failed >= settings.wide_after
-        near = self._match_near(points, predicted, uncertainty) if self._uses_odometry else None
-        self.contradiction = 1.0 if near is None else near.contradiction
-        if near is not None and self._is_new_ground(near, len(points)):
-            return Match(
-                predicted, near.score, near.overlap, near.contradiction, np.zeros((3, 3)), near.prior
-            )
-        if (
-            near is not None
-            and self._is_good(near)
-            and near.score >= settings.convincing_share * self.usual_score
-        ):
-            return self._noted(near)
-        distance = math.hypot(float(moved[0]), float(moved[1]))
-        reach = (settings.blind_m, settings.blind_angle)
-        if not is_blind:
-            # Twice the motion and more: also where a robot is that went back while odometry said forth.
-            reach = (
-                min(settings.search_m + 2.2 * distance, reach[0]),
-                min(settings.search_angle + 2.2 * abs(float(moved[2])), reach[1]),
-            )
-        is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
-        far = None if is_sparse else self._match_far(points, predicted, reach)
-        if self._uses_odometry and is_blind and far is not None:
-            # So far from odometry something that looks a little alike, or in part, is soon found.
-            is_alike = (
-                far.score >= settings.convincing_share * self.usual_score
-                and far.overlap >= settings.blind_overlap
-            )
-            far = far if is_alike else None
-        good = [match for match in (near, far) if match is not None and self._is_good(match)]
-        if len(good) == 2:
-            return self._noted(good[1] if outweighs(good[1], good[0], settings.better_by) else good[0])
-        return self._noted(good[0]) if good else None
-
-    def _noted(self, match: Match) -> Match:
-        self.usual_score = (
-            match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
-        )
-        return match
-
-    def _is_new_ground(self, match: Match, points: int) -> bool:
-        """Whether a scan sees hardly anything that the local map has observed.
-
-        Also true where it sees hardly anything at all.
-        """
-        settings = self._matching
-        is_sparse = points < min(settings.least_points, self._geometry.beams // 8)
-        return is_sparse or (
-            match.overlap < settings.least_overlap and match.contradiction <= settings.most_contradiction
-        )
-
-    def _is_good(self, match: Match) -> bool:
-        settings = self._matching
-        least_score = max(settings.least_score, settings.least_share * self.usual_score)
-        agrees = match.score >= least_score and match.overlap >= settings.least_overlap
-        return agrees and match.contradiction <= settings.most_contradiction
-
-    def _match_near(
-        self, points: NDArray[np.float64], predicted: NDArray[np.float64], uncertainty: NDArray[np.float64]
-    ) -> Match:
-        settings, grid = self._matching, self._active[0].submap.grid
-        spread = np.sqrt(np.diag(uncertainty))
-        # Odometry that leaps leads nowhere, and is not sought farther than where there is none.
-        reach_m = min(
-            settings.search_m + settings.search_deviations * float(spread[:2].max()),
-            max(settings.search_m, settings.blind_m),
-        )
-        reach_angle = min(
-            settings.search_angle + settings.search_deviations * float(spread[2]),
-            max(settings.search_angle, settings.blind_angle),
-        )
-        information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
-        weight = settings.weight(len(points))
-        start = search(grid, points, predicted, reach_m, reach_angle, information, weight, settings.unseen)
-        return refine(
-            grid, points, start, predicted, information, weight, settings.unseen, settings.surface_m
-        )
-
-    def _match_far(
-        self, points: NDArray[np.float64], predicted: NDArray[np.float64], reach: tuple[float, float]
-    ) -> Match | None:
-        settings, oldest = self._matching, self._active[0].submap
-        least = 0.5 * settings.least_score * settings.least_overlap
-        found, _ = place(pyramid(oldest.finished()), points, predicted, reach, least, settings.evaluations)
-        if found is None:
-            return None
-        weight = settings.weight(len(points))
-        return refine(
-            oldest.grid,
-            points,
-            found.pose,
-            found.pose,
-            np.zeros((3, 3)),
-            weight,
-            settings.unseen,
-            settings.surface_m,
-        )
+        """Return where a scan lies on the older local map, see ``LocalMatcher.match``."""
+        return self._matcher.match(self._active[0].submap, points, predicted, moved, uncertainty, failed)
 
     def rendered_again(self, points: NDArray[np.float64]) -> Match | None:
         """Return where the older local map's first scan now lies on that map.
 
         Its points are (n, 2) [m]. None if they do not match.
         """
-        settings, nowhere = self._matching, np.zeros(3)
-        grid = self._active[0].submap.grid
-        weight = settings.weight(len(points))
-        match = refine(
-            grid, points, nowhere, nowhere, np.zeros((3, 3)), weight, settings.unseen, settings.surface_m
-        )
-        return match if self._is_good(match) and not self._is_new_ground(match, len(points)) else None
+        return self._matcher.match_first(self._active[0].submap, points)
 
     def insert(self, pose: NDArray[np.float64], path: float, ranges: NDArray[np.float32]) -> bool:
         """Insert a scan at x, y, theta (3,) in the older local map's frame.
@@ -309,34 +187,6 @@ class LocalMapper:
     def _ended(self, active: list[_Active]) -> list[Finished]:
         ended = [one for one in active if one.submap.scans >= self._submaps.least_scans // 2]
         return [Finished(one.submap.finished(), np.array(one.nodes), np.stack(one.places)) for one in ended]
-
-
-def outweighs(far: Match, near: Match, better_by: float) -> bool:
-    """Return whether a match outweighs odometry, which then has to be wrong.
-
-    The match against odometry must be better than one with it by enough.
-
-    Where nearly all of a scan lies near known walls, and elsewhere only a part of it, that part may agree
-    better by chance, as on the other side of a wall: all points together must not agree less.
-
-    Parameters
-    ----------
-    far, near : Match
-        The match against odometry, and that with it.
-    better_by : float
-        By how much more the points near what the map has observed have to agree.
-    """
-    return far.score > near.score + better_by and far.score * far.overlap >= near.score * near.overlap
-
-
-def turned(matrix: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
-    """Return a (3, 3) covariance or information of x, y, theta in another frame.
-
-    Its own frame is rotated by an angle [rad] in that frame.
-    """
-    cosine, sine = math.cos(angle), math.sin(angle)
-    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(turn @ matrix @ turn.T, np.float64)
 
 
 def way(motion: NDArray[np.float64]) -> float:

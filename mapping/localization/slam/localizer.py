@@ -13,13 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.covariance import turned
 from lidarium.mapping.geometry.rigid import Transform, composed, relative
 from lidarium.mapping.grids.occupancy import OccupancyGrid
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.dead_reckoning.odometry import compounded
 from lidarium.mapping.localization.graph.node_graph import NodeGraph
-from lidarium.mapping.localization.matching.local_mapping import LocalMapper, turned, way
+from lidarium.mapping.localization.matching.local_mapping import LocalMapper, way
 from lidarium.mapping.localization.matching.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.matching.wall_compass import WallCompass

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lidarium.mapping.localization.matching.local_mapping import outweighs
+from lidarium.mapping.localization.matching.local_matching import outweighs
 from lidarium.mapping.localization.matching.scan_matching import Match
 
 BETTER_BY = 0.1

@@ -1,0 +1,83 @@
+"""Grids of solid cells, and how they lie on a floor."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Origins of rasters are whole multiples of this [m], so that belief grids of every usual resolution line up
+# with them.
+LATTICE = 0.1
+_PADDING = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Raster:
+    """Solid cells of a floor at one height.
+
+    Attributes
+    ----------
+    solid : (rows, columns) uint8
+        1 where the cell is solid; row 0 at the lowest y. The outermost ring of cells is solid.
+    origin : (x, y)
+        Lower left corner of cell (0, 0) [m].
+    resolution : float
+        Side of a cell [m].
+    kept : dict
+        What was made of the cells, where they are read-only, see ``free_space``.
+    """
+
+    solid: NDArray[np.uint8]
+    origin: tuple[float, float]
+    resolution: float
+    kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the cells take, and what is kept of them."""
+        sizes: list[int] = [value.nbytes for value in list(self.kept.values()) if value is not None]
+        return self.solid.nbytes + sum(sizes)
+
+
+def frame_of(
+    bounds: tuple[float, float, float, float], resolution: float
+) -> tuple[tuple[float, float], tuple[int, int]]:
+    """Return origin and (rows, columns) of the raster.
+
+    It has at least one cell beyond the bounds on all sides.
+    """
+    margin = math.ceil(resolution / LATTICE - 1e-9)
+    # Divided, not multiplied: 3 / 10 is the double nearest to 0.3, and 3 * 0.1 is not.
+    x, y = ((math.floor(low / LATTICE + 1e-9) - margin) / round(1.0 / LATTICE) for low in bounds[:2])
+    columns, rows = (
+        math.ceil((high - low) / resolution - 1e-9) + 1 for low, high in ((x, bounds[2]), (y, bounds[3]))
+    )
+    return (x, y), (-(-rows // _PADDING) * _PADDING, -(-columns // _PADDING) * _PADDING)
+
+
+def cells_within(
+    bounds: tuple[float, float, float, float], origin: tuple[float, float], resolution: float
+) -> tuple[slice, slice]:
+    """Return rows and columns of the cells whose centre is within the bounds."""
+    x_low, y_low, x_high, y_high = ((bounds[k] - origin[k % 2]) / resolution - 0.5 for k in range(4))
+    return (
+        slice(math.ceil(y_low - 1e-6), math.floor(y_high + 1e-6) + 1),
+        slice(math.ceil(x_low - 1e-6), math.floor(x_high + 1e-6) + 1),
+    )
+
+
+def sampled(
+    cells: Raster, origin: tuple[float, float], resolution: float, inside: tuple[slice, slice]
+) -> NDArray[np.uint8]:
+    """Return the image cell under each cell centre; solid outside of the image."""
+    indices = []
+    for axis in (0, 1):
+        centres = origin[1 - axis] + (np.arange(inside[axis].start, inside[axis].stop) + 0.5) * resolution
+        indices.append(
+            np.floor((centres - cells.origin[1 - axis]) / cells.resolution + 1e-6).astype(np.int64)
+        )
+    framed = np.pad((cells.solid != 0).astype(np.uint8), 1, constant_values=1)
+    rows, columns = (np.clip(index + 1, 0, framed.shape[axis] - 1) for axis, index in enumerate(indices))
+    return np.take(framed[rows], columns, axis=1)

@@ -1,0 +1,205 @@
+"""Matches of scans with a local map: near what odometry says, else far from it."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.geometry.covariance import turned
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.localization.matching.branch_and_bound import place, pyramid
+from lidarium.mapping.localization.matching.scan_matching import Match, refine
+from lidarium.mapping.localization.matching.scan_search import search
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
+from lidarium.mapping.localization.matching.submaps import Submap
+
+
+class LocalMatcher:
+    """Lays scans on a local map, and knows how well they have agreed of late.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        How.
+    geometry : ScanGeometry
+        Which way the beams look.
+
+    Attributes
+    ----------
+    usual_score : float
+        Agreement of matches of late.
+    contradiction : float
+        Share of the last scan's returns that lay, from where odometry led, in what the local map knows to be
+        free.
+    """
+
+    def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
+        self._matching, self._uses_odometry, self._geometry = (
+            settings.matching,
+            settings.uses_odometry,
+            geometry,
+        )
+        self.usual_score, self.contradiction = 0.0, 0.0
+
+    def match(
+        self,
+        submap: Submap,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        moved: NDArray[np.float64],
+        uncertainty: NDArray[np.float64],
+        failed: int,
+    ) -> Match | None:
+        """Return where a scan lies on a local map; None where it does not match.
+
+        Near what odometry says it is searched first, weighing both. Where that does not convince, odometry
+        may be wrong (a wheel slips, the robot was pushed), and the search goes farther, without it, for scans
+        of enough returns; what is found there has to be clearly better. On new ground, and where a scan
+        hardly has a return, nothing but odometry tells where the robot is.
+
+        Parameters
+        ----------
+        submap : Submap
+            The local map.
+        points : (n, 2) float64
+            Points in the robot's frame [m].
+        predicted : (3,) float64
+            Where the robot should be, in the local map's frame [m, rad].
+        moved : (3,) float64
+            The motion since the last match that led there.
+        uncertainty : (3, 3) float64
+            Covariance of that motion, in the robot's frame at its end [m^2, m rad, rad^2].
+        failed : int
+            How many scans in a row did not match before.
+        """
+        settings = self._matching
+        is_blind = not self._uses_odometry or failed >= settings.wide_after
+        near = self._match_near(submap, points, predicted, uncertainty) if self._uses_odometry else None
+        self.contradiction = 1.0 if near is None else near.contradiction
+        if near is not None and self._is_new_ground(near, len(points)):
+            return Match(
+                predicted, near.score, near.overlap, near.contradiction, np.zeros((3, 3)), near.prior
+            )
+        if (
+            near is not None
+            and self._is_good(near)
+            and near.score >= settings.convincing_share * self.usual_score
+        ):
+            return self._noted(near)
+        distance = math.hypot(float(moved[0]), float(moved[1]))
+        reach = (settings.blind_m, settings.blind_angle)
+        if not is_blind:
+            # Twice the motion and more: also where a robot is that went back while odometry said forth.
+            reach = (
+                min(settings.search_m + 2.2 * distance, reach[0]),
+                min(settings.search_angle + 2.2 * abs(float(moved[2])), reach[1]),
+            )
+        is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
+        far = None if is_sparse else self._match_far(submap, points, predicted, reach)
+        if self._uses_odometry and is_blind and far is not None:
+            # So far from odometry something that looks a little alike, or in part, is soon found.
+            is_alike = (
+                far.score >= settings.convincing_share * self.usual_score
+                and far.overlap >= settings.blind_overlap
+            )
+            far = far if is_alike else None
+        good = [match for match in (near, far) if match is not None and self._is_good(match)]
+        if len(good) == 2:
+            return self._noted(good[1] if outweighs(good[1], good[0], settings.better_by) else good[0])
+        return self._noted(good[0]) if good else None
+
+    def _noted(self, match: Match) -> Match:
+        self.usual_score = (
+            match.score if self.usual_score == 0.0 else 0.9 * self.usual_score + 0.1 * match.score
+        )
+        return match
+
+    def _is_new_ground(self, match: Match, points: int) -> bool:
+        """Whether a scan sees hardly anything that the local map has observed.
+
+        Also true where it sees hardly anything at all.
+        """
+        settings = self._matching
+        is_sparse = points < min(settings.least_points, self._geometry.beams // 8)
+        return is_sparse or (
+            match.overlap < settings.least_overlap and match.contradiction <= settings.most_contradiction
+        )
+
+    def _is_good(self, match: Match) -> bool:
+        settings = self._matching
+        least_score = max(settings.least_score, settings.least_share * self.usual_score)
+        agrees = match.score >= least_score and match.overlap >= settings.least_overlap
+        return agrees and match.contradiction <= settings.most_contradiction
+
+    def _match_near(
+        self,
+        submap: Submap,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        uncertainty: NDArray[np.float64],
+    ) -> Match:
+        settings, grid = self._matching, submap.grid
+        spread = np.sqrt(np.diag(uncertainty))
+        reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
+        reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
+        information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
+        weight = settings.weight(len(points))
+        start = search(grid, points, predicted, reach_m, reach_angle, information, weight, settings.unseen)
+        return refine(
+            grid, points, start, predicted, information, weight, settings.unseen, settings.surface_m
+        )
+
+    def _match_far(
+        self,
+        submap: Submap,
+        points: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+        reach: tuple[float, float],
+    ) -> Match | None:
+        settings = self._matching
+        least = 0.5 * settings.least_score * settings.least_overlap
+        found, _ = place(pyramid(submap.finished()), points, predicted, reach, least, settings.evaluations)
+        if found is None:
+            return None
+        weight = settings.weight(len(points))
+        return refine(
+            submap.grid,
+            points,
+            found.pose,
+            found.pose,
+            np.zeros((3, 3)),
+            weight,
+            settings.unseen,
+            settings.surface_m,
+        )
+
+    def match_first(self, submap: Submap, points: NDArray[np.float64]) -> Match | None:
+        """Return where the first scan of a local map now lies on that map.
+
+        Its points are (n, 2) [m]. None if they do not match.
+        """
+        settings, nowhere = self._matching, np.zeros(3)
+        grid = submap.grid
+        weight = settings.weight(len(points))
+        match = refine(
+            grid, points, nowhere, nowhere, np.zeros((3, 3)), weight, settings.unseen, settings.surface_m
+        )
+        return match if self._is_good(match) and not self._is_new_ground(match, len(points)) else None
+
+
+def outweighs(far: Match, near: Match, better_by: float) -> bool:
+    """Return whether a match outweighs odometry, which then has to be wrong.
+
+    The match against odometry must be better than one with it by enough.
+
+    Where nearly all of a scan lies near known walls, and elsewhere only a part of it, that part may agree
+    better by chance, as on the other side of a wall: all points together must not agree less.
+
+    Parameters
+    ----------
+    far, near : Match
+        The match against odometry, and that with it.
+    better_by : float
+        By how much more the points near what the map has observed have to agree.
+    """
+    return far.score > near.score + better_by and far.score * far.overlap >= near.score * near.overlap
