@@ -25,13 +25,8 @@ from lidarium.evaluation.analysis.figures import (
 from lidarium.evaluation.analysis.groups import Group, paired, repeats, times_to
 from lidarium.evaluation.analysis.records import Entry, Key
 from lidarium.evaluation.drawing.floor_pictures import recorded_pair, save_paths, save_visits, visits_on
-from lidarium.evaluation.drawing.plots import (
-    coverage_curves,
-    profiles,
-    save_boxes,
-    save_coverage,
-    save_profiles,
-)
+from lidarium.evaluation.drawing.plots import coverage_curves, save_boxes, save_coverage
+from lidarium.evaluation.drawing.profiles import profiles, save_profiles
 from lidarium.evaluation.report import tables
 from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.statistics import FEWEST_FOR_NOMINAL, median_interval

@@ -115,7 +115,7 @@ MOVED: dict[str, tuple[str, ...]] = {
     "evaluation.report.figures": ("evaluation.analysis.figures",),
     "evaluation.report.floor_pictures": ("evaluation.drawing.floor_pictures",),
     "evaluation.report.groups": ("evaluation.analysis.groups",),
-    "evaluation.report.plots": ("evaluation.drawing.plots",),
+    "evaluation.report.plots": ("evaluation.drawing.plots", "evaluation.drawing.profiles"),
     "evaluation.report.records": ("evaluation.analysis.records",),
     "evaluation.report.style": ("evaluation.drawing.style",),
     "evaluation.result": ("evaluation.episodes.result",),

@@ -3,7 +3,7 @@ import pytest
 
 from lidarium.evaluation.analysis.figures import compared, further_figure, further_keys, time_figure
 from lidarium.evaluation.analysis.groups import floor_set_of, grouped, paired, repeats, times_to
-from lidarium.evaluation.drawing.plots import profiles
+from lidarium.evaluation.drawing.profiles import profiles
 
 ENDED = {"robot_0": "no_frontier"}
 CUT = {"robot_0": "horizon"}
