@@ -4,7 +4,6 @@ Each sees the team's map and its teammates in its own frame.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,15 +19,10 @@ from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.observation_spaces import FARTHEST
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.station.team_mapping import Frames, TeamMapping, crop_around
+from lidarium.envs.wrappers.contacts import CanTalk, check_links, clusters_of
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.validation import ValidationSettings
-
-CanTalk = Callable[[float, NDArray[np.float64]], NDArray[np.bool_]]
-"""Takes the time [s] and the true poses (robots, 3).
-
-Returns which robots reach each other, (robots, robots).
-"""
 
 TEAM_VALIDATION = ValidationSettings(
     most_contradiction_m=1.0, plenty_of_overlap_m2=0.0, plenty_of_wall_m=10.0, contradiction_share=0.1
@@ -136,7 +130,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         if robots < 2:
             raise ValueError(f"robots is {robots}; merging maps wants two or more")
         if can_talk is not None and not callable(can_talk):
-            _check_links(np.asarray(can_talk), robots)
+            check_links(np.asarray(can_talk), robots)
         self.env, self._base = env, base
         self.merging = settings or MergingSettings()
         self._can_talk = can_talk
@@ -212,7 +206,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         self.env.close()
 
     def _exchange(self, infos: dict[str, dict[str, Any]]) -> None:
-        """Let the robots exchange maps if it is time, and tell who has come to know whom."""
+        """Let the robots exchange maps if it is time, and note who has come to know whom."""
         for info in infos.values():
             info["merges"] = []
             info["truth"]["merges"] = []
@@ -253,14 +247,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
                 if callable(self._can_talk)
                 else self._can_talk
             )
-        reached = _check_links(np.asarray(links), robots).astype(np.int64) + np.eye(robots, dtype=np.int64)
-        for _ in range(robots.bit_length()):
-            reached = ((reached @ reached) > 0).astype(np.int64)
-        rows = {tuple(row) for row in (reached > 0).tolist()}
-        return [
-            [agent for agent, is_in in zip(self.possible_agents, row, strict=True) if is_in]
-            for row in sorted(rows, reverse=True)
-        ]
+        return clusters_of(self.possible_agents, check_links(np.asarray(links), robots))
 
     def _with_team(self, observations: dict[str, Observation]) -> dict[str, Observation]:
         time_s, perception = self._base.scorer.time, self._base.perception
@@ -314,12 +301,3 @@ def team_boxes(robots: int, cells: int) -> dict[str, spaces.Space[Any]]:
         "team_map": spaces.Box(0, 255, (1, cells, cells), np.uint8),
         "teammates": spaces.Box(low, high, dtype=np.float32),
     }
-
-
-def _check_links(links: NDArray[Any], robots: int) -> NDArray[np.bool_]:
-    if links.shape != (robots, robots):
-        raise ValueError(
-            f"can_talk has shape {links.shape}; want ({robots}, {robots}): which robots reach each other"
-        )
-    found = np.asarray(links, np.bool_)
-    return found | found.T
