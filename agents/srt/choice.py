@@ -45,109 +45,218 @@ class Choice:
     is_goal: bool = False
 
 
-def choose(
-    node: Node,
-    tree: Tree,
-    known: set[int],
-    source: CandidateSource,
-    memory: Memory,
-    settings: SrtSettings,
-    generator: np.random.Generator,
-    senses: Senses,
-    targets: Sequence[Candidate],
-    limits: Limits,
-) -> list[Choice]:
-    """Return the legs of the path to take from a node.
+class WayChooser:
+    """Chooses the ways of one robot.
 
-    There are none where nothing is left to visit.
-
-    Nodes are looked at along the tree's ways, nearest first; with ``backtrack`` ``parent`` only the node
-    itself is.
+    Parameters
+    ----------
+    source : CandidateSource
+        Where candidates come from.
+    settings : SrtSettings
+        How the tree grows.
+    limits : Limits
+        What the robot can do.
+    generator : numpy.random.Generator
+        Where draws come from.
     """
-    lengths, before = (
-        tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
-    )
-    reached = [tree.nodes[number] for number in lengths]
-    goal = senses.goal
-    if goal is not None:
+
+    def __init__(
+        self,
+        source: CandidateSource,
+        settings: SrtSettings,
+        limits: Limits,
+        generator: np.random.Generator,
+    ) -> None:
+        self._source, self._settings, self._limits, self._generator = source, settings, limits, generator
+
+    def choose(
+        self,
+        node: Node,
+        tree: Tree,
+        known: set[int],
+        memory: Memory,
+        senses: Senses,
+        targets: Sequence[Candidate],
+    ) -> list[Choice]:
+        """Return the legs of the path to take from a node.
+
+        There are none where nothing is left to visit.
+
+        Nodes are looked at along the tree's ways, nearest first; with ``backtrack`` ``parent`` only the node
+        itself is.
+
+        Parameters
+        ----------
+        node : Node
+            Where the robot is.
+        tree : Tree
+            The team's graph.
+        known : set of int
+            Nodes that the robot knows.
+        memory : Memory
+            What it remembers.
+        senses : Senses
+            What it senses.
+        targets : sequence of Candidate
+            Those of teammates in contact.
+        """
+        settings = self._settings
+        lengths, before = (
+            tree.ways(node.number, known) if settings.backtrack == "open" else ({node.number: 0.0}, {})
+        )
+        reached = [tree.nodes[number] for number in lengths]
+        if straight := self._to_goal(tree, reached, lengths, before, memory, senses):
+            return straight
+        is_drawn = settings.candidates != "goal" or self._generator.random() < settings.random_share
+        tour = [] if is_drawn else self.tour(node, memory, senses, targets)
+        if tour:
+            return tour
+        others = [tree.nodes[number] for number in sorted(known)]
+        if is_drawn:
+            best = self._drawn(reached, lengths, memory, others, targets)
+        else:
+            found = [
+                candidate for each in reached for candidate in self._source.of_node(each, memory, others)
+            ]
+            best = self._cheapest(_left_by(targets, found), tree, lengths, before, senses)
+        if best is not None:
+            return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
+        if settings.candidates != "goal":
+            return []
+        # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
+        return (
+            self._to_frontier(node, memory, settings.least_frontier, senses, targets)
+            or self._across(others, memory, senses, targets)
+            or self._to_frontier(node, memory, LAST_FRONTIER, senses, targets)
+        )
+
+    def _cheapest(
+        self,
+        found: list[Candidate],
+        tree: Tree,
+        lengths: dict[int, float],
+        before: dict[int, int],
+        senses: Senses,
+    ) -> Candidate | None:
+        """Return the candidate to which the path costs least, None where there is none."""
+
+        def cost_of(candidate: Candidate) -> float:
+            legs = [tree.nodes[number].place for number in way_to(candidate.node, before)]
+            length = lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place)
+            return self._weighed(length, legs[0] if legs else candidate.place, candidate.place, senses)
+
+        return min(found, key=cost_of, default=None)
+
+    def _drawn(
+        self,
+        reached: list[Node],
+        lengths: dict[int, float],
+        memory: Memory,
+        others: list[Node],
+        targets: Sequence[Candidate],
+    ) -> Candidate | None:
+        """Return a drawn candidate of the nearest node that has any, None where none has."""
+        for each in sorted(reached, key=lambda each: lengths[each.number]):
+            found = _left_by(targets, self._source.of_node(each, memory, others))
+            if found:
+                return found[int(self._generator.integers(len(found)))]
+        return None
+
+    def _to_goal(
+        self,
+        tree: Tree,
+        reached: list[Node],
+        lengths: dict[int, float],
+        before: dict[int, int],
+        memory: Memory,
+        senses: Senses,
+    ) -> list[Choice]:
+        """Return the path to a goal that is known to be in reach; none where it is not, or there is no goal.
+
+        ``lengths`` and ``before`` are those of the tree's paths to the nodes that are reached.
+        """
+        goal = senses.goal
+        if goal is None:
+            return []
         across = memory.way(senses.pose[:2], goal)
         if across is not None:
             return [*(Choice(place, None) for place in across[:-1]), Choice(goal, None, is_goal=True)]
         in_sight = [each for each in reached if each.safe.contains(goal)]
-        if in_sight:
-            nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, goal))
-            return [*_legs(tree, way_to(nearest.number, before)), Choice(goal, None, is_goal=True)]
-    is_drawn = settings.candidates != "goal" or generator.random() < settings.random_share
-    tour = [] if is_drawn else tour_way(node, source, memory, settings, senses, targets, limits)
-    if tour:
-        return tour
-    others = [tree.nodes[number] for number in sorted(known)]
+        if not in_sight:
+            return []
+        nearest = min(in_sight, key=lambda each: lengths[each.number] + math.dist(each.place, goal))
+        return [*_legs(tree, way_to(nearest.number, before)), Choice(goal, None, is_goal=True)]
 
-    def cost_of(candidate: Candidate) -> float:
-        legs = [tree.nodes[number].place for number in way_to(candidate.node, before)]
-        way = lengths[candidate.node] + math.dist(tree.nodes[candidate.node].place, candidate.place)
-        return _weighed(way, legs[0] if legs else candidate.place, candidate.place, settings, senses, limits)
+    def tour(self, node: Node, memory: Memory, senses: Senses, targets: Sequence[Candidate]) -> list[Choice]:
+        """Return the path to the first frontier of the shortest tour.
 
-    best: Candidate | None = None
-    if not is_drawn:
-        found = [candidate for each in reached for candidate in source.of_node(each, memory, others)]
-        best = min(_left_by(targets, found), key=cost_of, default=None)
-    else:
-        for each in sorted(reached, key=lambda each: lengths[each.number]):
-            found = _left_by(targets, source.of_node(each, memory, others))
-            if found:
-                best = found[int(generator.integers(len(found)))]
-                break
-    if best is not None:
-        return [*_legs(tree, way_to(best.node, before)), Choice(best.place, None, best)]
-    if settings.candidates != "goal":
+        The tour visits the frontiers of the map; there is no path where there is no tour.
+
+        Only explorers plan tours: robots without a goal that go where what was seen is open, at the least
+        cost.
+        """
+        settings = self._settings
+        if senses.goal is not None or settings.candidates != "goal" or settings.algorithm != "integrated":
+            return []
+        of_teammates = [target.focus for target in targets]
+        for least in (settings.least_frontier, LAST_FRONTIER):
+            begun = first_on_tour(memory, senses, self._limits, least, self._source.intent, of_teammates)
+            if begun is not None:
+                return _to_focus(node, *begun)
         return []
-    # Towards a goal frontiers are the last resort: what lies beside the way need not be seen.
-    return (
-        _to_frontier(node, memory, settings.least_frontier, settings, senses, targets, limits)
-        or _across(others, source, memory, senses, targets)
-        or _to_frontier(node, memory, LAST_FRONTIER, settings, senses, targets, limits)
-    )
 
+    def _across(
+        self, nodes: list[Node], memory: Memory, senses: Senses, targets: Sequence[Candidate]
+    ) -> list[Choice]:
+        """Return the path across the map to the nearest indirect opening.
 
-def tour_way(
-    node: Node,
-    source: CandidateSource,
-    memory: Memory,
-    settings: SrtSettings,
-    senses: Senses,
-    targets: Sequence[Candidate],
-    limits: Limits,
-) -> list[Choice]:
-    """Return the path to the first frontier of the shortest tour.
-
-    The tour visits the frontiers of the map; there is no path where there is no tour.
-
-    Only explorers plan tours: robots without a goal that go where what was seen is open, at the least cost.
-    """
-    if senses.goal is not None or settings.candidates != "goal" or settings.algorithm != "integrated":
+        No straight path from the opening's node leads to it.
+        """
+        found = [candidate for each in nodes for candidate in self._source.beside(each, memory)]
+        for candidate in sorted(_left_by(targets, found), key=lambda each: senses.distance_to(each.place)):
+            across = memory.way(senses.pose[:2], candidate.place)
+            if across is not None:
+                return [
+                    *(Choice(place, None) for place in across[:-1]),
+                    Choice(candidate.place, None, candidate),
+                ]
         return []
-    of_teammates = [target.focus for target in targets]
-    for least in (settings.least_frontier, LAST_FRONTIER):
-        begun = first_on_tour(memory, senses, limits, least, source.intent, of_teammates)
-        if begun is not None:
-            return _to_focus(node, *begun)
-    return []
 
+    def _weighed(
+        self, length: float, first: NDArray[np.float64], last: NDArray[np.float64], senses: Senses
+    ) -> float:
+        """Return the cost of a path [m].
 
-def _across(
-    nodes: list[Node], source: CandidateSource, memory: Memory, senses: Senses, targets: Sequence[Candidate]
-) -> list[Choice]:
-    """Return the path across the map to the nearest indirect opening.
+        It counts its length, the turn towards its first place, and how far from the goal it ends.
+        """
+        gap = first - senses.pose[:2]
+        turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
+        length += turn * self._limits.speed / self._limits.turn_rate
+        return self._settings.way_weight * length + (
+            0.0 if senses.goal is None else math.dist(last, senses.goal)
+        )
 
-    No straight path from the opening's node leads to it.
-    """
-    found = [candidate for each in nodes for candidate in source.beside(each, memory)]
-    for candidate in sorted(_left_by(targets, found), key=lambda each: senses.distance_to(each.place)):
-        way = memory.way(senses.pose[:2], candidate.place)
-        if way is not None:
-            return [*(Choice(place, None) for place in way[:-1]), Choice(candidate.place, None, candidate)]
-    return []
+    def _to_frontier(
+        self, node: Node, memory: Memory, least: float, senses: Senses, targets: Sequence[Candidate]
+    ) -> list[Choice]:
+        """Return the cheapest path to a map frontier of at least a length [m].
+
+        Frontiers of teammates are left out.
+        """
+        found = memory.frontiers(senses.pose[:2], least, MOST)
+        if found is None:
+            return []
+
+        def cost_of(k: int) -> float:
+            return self._weighed(float(found.costs[k]), found.legs(k)[0], found.focuses[k], senses)
+
+        left = [
+            k
+            for k, focus in enumerate(found.focuses)
+            if all(math.dist(focus, target.focus) >= TEAMMATE_SAME for target in targets)
+        ]
+        best = min(left, key=cost_of, default=None)
+        return [] if best is None else _to_focus(node, found.legs(best), found.focuses[best])
 
 
 def home_way(
@@ -179,53 +288,6 @@ def _left_by(targets: Sequence[Candidate], found: list[Candidate]) -> list[Candi
             for target in targets
         )
     ]
-
-
-def _weighed(
-    way: float,
-    first: NDArray[np.float64],
-    last: NDArray[np.float64],
-    settings: SrtSettings,
-    senses: Senses,
-    limits: Limits,
-) -> float:
-    """Return the cost of a path [m].
-
-    It counts its length, the turn towards its first place, and how far from the goal it ends.
-    """
-    gap = first - senses.pose[:2]
-    turn = abs(wrapped(math.atan2(gap[1], gap[0]) - float(senses.pose[2])))
-    way += turn * limits.speed / limits.turn_rate
-    return settings.way_weight * way + (0.0 if senses.goal is None else math.dist(last, senses.goal))
-
-
-def _to_frontier(
-    node: Node,
-    memory: Memory,
-    least: float,
-    settings: SrtSettings,
-    senses: Senses,
-    targets: Sequence[Candidate],
-    limits: Limits,
-) -> list[Choice]:
-    """Return the cheapest path to a map frontier of at least a length [m].
-
-    Frontiers of teammates are left out.
-    """
-    found = memory.frontiers(senses.pose[:2], least, MOST)
-    if found is None:
-        return []
-
-    def cost_of(k: int) -> float:
-        return _weighed(float(found.costs[k]), found.legs(k)[0], found.focuses[k], settings, senses, limits)
-
-    left = [
-        k
-        for k, focus in enumerate(found.focuses)
-        if all(math.dist(focus, target.focus) >= TEAMMATE_SAME for target in targets)
-    ]
-    best = min(left, key=cost_of, default=None)
-    return [] if best is None else _to_focus(node, found.legs(best), found.focuses[best])
 
 
 def _to_focus(node: Node, legs: list[NDArray[np.float64]], focus: NDArray[np.float64]) -> list[Choice]:

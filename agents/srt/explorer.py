@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
-from lidarium.agents.srt.choice import Choice, choose, home_way, tour_way
+from lidarium.agents.srt.choice import Choice, WayChooser, home_way
 from lidarium.agents.srt.memories.memory import Memory
 from lidarium.agents.srt.motion.blocks import Blocks, Remedy, place_aside
 from lidarium.agents.srt.motion.drive import Drive, Phase, driven, free_way, limits_of
@@ -96,6 +96,7 @@ class Explorer:
         body = robot.radius + settings.margin
         self._growth = TreeGrowth(agent, tree, settings, lidar, body)
         self._tree, self._source = tree, CandidateSource(settings, body, generator)
+        self._chooser = WayChooser(self._source, settings, self._limits, generator)
         self._route: list[Choice] = []
         self._drive: Drive | None = None
         self._chose_at = np.zeros(2)
@@ -205,15 +206,7 @@ class Explorer:
         # does.
         was_drawn = self._settings.random_share > 0.0 and not candidate.is_frontier
         if not was_drawn and senses.distance_to(self._chose_at) >= REPLAN_DISTANCE:
-            way = tour_way(
-                self._growth.node,
-                self._source,
-                memory,
-                self._settings,
-                senses,
-                targets,
-                self._limits,
-            )
+            way = self._chooser.tour(self._growth.node, memory, senses, targets)
             if way:
                 self._set_out(way, senses)
 
@@ -232,18 +225,7 @@ class Explorer:
             self._go_home(self.ending if self.ending in FINAL else "budget", senses, memory)
             return
         node = self._growth.node
-        way = choose(
-            node,
-            self._tree,
-            self.known,
-            self._source,
-            memory,
-            self._settings,
-            self._generator,
-            senses,
-            targets,
-            self._limits,
-        )
+        way = self._chooser.choose(node, self._tree, self.known, memory, senses, targets)
         if way:
             self.ending, self.is_home, self._blocks.asides = None, False, 0
             self._set_out(way, senses)

@@ -6,6 +6,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.agents.supervisor.assignment import NOBODY, best_goal
 from lidarium.agents.supervisor.knowledge.station import MergeStation
@@ -86,22 +87,14 @@ class Judge:
         inputs = self._inputs(agent, survey.known_area_m2)
         if agent not in workers:
             return self._decide(Case(inputs))
-        row = workers.index(agent)
-        rival = self._rival(agent, workers, survey)
+        row, rival = workers.index(agent), self._rival(agent, workers, survey)
         if agent in self._standing_by and rival is not None:
             # It has no path of its own; what counts is its way to the goal of the other.
             goal = survey.going[rival.agent]
-            inputs = replace(
-                inputs, remaining_m=float(survey.goals.costs[row, goal]) if goal != NOBODY else math.inf
-            )
+            remaining_m = float(survey.goals.costs[row, goal]) if goal != NOBODY else math.inf
+            inputs = replace(inputs, remaining_m=remaining_m)
         others = [teammate for teammate in workers if teammate != agent]
-        worth = np.where(survey.is_goal(), 1.0, -np.inf)
-        for teammate in others:
-            place = survey.places[teammate]
-            if place is not None:
-                worth = worth - survey.seen_at(place)
-            if taken[teammate] != NOBODY:
-                worth[taken[teammate]] = -np.inf
+        worth = _worth(others, survey, taken)
         if survey.going[agent] != NOBODY and rival is not None:
             worth[survey.going[agent]] = -np.inf
         costs, weight = survey.goals.costs[row], self._settings.cost_weight
@@ -189,3 +182,18 @@ class Judge:
     def _decide(self, case: Case) -> Judged:
         leaf, answers = decide(self._tree, case)
         return Judged(case, leaf, tuple(answers))
+
+
+def _worth(others: list[str], survey: Survey, taken: Mapping[str, int]) -> NDArray[np.float64]:
+    """Return what each goal is worth to a robot, (K,).
+
+    It is less where others see the goal, and -inf where it is taken or none.
+    """
+    worth = np.where(survey.is_goal(), 1.0, -np.inf)
+    for teammate in others:
+        place = survey.places[teammate]
+        if place is not None:
+            worth = worth - survey.seen_at(place)
+        if taken[teammate] != NOBODY:
+            worth[taken[teammate]] = -np.inf
+    return worth

@@ -206,27 +206,28 @@ class EpisodeBatch:
         self._buffers.turn(seen, is_same_step)
         self.score.rewards[:], self.score.reward_terms[:] = 0.0, 0.0
         self.run_kernel(modes, self._commands, seen)
+        terms = self._take_terms(acted, is_plain)
+        self.acted = acted
+        self._note_endings(acted, stopping)
+        self.infos = self._row_infos.of_step(terms, self.reasons, self.has_endings)
+        # Episodes that have not run in this call have nothing to be looked at again.
+        self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
+
+    def _take_terms(self, acted: NDArray[np.bool_], is_plain: bool) -> dict[str, NDArray[np.float64]]:
+        """Return what each term of the reward brought in the step, and add up those that are no kernels.
+
+        Rows that did not act have earned nothing; ``is_plain`` says that all did.
+        """
         earned = {} if self._extra.is_empty else self._extra.earned(self.world)
         for amounts in earned.values():
             self.score.rewards += amounts
         if not is_plain:
             self.score.rewards[~acted], self.score.reward_terms[~acted] = 0.0, 0.0
             earned = {name: np.where(acted, amounts, 0.0) for name, amounts in earned.items()}
-        self.acted = acted
-        self._note_endings(acted, stopping)
-        if self.has_endings:
-            ended = self.reasons != 0
-            self.is_whole = False
-            self.live[ended] = False
-            self.world.moves[ended] = 0
-            self.world.flags[ended] |= ENDED
-        terms = dict(zip(TERMS, self.score.reward_terms.T.copy(), strict=True))
-        self.infos = self._row_infos.of_step({**terms, **earned}, self.reasons, self.has_endings)
-        # Episodes that have not run in this call have nothing to be looked at again.
-        self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
+        return {**dict(zip(TERMS, self.score.reward_terms.T.copy(), strict=True)), **earned}
 
     def _note_endings(self, acted: NDArray[np.bool_], stopping: NDArray[np.int8] | None) -> None:
-        """Note why robots that took part in the step end.
+        """Note why robots that took part in the step end, and let them stand.
 
         What happens to them counts before reasons of their own.
         """
@@ -238,6 +239,12 @@ class EpisodeBatch:
             own = acted & (stopping != 0) & ((self.reasons == 0) | (self.reasons == HORIZON))
             self.reasons[own] = stopping[own]
         self.has_endings = bool(self.reasons.any())
+        if self.has_endings:
+            ended = self.reasons != 0
+            self.is_whole = False
+            self.live[ended] = False
+            self.world.moves[ended] = 0
+            self.world.flags[ended] |= ENDED
 
     def run_kernel(
         self, modes: NDArray[np.int8], commands: NDArray[np.float64], seen: NDArray[np.bool_]

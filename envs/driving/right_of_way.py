@@ -132,7 +132,7 @@ class RightOfWay:
         last = drives.cells[row, drives.counts[row] - 1]
         goal, heading = (int(last[0]), int(last[1])), float(drives.headings[row])
         if not near:
-            # A wall, not a robot: back out a little the way it came, and plan anew.
+            # A wall, not a robot: back out a little along the path by which it came, and plan again.
             self._planner.drive_to(row, goal, [], heading)
             drives.backing[row] = BACKING_STEPS
             return

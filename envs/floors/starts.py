@@ -43,8 +43,7 @@ def draw_starts(
     generator : numpy.random.Generator
         Source of the draws.
     proposed : (K, 3) float64
-        Starts x, y, theta that come with the floor [m, rad]. One that is free but too near to a wall for this
-        robot, or overlaps a robot on a former one, is passed over.
+        Starts x, y, theta of the floor [m, rad]. One too near to a wall or a former one is passed over.
 
     Returns
     -------

@@ -76,17 +76,7 @@ def save_spline_picture(
     show_cells(axes, np.stack([rgb("#ffffff"), rgb(SOLID)])[solid], box, SOLID)
     handles = [*_draw_map(axes, spline_map), *_draw_paths(axes, true_path, believed_path)]
     if tree:
-        axes.add_collection(
-            PolyCollection(
-                list(safe_regions), facecolors=TREE_COLOUR, alpha=0.06, edgecolors="none", zorder=1
-            )
-        )
-        axes.add_collection(
-            LineCollection([np.array(edge) for edge in tree], colors=TREE_COLOUR, linewidths=1.1, zorder=4)
-        )
-        nodes = np.array([point for edge in tree for point in edge])
-        axes.plot(*nodes.T, "o", color=TREE_COLOUR, markersize=3.5, zorder=5)
-        handles.append(Line2D([], [], color=TREE_COLOUR, marker="o", markersize=3.5, label="tree"))
+        handles.append(_draw_tree(axes, tree, safe_regions))
     if floor.goal is not None:
         goal = axes.plot(
             [floor.goal[0]],
@@ -103,10 +93,27 @@ def save_spline_picture(
         handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=3, frameon=False, fontsize=8.5
     )
     controls = sum(len(curve.spline.control_points) for curve in spline_map.curves)
-    told = (
+    note = (
         f"{len(spline_map.curves)} curves with {controls} control points, {spline_map.length:.1f} m of wall"
     )
-    save_titled_figure(path, figure, title or floor.name, told)
+    save_titled_figure(path, figure, title or floor.name, note)
+
+
+def _draw_tree(
+    axes: Axes,
+    tree: Sequence[tuple[tuple[float, float], tuple[float, float]]],
+    safe_regions: Sequence[NDArray[np.float64]],
+) -> Line2D:
+    """Draw the edges, nodes and safe regions of a tree, and return its handle for the legend."""
+    axes.add_collection(
+        PolyCollection(list(safe_regions), facecolors=TREE_COLOUR, alpha=0.06, edgecolors="none", zorder=1)
+    )
+    axes.add_collection(
+        LineCollection([np.array(edge) for edge in tree], colors=TREE_COLOUR, linewidths=1.1, zorder=4)
+    )
+    nodes = np.array([point for edge in tree for point in edge])
+    axes.plot(*nodes.T, "o", color=TREE_COLOUR, markersize=3.5, zorder=5)
+    return Line2D([], [], color=TREE_COLOUR, marker="o", markersize=3.5, label="tree")
 
 
 def _draw_map(axes: Axes, spline_map: SplineMap) -> list[Line2D]:

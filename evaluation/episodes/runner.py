@@ -154,12 +154,12 @@ def run_episode(
     """
     check_observed(policy, type(policy).__name__, env.settings.observe)
     level = at_level(env, policy.level, policy.shares_map)
-    driver = level.waypoints if isinstance(level, FrontierExploration) else level
+    driver = _driver_of(level)
     world = level if merging is None else MergedMaps(level, merging)
     episode = Episode(env, policy, seed)
     began = time.perf_counter()
     observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))
-    policy.reset(RunningTeam(env, driver if isinstance(driver, WaypointExploration) else None), seed)
+    policy.reset(RunningTeam(env, driver), seed)
     with nullcontext() if raise_interrupt else PatientInterrupt() as interrupt:
         try:
             if on_decision is not None:
@@ -170,11 +170,7 @@ def run_episode(
                 episode.decision_seconds.append(time.perf_counter() - decided)
                 observations = world.step(actions)[0]
                 observations = {agent: observations[agent] for agent in env.agents}
-                if isinstance(env, WatchedExploration):
-                    orders = driver.driver.orders() if isinstance(driver, WaypointExploration) else None
-                    env.decided(orders, policy.given_up)
-                if on_decision is not None:
-                    on_decision(env)
+                _show_decision(env, policy, driver, on_decision)
         except KeyboardInterrupt:
             if interrupt is None or interrupt.is_asked:
                 raise
@@ -182,11 +178,37 @@ def run_episode(
         episode.is_interrupted |= interrupt is not None and interrupt.is_asked and bool(env.agents)
     episode.wall_seconds = time.perf_counter() - began
     episode.given_up = list(policy.given_up)
-    episode.merges = world.events if isinstance(world, MergedMaps) else merges_of(policy, env)
-    if isinstance(env, WatchedExploration):
-        for merge in episode.merges:
-            env.tell(merge_event(env, merge))
+    _note_merges(episode, world.events if isinstance(world, MergedMaps) else merges_of(policy, env))
     return episode
+
+
+def _note_merges(episode: Episode, merges: list[MergeEvent]) -> None:
+    """Take in which merges were used, and let who watches know."""
+    env, episode.merges = episode.env, merges
+    if isinstance(env, WatchedExploration):
+        for merge in merges:
+            env.tell(merge_event(env, merge))
+
+
+def _driver_of(
+    level: ExplorationEnv | WaypointExploration | FrontierExploration,
+) -> WaypointExploration | None:
+    """Return what drives the robots to their targets, None where a policy decides speeds."""
+    below = level.waypoints if isinstance(level, FrontierExploration) else level
+    return below if isinstance(below, WaypointExploration) else None
+
+
+def _show_decision(
+    env: ExplorationEnv,
+    policy: Policy,
+    driver: WaypointExploration | None,
+    on_decision: Progress | None,
+) -> None:
+    """Let who watches, and who is to be called, know of a decision that has been carried out."""
+    if isinstance(env, WatchedExploration):
+        env.decided(None if driver is None else driver.driver.orders(), policy.given_up)
+    if on_decision is not None:
+        on_decision(env)
 
 
 def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:

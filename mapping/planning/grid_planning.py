@@ -203,24 +203,39 @@ def search(
     _check_search(space, log_odds, clearance, start, until.goal)
     passage = passage_of(footprint, space.resolution, clearance.limit)
     space.provide(passage.slots)
-    budget = int(budget_of(float(until.maximum_cost), space.resolution))
-    further = int(budget_of(float(until.beyond), space.resolution)) if until.beyond > 0.0 else 0
-    first, targets = (int(start[0]), int(start[1])), until.targets
-    goal_row, goal_column = (-1, -1) if until.goal is None else (int(until.goal[0]), int(until.goal[1]))
-    wanted = 0 if targets is None else int(until.count)
-    task = Task(*first, goal_row, goal_column, budget, False, wanted, further)
-    mask, near = (_NO_MASK, _NO_MASK) if targets is None else (targets.mask, targets.near)
-    spans = np.zeros(1, np.int64) if targets is None else targets.spans.copy()
-    lookout, discs = Lookout(mask, near, spans, space.hits), _discs_array(blocked)
+    first, task = (int(start[0]), int(start[1])), _task_of(start, until, space.resolution)
+    lookout, discs = _lookout_for(until.targets, space.hits), _discs_array(blocked)
     space.forget()
     space.touched_count, hit_count, settled = search_at(
         log_odds.ctypes.data, clearance.closeness, passage, space.memory, discs, task, lookout
     )
-    packed = space.hits[:hit_count].astype(np.int64)
+    return Search(
+        space, first, task.budget, settled, _nearest_hits(space, hit_count)[: until.count], space.generation
+    )
+
+
+def _task_of(start: Cell, until: Until, resolution: float) -> Task:
+    """Return where a search starts, and when it ends."""
+    budget = int(budget_of(float(until.maximum_cost), resolution))
+    further = int(budget_of(float(until.beyond), resolution)) if until.beyond > 0.0 else 0
+    goal_row, goal_column = (-1, -1) if until.goal is None else (int(until.goal[0]), int(until.goal[1]))
+    wanted = 0 if until.targets is None else int(until.count)
+    return Task(int(start[0]), int(start[1]), goal_row, goal_column, budget, False, wanted, further)
+
+
+def _lookout_for(targets: Targets | None, hits: NDArray[np.int32]) -> Lookout:
+    """Return what a search looks out for, nothing where there are no targets."""
+    if targets is None:
+        return Lookout(_NO_MASK, _NO_MASK, np.zeros(1, np.int64), hits)
+    return Lookout(targets.mask, targets.near, targets.spans.copy(), hits)
+
+
+def _nearest_hits(space: SearchSpace, count: int) -> NDArray[np.int64]:
+    """Return the first ``count`` cells (row, column) that a search has hit, the cheapest first."""
+    packed = space.hits[:count].astype(np.int64)
     rows, columns = packed >> ROW_SHIFT, packed & COLUMN_BITS
-    order = np.lexsort((columns, rows, -space.remaining[rows, columns].astype(np.int64)))[: until.count]
-    hits = np.stack((rows[order], columns[order]), axis=1)
-    return Search(space, first, budget, settled, hits, space.generation)
+    order = np.lexsort((columns, rows, -space.remaining[rows, columns].astype(np.int64)))
+    return np.stack((rows[order], columns[order]), axis=1)
 
 
 def plan(

@@ -74,26 +74,8 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
             )
         )
         goals.append(_at_most(f"{title} / that of `{TOLD}`", time_ratios(led, told), 1.10, robots))
-    scenario = [*rows["pairs"], *rows["three"]]
     for robots in (2, 3):
-        flat = chosen(scenario, SUPERVISED, robots, lambda floor: floor == "apartment")
-        large = chosen(teams, SUPERVISED, robots, lambda floor: area_m2(floor) >= LARGE_M2)
-        goals.append(
-            _at_most(
-                f"way of {robots} robots / one robot's, apartment",
-                path_shares(flat, rows["alone"]),
-                1.30,
-                robots,
-            )
-        )
-        goals.append(
-            _at_most(
-                f"way of {robots} robots / one robot's, floors over 300 m2",
-                path_shares(large, alone),
-                1.15,
-                robots,
-            )
-        )
+        goals += _path_goals(rows, robots)
     for robots in (2, 3):
         points = overlap_points(chosen(teams, SUPERVISED, robots), told)
         goals.append(
@@ -105,15 +87,7 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
                 digits=1,
             )
         )
-    every = [*(row for name in rows for row in rows[name]), *failing]
-    led = [
-        row for row in every if row["supervisor"] is not None and row["robots"] > 1 and row["policy"] != TOLD
-    ]
-    goals.append(_share("runs in which a wrong merge was used", led, has_wrong_merge, 0.0))
-    goals.append(
-        _share("runs with a merge that errs as much by the starts, drift included", led, has_off_merge, None)
-    )
-    goals.append(_share("runs with a merge that is not correct by `result.json`", led, has_false_merge, None))
+    goals += _merge_goals([*(row for name in rows for row in rows[name]), *failing])
     five = chosen(rows["five"], SUPERVISED)
     for name in ("p50", "p95"):
         milliseconds = [float(row["tick_ms"][name]) for row in five if row["tick_ms"][name] is not None]
@@ -128,6 +102,30 @@ def goals_of(rows: Mapping[str, Sequence[Row]], failing: Sequence[Row]) -> list[
         )
     )
     return goals
+
+
+def _path_goals(rows: Mapping[str, Sequence[Row]], robots: int) -> list[Goal]:
+    """Return how long the paths of a team may be, beside those of one robot."""
+    scenario = [*rows["pairs"], *rows["three"]]
+    flat = chosen(scenario, SUPERVISED, robots, lambda floor: floor == "apartment")
+    large = chosen(rows["teams"], SUPERVISED, robots, lambda floor: area_m2(floor) >= LARGE_M2)
+    title = f"way of {robots} robots / one robot's"
+    return [
+        _at_most(f"{title}, apartment", path_shares(flat, rows["alone"]), 1.30, robots),
+        _at_most(f"{title}, floors over 300 m2", path_shares(large, rows["one"]), 1.15, robots),
+    ]
+
+
+def _merge_goals(every: Sequence[Row]) -> list[Goal]:
+    """Return the shares of runs whose merges were wrong, of all runs that merge maps."""
+    led = [
+        row for row in every if row["supervisor"] is not None and row["robots"] > 1 and row["policy"] != TOLD
+    ]
+    return [
+        _share("runs in which a wrong merge was used", led, has_wrong_merge, 0.0),
+        _share("runs with a merge that errs as much by the starts, drift included", led, has_off_merge, None),
+        _share("runs with a merge that is not correct by `result.json`", led, has_false_merge, None),
+    ]
 
 
 def covered_by_others(row: Row) -> float:

@@ -86,14 +86,7 @@ class LocalMatcher:
             and near.score >= settings.convincing_share * self.usual_score
         ):
             return self._noted(near)
-        distance = math.hypot(float(moved[0]), float(moved[1]))
-        reach = (settings.blind_m, settings.blind_angle)
-        if not is_blind:
-            # Twice the motion and more: also where a robot is that went back while odometry said forth.
-            reach = (
-                min(settings.search_m + 2.2 * distance, reach[0]),
-                min(settings.search_angle + 2.2 * abs(float(moved[2])), reach[1]),
-            )
+        reach = (settings.blind_m, settings.blind_angle) if is_blind else self._reach(moved)
         is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
         far = None if is_sparse else self._match_far(submap, points, predicted, reach)
         if self._uses_odometry and is_blind and far is not None:
@@ -107,6 +100,15 @@ class LocalMatcher:
         if len(good) == 2:
             return self._noted(good[1] if outweighs(good[1], good[0], settings.better_by) else good[0])
         return self._noted(good[0]) if good else None
+
+    def _reach(self, moved: NDArray[np.float64]) -> tuple[float, float]:
+        """Return how far to search without odometry, [m] and [rad]."""
+        settings, distance = self._matching, math.hypot(float(moved[0]), float(moved[1]))
+        # Twice the motion and more: also where a robot is that went back while odometry said forth.
+        return (
+            min(settings.search_m + 2.2 * distance, settings.blind_m),
+            min(settings.search_angle + 2.2 * abs(float(moved[2])), settings.blind_angle),
+        )
 
     def _noted(self, match: Match) -> Match:
         self.usual_score = (

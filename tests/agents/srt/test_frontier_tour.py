@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
-from lidarium.agents.srt.choice import choose
+from lidarium.agents.srt.choice import WayChooser
 from lidarium.agents.srt.frontier_tour import first_on_tour
 from lidarium.agents.srt.memories.map_memory import MapMemory
 from lidarium.agents.srt.memories.region_memory import RegionMemory
@@ -177,7 +177,8 @@ def went_for(memory, goal, targets=()):
     tree = Tree()
     tree.add(node, None, set())
     source = CandidateSource(srt, RADIUS, np.random.default_rng(0))
-    way = choose(node, tree, {0}, source, memory, srt, np.random.default_rng(0), there, targets, LIMITS)
+    chooser = WayChooser(source, srt, LIMITS, np.random.default_rng(0))
+    way = chooser.choose(node, tree, {0}, memory, there, targets)
     return float(way[-1].candidate.focus[0]) - 1.0
 
 
