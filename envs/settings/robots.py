@@ -55,7 +55,10 @@ class Robot:
     def __post_init__(self) -> None:
         check_settings(self, "the robot")
         if self.cruise_speed > self.max_speed:
-            raise ValueError(f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s")
+            raise ValueError(
+                f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s; "
+                "want at most that"
+            )
 
     def wheel_speeds(self, speed: float, turn_rate: float) -> tuple[float, float]:
         """Return the speeds of the left and the right wheel [m/s].

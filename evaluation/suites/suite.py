@@ -77,7 +77,7 @@ class Trial:
             letter if letter.isalnum() or letter in "._-" else "-"
             for letter in self.key.replace(" | ", "__").replace(" ", "")
         )
-        return f"{letters[-150:]}-{hashlib.sha256(self.key.encode()).hexdigest()[:8]}"
+        return f"{letters[-150:]}-{hashlib.sha256(self.key.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,7 +25,7 @@ MOST_FILE_BYTES = 1 << 31
 MOST_MESSAGE = 500
 """Longest message of an error [characters]."""
 
-LEAST_UNPACKED, UNPACKED_RATIO = 32 << 20, 24
+LEAST_UNPACKED, UNPACKED_RATIO = 4 << 20, 16
 """A packed file may have the first many bytes when unpacked, or so many times its own."""
 
 READING_ERRORS = (

@@ -28,14 +28,19 @@ def outcome_of(action: Callable[[], object]) -> dict[str, object]:
         action()
         found: dict[str, object] = {"kind": "fine"}
     except Exception as error:
-        is_clear = isinstance(error, ValueError | OSError) and not isinstance(error, UnicodeError)
-        is_clear = is_clear and 0 < len(str(error)) <= MOST_MESSAGE
+        where = traceback.extract_tb(error.__traceback__)[-1]
         found = {"kind": "refused"}
-        if not is_clear:
-            where = traceback.extract_tb(error.__traceback__)[-1]
+        if not _is_clear(error, where):
             place = f"{Path(where.filename).name}:{where.lineno}"
             found = {"kind": "wrong", "error": f"{type(error).__name__}: {str(error)[:200]}", "at": place}
     return {**found, "cpu_s": round(time.process_time() - began, 3)}
+
+
+def _is_clear(error: Exception, where: traceback.FrameSummary) -> bool:
+    """Whether an error is one that the package raises itself, short enough to be read."""
+    is_raised = "/lidarium/" in where.filename and (where.line or "").startswith("raise")
+    is_ours = isinstance(error, OSError) or (isinstance(error, ValueError) and is_raised)
+    return is_ours and not isinstance(error, UnicodeError) and 0 < len(str(error)) <= MOST_MESSAGE
 
 
 def file_case(samples: list[Path], folder: Path, seed: int, number: int) -> Callable[[], object]:

@@ -290,7 +290,8 @@ class Slam:
             Transform(*pose).apply(self._all_points(ranges))
             for pose, ranges in zip(poses, scans.ranges[since], strict=True)
         ]
-        compass.survey(np.concatenate(points), node, float(self._graph.nodes[node, 2]))
+        if points:  # none of the scans since may have been kept
+            compass.survey(np.concatenate(points), node, float(self._graph.nodes[node, 2]))
 
     def _motion_covariance(
         self, matched: NDArray[np.float64], since: NDArray[np.float64]
