@@ -3,10 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import Annotated, Any
 
-from lidarium.mapping.geometry.bounds import Bounds, above, check_settings, shown, within
+from lidarium.mapping.geometry.bounds import Bounds, Rule, above, check_settings, shown, within
 
 KINDS = ("", "laser_dropout", "blind_sector", "stuck_wheel", "kidnapping", "dead_robot", "dead_radio")
 """Kinds of faults by name, in the order of their numbers."""
@@ -16,6 +15,12 @@ Rate = Annotated[float, within(0.0, 1e6, "a number an hour")]
 
 LASTING = Bounds(0.0, 1e9, has_least=False, what="a time", never=True)
 """How long a fault may last [s]."""
+
+WIDTH = Rule(float, bounds=above(0.0, 2.0 * math.pi))
+"""How wide a blind sector may be [rad]."""
+
+PLACE = Rule(float, bounds=within(-1e6, 1e6))
+"""What a number of a place has to be [m, rad]."""
 
 MOST_SCHEDULED = 10_000
 """Most faults of a schedule."""
@@ -60,7 +65,7 @@ class Fault:
         if self.kind not in KINDS[1:]:
             raise ValueError(f"kind of the fault is {self.kind!r}; want one of {', '.join(KINDS[1:])}")
         check_settings(self, "the fault")
-        if not (isinstance(self.width, Real) and 0.0 < self.width <= 2.0 * math.pi):
+        if not WIDTH.hold(self.width):
             raise ValueError(
                 f"the blind sector is {self.width} rad wide at {self.bearing} rad; want a width above 0 and "
                 "at most 2 pi"
@@ -118,7 +123,7 @@ class FaultSettings:
 def _place(place: Any) -> tuple[float, float, float]:  # noqa: ANN401
     """Return where a kidnapped robot is put, checked."""
     is_pose = isinstance(place, Sequence) and len(place) == 3
-    if not is_pose or not all(isinstance(value, Real) and abs(float(value)) <= 1e6 for value in place):
+    if not is_pose or not all(PLACE.hold(value) for value in place):
         raise ValueError(
             f"place of the fault is {shown(place)}; want x, y [m] and theta [rad] within a million, or None"
         )

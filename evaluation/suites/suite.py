@@ -135,8 +135,8 @@ class Suite:
         check_numbers("robots", self.robots, ROBOTS)
         check_numbers("seeds", self.seeds, SEED)
         check_numbers("image_resolution", [self.image_resolution], SIDE)
-        teams = max((len(teams) for teams in self.starts.values()), default=1)
-        check_trials(*map(len, (self.policies, self.floors, self.robots, self.seeds, self.variants)), teams)
+        most = max((len(teams) for teams in self.starts.values()), default=1)
+        check_trials(*map(len, (self.policies, self.floors, self.robots, self.seeds, self.variants)), most)
         for name in self.policy_settings:
             if name not in self.policies:
                 raise ValueError(

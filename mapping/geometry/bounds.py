@@ -9,7 +9,6 @@ import reprlib
 import types
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import lru_cache
 from numbers import Integral, Real
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -151,11 +150,15 @@ class Rule:
         return isinstance(value, number) and not is_logical and self.bounds.hold(value)
 
 
-@lru_cache(maxsize=256)
-def rules_of(kind: type) -> dict[str, Rule]:
+_RULES: dict[Any, dict[str, Rule]] = {}
+
+
+def rules_of(kind: Any) -> dict[str, Rule]:  # noqa: ANN401
     """Return what each setting of a class has to be, as its annotations declare it."""
-    hints = get_type_hints(kind, include_extras=True)
-    return {each.name: _rule(hints[each.name]) for each in fields(kind)}
+    if kind not in _RULES:
+        hints = get_type_hints(kind, include_extras=True)
+        _RULES[kind] = {each.name: _rule(hints[each.name]) for each in fields(kind)}
+    return _RULES[kind]
 
 
 def check_settings(settings: Any, whose: str = "") -> None:  # noqa: ANN401
