@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.drawing import draw_segments, fill_shapes
+from lidarium.envs.floors.extent import check_extent
 from lidarium.envs.floors.raster import Raster, cells_within, frame_of, sampled
 from lidarium.envs.floors.solid import Solid, middle_line, width_of
 
