@@ -12,7 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.exploration import ExplorationEnv, Observation, Outcome
 from lidarium.envs.levels.decisions import boxes_of
 from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
@@ -173,12 +173,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         self._exchange(infos)
         return self._with_team(observations), infos
 
-    def step(
-        self,
-        actions: Any,  # noqa: ANN401
-    ) -> tuple[
-        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
-    ]:
+    def step(self, actions: Any) -> Outcome:  # noqa: ANN401
         """Take a step or a decision, and exchange maps where the period is over."""
         observations, rewards, terminations, truncations, infos = self.env.step(actions)
         self.agents = self.env.agents
