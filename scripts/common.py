@@ -7,6 +7,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-DONE, BAD_INPUT, NO, INTERRUPTED, DEFECT = 0, 2, 3, 130, 1
+DONE, BAD_INPUT, NO, INTERRUPTED, TERMINATED, DEFECT = 0, 2, 3, 130, 143, 1
 """Exit codes."""
 
 LINE_PERIOD_S = 5.0
@@ -124,8 +125,12 @@ class Answer:
 
 
 def tell(message: str) -> None:
-    """Print a message on standard error."""
-    print(message, file=sys.stderr, flush=True)
+    """Print a message on standard error.
+
+    Where nobody reads it any more the work goes on all the same.
+    """
+    with suppress(OSError, ValueError):  # ValueError: the stream is closed
+        print(message, file=sys.stderr, flush=True)
 
 
 def announce_compiling() -> None:

@@ -132,6 +132,11 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
         tell(f"{trial.key}: {type(error).__name__}: {error}")
     keys = {trial.key for trial in campaign.suite.trials()}
     episodes = [episode for episode in read_episodes(folder / EPISODES_FILE) if episode["key"] in keys]
+    if len(episodes) < campaign.done:
+        raise FileNotFoundError(
+            f"{folder / EPISODES_FILE} holds {len(episodes)} of the {campaign.done} episodes that were "
+            "finished; somebody has removed or replaced it meanwhile, run the same command again"
+        )
     rows = summary_of(episodes)
     result = {
         "folder": str(folder),

@@ -3,12 +3,8 @@
 Also generated floors, floors of other formats, and floors made ahead.
 """
 
-import multiprocessing
-import signal
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -210,19 +206,7 @@ def prepare_floors(command: Prepare) -> Answer:
         laser_height=settings.lidar.height,
         body_height=settings.robot.height,
     )
-    prepared, made, is_interrupted = 0, 0, False
-    with _mapped(command.workers) as mapped:
-        try:
-            for is_new in counted(mapped(prepare, specs), len(specs), "floors prepared", command.json):
-                prepared, made = prepared + 1, made + is_new
-        except KeyboardInterrupt:
-            is_interrupted = True
-        except BrokenProcessPool as error:
-            raise ChildProcessError(
-                f"a worker was killed, most often for want of memory; at least {prepared:,} of "
-                f"{len(specs):,} floors are ready and kept: "
-                f"call again to go on, with fewer --workers than {command.workers}"
-            ) from error
+    prepared, made, is_interrupted = _prepare(prepare, specs, command)
     result = {
         "name": command.name,
         "floors": len(specs),
@@ -252,26 +236,32 @@ def _prepared(spec: str, resolution: float, laser_height: float, body_height: fl
     return prepare_tables(floor_store(), load_floor(spec), resolution, laser_height, body_height)
 
 
-@contextmanager
-def _mapped(workers: int) -> Iterator[Callable[[Callable[[str], bool], Iterable[str]], Iterator[bool]]]:
-    """Lend ``map``, over processes where there is more than one worker.
+def _prepare(prepare: Callable[[str], bool], specs: Sequence[str], command: Prepare) -> tuple[int, int, bool]:
+    """Prepare floors; return how many are, how many were made, and whether it was broken off."""
+    from lidarium.evaluation.suites.workers import WorkerDiedError, shared_out
 
-    Only this process hears interrupts.
-    """
-    if workers == 1:
-        yield map
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        workers, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
-    ) as pool:
-        yield partial(pool.map, chunksize=8)
+    prepared, made = 0, 0
+    with closing(shared_out(prepare, specs, command.workers)) as work:
+        try:
+            for _, result in counted(work, len(specs), "floors prepared", command.json):
+                if isinstance(result, WorkerDiedError):
+                    raise ChildProcessError(
+                        f"a worker was killed, most often for want of memory; at least {prepared:,} of "
+                        f"{len(specs):,} floors are ready and kept: "
+                        f"call again to go on, with fewer --workers than {command.workers}"
+                    ) from result
+                if isinstance(result, Exception):
+                    raise result
+                prepared, made = prepared + 1, made + result
+        except KeyboardInterrupt:
+            return prepared, made, True
+    return prepared, made, False
 
 
 def _written(command: Command, floor: "Floor", resolution: float) -> Answer:
     """Write a floor as a ROS map and a picture, with its figures."""
     from lidarium.envs.floors.catalogue.names import describe_floor
-    from lidarium.evaluation.episodes.output import check_writable
+    from lidarium.evaluation.episodes.output import check_writable, check_written
     from lidarium.mapping.files.map_files import write_ros_map
 
     stem = file_name(floor.name)
@@ -282,9 +272,9 @@ def _written(command: Command, floor: "Floor", resolution: float) -> Answer:
     write_ros_map(folder, stem, _levels(raster.solid, resolution), (*raster.origin, 0.0), resolution)
     _save_picture(folder / f"{stem}.png", floor)
     _write_result(command, f"{stem}.json", result, folder)
-    return Answer(
-        result, _description(result, folder, [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")])
-    )
+    files = [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")]
+    check_written(folder, files)
+    return Answer(result, _description(result, folder, files))
 
 
 def _levels(solid: Any, resolution: float) -> Any:  # noqa: ANN401

@@ -3,7 +3,6 @@
 It reads what is asked for, runs it, and converts the outcome into exit codes.
 """
 
-import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -39,6 +38,13 @@ from lidarium.scripts.common import (
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
 from lidarium.scripts.merge import Merge
+from lidarium.scripts.process.signals import (
+    code_of,
+    end_all_workers,
+    heard_termination,
+    leave_at_the_next,
+)
+from lidarium.scripts.process.streams import flush_streams, open_closed_streams, print_result, silence
 from lidarium.scripts.replay import Replay
 from lidarium.scripts.report import Report
 from lidarium.scripts.reproduce import Reproduce
@@ -93,21 +99,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 2 bad input, 3 the answer is no, 130 interrupted (finished parts are kept), 1 a
-        defect of ours.
+        Exit code: 0 done, 2 bad input, 3 the answer is no, 130 interrupted by Ctrl-C and 143 by SIGTERM
+        (finished parts are kept), 1 a defect of ours.
     """
+    is_process = arguments is None
+    if is_process:
+        open_closed_streams()
+    with heard_termination() as termination:
+        try:
+            code = _ended(arguments)
+        except KeyboardInterrupt:
+            code = INTERRUPTED
+            tell("interrupted")
+        if code == INTERRUPTED:
+            code = code_of(termination.is_asked)
+            if is_process:
+                leave_at_the_next(code)
+            end_all_workers()
+    if is_process:
+        flush_streams()
+    return code
+
+
+def _ended(arguments: Sequence[str] | None) -> int:
+    """Run a command; return its exit code, errors included."""
     try:
         return _answered(_command(arguments))
     except SystemExit as leaving:  # tyro, having printed help (0) or what is wrong with the options (2)
         return leaving.code if isinstance(leaving.code, int) else BAD_INPUT
-    except KeyboardInterrupt:
-        tell("interrupted")
-        return INTERRUPTED
-    except BrokenPipeError:
-        # The reader of our output has left: nobody is there to be told, and Python shall not complain at
-        # exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DONE
     except (ValueError, OSError) as error:
         tell(f"lidarium: {_message(error)}")
         return BAD_INPUT
@@ -122,7 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "lidarium: this is a defect of lidarium, not of your input. Please report it with the command "
             "line and the lines below.\n"
         )
-        traceback.print_exc()
+        tell(traceback.format_exc())
         return DEFECT
 
 
@@ -131,7 +150,13 @@ def _command(arguments: Sequence[str] | None) -> Command:
 
     config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
     description = "Teams of lidar robots explore unknown floors. Begin with `lidarium run`."
-    chosen: Any = tyro.cli(Choice, prog="lidarium", description=description, args=arguments, config=config)
+    try:
+        chosen: Any = tyro.cli(
+            Choice, prog="lidarium", description=description, args=arguments, config=config
+        )
+    except BrokenPipeError as error:  # nobody reads the help to its end
+        silence(sys.stdout)
+        raise SystemExit(DONE) from error
     command: Command = chosen.command if isinstance(chosen, Floors) else chosen
     return command
 
@@ -142,10 +167,8 @@ def _answered(command: Command) -> int:
     if isinstance(command, _WITH_KERNELS):
         announce_compiling()
     answer = _EXECUTE[type(command)](command)
-    text = as_json(answer.result) if command.json else answer.text + "\n"
     if answer.result:
-        sys.stdout.write(text)
-        sys.stdout.flush()
+        print_result(as_json(answer.result) if command.json else answer.text + "\n")
     return answer.code
 
 

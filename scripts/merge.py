@@ -148,7 +148,7 @@ def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, An
     In the ROS frame of the group's first map.
     """
     from lidarium.evaluation.drawing.merge_picture import save_merge_picture
-    from lidarium.evaluation.episodes.output import write_json
+    from lidarium.evaluation.episodes.output import check_written, write_json
     from lidarium.mapping.files.map_files import write_ros_map
     from lidarium.mapping.geometry.rigid import Transform
 
@@ -162,7 +162,9 @@ def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, An
         files += [f"{name}.yaml", f"{name}.pgm"]
     save_merge_picture(out / "merge.png", merged)
     write_json(out / "transforms.json", result)
-    return [*files, "transforms.json", "merge.png"]
+    files += ["transforms.json", "merge.png"]
+    check_written(out, files)
+    return files
 
 
 def _summary(merged: "Merged", files: list[str], out: Path) -> str:

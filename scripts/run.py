@@ -248,7 +248,7 @@ def _write(
     Return the files' names.
     """
     from lidarium.evaluation.drawing.run_picture import save_run_picture
-    from lidarium.evaluation.episodes.output import write_json, write_text
+    from lidarium.evaluation.episodes.output import check_written, write_json, write_text
     from lidarium.evaluation.episodes.supervision import decision_lines
     from lidarium.evaluation.truth.beliefs import team_log_odds
     from lidarium.mapping.files.map_files import write_ros_map
@@ -270,7 +270,9 @@ def _write(
         *(["episode.npz"] if recorder is not None else []),
         *(["run.mp4"] if command.video else []),
     ]
-    return ["result.json", "map.yaml", "map.pgm", "run.png", *asked_for]
+    files = ["result.json", "map.yaml", "map.pgm", "run.png", *asked_for]
+    check_written(folder, files)
+    return files
 
 
 def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]) -> str:

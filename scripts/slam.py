@@ -239,7 +239,7 @@ def _against_relations(
 
 
 def _write(command: Slam, out: Path, log: "LaserLog", followed: "Followed", result: dict[str, Any]) -> None:
-    from lidarium.evaluation.episodes.output import write_json
+    from lidarium.evaluation.episodes.output import check_written, write_json
     from lidarium.mapping.files.map_files import cropped, write_ros_map
     from lidarium.mapping.files.trajectories import write_tum
 
@@ -248,6 +248,7 @@ def _write(command: Slam, out: Path, log: "LaserLog", followed: "Followed", resu
     write_ros_map(out, "map", levels, (*origin, 0.0), grid.settings.resolution)
     write_tum(out / "trajectory.tum", log.stamps, followed.poses)
     write_json(out / "slam.json", result)
+    check_written(out, ("map.yaml", "map.pgm", "trajectory.tum", "slam.json"))
 
 
 def _summary(result: dict[str, Any], out: Path) -> str:

@@ -3,6 +3,7 @@
 The film is an mp4 that is written whole or not at all.
 """
 
+import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -112,8 +113,21 @@ def film_writer(path: Path) -> Iterator[Any]:
         "macro_block_size": 2,
         "output_params": ["-preset", "veryfast"],
     }
-    with whole_file(path) as beside, imageio.get_writer(str(beside), **options) as writer:
-        yield writer
+    with whole_file(path) as beside:
+        with imageio.get_writer(str(beside), **options) as writer:
+            yield writer
+        _check_whole(beside, path)
+
+
+def _check_whole(film: Path, path: Path) -> None:
+    """Check that a film has its table of contents, which comes last.
+
+    The program that writes it says nothing where the disk is full.
+    """
+    if not film.exists() or b"moov" not in film.read_bytes():
+        raise OSError(
+            errno.EIO, "the film is not whole; is the disk full, or were there no frames?", str(path)
+        )
 
 
 def check_speed(speed: float) -> None:

@@ -1,45 +1,69 @@
-"""Lets a first Ctrl-C wait for the end of a step, so that what is kept is whole."""
+"""Lets a first Ctrl-C, or SIGTERM, wait for the end of a step, so that what is kept is whole."""
 
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType, TracebackType
+from typing import Any
+
+
+class Termination:
+    """Handler of SIGTERM that acts as Ctrl-C does, and remembers that it was SIGTERM.
+
+    Attributes
+    ----------
+    is_asked : bool
+        Whether the signal came.
+    """
+
+    def __init__(self) -> None:
+        self.is_asked = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Raise ``KeyboardInterrupt``."""
+        self.is_asked = True
+        raise KeyboardInterrupt
 
 
 class PatientInterrupt:
     """Context in which a first SIGINT is only noted, to be acted on between two steps.
 
-    A second one raises at once.
+    So is a first SIGTERM, where a ``Termination`` handles it. A second one raises at once.
 
     An exception that is thrown into the middle of anything leaves it in the middle: a world half stepped, or
     Numba with a loader that has died for good, after which no kernel can be called. What is to be kept after
     an interrupt is therefore broken off where it is whole. Outside the main thread, and where an application
-    handles SIGINT in its own way, nothing is changed.
+    handles a signal in its own way, nothing is changed.
     """
 
     def __init__(self) -> None:
         self._is_asked = False
-        self._is_installed = False
+        self._before: dict[int, Any] = {}
 
     def __enter__(self) -> "PatientInterrupt":
-        is_ours = (
-            threading.current_thread() is threading.main_thread()
-            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        )
-        if is_ours:
-            signal.signal(signal.SIGINT, self._note)
-            self._is_installed = True
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                before = signal.getsignal(number)
+                if before is signal.default_int_handler or isinstance(before, Termination):
+                    self._before[number] = before
+                    signal.signal(number, self._noting(before))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._is_installed:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        while self._before:
+            signal.signal(*self._before.popitem())
 
-    def _note(self, number: int, frame: FrameType | None) -> None:
-        if self._is_asked:
-            raise KeyboardInterrupt
-        self._is_asked = True
+    def _noting(self, before: Any) -> Callable[[int, FrameType | None], None]:  # noqa: ANN401
+        def note(number: int, frame: FrameType | None) -> None:
+            if self._is_asked:
+                before(number, frame)
+            self._is_asked = True
+            if isinstance(before, Termination):
+                before.is_asked = True
+
+        return note
 
     @property
     def is_asked(self) -> bool:

@@ -1,18 +1,25 @@
 """Files that are there whole or not at all: written beside, then renamed."""
 
+import errno
 import json
+import os
+import re
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+_UNFINISHED = re.compile(r"\.(?P<name>.+)\.[a-z0-9_]{8}")
+"""Names of the folders in which ``whole_file`` writes."""
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """Lend a name beside ``path`` to write to.
 
-    It becomes ``path`` at the end, and is removed where writing fails.
+    It becomes ``path`` at the end, when it is on the disk, and is removed where writing fails. A link of that
+    name is replaced, not followed.
 
     Parameters
     ----------
@@ -34,7 +41,56 @@ def whole_file(path: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
         beside = Path(folder) / path.name
         yield beside
+        _bring_to_disk(beside)
         beside.replace(path)
+
+
+def _bring_to_disk(path: Path) -> None:
+    """Wait until a file is on the disk: some disks tell only then that they are full."""
+    handle = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def clear_unfinished(folder: Path, suffix: str) -> None:
+    """Take away what ``whole_file`` left where its process was killed.
+
+    Only what it made goes: a folder of its naming, no link, that holds at most the one file.
+
+    Parameters
+    ----------
+    folder : Path
+        Where it wrote; nobody writes there now.
+    suffix : str
+        How the files' names end, such as ``.npz``.
+    """
+    for rest in folder.glob(f".*{suffix}.*"):
+        named = _UNFINISHED.fullmatch(rest.name)
+        if named is None or not named["name"].endswith(suffix) or rest.is_symlink():
+            continue
+        with suppress(OSError):  # it is no folder, or cannot be read
+            if set(os.listdir(rest)) <= {named["name"]}:
+                (rest / named["name"]).unlink(missing_ok=True)
+                rest.rmdir()
+
+
+def check_written(folder: Path, names: Iterable[str]) -> None:
+    """Check that the files that were written are still there.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where one is not: the folder was removed or replaced meanwhile.
+    """
+    for name in names:
+        if not (Path(folder) / name).is_file():
+            raise FileNotFoundError(
+                errno.ENOENT,
+                "was written, and somebody has removed it meanwhile; run the same command again",
+                str(Path(folder) / name),
+            )
 
 
 def write_text(path: Path, text: str) -> None:

@@ -15,8 +15,7 @@ import lidarium
 from lidarium.evaluation.analysis.episodes import Episodes, name_of, read_episodes
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
-from lidarium.evaluation.episodes.output import check_writable, write_text
-from lidarium.evaluation.report.plain_text import code, plain
+from lidarium.evaluation.episodes.output import check_writable, check_written, write_text
 from lidarium.evaluation.report.sections import Section, tell_group
 
 
@@ -77,6 +76,8 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
         json.dumps(numbers, allow_nan=False, ensure_ascii=False, separators=(",", ":")) + "\n",
     )
     write_text(out / "report.md", _page(result, sections))
+    pictures = [name for section in sections for name in section.numbers["pictures"]]
+    check_written(out, ["report.json", "report.md", *pictures])
     return numbers
 
 

@@ -8,26 +8,32 @@ before, so that any number of workers leaves the same lines, though in another o
 """
 
 import json
-import shutil
 import time
 from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import lidarium
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.evaluation.episodes.output import write_json
-from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
+from lidarium.evaluation.episodes.output import clear_unfinished, write_json
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
 from lidarium.evaluation.suites.suite import Suite, Trial
 from lidarium.evaluation.suites.workers import shared_out
 from lidarium.mapping.files.guarded_reading import read_text, reason
 
+if TYPE_CHECKING:
+    from lidarium.evaluation.record import EpisodeRecord
+
 SUITE_FILE, EPISODES_FILE, RECORDS_FOLDER = "suite.json", "episodes.jsonl", "records"
+
+
+class RecordNotWrittenError(OSError):
+    """Raised where a record cannot be written; the next ones could not be either."""
 
 
 @dataclass(slots=True)
@@ -76,7 +82,9 @@ class Campaign:
             Where the folder holds episodes of another version or other settings, or is being written to by
             someone else.
         OSError
-            Where the folder cannot be written to, or the disk is full; finished episodes are kept.
+            Where the folder cannot be written to, the disk is full, or the folder was removed meanwhile: at
+            the first episode that cannot be kept. Finished ones are kept, but for those of a folder that is
+            gone.
         """
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
@@ -86,19 +94,22 @@ class Campaign:
             check_same(file.episodes, self.suite, self.folder)
             _write_suite(self.folder / SUITE_FILE, self.suite)
             records = self.folder / RECORDS_FOLDER if self.records else None
-            _clear_rests(self.folder / RECORDS_FOLDER)
+            clear_unfinished(self.folder / RECORDS_FOLDER, ".npz")
             finished = {episode[KEY] for episode in file.episodes}
             missing = [trial for trial in trials if trial.key not in finished]
             self.done = self.total - len(missing)
-            for trial, result in shared_out(
-                partial(run_trial, self.suite, records=records), missing, self.workers
-            ):
-                if isinstance(result, Exception):
-                    self.failures.append((trial, result))
-                    continue
-                file.append(result)
-                self.done += 1
-                yield result
+            work = shared_out(partial(run_trial, self.suite, records=records), missing, self.workers)
+            with closing(work):
+                for trial, result in work:
+                    if isinstance(result, RecordNotWrittenError):
+                        raise result
+                    if isinstance(result, Exception):
+                        self.failures.append((trial, result))
+                        continue
+                    file.append(result)
+                    self.done += 1
+                    yield result
+            file.check_in_place()
 
 
 def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[str, Any]:
@@ -111,7 +122,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     from lidarium.evaluation.episodes.runner import run_episode
     from lidarium.evaluation.episodes.stop_rules import Stopper, stop_rule_of
     from lidarium.evaluation.episodes.watching import WatchedExploration
-    from lidarium.evaluation.record import Recorder, write_record
+    from lidarium.evaluation.record import Recorder
 
     began = time.perf_counter()
     settings = suite.settings(trial.variant, trial.robots)
@@ -135,7 +146,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     )
     result = result_of(episode, trial.policy, history)
     if records is not None:
-        write_record(records / f"{trial.file_name}.npz", recorder.finish())
+        _keep_record(records / f"{trial.file_name}.npz", recorder.finish())
     where = [[round(float(number), 6) for number in start] for start in env.world.starts]
     record = None if records is None else f"{RECORDS_FOLDER}/{trial.file_name}.npz"
     about = {KEY: trial.key, "variant": trial.variant, "starts": where, "record": record}
@@ -145,6 +156,19 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
         "decisions": len(episode.decision_seconds),
         "wall_s": round(time.perf_counter() - began, 4),
     }
+
+
+def _keep_record(path: Path, record: "EpisodeRecord") -> None:
+    from lidarium.evaluation.record import write_record
+
+    try:
+        write_record(path, record)
+    except OSError as error:
+        raise RecordNotWrittenError(
+            error.errno,
+            f"{error.strerror or error}; the episodes before are kept, the same command goes on from there",
+            str(path),
+        ) from error
 
 
 def drawn_starts(
@@ -223,10 +247,14 @@ def _kept_suite(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        kept = json.loads(read_text(path, MOST_SUITE_BYTES))
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path} is not JSON: {reason(error)}; mend it, or choose another folder") from error
-    return kept if isinstance(kept, dict) else {}
+        kept = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path} is not JSON: {error}; mend it, or choose another folder") from error
+    if not (isinstance(kept, dict) and "version" in kept and "policies" in kept):
+        raise ValueError(
+            f"{path} is there, and no evaluation has written it; move it away, or choose another folder"
+        )
+    return kept
 
 
 def _write_suite(path: Path, suite: Suite) -> None:
@@ -243,13 +271,6 @@ def _write_suite(path: Path, suite: Suite) -> None:
             joined[name] = value
     if joined != kept:
         write_json(path, joined)
-
-
-def _clear_rests(records: Path) -> None:
-    """Take away what writers left that were killed."""
-    for rest in records.glob(".*"):
-        if rest.is_dir():
-            shutil.rmtree(rest, ignore_errors=True)
 
 
 def _image_resolution(suite: Suite, trial: Trial) -> float | None:

@@ -3,13 +3,17 @@
 They are written at once, never in part, by one writer at a time.
 
 What is in the file stays there. A line that was cut off when its writer was killed is dropped, with a
-warning; anything else that is wrong is told and left to the user.
+warning; anything else that is wrong is told and left to the user, and so is a file that no writer of episodes
+has made. An episode counts as kept when it is on the disk, in the file that bears the name.
 """
 
+import errno
 import json
 import os
+import stat
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -40,6 +44,13 @@ def read_episodes(path: Path) -> list[dict[str, Any]]:
         Where the last line was cut off, or an episode is there twice; it is left out.
     """
     return _parsed(path)[0]
+
+
+_FIRST = f'{{"{KEY}":'.encode()
+"""What each line begins with."""
+
+_NOT_FOLLOWED = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+"""How the file is opened: no link, and without waiting for the other end of a pipe."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +109,7 @@ def _parsed(path: Path) -> tuple[list[dict[str, Any]], int]:
     """Read the episodes, and how many bytes of the file hold whole lines."""
     lines = read_lines(path)
     if lines.cut_off is not None:
-        warnings.warn(
-            f"{path}, line {lines.cut_off[0]}: the last line was cut off and is left out; its episode runs "
-            "again",
-            stacklevel=3,
-        )
+        _check_ours(path, lines.whole)
     episodes: dict[str, dict[str, Any]] = {}
     for number, episode in lines.numbered:
         if not isinstance(episode.get(KEY), str):
@@ -120,6 +127,12 @@ def _parsed(path: Path) -> tuple[list[dict[str, Any]], int]:
             warnings.warn(
                 f"{path}, line {number}: episode {episode[KEY]!r} is there before; counted once", stacklevel=3
             )
+    if lines.cut_off is not None:
+        warnings.warn(
+            f"{path}, line {lines.cut_off[0]}: the last line was cut off and is left out; its episode runs "
+            "again",
+            stacklevel=3,
+        )
     return list(episodes.values()), lines.whole
 
 
@@ -152,7 +165,7 @@ class EpisodesFile:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        self._handle = _opened(self.path)
         try:
             _lock(self._handle, self.path)
             self.episodes, whole = _parsed(self.path)
@@ -172,24 +185,48 @@ class EpisodesFile:
         ValueError
             Where it has no key, or holds a number that is not finite.
         OSError
-            Where it cannot be written, such as on a full disk; the file is as it was before.
+            Where it cannot be written, such as on a full disk; the file is as it was before. And where the
+            file has been removed or replaced since it was opened.
         """
         if not isinstance(episode.get(KEY), str):
             raise ValueError(
                 f"the episode has the key {episode.get(KEY)!r}; want text that tells it from all others"
             )
         line = json.dumps(episode, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-        # Bytes of names that are no UTF-8 are escaped as JSON does it.
-        self._append(line.encode("utf-8", "backslashreplace") + b"\n")
+        self._append(line.encode() + b"\n")
+        self.check_in_place()
+
+    def check_in_place(self) -> None:
+        """Check that what is written here is what others read under the file's name.
+
+        Raises
+        ------
+        OSError
+            Where the file, or its folder, was removed or replaced since it was opened.
+        """
+        ours = os.fstat(self._handle)
+        try:
+            named = os.lstat(self.path)
+        except FileNotFoundError:
+            named = None
+        if named is None or (named.st_dev, named.st_ino) != (ours.st_dev, ours.st_ino):
+            what = "removed" if named is None else "replaced by another"
+            raise OSError(
+                errno.ESTALE,
+                f"was {what} while episodes were written to it, which are lost; leave the folder in its "
+                "place and run the same command again",
+                str(self.path),
+            )
 
     def _append(self, content: bytes) -> None:
         try:
             written = os.write(self._handle, content)
             if written != len(content):
-                raise OSError(28, "the disk is full", str(self.path))
+                raise OSError(errno.ENOSPC, "the disk is full", str(self.path))
             os.fsync(self._handle)
         except OSError as error:
-            os.ftruncate(self._handle, self._size)
+            with suppress(OSError):  # what is cut off is seen, and left out, by who opens the file next
+                os.ftruncate(self._handle, self._size)
             raise OSError(
                 error.errno,
                 f"{error.strerror or error}; the episodes before are kept, the same command goes on from "
@@ -212,6 +249,37 @@ class EpisodesFile:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _opened(path: Path) -> int:
+    """Open a file to be read and added to, made if absent; a plain file and no link."""
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | _NOT_FOLLOWED, 0o666)
+    except OSError as error:
+        if path.is_symlink():
+            raise _not_plain(path, "a link") from error
+        raise
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise _not_plain(path, "no plain file")
+    return handle
+
+
+def _not_plain(path: Path, what: str) -> ValueError:
+    return ValueError(f"{path} is {what}; episodes are written to plain files only, choose another folder")
+
+
+def _check_ours(path: Path, whole: int) -> None:
+    """Check that a last line that breaks off is the beginning of an episode, and may be dropped."""
+    with path.open("rb") as file:
+        file.seek(whole)
+        rest = file.read(64).replace(b" ", b"").strip(b"\0\r\n\t")
+    # Some file systems leave zeros where writing was broken off.
+    if not (rest.startswith(_FIRST) or _FIRST.startswith(rest)):
+        raise ValueError(
+            f"{path} ends with {rest[:20]!r}, which no evaluation has written; move the file away, or choose "
+            "another folder"
+        )
 
 
 def _lock(handle: int, path: Path) -> None:

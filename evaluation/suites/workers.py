@@ -8,11 +8,15 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
+import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import TypeVar
+
+from lidarium.evaluation.suites.processes import end_workers, stopped_workers
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -23,10 +27,17 @@ _TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" el
 WAITING_PER_WORKER = 2
 """Tasks that are handed over before a worker is free, so that it never waits."""
 
+LOOKED_AFTER_S = 10.0
+"""Wall time between two looks at whether a worker is stopped [s]."""
+
+
+class WorkerDiedError(RuntimeError):
+    """Raised, as a task's result, where its process died whenever it was tried."""
+
 
 def shared_out(
     work: Callable[[Task], Result], tasks: Iterable[Task], workers: int, *, is_apart: bool = False
-) -> Iterator[tuple[Task, Result | Exception]]:
+) -> Generator[tuple[Task, Result | Exception], None, None]:
     """Do tasks in this process or in several; yield each with its result when ready.
 
     One worker means this process, more mean processes of their own.
@@ -46,8 +57,13 @@ def shared_out(
     Yields
     ------
     task, result
-        An exception that the task has raised is its result. A task whose process died has a ``RuntimeError``;
-        those that were under way beside it are done again.
+        An exception that the task has raised is its result. A task whose process died has a
+        ``WorkerDiedError``; those that were under way beside it are done again.
+
+    Warns
+    -----
+    UserWarning
+        Where a worker is stopped from outside: its task waits until it is continued.
     """
     if workers <= 1 and not is_apart:
         for task in tasks:
@@ -61,7 +77,8 @@ def shared_out(
             # Who brought the others down does it again, alone.
             suspects = yield from _in_pool(work, iter([suspect]), 1)
             if suspects:
-                yield suspect, RuntimeError("its process died, twice: out of memory, or killed from outside")
+                reason = "its process died, twice: out of memory, or killed from outside"
+                yield suspect, WorkerDiedError(reason)
         if not lost:
             return
 
@@ -80,12 +97,14 @@ def _in_pool(
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
-    is_whole = False
+    is_whole, watch = False, _Watch()
     try:
         for task in islice(tasks, WAITING_PER_WORKER * workers):
             running[pool.submit(_done, work, task)] = task
         while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            ready = wait(running, LOOKED_AFTER_S, FIRST_COMPLETED).done
+            watch.look()
+            for future in ready:
                 task = running.pop(future)
                 error = future.exception()
                 if isinstance(error, BrokenProcessPool):
@@ -103,11 +122,32 @@ def _in_pool(
                         lost.append(following)
         is_whole = True
     finally:
-        pool.shutdown(wait=is_whole, cancel_futures=True)
-        if not is_whole:
-            for process in multiprocessing.active_children():
-                process.terminate()
+        # Not waited for without end: a worker that is stopped would never leave.
+        pool.shutdown(wait=False, cancel_futures=True)
+        end_workers(is_told=is_whole)
     return lost
+
+
+class _Watch:
+    """Tells of workers that are stopped, of each once."""
+
+    def __init__(self) -> None:
+        self._told: set[int] = set()
+        self._looked = time.monotonic()
+
+    def look(self) -> None:
+        """Look whether a worker is stopped, if the last look was long ago."""
+        if time.monotonic() - self._looked < LOOKED_AFTER_S:
+            return
+        self._looked = time.monotonic()
+        for number in stopped_workers():
+            if number not in self._told:
+                self._told.add(number)
+                warnings.warn(
+                    f"worker process {number} is stopped, and its work waits; continue it with `kill -CONT "
+                    f"{number}`, or end this command with Ctrl-C",
+                    stacklevel=2,
+                )
 
 
 def _attempted(work: Callable[[Task], Result], task: Task) -> Result | Exception:

@@ -2,6 +2,7 @@
 work."""
 
 import json
+import os
 import shutil
 
 import pytest
@@ -84,9 +85,55 @@ def test_a_campaign_goes_on_where_it_stopped_and_takes_more(folder, tmp_path):
 
 def test_what_a_killed_writer_left_is_cleared_away(folder, tmp_path):
     shutil.copytree(folder, tmp_path / "copy")
-    (tmp_path / "copy" / "records" / ".half.npz.x7").mkdir()
+    (tmp_path / "copy" / "records" / ".half.npz.x7_a12bc").mkdir()
+    (tmp_path / "copy" / "records" / ".git").mkdir()
     assert list(Campaign(suite(), tmp_path / "copy").run()) == []
-    assert not list((tmp_path / "copy" / "records").glob(".*"))
+    assert [path.name for path in (tmp_path / "copy" / "records").glob(".*")] == [".git"]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_folder_that_is_removed_meanwhile_ends_the_campaign(tmp_path, workers):
+    plan = suite(seeds=tuple(range(20)))
+    campaign = Campaign(plan, tmp_path / "out", workers=workers)
+    runs = campaign.run()
+    next(runs)
+    shutil.rmtree(tmp_path / "out")
+    with pytest.raises(OSError, match="while episodes were written"):
+        next(runs)
+    assert not campaign.failures
+
+
+@pytest.mark.parametrize("records", [True, False])
+def test_a_full_disk_ends_the_campaign_at_its_first_write_and_the_next_goes_on(
+    folder, tmp_path, monkeypatch, records
+):
+    before, calls = os.fsync, []
+
+    def full(handle):
+        calls.append(handle)
+        if len(calls) > 4:
+            raise OSError(28, "No space left on device")
+        before(handle)
+
+    campaign = Campaign(suite(), tmp_path / "out", records=records)
+    with monkeypatch.context() as patched:
+        patched.setattr("os.fsync", full)
+        with pytest.raises(OSError, match=r"No space.*goes on from there"):
+            list(campaign.run())
+    # The suite's file, then a record and a line for each episode, or a line.
+    assert campaign.done == (1 if records else 3)
+    assert len(calls) == 5
+    assert len(list(Campaign(suite(), tmp_path / "out", records=records).run())) == 4 - campaign.done
+    if records:
+        assert lasting(tmp_path / "out") == lasting(folder)
+
+
+@pytest.mark.parametrize("content", ["{}", "[1]", '{"name": "my bands"}', '{"version": "1"}'])
+def test_a_suite_file_of_someone_else_is_refused_and_left(tmp_path, content):
+    (tmp_path / "suite.json").write_text(content)
+    with pytest.raises(ValueError, match="no evaluation has written it"):
+        list(Campaign(suite(), tmp_path).run())
+    assert (tmp_path / "suite.json").read_text() == content
 
 
 def test_other_settings_and_other_versions_are_refused(folder, tmp_path):

@@ -1,7 +1,9 @@
 """What has been written stays, whenever the writer dies; what is wrong is told."""
 
 import json
+import os
 import random
+import shutil
 import subprocess
 import sys
 import time
@@ -105,6 +107,82 @@ def test_a_full_disk_leaves_the_file_as_it_was(tmp_path, monkeypatch):
         assert path.read_bytes() == before
         file.append(episode(3))
     assert read_episodes(path) == [episode(1), episode(3)]
+
+
+@pytest.mark.parametrize("change", ["removed", "folder removed", "replaced", "linked"])
+def test_what_is_written_into_nothing_is_told(tmp_path, change):
+    """The fault that was found: episodes went on into a file that no longer had a name."""
+    path = tmp_path / "out" / "episodes.jsonl"
+    with EpisodesFile(path) as file:
+        file.append(episode(1))
+        if change == "folder removed":
+            shutil.rmtree(path.parent)
+        else:
+            path.unlink()
+        if change == "replaced":
+            path.write_text("another")
+        if change == "linked":
+            path.symlink_to(tmp_path / "elsewhere")
+        with pytest.raises(OSError, match="while episodes were written"):
+            file.append(episode(2))
+        with pytest.raises(OSError, match="while episodes were written"):
+            file.check_in_place()
+
+
+def test_a_disk_that_cannot_even_be_tidied_up_is_told_as_what_it_is(tmp_path, monkeypatch):
+    path = tmp_path / "episodes.jsonl"
+
+    def refuse(*_):
+        raise OSError(5, "Input/output error")
+
+    with EpisodesFile(path) as file:
+        file.append(episode(1))
+        with monkeypatch.context() as patched:
+            patched.setattr("os.fsync", refuse)
+            patched.setattr("os.ftruncate", refuse)
+            with pytest.raises(OSError, match=r"Input/output error; the episodes before"):
+                file.append(episode(2))
+    assert read_episodes(path)[0] == episode(1)
+
+
+FOREIGN = [
+    b"notes of mine",
+    b"\x1f\x8b\x08 packed",
+    b'{"episode": 1, "reward": 0.5',
+    b'{"key": "1"}\nand so on',
+    b'{"keys": 1}\n{"k',
+    b"{}\n",
+]
+
+
+@pytest.mark.parametrize("content", FOREIGN)
+def test_a_file_that_no_writer_of_episodes_made_is_refused_and_left(tmp_path, content):
+    path = tmp_path / "episodes.jsonl"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"episodes\.jsonl"):
+        EpisodesFile(path)
+    assert path.read_bytes() == content
+
+
+@pytest.mark.filterwarnings("ignore:.*cut off")
+@pytest.mark.parametrize("rest", [b'{"', b'{"key', b'{"key":"2","pa', b'{"key": "2', bytes(512)])
+def test_the_beginning_of_an_episode_and_zeros_of_a_broken_disk_are_dropped(tmp_path, rest):
+    path = tmp_path / "episodes.jsonl"
+    whole = json.dumps(episode(1)).encode() + b"\n"
+    path.write_bytes(whole + rest)
+    with EpisodesFile(path) as file:
+        assert file.episodes == [episode(1)]
+    assert path.read_bytes() == whole
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links and pipes are those of Unix")
+def test_links_and_pipes_are_refused(tmp_path):
+    (tmp_path / "theirs").write_text("")
+    (tmp_path / "link.jsonl").symlink_to(tmp_path / "theirs")
+    os.mkfifo(tmp_path / "pipe.jsonl")
+    for name, what in (("link.jsonl", "is a link"), ("pipe.jsonl", "no plain file")):
+        with pytest.raises(ValueError, match=what):
+            EpisodesFile(tmp_path / name)
 
 
 @pytest.mark.parametrize("bad", [{}, {"key": 3}, {"key": "1", "number": float("nan")}])

@@ -1,0 +1,55 @@
+"""Processes of workers: which of them are stopped, and how they are ended."""
+
+import multiprocessing
+import time
+from contextlib import suppress
+from pathlib import Path
+
+GRACE_S = 2.0
+"""Wall time in which a process that was asked to end may do so [s]."""
+
+_STOPPED = frozenset("Tt")
+"""States of processes that run no more until they are continued, as the system names them."""
+
+
+def end_workers(grace_s: float = GRACE_S, *, is_told: bool = False) -> None:
+    """End all processes that this one has begun, and wait until they are gone.
+
+    A process that is stopped does not hear that it is to end; it is killed.
+
+    Parameters
+    ----------
+    grace_s : float
+        Wall time in which they may end by themselves [s].
+    is_told : bool
+        Whether they know already that they are to end.
+    """
+    processes = multiprocessing.active_children()
+    if not is_told:
+        for process in processes:
+            process.terminate()
+    ends = time.monotonic() + grace_s
+    for process in processes:
+        process.join(max(ends - time.monotonic(), 0.0))
+        if process.is_alive():
+            with suppress(OSError):  # it has gone meanwhile
+                process.kill()
+            process.join()
+
+
+def stopped_workers() -> list[int]:
+    """Return the numbers of the processes begun by this one that are stopped (SIGSTOP, Ctrl-Z).
+
+    None where the system does not tell.
+    """
+    numbers = [process.pid for process in multiprocessing.active_children() if process.pid is not None]
+    return [number for number in numbers if _state(number) in _STOPPED]
+
+
+def _state(number: int) -> str:
+    try:
+        told = Path(f"/proc/{number}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:  # it is gone, or the system has no such files
+        return ""
+    # The state is behind the program's name, which is in brackets and may hold any character.
+    return told.rpartition(")")[2].strip()[:1]

@@ -1,0 +1,71 @@
+"""Commands end quietly where their output is closed or nobody reads it, and say so where it cannot be
+written."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from lidarium.scripts.common import tell
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="streams are closed as on Unix")
+
+PROGRAM = "import sys; from lidarium.scripts.main import main; sys.exit(main())"
+
+
+def in_shell(line, *arguments):
+    """Run a line of the shell in which ``"$@"`` is a command of lidarium."""
+    command = [sys.executable, "-c", PROGRAM, *map(str, arguments)]
+    return subprocess.run(["sh", "-c", line, "sh", *command], capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("arguments", [["floors", "list"], ["--help"], ["show", "settings", "--json"]])
+@pytest.mark.parametrize(
+    "line",
+    [
+        '"$@" >&-',
+        '"$@" 2>&-',
+        '"$@" >&- 2>&- <&-',
+        '{ { "$@"; echo code $? >&3; } | head -1; } 3>&1',
+        '{ { "$@" 2>&1; echo code $? >&3; } | true; } 3>&1',
+    ],
+)
+def test_closed_streams_and_readers_who_leave_are_no_error(line, arguments):
+    told = in_shell(line, *arguments)
+    assert told.returncode == 0
+    assert told.stderr == ""
+    assert "|" not in line or "code 0" in told.stdout.split("\n")
+
+
+def test_errors_end_with_their_code_where_nobody_hears_them():
+    assert in_shell('"$@" 2>&-', "run", "--floor", "none.yaml").returncode == 2
+    assert in_shell('"$@" >&- 2>&-', "nonsense").returncode == 2
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no device that is always full")
+def test_a_result_that_cannot_be_written_is_told():
+    told = in_shell('"$@" >/dev/full', "show", "robots", "--json")
+    assert told.returncode == 2
+    assert "the result cannot be written: No space left on device" in told.stderr
+    assert "Traceback" not in told.stderr
+
+
+def test_files_are_not_mixed_with_what_is_told_where_streams_are_closed(tmp_path):
+    told = in_shell('"$@" >&- 2>&-', "show", "robots", "--out", tmp_path)
+    assert told.returncode == 0
+    assert json.loads((tmp_path / "robots.json").read_text())["robots"]
+
+
+def test_work_goes_on_where_nobody_reads_its_messages(monkeypatch):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w", buffering=1) as stream:
+        monkeypatch.setattr(sys, "stderr", stream)
+        tell("explored 50 %")
+        tell("explored 60 %")
+        monkeypatch.undo()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), writing)
+    monkeypatch.setattr(sys, "stderr", stream)
+    tell("the stream is closed now")
