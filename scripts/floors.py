@@ -237,7 +237,10 @@ def _prepared(spec: str, resolution: float, laser_height: float, body_height: fl
 
 
 def _prepare(prepare: Callable[[str], bool], specs: Sequence[str], command: Prepare) -> tuple[int, int, bool]:
-    """Prepare floors; return how many are, how many were made, and whether it was broken off."""
+    """Prepare floors.
+
+    Return how many are ready, how many were made, and whether it was broken off.
+    """
     from lidarium.evaluation.suites.workers import WorkerDiedError, shared_out
 
     prepared, made = 0, 0

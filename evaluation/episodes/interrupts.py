@@ -1,4 +1,7 @@
-"""Lets a first Ctrl-C, or SIGTERM, wait for the end of a step, so that what is kept is whole."""
+"""Lets a first Ctrl-C or SIGTERM wait for the end of a step.
+
+What is kept is whole then.
+"""
 
 import signal
 import threading

@@ -270,7 +270,7 @@ def _not_plain(path: Path, what: str) -> ValueError:
 
 
 def _check_ours(path: Path, whole: int) -> None:
-    """Check that a last line that breaks off is the beginning of an episode, and may be dropped."""
+    """Check that what breaks off is the beginning of an episode."""
     with path.open("rb") as file:
         file.seek(whole)
         rest = file.read(64).replace(b" ", b"").strip(b"\0\r\n\t")

@@ -37,8 +37,15 @@ def end_workers(grace_s: float = GRACE_S, *, is_told: bool = False) -> None:
             process.join()
 
 
+def kill_workers() -> None:
+    """End all processes that this one has begun, at once, whatever they do."""
+    for process in multiprocessing.active_children():
+        with suppress(OSError):
+            process.kill()
+
+
 def stopped_workers() -> list[int]:
-    """Return the numbers of the processes begun by this one that are stopped (SIGSTOP, Ctrl-Z).
+    """Return the numbers of workers that are stopped (SIGSTOP, Ctrl-Z).
 
     None where the system does not tell.
     """

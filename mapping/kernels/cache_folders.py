@@ -36,7 +36,9 @@ def user_cache_folder() -> Path | None:
 
 
 def cache_folder(*names: str, beside: Path | None = None) -> Path | None:
-    """Return a folder for a cache that can be written to and that is ours alone, made if absent.
+    """Return a folder for a cache that is ours alone, made if absent.
+
+    Files can be written to it.
 
     Parameters
     ----------
@@ -96,9 +98,9 @@ def trusted_folder(base: Path, names: Collection[str], owners: Collection[int] =
 
 
 def is_private(told: os.stat_result, trusted: Collection[int]) -> bool:
-    """Whether what was found (without following links) is a folder of trusted users only.
+    """Whether what was found is a folder that only trusted users can write to.
 
-    That is one of them owns it, and nobody else can write to it.
+    It was found without following links.
     """
     if not stat.S_ISDIR(told.st_mode):
         return False

@@ -1,1 +1,1 @@
-"""What a command's process is asked and how it tells: signals, standard streams."""
+"""Signals that a command's process hears, with the streams that it tells on."""

@@ -1,11 +1,14 @@
-"""Signals of a command: a first one to end keeps what is finished, a second one ends it at once."""
+"""Signals that end a command.
+
+A first one keeps what is finished, a second one ends it at once.
+"""
 
 import os
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
@@ -14,9 +17,9 @@ from lidarium.scripts.common import INTERRUPTED, TERMINATED
 
 @contextmanager
 def heard_termination() -> Iterator[Any]:
-    """Let SIGTERM end what runs as Ctrl-C does; nothing changes outside the main thread.
+    """Let SIGTERM end what runs as Ctrl-C does.
 
-    Nor does anything where an application handles the signal in its own way.
+    Nothing changes outside the main thread, and where an application handles the signal in its own way.
 
     Yields
     ------
@@ -53,6 +56,11 @@ def leave_at_the_next(code: int) -> None:
         return
 
     def leave(number: int, frame: FrameType | None) -> None:
+        with suppress(BaseException):  # whatever was under way when the signal came
+            if "multiprocessing" in sys.modules:
+                from lidarium.evaluation.suites.processes import kill_workers
+
+                kill_workers()
         os._exit(code)
 
     for number in (signal.SIGINT, signal.SIGTERM):

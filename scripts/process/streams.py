@@ -1,4 +1,7 @@
-"""Standard streams of a command, some of which may be closed or have nobody who reads them."""
+"""Standard streams of a command.
+
+Some may be closed, or have nobody who reads them.
+"""
 
 import os
 import sys
@@ -23,7 +26,10 @@ def open_closed_streams() -> None:
 
 
 def silence(stream: TextIO) -> None:
-    """Lead a stream whose reader has left to nowhere, so that Python does not complain at exit."""
+    """Lead a stream to nowhere.
+
+    Its reader has left, and Python would complain at exit.
+    """
     with suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

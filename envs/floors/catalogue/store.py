@@ -229,7 +229,7 @@ def _content(path: Path) -> bytes:
 
 
 def _files(folder: Path) -> list[tuple[float, int, Path]]:
-    """Return time of last use, size and path of the files of a folder that the store has made.
+    """Return time of last use, size and path of a folder's entries.
 
     Unfinished writes of broken processes are included; what else lies there is nobody's to remove, and what
     a link leads to is another's.
