@@ -17,6 +17,9 @@ MOST_BEYOND_M = 1_000.0
 MOST_OUTLINE_M = 500_000.0
 """Longest sum of all outlines: each is followed cell by cell [m]."""
 
+MOST_PAIRS = 250_000
+"""Most walls times doors: each is compared with each."""
+
 MOST_CORNERS = 2_000_000
 """Most corners of all outlines."""
 
@@ -62,3 +65,15 @@ def check_extent(what: str, bounds: Iterable[float], rings: Iterable[NDArray[np.
                 f"{what} has more than {MOST_CORNERS:,} corners or {MOST_OUTLINE_M:,.0f} m of walls; want "
                 "fewer: check its scale, or part it"
             )
+
+
+def check_pairs(what: str, walls: int, doors: int) -> None:
+    """Check that comparing all walls with all doors does not take too long.
+
+    Raises
+    ------
+    ValueError
+        Where it would.
+    """
+    if walls * doors > MOST_PAIRS:
+        raise ValueError(f"{what} has {walls:,} walls and {doors:,} doors; want a product of {MOST_PAIRS:,}")

@@ -22,6 +22,7 @@ from lidarium.evaluation.episodes.result import settings_sha256
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.state import state_sha256
+from lidarium.mapping.files.guarded_reading import reason as said_by
 
 ADDED = frozenset({"localizer"})
 """Settings that older records do not have."""
@@ -134,7 +135,7 @@ def settings_of(header: dict[str, Any]) -> ExplorationSettings:
         settings = make_settings(**header["settings"])
     except (TypeError, AttributeError) as error:
         raise ValueError(
-            f"the settings of the record are not those of lidarium {lidarium.__version__}: {error}"
+            f"the settings of the record are not those of lidarium {lidarium.__version__}: {said_by(error)}"
         ) from error
     found = settings_sha256(settings)
     if found != header["settings_sha256"]:

@@ -7,8 +7,8 @@ import yaml
 
 from lidarium.mapping.files.guarded_reading import read_text, reading
 
-MOST_YAML_BYTES = 1 << 16
-"""Longest header: parsing takes a second for a few hundred kilobytes."""
+MOST_YAML_BYTES = 1 << 14
+"""Longest header, some fifty times the usual one: parsing takes long."""
 
 
 class _PlainLoader(yaml.SafeLoader):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.guarded_arrays import read_arrays
 from lidarium.mapping.files.guarded_reading import check_file, read_text, reading
 from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.geometry.bounds import Rule, shown, within
 from lidarium.mapping.splines.curve import make_curve
 from lidarium.mapping.splines.curves.basis import ORDER
 from lidarium.mapping.splines.curves.bspline import Spline
@@ -24,6 +25,9 @@ from lidarium.mapping.splines.curves.settings import SplineSettings
 from lidarium.mapping.splines.spline_map import Landmarks, SplineMap
 
 VERSION = 1
+SEEN = Rule(float, bounds=within(0.0, 2.0**53))
+"""How often something may have been seen."""
+
 MOST_LENGTH_M = 10_000.0
 """Longest curve of a map [m]."""
 
@@ -148,7 +152,7 @@ def from_compact_arrays(arrays: dict[str, NDArray[Any]], settings: SplineSetting
     if not len(marks) == len(mark_weights) == len(counts):
         raise ValueError("its arrays do not fit together")
     split = int(corner_count)
-    spline_map.updates = int(updates)
+    spline_map.updates = _counted(updates)
     # When landmarks were last seen is not kept: those on trial begin anew.
     now = np.full(len(marks), spline_map.updates, np.int64)
     spline_map.corners = Landmarks(marks[:split], mark_weights[:split], counts[:split], now[:split])
@@ -179,6 +183,13 @@ def _restored(points: NDArray[np.float64], shares: NDArray[np.float64]) -> Splin
     knots = np.concatenate([np.zeros(ORDER), shares, np.ones(ORDER)])
     spline = Spline(knots, points)
     return Spline(knots * spline.length(), points)
+
+
+def _counted(value: Any) -> int:  # noqa: ANN401
+    """Return how often, or when, something was seen."""
+    if not SEEN.hold(value):
+        raise ValueError(f"it has {shown(value)} updates; want {SEEN.wanted}")
+    return int(value)
 
 
 def _checked(spline: Spline) -> Spline:
@@ -235,7 +246,7 @@ def _from_json(content: dict[str, Any], settings: SplineSettings | None) -> Spli
         weights = np.array(curve["weights"], np.float64)
         spacing = spline_map.settings.map.sample_spacing
         spline_map.curves.append(
-            make_curve(spline, weights, int(curve["count"]), int(curve["last_seen"]), spacing)
+            make_curve(spline, weights, _counted(curve["count"]), _counted(curve["last_seen"]), spacing)
         )
     for name in ("corners", "peaks"):
         marks = content[name]
@@ -247,7 +258,7 @@ def _from_json(content: dict[str, Any], settings: SplineSettings | None) -> Spli
         if not len(points) == len(weights) == len(counts) == len(last_seen):
             raise ValueError(f"its {name} have not as many points as weights, counts and times")
         setattr(spline_map, name, Landmarks(points, weights, counts, last_seen))
-    spline_map.updates = int(content["updates"])
+    spline_map.updates = _counted(content["updates"])
     if not all(math.isfinite(value) for curve in spline_map.curves for value in curve.weights.tolist()):
         raise ValueError("weights are not finite")
     return spline_map

@@ -103,7 +103,7 @@ def test_a_small_file_that_unpacks_to_gigabytes_is_refused(name, tmp_path):
 
 
 def test_a_log_that_unpacks_to_gigabytes_is_refused(tmp_path):
-    (tmp_path / "a.log.gz").write_bytes(gzip.compress(b"ODOM 1 2 3\n" * 1_000_000, 1))
+    (tmp_path / "a.log.gz").write_bytes(gzip.compress(b"# a remark\n" * 1_000_000, 1))
     refused(read_carmen_log, tmp_path / "a.log.gz", "more than .* bytes when unpacked", 20.0)
     (tmp_path / "b.log.gz").write_bytes(gzip.compress(b"FLASER 1 " * 1_000_000, 1))
     refused(read_carmen_log, tmp_path / "b.log.gz", "a line of more than")
@@ -168,6 +168,21 @@ def test_a_bomb_of_aliases_is_refused_without_being_shown(tmp_path):
     lines += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]" for k in range(1, 12)]
     (tmp_path / "map.yaml").write_text("\n".join(lines) + "\n" + HEADER.format("*a11"))
     refused(read_ros_map, tmp_path / "map.yaml", "alias")
+
+
+def test_entities_of_xml_that_stand_for_gigabytes_are_refused(tmp_path):
+    entities = "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10}">' for k in range(1, 12))
+    text = f'<!DOCTYPE f [<!ENTITY e0 "{"x" * 100}">{entities}]><floor><a>&e11;</a></floor>'
+    (tmp_path / "a.xml").write_text(text)
+    refused(load_file, tmp_path / "a.xml", "not XML")
+
+
+def test_walls_and_doors_by_the_thousand_are_not_compared_with_each_other(tmp_path):
+    (tmp_path / "a.txt").write_text("0 0 60 0 wall\n" * 20_000 + "3 0 9 0 door\n" * 20_000)
+    refused(load_file, tmp_path / "a.txt", "want a product")
+    plan = {**PLAN, "walls": [[0, 0, 3, 3]] * 20_000, "doors": [[1, 1]] * 20_000}
+    (tmp_path / "b.json").write_text(json.dumps(plan, separators=(",", ":")))
+    refused(load_drawn, tmp_path / "b.json", "want a product")
 
 
 @pytest.mark.parametrize("far", [1e6, 1e9, 1e18, 1e300])

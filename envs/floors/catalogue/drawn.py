@@ -27,6 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from lidarium.envs.floors.drawing import strip
+from lidarium.envs.floors.extent import check_pairs
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.floors.generation.furniture import place
 from lidarium.mapping.files.guarded_reading import read_text, reading
@@ -79,6 +80,7 @@ def load_drawn(path: Path) -> Floor:
             solids = [replace(_rectangle(*bounds), holes=rooms)]
         else:
             solids = [*_outer_walls(bounds, float(plan.get("outer_wall", 0.2)))]
+        check_pairs(str(path), len(plan.get("walls", [])), len(plan.get("doors", [])))
         for wall in plan.get("walls", []):
             solids += _wall(wall, plan.get("doors", []))
         solids += [_rectangle(*block) for block in plan.get("blocks", [])]

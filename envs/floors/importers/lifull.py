@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.extent import check_pairs
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import WALL_THICKNESS, floor_of_lines, read_text, refuse_resolution
 
@@ -45,6 +46,7 @@ def load(path: Path, resolution: float | None) -> Floor:
     left, bottom = everything[:, [0, 2]].min(), everything[:, [1, 3]].max()
     to_metres = np.array([scale, -scale, scale, -scale])
     walls, doors = ((part - [left, bottom, left, bottom]) * to_metres for part in (walls, doors))
+    check_pairs(str(path), len(walls), len(doors))
     pieces = [piece for wall in walls for piece in _without_doors(wall, doors)]
     return floor_of_lines(path, np.array(pieces).reshape(-1, 4), doors)
 
