@@ -16,6 +16,7 @@ from lidarium.evaluation.analysis.episodes import Episodes, name_of, read_episod
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
 from lidarium.evaluation.episodes.output import check_writable, check_written, write_text
+from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.report.sections import Section, tell_group
 
 

@@ -21,6 +21,7 @@ import numpy as np
 import lidarium
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.evaluation.episodes.output import clear_unfinished, write_json
+from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
 from lidarium.evaluation.suites.suite import Suite, Trial
 from lidarium.evaluation.suites.workers import shared_out
@@ -247,9 +248,9 @@ def _kept_suite(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ValueError(f"{path} is not JSON: {error}; mend it, or choose another folder") from error
+        kept = json.loads(read_text(path, MOST_SUITE_BYTES))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path} is not JSON: {reason(error)}; mend it, or choose another folder") from error
     if not (isinstance(kept, dict) and "version" in kept and "policies" in kept):
         raise ValueError(
             f"{path} is there, and no evaluation has written it; move it away, or choose another folder"

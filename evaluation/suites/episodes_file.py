@@ -193,7 +193,8 @@ class EpisodesFile:
                 f"the episode has the key {episode.get(KEY)!r}; want text that tells it from all others"
             )
         line = json.dumps(episode, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-        self._append(line.encode() + b"\n")
+        # Bytes of names that are no UTF-8 are escaped as JSON does it.
+        self._append(line.encode("utf-8", "backslashreplace") + b"\n")
         self.check_in_place()
 
     def check_in_place(self) -> None:

@@ -142,8 +142,15 @@ class LocalMatcher:
     ) -> Match:
         settings, grid = self._matching, submap.grid
         spread = np.sqrt(np.diag(uncertainty))
-        reach_m = settings.search_m + settings.search_deviations * float(spread[:2].max())
-        reach_angle = settings.search_angle + settings.search_deviations * float(spread[2])
+        # Odometry that leaps leads nowhere, and is not sought farther than where there is none.
+        reach_m = min(
+            settings.search_m + settings.search_deviations * float(spread[:2].max()),
+            max(settings.search_m, settings.blind_m),
+        )
+        reach_angle = min(
+            settings.search_angle + settings.search_deviations * float(spread[2]),
+            max(settings.search_angle, settings.blind_angle),
+        )
         information = turned(np.asarray(np.linalg.inv(uncertainty), np.float64), float(predicted[2]))
         weight = settings.weight(len(points))
         start = search(grid, points, predicted, reach_m, reach_angle, information, weight, settings.unseen)
