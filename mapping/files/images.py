@@ -16,6 +16,9 @@ MOST_IMAGE_BYTES = 1 << 29
 MOST_PIXELS = 1 << 26
 """Most pixels of a picture: 8,192 x 8,192."""
 
+LEAST_PIXELS, PIXELS_PER_BYTE = 1 << 22, 1000
+"""A picture may have the first many pixels, and so many for each of its bytes: none is packed closer."""
+
 _JPEG_SIZES = (*range(0xC0, 0xC4), *range(0xC5, 0xC8), *range(0xC9, 0xCC), *range(0xCD, 0xD0))
 
 
@@ -72,16 +75,18 @@ def check_picture_size(content: bytes) -> None:
     if size is None:
         raise ValueError("it is no picture that is known; want png, pgm, bmp, jpg or tif")
     width, height = size
-    if not (width > 0 and height > 0 and width * height <= MOST_PIXELS):
-        raise ValueError(f"it has {width:,} x {height:,} pixels; want at most {MOST_PIXELS:,} in all")
+    most = min(MOST_PIXELS, max(LEAST_PIXELS, PIXELS_PER_BYTE * len(content)))
+    if not (width > 0 and height > 0 and width * height <= most):
+        raise ValueError(
+            f"it has {width:,} x {height:,} pixels in {len(content):,} bytes; want at most {most:,}"
+        )
 
 
 def picture_size(content: bytes) -> tuple[int, int] | None:
     """Return width and height of a picture; None where its format is not known or its header damaged."""
     try:
         if content[:8] == b"\x89PNG\r\n\x1a\n":
-            width, height = struct.unpack(">II", content[16:24])
-            return width, height
+            return _png(content)
         if content[:2] == b"BM":
             return _bmp(content)
         if content[:1] == b"P" and content[1:2] in b"123456":
@@ -93,6 +98,18 @@ def picture_size(content: bytes) -> tuple[int, int] | None:
     except (struct.error, ValueError, IndexError):
         return None
     return None
+
+
+def _png(content: bytes) -> tuple[int, int]:
+    """Return the size of a PNG none of whose chunks claims more bytes than the file has."""
+    place = 8
+    while place + 8 <= len(content):
+        (length,) = struct.unpack(">I", content[place : place + 4])
+        if place + 8 + length > len(content):
+            raise ValueError("a chunk is longer than the file")
+        place += 12 + length
+    width, height = struct.unpack(">II", content[16:24])
+    return width, height
 
 
 def _bmp(content: bytes) -> tuple[int, int]:

@@ -132,7 +132,12 @@ def test_a_picture_whose_header_is_too_large_is_refused_unread(content, tmp_path
     width, height = picture_size(content)
     assert width * height > MOST_PIXELS
     (tmp_path / "a.png").write_bytes(content)
-    refused(read_image, tmp_path / "a.png", "pixels; want at most")
+    refused(read_image, tmp_path / "a.png", "pixels in .* want at most")
+
+
+def test_a_picture_whose_chunk_claims_gigabytes_is_refused_unread(tmp_path):
+    (tmp_path / "a.png").write_bytes(png(60, 40) + struct.pack(">I", 0xFF000084) + b"IDAT" + bytes(100))
+    refused(read_image, tmp_path / "a.png", "not an image that can be read")
 
 
 def claims(shape, kind="<f8"):

@@ -77,7 +77,7 @@ def _mark(pixels: NDArray[Any]) -> NDArray[np.bool_]:
     The mark is yellow, or grey 208 in an image without colours.
     """
     if pixels.ndim == 3 and pixels.shape[2] >= 3:
-        blue, green, red = (pixels[..., channel].astype(np.int64) for channel in range(3))
+        blue, green, red = (pixels[..., channel] for channel in range(3))
         yellow = (blue < 100) & (green > 150) & (red > 150)
         if yellow.any():
             return np.asarray(yellow)
