@@ -152,7 +152,7 @@ MOVED: dict[str, tuple[str, ...]] = {
         "mapping.planning.search.search_state",
     ),
     "mapping.growing": ("mapping.grids.growing_array",),
-    "mapping.laser_logs": ("mapping.files.laser_logs", "mapping.files.npz_logs"),
+    "mapping.laser_logs": ("mapping.files.npz_logs", "mapping.files.laser_logs"),
     "mapping.level_changes": ("mapping.grids.map_deltas",),
     "mapping.localization.branch_and_bound": ("mapping.localization.matching.branch_and_bound",),
     "mapping.localization.calibration": ("mapping.localization.slam.calibration",),

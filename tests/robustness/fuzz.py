@@ -87,7 +87,8 @@ def _run_worker(kind: str, samples: Path, seed: int, first: int, last: int, tall
         command, cwd=TESTS, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     )
     lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-    threading.Thread(target=_pass_on, args=(worker, lines), daemon=True).start()
+    passing = threading.Thread(target=_pass_on, args=(worker, lines), daemon=True)
+    passing.start()
     current, patience, began_s, waited = None, STARTS_S, 0.0, 0
     try:
         while True:
@@ -118,6 +119,9 @@ def _run_worker(kind: str, samples: Path, seed: int, first: int, last: int, tall
     finally:
         worker.kill()
         worker.wait()
+        passing.join()
+        if worker.stdout is not None:
+            worker.stdout.close()
 
 
 def _cpu_s(process: int) -> float:
