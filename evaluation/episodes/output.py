@@ -10,6 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from lidarium.mapping.files.output import errors_named
+
 _UNFINISHED = re.compile(r"\.(?P<name>.+)\.[a-z0-9_]{8}")
 """Names of the folders in which ``whole_file`` writes."""
 
@@ -40,8 +42,9 @@ def whole_file(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
         beside = Path(folder) / path.name
-        yield beside
-        _bring_to_disk(beside)
+        with errors_named(path):
+            yield beside
+            _bring_to_disk(beside)
         beside.replace(path)
 
 

@@ -2,7 +2,23 @@
 
 import os
 import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+
+@contextmanager
+def errors_named(path: Path) -> Iterator[None]:
+    """Give errors of the system that name no file the name of the one that is written.
+
+    A full disk, for instance, is told of an open file, whose name the system does not know.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None or error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def write_whole(path: Path, content: bytes, *, is_lasting: bool = True) -> None:
@@ -30,7 +46,7 @@ def write_whole(path: Path, content: bytes, *, is_lasting: bool = True) -> None:
     # Made here rather than by tempfile, whose files are for their owner alone: the system applies the mask.
     handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:
-        with os.fdopen(handle, "wb") as file:
+        with errors_named(path), os.fdopen(handle, "wb") as file:
             file.write(content)
             if is_lasting:
                 file.flush()

@@ -9,12 +9,15 @@ import json
 import os
 import random
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from drawn_maps import RESOLUTION, apartment, kept
 from robustness.failing_disk import OPERATIONS, failing_disk
 
+from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.mapping.files.map_files import write_ros_map
 from lidarium.scripts.main import main
 
@@ -126,3 +129,31 @@ def test_no_failing_operation_loses_results_unsaid(command, inputs, tmp_path, ca
         assert main([*arguments, str(out)]) == 0, place + capsys.readouterr().err
         assert found_in(out) == expected, place
         shutil.rmtree(out)
+
+
+LIMIT_BYTES = 2048
+"""More than a suite and a few lines of episodes, less than a record."""
+
+
+def limit_files():
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT_BYTES, LIMIT_BYTES))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such limits there")
+def test_an_evaluation_of_several_processes_ends_at_the_first_record_that_does_not_fit(inputs, tmp_path):
+    arguments = [*arguments_of("evaluate", inputs), "--seeds", "100", "--workers", "2"]
+    program = "import sys; from lidarium.scripts.main import main; sys.exit(main())"
+    told = subprocess.run(
+        [sys.executable, "-c", program, *arguments, "--out", str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
+        preexec_fn=limit_files,
+        timeout=120,
+    )
+    assert told.returncode == 2, told.stderr
+    assert f"{os.strerror(errno.EFBIG)}; the episodes before are kept" in told.stderr
+    assert "Traceback" not in told.stderr
+    assert not read_episodes(tmp_path / "out" / "episodes.jsonl")
+    assert not list((tmp_path / "out" / "records").glob("*.npz"))
