@@ -24,7 +24,7 @@ from lidarium.scripts.main import main
 TRIES = os.environ.get("LIDARIUM_ROBUSTNESS", "")
 """How many operations of each command are tried, or ``all``."""
 
-SHORT = {"evaluate": 100, "slam": 6, "merge": 5, "run": 5, "report": 3}
+SHORT = {"evaluate": 34, "slam": 8, "merge": 4, "run": 4, "report": 3}
 """How many where nothing is said; those that draw pictures take longer."""
 
 ERRORS = (errno.ENOSPC, errno.EIO)
@@ -143,7 +143,7 @@ def limit_files():
 
 @pytest.mark.skipif(os.name == "nt", reason="no such limits there")
 def test_an_evaluation_of_several_processes_ends_at_the_first_record_that_does_not_fit(inputs, tmp_path):
-    arguments = [*arguments_of("evaluate", inputs), "--seeds", "100", "--workers", "2"]
+    arguments = [*arguments_of("evaluate", inputs), "--seeds", "40", "--workers", "2"]
     program = "import sys; from lidarium.scripts.main import main; sys.exit(main())"
     told = subprocess.run(
         [sys.executable, "-c", program, *arguments, "--out", str(tmp_path / "out")],

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numba
 import numpy as np
+import pytest
 
+from lidarium.benchmarks.speed.cases.cached_start import read_only_environment
 from lidarium.mapping.kernels import cache_folders, compilation
 from lidarium.mapping.kernels.compilation import kernel, use_threads
 from lidarium.mapping.kernels.views import (
@@ -264,6 +266,45 @@ def test_kernels_are_compiled_anew_where_nothing_can_be_written(tmp_path):
         [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
     )
     assert result.stdout.split() == ["2", "False"]
+
+
+PLANTED = """
+import os
+from lidarium.mapping.kernels import compilation
+@compilation.kernel
+def one_more(x):
+    return x + 1
+print(one_more(1), compilation._FOLDER, compilation._CAN_CACHE)
+"""
+
+
+@pytest.mark.skipif(
+    getattr(os, "geteuid", lambda: 1)() != 0, reason="only the administrator can make folders of other users"
+)
+def test_nothing_is_loaded_from_a_folder_that_another_user_made_before(tmp_path):
+    """Where only the temporary folder is left, and someone else was there first."""
+    environment = read_only_environment(tmp_path / "place")
+    temporary = Path(environment["TMPDIR"])
+    temporary.chmod(0o1777)
+    planted = temporary / f"lidarium-{os.geteuid()}"
+    planted.mkdir()
+    planted.chmod(0o777)
+    os.chown(planted, 65534, 65534)
+    script = tmp_path / "planted.py"
+    script.write_text(PLANTED)
+    result = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
+    )
+    assert result.stdout.split() == ["2", "None", "False"]
+    assert not list(planted.iterdir())
+    planted.rmdir()
+    result = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True
+    )
+    assert result.stdout.split()[1].startswith(str(planted / "kernels"))
+    assert planted.stat().st_mode & 0o777 == 0o700
+    for folder in (each for each in (tmp_path / "place").rglob("*") if each.is_dir()):
+        folder.chmod(0o755)
 
 
 def test_scratch_is_there_while_a_kernel_runs_and_gone_when_it_returns():
