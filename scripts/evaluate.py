@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from lidarium.scripts import first_start
 from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, table, tell
+from lidarium.scripts.process import first_start
 
 if TYPE_CHECKING:
     from lidarium.evaluation.suites.campaign import Campaign

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lidarium.scripts import first_start
 from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name, table
+from lidarium.scripts.process import first_start
 
 if TYPE_CHECKING:
     import numpy as np

@@ -183,17 +183,8 @@ def test_every_public_function_outside_of_kernels_has_type_hints():
     assert not bare
 
 
-TO_PART = {
-    "envs/levels/frontier_offers.py",
-    "evaluation/truth/map_tally.py",
-    "mapping/merging/validation.py",
-}
-"""Modules of kernels that are still to be parted; none may join them."""
-
-
 def test_modules_stay_small():
-    assert {path for path, source in SOURCES.items() if source.count("\n") >= 400} == TO_PART
-    assert max(source.count("\n") for source in SOURCES.values()) < 410
+    assert not [path for path, source in SOURCES.items() if source.count("\n") >= 400]
 
 
 def test_nothing_is_left_undone_in_the_sources():

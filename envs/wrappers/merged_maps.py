@@ -21,8 +21,8 @@ from lidarium.envs.radio.messages import Order
 from lidarium.envs.station.team_mapping import Frames, TeamMapping, crop_around
 from lidarium.envs.wrappers.contacts import CanTalk, check_links, clusters_of
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import ValidationSettings
 
 TEAM_VALIDATION = ValidationSettings(
     most_contradiction_m=1.0, plenty_of_overlap_m2=0.0, plenty_of_wall_m=10.0, contradiction_share=0.1

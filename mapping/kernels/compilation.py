@@ -3,9 +3,9 @@
 Arithmetic is exact, and kernels are cached where a directory can be written.
 
 Numba caches compiled code per source file and does not see a change in another file that the kernel calls
-into. The cache directory is therefore keyed by a hash of all sources with kernels. It lies in the package's
-own folder, the user's cache folder or the temporary folder: the first that this user can write to, and
-nobody else.
+into. The cache directory is therefore keyed by a hash of all sources with kernels, and of this package. It
+lies in the package's own folder, the user's cache folder or the temporary folder: the first that this user
+can write to, and nobody else.
 """
 
 import hashlib
@@ -39,7 +39,7 @@ def _sources_hash() -> str:
     for folder in _source_folders():
         for path in sorted(folder.rglob("*.py")):
             source = path.read_bytes()
-            if b"@kernel" in source or b"intrinsic(" in source:
+            if b"@kernel" in source or path.parent == Path(__file__).resolve().parent:
                 digest.update(path.relative_to(folder.parent).as_posix().encode())
                 digest.update(source)
     return digest.hexdigest()[:16]

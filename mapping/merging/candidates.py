@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform, halfway
+from lidarium.mapping.merging.agreement.validation import Agreement, compare, is_rival, why_refused
 from lidarium.mapping.merging.alignment import Candidate, distinct, find_inliers
 from lidarium.mapping.merging.correlation import best_translations
 from lidarium.mapping.merging.correspondence import Matches
 from lidarium.mapping.merging.description.described_map import DescribedMap
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import Agreement, compare, is_rival, why_refused
 from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_walls
 
 THIN_WALL_M = 0.1

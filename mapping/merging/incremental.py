@@ -14,12 +14,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.agreement.validation import ValidationSettings, why_refused
 from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.growing_maps import DescribedMaps, GrowingMap
 from lidarium.mapping.merging.merger import Merged, joined_tree, placed
 from lidarium.mapping.merging.pair import PairResult, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import ValidationSettings, why_refused
 
 PLENTY_M2 = 30.0
 """From this overlap on, maps need know nothing else [m2]."""

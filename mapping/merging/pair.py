@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement_counts import disc_agreement
+from lidarium.mapping.merging.agreement.counts import disc_agreement
+from lidarium.mapping.merging.agreement.validation import Agreement, compare, has_contradiction
 from lidarium.mapping.merging.alignment import Candidate, refine
 from lidarium.mapping.merging.candidates import (
     NO_INLIERS,
@@ -23,7 +24,6 @@ from lidarium.mapping.merging.candidates import (
 from lidarium.mapping.merging.correspondence import Matches, match_corners
 from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import Agreement, compare, has_contradiction
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
 NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))

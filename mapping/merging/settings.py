@@ -3,12 +3,12 @@
 import math
 from dataclasses import dataclass, field
 
+from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.alignment import AlignmentSettings
 from lidarium.mapping.merging.correlation import CorrelationSettings
 from lidarium.mapping.merging.correspondence import CorrespondenceSettings
 from lidarium.mapping.merging.description.corners import CornerSettings
 from lidarium.mapping.merging.description.descriptors import DescriptorSettings
-from lidarium.mapping.merging.validation import ValidationSettings
 
 MODES = ("default", "thesis")
 

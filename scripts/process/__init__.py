@@ -1,1 +1,1 @@
-"""Signals that a command's process hears, with the streams that it tells on."""
+"""How a command behaves as a process: signals, streams, its first start."""

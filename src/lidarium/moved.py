@@ -153,6 +153,7 @@ MOVED: dict[str, tuple[str, ...]] = {
     ),
     "mapping.growing": ("mapping.grids.growing_array",),
     "mapping.laser_logs": ("mapping.files.npz_logs", "mapping.files.laser_logs"),
+    "mapping.merging.validation": ("mapping.merging.agreement.validation",),
     "mapping.level_changes": ("mapping.grids.map_deltas",),
     "mapping.localization.branch_and_bound": ("mapping.localization.matching.branch_and_bound",),
     "mapping.localization.calibration": ("mapping.localization.slam.calibration",),

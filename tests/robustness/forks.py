@@ -9,6 +9,7 @@ import argparse
 import multiprocessing
 import sys
 
+import gymnasium as gym
 import numpy as np
 
 import lidarium
@@ -22,6 +23,11 @@ def make_episodes():
     env = lidarium.vector_env(EPISODES, "apartment", robots=2, threads=2)
     observations, _ = env.reset(seed=3)
     return env, observations
+
+
+def make_environment():
+    """Return an environment of one robot; its id is there once the package is imported."""
+    return gym.make("lidarium/Exploration-v0")
 
 
 def steps_of(env, steps=5):

@@ -36,10 +36,7 @@ def test_other_pools_see_what_their_parent_sees(method):
 
 def test_asynchronous_vector_environments_step_after_threads_started():
     forks.steps_of(forks.make_episodes()[0])
-    import lidarium  # noqa: F401 (registers the ids)
-
-    makers = [lambda: gym.make("lidarium/Exploration-v0")] * 2
-    env = gym.vector.AsyncVectorEnv(makers, context="spawn")
+    env = gym.vector.AsyncVectorEnv([forks.make_environment] * 2, context="spawn")
     try:
         env.reset(seed=3)
         env.step(env.action_space.sample())

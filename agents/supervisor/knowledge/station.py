@@ -18,6 +18,7 @@ from lidarium.envs.radio.messages import OperatingState
 from lidarium.envs.station.reports import Report
 from lidarium.envs.wrappers.merged_maps import TEAM_VALIDATION
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.description.described_map import resampled
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
@@ -26,7 +27,6 @@ from lidarium.mapping.merging.incremental import IncrementalMerger
 from lidarium.mapping.merging.merger import Merged, placed
 from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
-from lidarium.mapping.merging.validation import ValidationSettings
 
 Pair = tuple[str, str]
 

@@ -23,10 +23,10 @@ from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.suites.workers import shared_out
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging.agreement.validation import Agreement
 from lidarium.mapping.merging.description.described_map import DescribedMap
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MODES, MergeSettings, merge_settings
-from lidarium.mapping.merging.validation import Agreement
 
 METHODS = (*MODES, *FEATURES)
 

@@ -6,12 +6,12 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, 
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging import pair
+from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.growing_maps import GrowingMap
 from lidarium.mapping.merging.incremental import IncrementalMerger
 from lidarium.mapping.merging.pair import described, is_contradicted, verify_pair
 from lidarium.mapping.merging.settings import merge_settings
-from lidarium.mapping.merging.validation import ValidationSettings
 
 FIRST, SECOND = about_middle(0.4, apartment()), about_middle(-1.3, apartment())
 

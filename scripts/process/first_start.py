@@ -13,7 +13,7 @@ from typing import Any
 
 from lidarium.scripts.common import counted, tell
 
-LIST = Path(__file__).with_name("data") / "kernels_of_run.json"
+LIST = Path(__file__).parents[1] / "data" / "kernels_of_run.json"
 """The kernels that ``lidarium run`` calls from Python; ``scripts/dev/list_kernels.py`` writes it."""
 
 MOST_PROCESSES = 4

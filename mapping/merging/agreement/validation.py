@@ -13,7 +13,7 @@ import numpy as np
 
 from lidarium.mapping.geometry.checks import check_from_zero
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement_counts import count_overlap, count_walls, pose_numbers
+from lidarium.mapping.merging.agreement.counts import count_overlap, count_walls, pose_numbers
 from lidarium.mapping.merging.description.described_map import DescribedMap
 
 OCCUPIED_WEIGHT = 10.0

@@ -1,0 +1,1 @@
+"""Whether two maps agree under a motion, by what their cells say."""
