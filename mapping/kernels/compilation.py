@@ -3,13 +3,14 @@
 Arithmetic is exact, and kernels are cached where a directory can be written.
 
 Numba caches compiled code per source file and does not see a change in another file that the kernel calls
-into. The cache directory is therefore keyed by a hash of all sources with kernels, and of this package. It
+into. The cache directory is therefore keyed by a hash of all sources with kernels and of what they import. It
 lies in the package's own folder, the user's cache folder or the temporary folder: the first that this user
 can write to, and nobody else.
 """
 
 import hashlib
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,22 +27,34 @@ Array = NDArray[Any]
 _numba_config: Any = config
 
 PACKAGE_FOLDERS = ("mapping", "envs", "evaluation")
+"""Folders whose kernels call each other."""
+
+_ROOT = Path(__file__).resolve().parents[2]
+_IMPORTS = re.compile(rb"^from lidarium\.([\w.]+) import", re.MULTILINE)
 
 
-def _source_folders() -> list[Path]:
-    """Return the folders whose kernels call each other."""
-    root = Path(__file__).resolve().parents[2]
-    return [root / name for name in PACKAGE_FOLDERS]
+def key_sources(root: Path = _ROOT) -> list[Path]:
+    """Return the sources whose code or constants are in compiled kernels.
 
-
-def _sources_hash() -> str:
-    digest = hashlib.sha256(numba.__version__.encode())
-    for folder in _source_folders():
-        for path in sorted(folder.rglob("*.py")):
+    Those are files with kernels, this package, and the modules that either imports from.
+    """
+    found: set[Path] = set()
+    for folder in PACKAGE_FOLDERS:
+        for path in (root / folder).rglob("*.py"):
             source = path.read_bytes()
-            if b"@kernel" in source or path.parent == Path(__file__).resolve().parent:
-                digest.update(path.relative_to(folder.parent).as_posix().encode())
-                digest.update(source)
+            if b"@kernel" in source or path.parent.name == "kernels":
+                modules = (
+                    root / f"{name.decode().replace('.', '/')}.py" for name in _IMPORTS.findall(source)
+                )
+                found.update((path, *filter(Path.is_file, modules)))
+    return sorted(found)
+
+
+def _sources_hash(root: Path = _ROOT) -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in key_sources(root):
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -129,20 +129,21 @@ def test_parallel_kernels_compute_the_same():
     assert np.array_equal(doubled(np.arange(100.0)), 2.0 * np.arange(100.0))
 
 
-def test_the_cache_key_changes_with_any_kernel_source_and_only_then(tmp_path, monkeypatch):
+def test_the_cache_key_changes_with_kernels_and_what_they_import_and_only_then(tmp_path):
     for folder in compilation.PACKAGE_FOLDERS:
         (tmp_path / folder).mkdir()
-    source = tmp_path / "mapping" / "one.py"
-    source.write_text("@kernel\ndef f(x): return x\n")
+    source, constants = tmp_path / "mapping" / "one.py", tmp_path / "envs" / "constants.py"
+    source.write_text("from lidarium.envs.constants import A\n\n@kernel\ndef f(x): return x + A\n")
+    constants.write_text("A = 1\n")
     (tmp_path / "envs" / "plain.py").write_text("x = 1\n")
-    monkeypatch.setattr(
-        compilation, "_source_folders", lambda: [tmp_path / folder for folder in compilation.PACKAGE_FOLDERS]
-    )
-    first = compilation._sources_hash()
+    first = compilation._sources_hash(tmp_path)
     (tmp_path / "envs" / "plain.py").write_text("x = 2\n")
-    assert compilation._sources_hash() == first
+    assert compilation._sources_hash(tmp_path) == first
+    constants.write_text("A = 2\n")
+    second = compilation._sources_hash(tmp_path)
+    assert second != first
     source.write_text("@kernel\ndef f(x): return x + 1\n")
-    assert compilation._sources_hash() != first
+    assert compilation._sources_hash(tmp_path) not in (first, second)
 
 
 def test_a_start_tells_a_first_one_from_later_ones_by_the_cache(tmp_path, monkeypatch):
@@ -158,9 +159,8 @@ def test_a_start_tells_a_first_one_from_later_ones_by_the_cache(tmp_path, monkey
 
 def test_every_file_whose_constants_or_kernels_a_kernel_uses_is_in_the_cache_key():
     """Numba bakes globals into compiled code: a constant of a file without kernels could change unseen."""
-    with_kernels = {
-        path for path, text in SOURCES.items() if "@kernel" in text or path.parent.name == "kernels"
-    }
+    with_kernels = {path for path, text in SOURCES.items() if "@kernel" in text}
+    keyed = set(compilation.key_sources())
     assert len(with_kernels) > 5
     for path in with_kernels:
         tree = ast.parse(SOURCES[path])
@@ -185,9 +185,7 @@ def test_every_file_whose_constants_or_kernels_a_kernel_uses_is_in_the_cache_key
             if isinstance(name, ast.Name)
         }
         for name in used & imported.keys():
-            assert imported[name] in with_kernels, (
-                f"{path.name} uses {name} of {imported[name].name} in a kernel"
-            )
+            assert imported[name] in keyed, f"{path.name} uses {name} of {imported[name].name} in a kernel"
 
 
 def test_kernels_are_made_by_the_one_decorator_only():
