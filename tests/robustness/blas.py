@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-CORES = ("Prescott", "Haswell", "SkylakeX")
+CORES = ("Prescott", "Nehalem", "Haswell")
 FLOORS = ("apartment", "building:17", "clinic", "building:5")
 OF_THE_MACHINE = ("decision_ms", "tick_ms", "peak_mb", "steps_per_s", "wall_s")
 
@@ -39,9 +39,9 @@ def result_of(floor, seed, core, folder):
         [*command, *arguments], env=environment, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )
     result = json.loads(output.stdout)
-    poses = (folder / "map.pgm").read_bytes()
+    pixels = (folder / "map.pgm").read_bytes()
     return json.dumps(
-        [{k: v for k, v in result.items() if k not in OF_THE_MACHINE}, poses.hex()], sort_keys=True
+        [{k: v for k, v in result.items() if k not in OF_THE_MACHINE}, pixels.hex()], sort_keys=True
     )
 
 
