@@ -19,7 +19,7 @@ FLOORS = ("apartment", "building:17", "clinic", "building:5")
 OF_THE_MACHINE = ("decision_ms", "tick_ms", "peak_mb", "steps_per_s", "wall_s")
 
 
-def result_of(floor, seed, core, folder):
+def result_of(floor, seed, core, folder, options):
     """Return what a run found, without what depends on the machine's speed."""
     arguments = [
         "run",
@@ -32,6 +32,7 @@ def result_of(floor, seed, core, folder):
         "--out",
         str(folder),
         "--json",
+        *options,
     ]
     command = [sys.executable, "-c", "import sys; from lidarium.scripts.main import main; sys.exit(main())"]
     environment = {**os.environ, "OPENBLAS_CORETYPE": core}
@@ -49,12 +50,15 @@ def main():
     """Run cases under each kernel and print how many differ."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=12)
-    count = parser.parse_args().count
+    parser.add_argument("--ideal", action="store_true", help="without SLAM: poses are known")
+    chosen = parser.parse_args()
+    count = chosen.count
+    options = ("--realism", "ideal", "--policy", "utility_frontier") if chosen.ideal else ()
     differ = []
     for number in range(count):
         floor, seed = FLOORS[number % len(FLOORS)], number // len(FLOORS)
         with tempfile.TemporaryDirectory() as folder:
-            found = [result_of(floor, seed, core, Path(folder) / core) for core in CORES]
+            found = [result_of(floor, seed, core, Path(folder) / core, options) for core in CORES]
         if len(set(found)) > 1:
             differ.append(f"{floor} seed {seed}")
     print(f"{len(differ)} of {count} runs differ between {', '.join(CORES)}: {'; '.join(differ) or '-'}")
