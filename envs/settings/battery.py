@@ -31,7 +31,7 @@ class Battery:
         m off the middle, so far.
     """
 
-    capacity_j: Annotated[float, above(0.0, 1e12)] | None = None
+    capacity_j: Annotated[float, above(0.0, 1e12, "a number of joules")] | None = None
     idle_w: Annotated[float, within(0.0, 1e6)] = 4.6
     per_metre_j: Annotated[float, within(0.0, 1e6)] = 10.0
     per_radian_j: Annotated[float, within(0.0, 1e6)] = 1.15

@@ -172,9 +172,11 @@ def use_threads(threads: int) -> int:
         a parallel kernel would wait for them forever; serial forms give the same.
     """
     global _process_of_threads  # threads belong to the process
-    if threads <= 1:
-        return 1
     process = os.getpid()
+    if threads <= 1:
+        if _process_of_threads == process and numba.get_num_threads() != 1:
+            numba.set_num_threads(1)
+        return 1
     if _process_of_threads == 0:
         _process_of_threads = process
     if _process_of_threads != process:

@@ -127,7 +127,10 @@ def test_the_odometer_tells_what_wheels_tell_not_the_truth():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"capacity_j": 0.0}, "capacity_j of the battery is 0.0; want a number above 0"),
+        (
+            {"capacity_j": 0.0},
+            "capacity_j of the battery is 0.0; want a number of joules above 0 and at most 1e\\+12, or None",
+        ),
         ({"idle_w": -1.0}, "idle_w of the battery is -1.0"),
         ({"per_metre_j": math.inf}, "per_metre_j of the battery is inf"),
     ],

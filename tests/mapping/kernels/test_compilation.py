@@ -109,7 +109,9 @@ def test_grids_are_viewed_where_they_lie():
 
 def test_parallel_kernels_run_on_as_many_threads_as_wanted():
     before = numba.get_num_threads()
+    use_threads(before)
     assert use_threads(1) == 1
+    assert numba.get_num_threads() == 1
     assert use_threads(before) == before
     assert numba.get_num_threads() == before
 
