@@ -19,6 +19,9 @@ from lidarium.envs.floors.solid import Solid, middle_line, width_of
 
 MAX_RASTER_CELLS = 200_000_000
 
+CEILING = 2.5
+"""Height of a ceiling where a floor says nothing [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Floor:
@@ -39,6 +42,8 @@ class Floor:
         by seed).
     goal : (x, y) or None
         Where robots with a goal should go [m].
+    ceiling : float
+        Height of the ceiling, to which solids without a height reach [m].
     """
 
     name: str
@@ -47,6 +52,7 @@ class Floor:
     cells: Raster | None = None
     starts: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
     goal: tuple[float, float] | None = None
+    ceiling: float = CEILING
 
     def __post_init__(self) -> None:
         x_min, y_min, x_max, y_max = self.bounds
@@ -60,6 +66,10 @@ class Floor:
             self.bounds,
             (ring for solid in self.solids for ring in (solid.polygon, *solid.holes)),
         )
+        if not (math.isfinite(self.ceiling) and self.ceiling > 0.0):
+            raise ValueError(
+                f"floor {self.name!r} has its ceiling at {self.ceiling} m; want a positive height"
+            )
         if self.solids and self.cells is not None:
             raise ValueError(
                 f"floor {self.name!r} has {len(self.solids)} solids and cells too; want one or the other"
@@ -159,6 +169,8 @@ class Floor:
             digest.update(np.packbits(self.cells.solid != 0).tobytes())
         _hash_numbers(digest, "starts", self.starts)
         _hash_numbers(digest, "goal", self.goal or ())
+        if self.ceiling != CEILING:
+            _hash_numbers(digest, "ceiling", (self.ceiling,))
         return digest.hexdigest()
 
     @cached_property
@@ -179,6 +191,8 @@ class Floor:
                 ).tobytes()
             )
             digest.update(np.packbits(self.cells.solid != 0).tobytes())
+        if self.ceiling != CEILING:
+            digest.update(np.array((self.ceiling,), np.float64).tobytes())
         return digest.hexdigest()
 
 

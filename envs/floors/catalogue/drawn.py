@@ -1,19 +1,22 @@
 """Drawn floors: our own plans as short JSON files in `data/`.
 
-A file holds, all in metres and degrees::
+A file holds, all in metres and degrees, what it needs of::
 
     {
-      "name": "apartment", "about": "one sentence", "bounds": [0, 0, 11, 8],                       the outer
-      walls' outer faces "outer_wall": 0.2,                             thickness, inside of the bounds
-      "walls": [[0, 4, 8, 4], [8, 4, 8, 0, 0.2]],    middle line x, y, x, y, and the thickness where it is not
-      0.1 "blocks": [[3, 3, 5, 4]],                      solid rectangles x, y, x, y "doors": [[2, 4], [6, 4,
-      1.2]],                middle of the gap and its width where it is not 0.9 "rooms": [[[0, 0], [3, 0], [3,
-      9], [0, 9]]],   outlines of free space, apart from each other: all else is solid, no outer walls
-      "obstacles": [{"corners": [[1, 1], ...], "height": 1.2}],   a solid of any outline; one without a height
-      reaches the ceiling "wall_height": 2.5,                            of walls, blocks and what surrounds
-      rooms; to the ceiling where left out "furniture": [["bed", 2, 7, 90, 1.6, 2.0]],    kind, middle,
-      direction of its back, and width and depth if wanted "starts": [[1, 1, 0]],                         x,
-      y, heading "goal": [7, 7]
+      "name": "apartment",
+      "about": "one sentence",
+      "bounds": [0, 0, 11, 8],                 the outer walls' outer faces
+      "outer_wall": 0.2,                       their thickness, inside of the bounds
+      "walls": [[0, 4, 8, 4, 0.2]],            middle line x, y, x, y; thickness where it is not 0.1
+      "doors": [[6, 4, 1.2]],                  middle of the gap; its width where it is not 0.9
+      "blocks": [[3, 3, 5, 4]],                solid rectangles x, y, x, y
+      "rooms": [[[0, 0], [3, 0], [3, 9]]],     outlines of free space; all else is solid, no outer walls
+      "obstacles": [{"corners": [[1, 1], [2, 1], [2, 2]], "height": 1.2}],
+      "wall_height": 2.5,                      of walls, blocks and what surrounds rooms
+      "ceiling": 2.5,                          to which reaches what has no height
+      "furniture": [["bed", 2, 7, 90, 1.6, 2.0]],    kind, middle, direction of its back; width, depth
+      "starts": [[1, 1, 0]],                   x, y, heading
+      "goal": [7, 7]
     }
 
 A door cuts every wall that passes through its middle.
@@ -28,7 +31,7 @@ import numpy as np
 
 from lidarium.envs.floors.drawing import strip
 from lidarium.envs.floors.extent import check_pairs
-from lidarium.envs.floors.floor import Floor, Solid
+from lidarium.envs.floors.floor import CEILING, Floor, Solid
 from lidarium.envs.floors.generation.furniture import place
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.files.names import printable
@@ -103,6 +106,7 @@ def load_drawn(path: Path) -> Floor:
             None,
             np.array(starts).reshape(-1, 3),
             None if goal is None else (goal[0], goal[1]),
+            float(plan.get("ceiling", CEILING)),
         )
 
 

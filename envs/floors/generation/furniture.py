@@ -4,8 +4,9 @@ A laser thus sees the legs of a table, and a tall body meets its top.
 
 A piece is described in its own frame: x to the right of who looks at it, y from its front (0) to its back
 (depth), which stands against a wall. Seats and low tables are closed down to the floor: what a low robot
-(below 0.6 m) would touch, a laser at 0.3 m sees; table tops, desks and basins meet taller bodies only. Parts
-are boxes ``(x_low, y_low, x_high, y_high, z_low, z_high)``.
+(below 0.6 m) would touch, a laser at 0.3 m sees; table tops, desks and basins meet taller bodies only. Pieces
+called open stand on legs or feet, as most real ones do: what is above them, a planar laser misses. Parts are
+boxes ``(x_low, y_low, x_high, y_high, z_low, z_high)``.
 """
 
 import math
@@ -66,6 +67,19 @@ def _chair(width: float, depth: float, x: float = 0.0, y: float = 0.0, back_high
     ]
 
 
+def _open_chair(width: float, depth: float) -> list[Box]:
+    """Make a seat on four legs with a back."""
+    return [
+        (0.0, 0.0, width, depth, 0.42, 0.46),
+        *_legs(0.0, 0.0, width, depth, 0.035, 0.42),
+        (0.0, depth - 0.03, width, depth, 0.46, 0.90),
+    ]
+
+
+def _open_low_table(width: float, depth: float) -> list[Box]:
+    return [(0.0, 0.0, width, depth, 0.40, 0.44), *_legs(0.02, 0.02, width - 0.04, depth - 0.04, 0.05, 0.40)]
+
+
 def _office_chair(width: float, depth: float, x: float = 0.0, y: float = 0.0) -> list[Box]:
     return [
         (x, y, x + width, y + depth, 0.0, 0.52),
@@ -121,6 +135,20 @@ def _desk_group(width: float, depth: float) -> list[Box]:
 
 def _bed(width: float, depth: float) -> list[Box]:
     return [(0.0, 0.0, width, depth - 0.06, 0.0, 0.50), (0.0, depth - 0.06, width, depth, 0.0, 1.0)]
+
+
+def _open_bed(width: float, depth: float) -> list[Box]:
+    """Make a mattress on a frame with four legs and a head board down to the floor."""
+    return [
+        (0.0, 0.0, width, depth - 0.06, 0.30, 0.50),
+        *_legs(0.0, 0.0, width, depth - 0.06, 0.06, 0.30),
+        (0.0, depth - 0.06, width, depth, 0.0, 1.0),
+    ]
+
+
+def _open_shelf(width: float, depth: float) -> list[Box]:
+    """Make a closed shelf on four feet."""
+    return [(0.0, 0.0, width, depth, 0.12, 1.90), *_legs(0.0, 0.0, width, depth, 0.05, 0.12)]
 
 
 def _sofa(width: float, depth: float) -> list[Box]:
@@ -179,6 +207,10 @@ PIECES: dict[str, Piece] = {
     "low table": Piece((0.95, 1.20), (0.50, 0.60), _low_table),
     "meeting table": Piece((2.00, 3.60), (1.60, 1.80), _dining),
     "nightstand": Piece((0.40, 0.50), (0.35, 0.40), _block(0.50)),
+    "open bed": Piece((1.40, 1.80), (2.05, 2.10), _open_bed),
+    "open chair": Piece((0.42, 0.45), (0.42, 0.45), _open_chair),
+    "open low table": Piece((0.95, 1.20), (0.50, 0.60), _open_low_table),
+    "open shelf": Piece((0.80, 1.80), (0.30, 0.40), _open_shelf),
     "plant": Piece((0.35, 0.45), (0.35, 0.45), _block(1.30)),
     "reception": Piece((1.80, 2.60), (0.70, 0.80), _block(1.10)),
     "seats": Piece((1.20, 2.20), (0.55, 0.60), _seats),

@@ -111,7 +111,7 @@ def floor_tables(
     def make() -> FloorTables:
         kept = floor_store().load(key)
         if kept is not None:
-            return FloorTables.unpacked(kept)
+            return FloorTables.unpacked(kept, floor)
         tables = FloorTables.of_floor(floor, raster_resolution, laser_height, body_height)
         floor_store().save(key, tables.packed())
         return tables

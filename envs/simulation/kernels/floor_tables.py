@@ -32,12 +32,15 @@ class FloorTables:
         Tables of the ray casters.
     bound : (rows, columns) uint8
         Lower bound of the distance to the bodies' solid cells [cells].
+    floor : Floor or None
+        What stands there; None where the tables were made of rasters alone.
     """
 
     laser: Raster
     body: Raster
     rays: RayTables = field(repr=False)
     bound: NDArray[np.uint8] = field(repr=False)
+    floor: Floor | None = field(default=None, repr=False)
 
     @classmethod
     def of_floor(
@@ -59,18 +62,18 @@ class FloorTables:
         laser = floor.raster(resolution, laser_height, laser_height)
         if np.array_equal(laser.solid, body.solid):
             laser = body
-        return cls(laser, body, RayTables(laser.solid), distance_bound(body.solid))._frozen()
+        return cls(laser, body, RayTables(laser.solid), distance_bound(body.solid), floor)._frozen()
 
     @classmethod
-    def unpacked(cls, arrays: Mapping[str, NDArray[Any]]) -> "FloorTables":
-        """Make the tables of what `packed` returned."""
+    def unpacked(cls, arrays: Mapping[str, NDArray[Any]], floor: Floor) -> "FloorTables":
+        """Make the tables of a floor of what `packed` returned."""
         x, y, resolution = arrays["frame"].tolist()
         rasters = [
             Raster(_cells(arrays[name], arrays["bound"].shape), (x, y), resolution)
             for name in ("body", "laser")
             if name in arrays
         ]
-        return cls(rasters[-1], rasters[0], RayTables(rasters[-1].solid), arrays["bound"])._frozen()
+        return cls(rasters[-1], rasters[0], RayTables(rasters[-1].solid), arrays["bound"], floor)._frozen()
 
     def packed(self) -> dict[str, NDArray[Any]]:
         """Return the parts that are expensive to make: rasters, bound and frame.

@@ -99,6 +99,25 @@ def _drive(world: WorldArrays, episode: int, robots: int, commands: Array) -> No
 
 
 @kernel(spliced=True)
+def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) -> None:
+    """Read the encoders of an episode, whose wheels drove at ``velocities`` (rows, 2)."""
+    first = episode * robots
+    for row in range(first, first + robots):
+        read_encoders(
+            world.odometry_model,
+            world.noise_table,
+            stream_key(world.seeds[episode], row - first, world.steps[episode]),
+            world.wheels[row],
+            world.bodies[row - first, WHEEL_BASE],
+            world.bodies[row - first, TICKS_PER_METRE],
+            velocities[row],
+            world.sensor[TIME_STEP],
+            world.measured[row],
+            world.odometry[row],
+        )
+
+
+@kernel(spliced=True)
 def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_bodies: bool) -> None:
     """Move the bodies of an episode by ``commands`` (rows, 2), and read their encoders."""
     first, last = episode * robots, (episode + 1) * robots
@@ -126,19 +145,7 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
             world.collisions[first:last],
         )
     if moves_bodies and has_odometry:
-        for row in range(first, last):
-            read_encoders(
-                world.odometry_model,
-                world.noise_table,
-                stream_key(world.seeds[episode], row - first, world.steps[episode]),
-                world.wheels[row],
-                world.bodies[row - first, WHEEL_BASE],
-                world.bodies[row - first, TICKS_PER_METRE],
-                world.velocities[row],
-                world.sensor[TIME_STEP],
-                world.measured[row],
-                world.odometry[row],
-            )
+        _encode(world, episode, robots, world.velocities)
 
 
 @kernel(spliced=True)
@@ -220,6 +227,40 @@ def _perceive_row(table: Array, row: int, robots: int, runs: Array) -> None:
     world = world_at(table)
     if runs[row // robots] and not world.flags[row] & ENDED:
         perceive_robot(world, row, row // robots * robots, robots, scan_scratch(world))
+
+
+@kernel
+def drive(table: Array, robots: int, commands: Array, runs: Array) -> None:
+    """Write into ``driven`` what faults and drives make of ``commands``.
+
+    ``commands`` is (rows, 2), ``runs`` (episodes,). A kidnapped robot is put elsewhere.
+    """
+    world = world_at(table)
+    for episode in range(runs.shape[0]):
+        if runs[episode]:
+            _drive(world, episode, robots, commands)
+
+
+@kernel
+def encode(table: Array, robots: int, velocities: Array, runs: Array) -> None:
+    """Read the encoders of wheels that drove at ``velocities`` (rows, 2)."""
+    world = world_at(table)
+    for episode in range(runs.shape[0]):
+        if runs[episode]:
+            _encode(world, episode, robots, velocities)
+
+
+@kernel
+def sense(table: Array, robots: int, runs: Array) -> None:
+    """Take the scans of all robots that have not ended, where they are."""
+    world = world_at(table)
+    scratch = scan_scratch(world)
+    for episode in range(runs.shape[0]):
+        if not runs[episode]:
+            continue
+        for row in range(episode * robots, (episode + 1) * robots):
+            if not world.flags[row] & ENDED:
+                sense_robot(world, row, episode * robots, robots, scratch)
 
 
 @kernel
