@@ -39,6 +39,7 @@ class AgentInfos:
         self._operating, self._meters = operating, meters
         self._rows = {agent: row for row, agent in enumerate(settings.agents)}
         self._is_battery_limited = settings.battery.is_limited
+        self._camera = settings.camera
 
     def of(self, agents: Sequence[str]) -> dict[str, dict[str, Any]]:
         """Return what a learner may not see, and the operating states, by agent."""
@@ -62,4 +63,7 @@ class AgentInfos:
         if self._is_battery_limited:
             for agent in agents:
                 infos[agent]["energy_j"] = float(self._meters.used_j[rows[agent]])
+        if self._camera is not None:
+            for agent in agents:
+                infos[agent]["camera"] = self._camera.calibration
         return infos

@@ -6,13 +6,14 @@ import numpy as np
 from gymnasium import spaces
 
 from lidarium.envs.settings.exploration import OBSERVABLES, ExplorationSettings
+from lidarium.envs.settings.observables import SENSED
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""
 
 
 KEYS = (*OBSERVABLES, "goal")
-"""All that is ever observed, in the order in which the kernel takes the arrays."""
+"""All that the kernel writes, in the order in which it takes the arrays."""
 
 
 def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:
@@ -46,6 +47,7 @@ def boxes_of(settings: ExplorationSettings) -> dict[str, spaces.Box]:
             0, 255, (len(settings.egocentric_scales), own_cells, own_cells), np.uint8
         ),
         "goal": spaces.Box(-FARTHEST, FARTHEST, (2,), np.float32),
+        **{name: SENSED[name].box(settings) for name in settings.observe if name in SENSED},
     }
 
 

@@ -70,7 +70,13 @@ class ObservationWriter:
             )
         kinds = {name: ((self.rows, *box.shape), box.dtype) for name, box in boxes_of(settings).items()}
         self._kinds = [kinds[name] for name in self.keys]
-        # The kernel takes the arrays of all keys, in their order; what is not observed stands behind what is.
+        self._sensed = [(place, name) for place, name in enumerate(self.keys) if name not in KEYS]
+        missing = [name for _, name in self._sensed if name not in simulation.sensors]
+        if missing:
+            raise ValueError(
+                f"the world has no sensor {missing[0]!r}; it has {', '.join(simulation.sensors)}"
+            )
+        # The kernel takes the arrays of all its keys, in order; what is not observed stands behind what is.
         absent = [name for name in KEYS if name not in self.keys]
         self._absent = [np.empty((0,) * len(kinds[name][0]), kinds[name][1]) for name in absent]
         self._in_order = itemgetter(*((*self.keys, *absent).index(name) for name in KEYS))
@@ -130,7 +136,21 @@ class ObservationWriter:
             write_parallel(chosen, sources, observed)
         else:
             write_serial(chosen, sources, observed)
+        self._copy_sensors(arrays, active)
         return dict(zip(self.keys, arrays, strict=True)) if out is None else out
+
+    def copy_sensors(self, out: Mapping[str, NDArray[Any]], active: NDArray[np.bool_]) -> None:
+        """Write what the kernel does not write: last measurements of sensors, of the rows that are active."""
+        if self._sensed:
+            self._copy_sensors([out[name] for name in self.keys], active)
+
+    def _copy_sensors(self, arrays: list[NDArray[Any]], active: NDArray[np.bool_] | None) -> None:
+        for place, name in self._sensed:
+            measured = self._simulation.sensors[name].reshape(arrays[place].shape)
+            if active is None:
+                arrays[place][:] = measured
+            else:
+                arrays[place][active] = measured[active]
 
     def arguments(self, out: Mapping[str, NDArray[Any]]) -> tuple[Array, Arrays]:
         """Return what ``write_row`` takes beside the row.

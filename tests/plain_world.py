@@ -27,6 +27,7 @@ class PlainWorld:
         self.floors = [None] * episodes
         self.seeds, self.steps = np.zeros(episodes, np.uint64), np.zeros(episodes, np.int64)
         self.starts, self.poses, self.velocities = (np.zeros((rows, n)) for n in (3, 3, 2))
+        self.attitudes = np.zeros((rows, 3))
         self.moves, self.flags = np.ones(rows, np.uint8), np.zeros(rows, np.int64)
         self.failed, self.contacts = np.zeros(rows, np.uint8), np.zeros(rows, np.uint8)
         self.travelled, self.collisions = np.zeros(rows), np.zeros(rows, np.int64)

@@ -100,6 +100,7 @@ class BatchRun:
             new_queue(),
             threads,
         )
+        self._writer.copy_sensors(observations, seen)
 
     def _run_staged(
         self,

@@ -39,6 +39,13 @@ class RowInfos:
         self._rows = simulation.robots * simulation.episodes
         self.everyone = _frozen(np.ones(self._rows, np.bool_))
         self._no_orders = _frozen(np.full(self._rows, "", object))
+        camera = None if simulation.camera is None else simulation.camera.camera.calibration
+        self._calibration = camera and {
+            "intrinsics": {
+                name: _frozen(np.full(self._rows, value)) for name, value in camera["intrinsics"].items()
+            },
+            "mount": _frozen(np.tile(camera["mount"], (self._rows, 1))),
+        }
         self._states = _frozen(np.full(self._rows, OperatingState.OPERATING.value, object))
 
     def begin(self, rows: NDArray[np.bool_]) -> None:
@@ -80,6 +87,8 @@ class RowInfos:
             infos["ended_because"], infos["_ended_because"] = names, ended
             self._note_states(ended, [state_after(name).value for name in names[ended]])
         infos["state"], infos["_state"] = self._states, everyone
+        if self._calibration is not None:
+            infos["camera"], infos["_camera"] = self._calibration, everyone
         return infos
 
     def _note_states(self, rows: NDArray[np.bool_], states: str | list[str]) -> None:

@@ -41,7 +41,9 @@ class Software:
         self._perception, self._settings = perception, settings
         self._localizes = settings.localization not in KERNEL_LOCALIZATIONS
         self._beams = np.empty(settings.lidar.beams, np.float32)
-        self.is_staged = self._localizes or bool(perception.exchanges) or not perception.simulation.is_fused
+        has_camera = perception.simulation.camera is not None
+        is_fused = perception.simulation.is_fused and not has_camera
+        self.is_staged = self._localizes or bool(perception.exchanges) or not is_fused
 
     def start(self, episode: int, seed: int) -> None:
         """Begin an episode, after its robots were placed.

@@ -1,14 +1,18 @@
 """Every knob of the exploration environments, with its unit and default."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
 from lidarium.envs.settings.battery import BATTERIES, Battery
+from lidarium.envs.settings.cameras import CAMERAS as CAMERAS
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
 from lidarium.envs.settings.lidar import LIDARS, Lidar
 from lidarium.envs.settings.limits import OBSERVABLES as OBSERVABLES
 from lidarium.envs.settings.limits import check_workload, egocentric_scales_of, observed_names
+from lidarium.envs.settings.observables import check_sensed
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.radio import RADIO, RadioSettings
 from lidarium.envs.settings.rewards import RewardSettings
@@ -61,6 +65,8 @@ class ExplorationSettings:
         The body of each.
     lidar : Lidar
         The laser of each.
+    camera : DepthCamera or None
+        The depth camera of each; None for none.
     occupancy : OccupancySettings
         Their maps.
     reward : RewardSettings
@@ -98,7 +104,8 @@ class ExplorationSettings:
     goal_radius : float
         Distance to the goal, where the floor has one, at which a robot ends as ``reached`` [m].
     observe : tuple of str
-        What the robots observe, any of ``OBSERVABLES``; given in any order, kept in that of ``OBSERVABLES``.
+        What the robots observe: any of ``OBSERVABLES``, kept in that order, and of the registry
+        ``observable``.
     map_cells : int
         Side of the observed ``map`` [cells], a multiple of 2; half of it is how far a waypoint of the level
         of waypoints can lie.
@@ -117,6 +124,7 @@ class ExplorationSettings:
     robots: Annotated[int, within(1, MAX_ROBOTS)] = 3
     robot: Robot = field(default_factory=lambda: ROBOTS["kobuki"])
     lidar: Lidar = field(default_factory=lambda: LIDARS["urg"])
+    camera: DepthCamera | None = None
     occupancy: Annotated[OccupancySettings, OCCUPANCY] = field(default_factory=OccupancySettings)
     reward: RewardSettings = field(default_factory=RewardSettings)
     known_starts: bool = True
@@ -144,10 +152,12 @@ class ExplorationSettings:
 
     def __post_init__(self) -> None:
         for name, wanted in PARTS.items():
-            if not isinstance(getattr(self, name), wanted):
+            is_absent = getattr(self, name) is None and name in OPTIONAL_PARTS
+            if not is_absent and not isinstance(getattr(self, name), wanted):
                 raise ValueError(
                     f"{name} is {shown(getattr(self, name))}; want "
                     f"{wanted.__name__}{' or its name' if name in REGISTRIES else ''}"
+                    f"{', or None' if name in OPTIONAL_PARTS else ''}"
                 )
         check_settings(self)
         if self.localization not in localizations():
@@ -175,7 +185,23 @@ class ExplorationSettings:
                 f"decision_period_s is {self.decision_period_s} s; want at least the time step of "
                 f"{self.time_step} s"
             )
+        if self.camera is not None:
+            self._check_camera(self.camera)
+        check_sensed(self)
         check_workload(self)
+
+    def _check_camera(self, camera: DepthCamera) -> None:
+        """Check that the mount is on the robot, where no wall can be."""
+        if math.hypot(camera.forward, camera.left) > self.robot.radius:
+            raise ValueError(
+                f"the camera is mounted at forward {camera.forward} m, left {camera.left} m, beyond the "
+                f"robot's radius of {self.robot.radius} m, where a wall may be; want it on the robot"
+            )
+        if camera.height > self.robot.height:
+            raise ValueError(
+                f"height of the camera is {camera.height} m, above the robot's height of "
+                f"{self.robot.height} m, where furniture may be; want at most that, or a higher robot"
+            )
 
     def _check_localizer(self) -> None:
         if self.localization not in LOCALIZERS:
@@ -217,12 +243,18 @@ class ExplorationSettings:
         return max(round(self.decision_period_s / self.time_step), 1)
 
 
+_KINDS = {name: (kind, *get_args(kind)) for name, kind in get_type_hints(ExplorationSettings).items()}
+
 PARTS: dict[str, type] = {
     name: kind
-    for name, kind in get_type_hints(ExplorationSettings).items()
+    for name, kinds in _KINDS.items()
+    for kind in kinds
     if isinstance(kind, type) and is_dataclass(kind)
 }
 """Settings that are made of others."""
+
+OPTIONAL_PARTS = tuple(name for name in PARTS if type(None) in _KINDS[name])
+"""Those that may be None."""
 
 
 def localizations() -> tuple[str, ...]:

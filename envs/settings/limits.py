@@ -9,15 +9,15 @@ from numbers import Integral
 from typing import Any
 
 from lidarium.mapping.geometry.bounds import shown
-from lidarium.registry import unknown
+from lidarium.registry import registry, unknown
 
 MAX_EGOCENTRIC_SCALE = 64
 MAX_SCALES = 16
 
 OBSERVABLES = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
-"""What a robot can observe, in the order in which observations have it.
+"""What any robot can observe, in the order in which observations have it.
 
-A goal is observed wherever the floor has one.
+A goal is observed wherever the floor has one. What further sensors measure is in the registry ``observable``.
 """
 
 MOST_SCAN_CELLS = 16_384
@@ -64,7 +64,8 @@ def _drive(settings: Any) -> float:  # noqa: ANN401
 
 def _observed(settings: Any) -> float:  # noqa: ANN401
     crops = len(settings.egocentric_scales) * settings.egocentric_cells**2
-    return float(settings.robots * (settings.map_cells**2 + crops))
+    pixels = 0 if settings.camera is None else settings.camera.rows * settings.camera.columns
+    return float(settings.robots * (settings.map_cells**2 + crops + 4 * pixels))
 
 
 PRODUCTS = (
@@ -93,10 +94,10 @@ PRODUCTS = (
         "smaller, slower or fewer robots, or a coarser raster_resolution",
     ),
     Product(
-        "the number of cells that are observed, robots * (map_cells^2 + scales * egocentric_cells^2),",
+        "the size of what is observed, robots * (map_cells^2 + scales * egocentric_cells^2 + 4 * pixels),",
         _observed,
         MOST_OBSERVED,
-        "fewer map_cells or egocentric_cells",
+        "fewer map_cells, egocentric_cells or pixels",
     ),
     Product(
         "the number of steps of an episode, horizon_s / time_step,",
@@ -131,19 +132,20 @@ def check_workload(settings: Any) -> None:  # noqa: ANN401
 
 
 def observed_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Return names of what is observed in the order of ``OBSERVABLES``, checked."""
-    wanted = f"want one or more of {', '.join(OBSERVABLES)}"
+    """Return names of what is observed, checked, in the order of ``OBSERVABLES`` and then of the registry."""
+    known = (*OBSERVABLES, *registry("observable"))
+    wanted = f"want one or more of {', '.join(known)}"
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise ValueError(f"observe is {shown(names)}; {wanted}, in a list or tuple")
     names = tuple(names)
     for name in names:
-        if name not in OBSERVABLES:
-            raise ValueError(f"observe has an {unknown('name', name, OBSERVABLES)}")
+        if name not in known:
+            raise ValueError(f"observe has an {unknown('name', name, known)}")
         if names.count(name) > 1:
             raise ValueError(f"observe is {names}; want {name!r} once")
     if not names:
         raise ValueError(f"observe is empty ({names}); {wanted}")
-    return tuple(name for name in OBSERVABLES if name in names)
+    return tuple(name for name in known if name in names)
 
 
 def egocentric_scales_of(scales: Iterable[int]) -> tuple[int, ...]:

@@ -5,7 +5,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from lidarium.envs.settings.exploration import OCCUPANCY, PARTS, ExplorationSettings, localizer_settings
+from lidarium.envs.settings.exploration import (
+    OCCUPANCY,
+    OPTIONAL_PARTS,
+    PARTS,
+    ExplorationSettings,
+    localizer_settings,
+)
 from lidarium.envs.settings.lidar import NOISE, Lidar
 from lidarium.envs.settings.realism import REALISM
 from lidarium.mapping.geometry.bounds import Rule, check_values, rules_of, shown, within
@@ -30,8 +36,8 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         Where to start from; the defaults where None.
     **options
         Any attribute of ``ExplorationSettings``; a part such as ``robot`` or ``reward`` also as a mapping of
-        its values, and ``robot``, ``lidar``, ``odometry``, ``radio`` and ``battery`` by name. ``noise``
-        (none, datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m],
+        its values, and ``robot``, ``lidar``, ``camera``, ``odometry``, ``radio`` and ``battery`` by name.
+        ``noise`` (none, datasheet or thesis) for the laser's noise, ``resolution`` for the maps' cell [m],
         ``max_cycles`` (steps) in place of ``horizon_s``; ``realism`` (ideal, lab or field) for all of noise,
         odometry, localization, radio and faults that is not given itself; ``assigned`` for single values, as
         ``assign`` takes them, set last.
@@ -114,6 +120,8 @@ def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> Explora
         path = name.strip().split(".")
         if path[0] == "localizer" and settings.localizer is None:
             settings = replace(settings, localizer=localizer_settings(settings.localization, {}))
+        if path[0] in OPTIONAL_PARTS and len(path) > 1 and getattr(settings, path[0]) is None:
+            settings = replace(settings, **{path[0]: PARTS[path[0]]()})
         settings = _replaced(settings, path, _value(text.strip()), name.strip())
     return settings
 

@@ -79,11 +79,11 @@ def documented_attributes(kind: type) -> dict[str, tuple[str, str]]:
     return found
 
 
-def markdown_table() -> str:
-    """Return the table of all settings as Markdown."""
+def markdown_table(settings: Any = None, prefix: str = "") -> str:  # noqa: ANN401
+    """Return the table of all settings, or of those of a part, as Markdown."""
     rows = [
         f"| `{row.name}` | {row.kind} | `{_shown(row.default)}` | {row.bounds} | {row.summary} |"
-        for row in settings_table()
+        for row in settings_table(settings, prefix)
     ]
     return (
         "\n".join(["| setting | type | default | bounds | what it is |", "|---|---|---|---|---|", *rows])

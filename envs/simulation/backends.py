@@ -32,7 +32,7 @@ def simulation_of(
     world: World, settings: ExplorationSettings, kind: type[Simulation] = Simulation
 ) -> Simulation:
     """Return the simulation of a world, with the beliefs and the score that settings ask for."""
-    return kind(
+    simulation = kind(
         world,
         settings.lidar,
         settings.occupancy,
@@ -43,6 +43,9 @@ def simulation_of(
         settings.localization,
         settings.radio.is_ideal,
     )
+    if settings.camera is not None:
+        simulation.mount(settings.camera)
+    return simulation
 
 
 def make_kinematic(settings: ExplorationSettings, episodes: int = 1) -> Simulation:

@@ -61,3 +61,6 @@ class KinematicSimulation(Simulation):
         step = step_rows if self._is_parallel and self.use_threads() > 1 else step_serial
         chosen = self._everywhere if runs is None else runs
         step(self._table, self.robots, commands, chosen, moves_bodies, perceives)
+        if self.camera is not None:
+            # The kernel has counted the step.
+            self.camera.take(self.world.steps - 1, runs)

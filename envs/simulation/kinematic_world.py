@@ -65,6 +65,7 @@ class KinematicWorld:
             np.zeros((rows, 3)),
             np.zeros((rows, 2)),
         )
+        self.attitudes = np.zeros((rows, 3))
         self.moves, self.flags = np.ones(rows, np.uint8), np.zeros(rows, np.int64)
         self.failed, self.faults = np.zeros(rows, np.uint8), np.zeros((rows, faults.capacity * FAULT_NUMBERS))
         self.bumpers, self.contacts = np.zeros((rows, 3), np.int8), np.zeros(rows, np.uint8)

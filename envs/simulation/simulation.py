@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.scoring.score import Score
+from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.beliefs import Beliefs
+from lidarium.envs.simulation.depth.depth_sensor import DepthSensor
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE
 from lidarium.envs.simulation.disturbances.odometry import RADIUS
 from lidarium.envs.simulation.kernels.arrays import (
@@ -83,6 +85,8 @@ class Simulation:
     ----------
     world, beliefs, score : World, Beliefs, Score
         Its three parts.
+    camera : DepthSensor or None
+        The depth cameras of the robots, where they have any.
     """
 
     is_fused = False
@@ -118,6 +122,17 @@ class Simulation:
         self._threads = min(threads, int(os.cpu_count() or 1))
         self._is_parallel = self.threads > 1
         self._table = table_of_owners(self, world, self.beliefs, self.score)
+        self.camera: DepthSensor | None = None
+
+    def mount(self, camera: DepthCamera) -> None:
+        """Put a depth camera on each robot."""
+        self.camera = DepthSensor(self.world, camera, self.time_step, self._threads)
+
+    @property
+    def sensors(self) -> Mapping[str, NDArray[Any]]:
+        """What the sensors measured last, by name: those of the world, and ``depth`` of the cameras."""
+        sensors = self.world.sensors
+        return sensors if self.camera is None else {**sensors, "depth": self.camera.frames}
 
     def place(
         self,
@@ -151,6 +166,8 @@ class Simulation:
             # Log-odds take a byte a cell; masks and pooled maps hardly half of that.
             self._pool = ArrayPool(3 * counted.size * WORD * self.robots * self.episodes // 2)
         self.world.place(episode, floor, starts, free, seed)
+        if self.camera is not None:
+            self.camera.place(episode, floor)
         self.frames[episode] = floor.frame
         self.score.place(episode, counted, self._pool)
         for row in range(first, last):
@@ -217,6 +234,8 @@ class Simulation:
             Which episodes take the step; all where None.
         """
         self.world.move_and_sense(commands, moves_bodies=moves_bodies, runs=runs)
+        if self.camera is not None:
+            self.camera.take(self.world.steps, runs)
         score_and_localize(self._table, self.robots, self._everywhere if runs is None else runs)
         if perceives:
             self.perceive(runs)

@@ -261,8 +261,9 @@ def settings_sha256(settings: ExplorationSettings) -> str:
     """
     values = asdict(settings)
     del values["threads"]
-    if values["localizer"] is None:
-        del values["localizer"]
+    for name in ("localizer", "camera"):
+        if values[name] is None:
+            del values[name]
     if not values["reward"]["more"]:
         del values["reward"]["more"]
     return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

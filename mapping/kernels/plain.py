@@ -101,3 +101,11 @@ def lower_ranges(
 def crop_block(rows: Array, places: Array) -> Levels:
     """Return the 8 x 8 levels of the cells at some places, 16 * row + column, of loaded rows."""
     return levels_of(rows.reshape(-1)[places]).reshape(8, 8)
+
+
+def raised_pixels(pixels: Array, start: float, slope: float, first: int, last: int) -> NDArray[np.float32]:
+    """Return pixels, those from ``first`` to ``last`` at least ``start + slope * place``."""
+    places = np.arange(len(pixels))
+    new = np.float32(start) + np.float32(slope) * places.astype(np.float32)
+    is_within = (first <= places) & (places <= last)
+    return np.where(is_within & (new > pixels), new, pixels).astype(np.float32)

@@ -2,7 +2,8 @@
 
 ``parallel_env`` makes the PettingZoo environment, ``env`` its turn-based form, ``vector_env`` and
 ``sb3_vec_env`` many episodes at once, and after ``import lidarium`` Gymnasium knows
-``lidarium/Exploration-v0``, ``lidarium/WaypointExploration-v0`` and ``lidarium/FrontierExploration-v0``.
+``lidarium/Exploration-v0``, ``lidarium/WaypointExploration-v0``, ``lidarium/FrontierExploration-v0`` and
+``lidarium/Exploration3D-v0``.
 """
 
 import sys
@@ -42,22 +43,30 @@ class _MovedModules:
 if not any(getattr(finder, "__name__", "") == _MovedModules.__name__ for finder in sys.meta_path):
     sys.meta_path.append(_MovedModules)
 
-_LEVELS = {"Exploration": "velocity", "WaypointExploration": "waypoint", "FrontierExploration": "frontier"}
+_IDS: dict[str, dict[str, Any]] = {
+    "Exploration": {"level": "velocity"},
+    "WaypointExploration": {"level": "waypoint"},
+    "FrontierExploration": {"level": "frontier"},
+    "Exploration3D": {
+        "level": "velocity",
+        "camera": "xtion",
+        "observe": ("scan", "pose", "velocity", "bumper", "map", "depth"),
+    },
+}
+"""What each id means; options of the maker go before."""
 
-for _name, _level in _LEVELS.items():
+for _name, _options in _IDS.items():
     if f"lidarium/{_name}-v0" not in gymnasium.registry:
         gymnasium.register(
             id=f"lidarium/{_name}-v0",
             entry_point="lidarium.envs.levels.gymnasium_env:SoloExploration",
             vector_entry_point="lidarium.envs.batch.vector_env:make_vector_env",
-            kwargs={"level": _level},
+            kwargs=_options,
         )
         pettingzoo.register(
-            "parallel", f"lidarium/{_name}-v0", entry_point="lidarium:parallel_env", kwargs={"level": _level}
+            "parallel", f"lidarium/{_name}-v0", entry_point="lidarium:parallel_env", kwargs=_options
         )
-        pettingzoo.register(
-            "aec", f"lidarium/{_name}-v0", entry_point="lidarium:env", kwargs={"level": _level}
-        )
+        pettingzoo.register("aec", f"lidarium/{_name}-v0", entry_point="lidarium:env", kwargs=_options)
 
 
 def parallel_env(

@@ -16,6 +16,8 @@ REGISTRIES: dict[str, str] = {
     "policy": "lidarium.agents.catalogue:POLICIES",
     "robot": "lidarium.envs.settings.robots:ROBOTS",
     "lidar": "lidarium.envs.settings.lidar:LIDARS",
+    "camera": "lidarium.envs.settings.cameras:CAMERAS",
+    "observable": "lidarium.envs.settings.observables:SENSED",
     "noise": "lidarium.envs.settings.lidar:NOISE",
     "odometry": "lidarium.envs.settings.odometry:ODOMETRY",
     "radio": "lidarium.envs.settings.radio:RADIO",

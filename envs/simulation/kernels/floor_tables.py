@@ -5,11 +5,13 @@ Shared by all episodes on it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.faces import Faces, faces_of
 from lidarium.envs.floors.floor import Floor, Raster
 from lidarium.envs.simulation.kernels.motion import distance_bound
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
@@ -86,6 +88,19 @@ class FloorTables:
             "body": np.packbits(self.body.solid),
         }
         return arrays if self.laser is self.body else {**arrays, "laser": np.packbits(self.laser.solid)}
+
+    @cached_property
+    def faces(self) -> Faces:
+        """Faces of the floor, for cameras.
+
+        Raises
+        ------
+        ValueError
+            Where the tables were made of rasters alone.
+        """
+        if self.floor is None:
+            raise ValueError("these tables know no floor (floor is None); want those of a floor for a camera")
+        return faces_of(self.floor)
 
     @property
     def nbytes(self) -> int:

@@ -1,0 +1,99 @@
+"""Bodies of robots drawn into inverse depths: upright cylinders, exact at pixel centres."""
+
+import math
+
+import numpy as np
+
+from lidarium.envs.simulation.depth.face_drawing import (
+    CENTRE_COLUMN,
+    CENTRE_ROW,
+    COLUMNS,
+    DEPTH_MAX,
+    FOCAL,
+    NEAR,
+    ROWS,
+)
+from lidarium.mapping.kernels.compilation import Array, kernel
+
+
+@kernel(borrowing=True)
+def _box_around(
+    centre: Array, radius: float, height: float, axes: Array, eye: Array, view: Array
+) -> tuple[int, int, int, int]:
+    """Return the first and last row and column of an image between which a cylinder lies."""
+    low_row, high_row, low_column, high_column = math.inf, -math.inf, math.inf, -math.inf
+    for corner in range(8):
+        x = centre[0] - eye[0] + (radius if corner & 1 else -radius)
+        y = centre[1] - eye[1] + (radius if corner & 2 else -radius)
+        z = centre[2] - eye[2] + (height if corner & 4 else 0.0)
+        ahead = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+        if ahead < NEAR:
+            return 0, int(view[ROWS]) - 1, 0, int(view[COLUMNS]) - 1
+        across = (axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z) / ahead
+        down = (axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z) / ahead
+        low_row, high_row = min(low_row, down), max(high_row, down)
+        low_column, high_column = min(low_column, across), max(high_column, across)
+    focal = view[FOCAL]
+    return (
+        max(int(math.ceil(max(view[CENTRE_ROW] + focal * low_row, 0.0))), 0),
+        int(math.floor(min(view[CENTRE_ROW] + focal * high_row, view[ROWS] - 1.0))),
+        max(int(math.ceil(max(view[CENTRE_COLUMN] + focal * low_column, 0.0))), 0),
+        int(math.floor(min(view[CENTRE_COLUMN] + focal * high_column, view[COLUMNS] - 1.0))),
+    )
+
+
+@kernel(inline=True)
+def _meets_cylinder(
+    x: float, y: float, z: float, ray_x: float, ray_y: float, ray_z: float, radius: float, height: float
+) -> float:
+    """Return the inverse of how far along a ray an upright cylinder is met from the outside, or 0.
+
+    The ray begins at x, y, z from the middle of the cylinder's base [m].
+    """
+    squared = ray_x * ray_x + ray_y * ray_y
+    inward = x * ray_x + y * ray_y
+    outside = x * x + y * y - radius * radius
+    if outside > 0.0 and squared > 0.0:
+        root = inward * inward - squared * outside
+        if root >= 0.0 and inward < 0.0:
+            along = outside / (math.sqrt(root) - inward)
+            met = z + along * ray_z
+            if 0.0 <= met <= height:
+                return 1.0 / along
+    if z > height and ray_z < 0.0:
+        along = (height - z) / ray_z
+        met_x, met_y = x + along * ray_x, y + along * ray_y
+        if met_x * met_x + met_y * met_y <= radius * radius:
+            return 1.0 / along
+    return 0.0
+
+
+@kernel(borrowing=True)
+def draw_body(
+    centre: Array, radius: float, height: float, axes: Array, eye: Array, view: Array, inverse: Array
+) -> None:
+    """Draw an upright cylinder into inverse depths.
+
+    Parameters
+    ----------
+    centre : (3,) float64
+        Middle of its base in the world [m].
+    radius, height : float
+        Its size [m].
+    axes, eye, view, inverse
+        As in ``face_drawing.draw_faces``.
+    """
+    x, y, z = eye[0] - centre[0], eye[1] - centre[1], eye[2] - centre[2]
+    if math.hypot(x, y) > radius + view[DEPTH_MAX] / math.cos(math.atan(view[COLUMNS] / view[FOCAL])):
+        return
+    first, last, left, right = _box_around(centre, radius, height, axes, eye, view)
+    scale = 1.0 / view[FOCAL]
+    for row in range(first, last + 1):
+        down = (row - view[CENTRE_ROW]) * scale
+        for column in range(left, right + 1):
+            across = (column - view[CENTRE_COLUMN]) * scale
+            ray_x = axes[0, 0] * across + axes[1, 0] * down + axes[2, 0]
+            ray_y = axes[0, 1] * across + axes[1, 1] * down + axes[2, 1]
+            ray_z = axes[0, 2] * across + axes[1, 2] * down + axes[2, 2]
+            met = np.float32(_meets_cylinder(x, y, z, ray_x, ray_y, ray_z, radius, height))
+            inverse[row, column] = max(inverse[row, column], met)
