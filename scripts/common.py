@@ -48,6 +48,8 @@ class TeamCommand(Command):
     """body of the robots; `lidarium show robots` lists them"""
     lidar: str = "urg"
     """laser of the robots; `lidarium show lidars` lists them"""
+    camera: str | None = None
+    """depth camera of the robots; `lidarium show cameras` lists them"""
     realism: str = "ideal"
     """how real the world is: ideal, lab or field; the options below change parts of it"""
     noise: str | None = None
@@ -88,7 +90,7 @@ class TeamCommand(Command):
         """
         given = {
             name: getattr(self, name)
-            for name in ("noise", "odometry", "localization", "radio", "battery")
+            for name in ("camera", "noise", "odometry", "localization", "radio", "battery")
             if getattr(self, name) is not None
         }
         starts = {"known_starts": False} if self.unknown_starts else {}

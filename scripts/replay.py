@@ -13,6 +13,7 @@ from lidarium.scripts.common import DONE, NO, Answer, Command, table, tell
 
 if TYPE_CHECKING:
     from lidarium.envs.exploration import ExplorationEnv
+    from lidarium.envs.floors.floor import Floor
     from lidarium.evaluation.record import EpisodeRecord
 
 
@@ -83,7 +84,7 @@ def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
         files.append(str(command.picture))
     if command.video is not None:
         tell(f"filming {record.display.times[-1]:.0f} s")
-        save_track_film(command.video, record, command.video_speed)
+        save_track_film(command.video, record, command.video_speed, floor=_floor_of_camera(command, record))
         files.append(str(command.video))
     display = record.display
     result = {
@@ -100,6 +101,24 @@ def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
         ("files", ", ".join(files)),
     ]
     return Answer(result, "\n".join([_title(result), table(facts)]))
+
+
+def _floor_of_camera(command: Replay, record: "EpisodeRecord") -> "Floor | None":
+    """Return the floor that the cameras of a record see.
+
+    It is None where robots had no cameras, or where the floor is not found.
+    """
+    from lidarium.evaluation.record.replay import find_floor
+
+    if not record.header["settings"].get("camera"):
+        return None
+    try:
+        return find_floor(record.header, command.floor)
+    except ValueError as error:
+        if command.floor is not None:
+            raise
+        tell(f"the film is without cameras: {error}")
+        return None
 
 
 def _run_again(command: Replay, record: "EpisodeRecord") -> Answer:

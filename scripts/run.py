@@ -27,6 +27,9 @@ LONE_POLICY, TEAM_POLICY = "nearest_frontier", "supervised"
 TEAM_WORLD: dict[str, Any] = {"noise": "datasheet", "odometry": "typical", "localization": "slam"}
 """How real the world of a team is where nothing is said."""
 
+VIEW_SIZE = 900, 1200
+"""Rows and columns of the picture from above [pixels]."""
+
 STOP_COVERAGE = 0.99
 """Share of the floor at which a run without a goal ends."""
 
@@ -262,10 +265,13 @@ def _write(
     log_odds, (x, y) = team_log_odds(episode.env)
     write_ros_map(folder, "map", three_levels(log_odds), (x, y, 0.0), command.map_resolution)
     save_run_picture(folder / "run.png", episode, command.chosen_policy)
+    if command.camera is not None:
+        _save_view(folder / "view.png", episode)
     report = episode.policy.report()
     if report.supervision is not None:
         write_text(folder / "decisions.jsonl", decision_lines(report))
     asked_for = [
+        *(["view.png"] if command.camera is not None else []),
         *(["decisions.jsonl"] if report.supervision is not None else []),
         *(["episode.npz"] if recorder is not None else []),
         *(["run.mp4"] if command.video else []),
@@ -273,6 +279,20 @@ def _write(
     files = ["result.json", "map.yaml", "map.pgm", "run.png", *asked_for]
     check_written(folder, files)
     return files
+
+
+def _save_view(path: Path, episode: "Episode") -> None:
+    """Draw the floor from above, with the robots where they ended."""
+    import imageio.v3 as imageio
+
+    from lidarium.envs.drawing.views import views_of
+    from lidarium.evaluation.episodes.output import whole_file
+
+    env = episode.env
+    assert env.floor is not None
+    views = views_of(env.floor, env.settings.robot, env.settings.robots)
+    with whole_file(path) as beside:
+        imageio.imwrite(beside, views.from_above(env.world.poses, VIEW_SIZE), extension=".png")
 
 
 def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]) -> str:

@@ -23,6 +23,7 @@ class Show(Command):
             "policies",
             "robots",
             "lidars",
+            "cameras",
             "realism",
             "odometry",
             "localizers",
@@ -75,6 +76,28 @@ def _robots() -> tuple[dict[str, Any], str]:
         for name, robot in ROBOTS.items()
     ]
     return {"robots": {name: asdict(robot) for name, robot in ROBOTS.items()}}, table(rows, header, indent="")
+
+
+def _cameras() -> tuple[dict[str, Any], str]:
+    import math
+
+    from lidarium.envs.settings.cameras import CAMERAS
+
+    header = ("camera", "pixels", "view [deg]", "from [m]", "to [m]", "height [m]", "noisy")
+    rows = [
+        (
+            name,
+            f"{camera.columns} x {camera.rows}",
+            round(math.degrees(camera.field_of_view), 1),
+            camera.depth_min,
+            camera.depth_max,
+            camera.height,
+            "yes" if camera.is_noisy else "no",
+        )
+        for name, camera in CAMERAS.items()
+    ]
+    result = {"cameras": {name: asdict(camera) for name, camera in CAMERAS.items()}}
+    return result, table(rows, header, indent="")
 
 
 def _lidars() -> tuple[dict[str, Any], str]:
@@ -215,6 +238,7 @@ _LISTS = {
     "policies": _policies,
     "robots": _robots,
     "lidars": _lidars,
+    "cameras": _cameras,
     "realism": _realism,
     "odometry": _odometry,
     "localizers": _localizers,

@@ -50,3 +50,11 @@ def test_commands_of_tutorials_exist(name):
         )
     )
     assert named <= known_commands()
+
+
+def test_the_furnished_apartment_is_mapped_as_the_tutorial_says(capsys):
+    name = "map_a_furnished_apartment.md"
+    exec(compile(code_of(name), name, "exec"), {})
+    text = (TUTORIALS / name).read_text(encoding="utf-8")
+    shown = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
+    assert capsys.readouterr().out == "".join(shown)

@@ -85,7 +85,7 @@ def draw_frame(
 
     The truth: free floor is faint where unexplored and white where the team has sensed it, walls are dark
     where the team has been near. On it the robots with their headings, their last scans as fans, and their
-    ways of the last minute.
+    ways of the last minute. Beside it, where robots have cameras, what the first one sees.
 
     Parameters
     ----------
@@ -127,7 +127,23 @@ def draw_frame(
     )
     if draw_over is not None:
         draw_over(frame, view)
-    return with_header(frame, scene.name, scene.scorer.coverage, scene.scorer.time)
+    frame = with_header(frame, scene.name, scene.scorer.coverage, scene.scorer.time)
+    return _with_panel(frame, scene, tables)
+
+
+def _with_panel(frame: Frame, scene: Scene, tables: FloorTables) -> Frame:
+    """Put what the first robot's camera sees beside a frame, where there is a camera."""
+    sensor, world = scene.simulation.camera, scene.simulation.world
+    if sensor is None or tables.floor is None:
+        return frame
+    from lidarium.envs.drawing.views import camera_panel, views_of
+
+    robots = scene.settings.robots
+    views = views_of(tables.floor, scene.settings.robot, robots)
+    panel = camera_panel(
+        views, world.poses[:robots], world.attitudes[:robots], sensor.frames[0], sensor.camera, len(frame)
+    )
+    return np.concatenate([frame, panel], axis=1)
 
 
 def _draw_floor(scene: Scene, tables: FloorTables, view: View) -> Frame:

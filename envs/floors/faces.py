@@ -5,18 +5,21 @@ counter-clockwise. Solids are prisms, so that their faces are sides, tops and un
 holes are cut into trapezoids. Faces on the ground or at the ceiling are left out: nobody sees them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.raster import Raster
+from lidarium.envs.floors.raster import Raster, rectangles_of
 from lidarium.envs.floors.solid import Solid
 
-GROUND, CEILING, SURROUNDINGS = -1, -2, -3
-"""Numbers of what is no solid: the ground, the ceiling, and all outside of the bounds and image walls."""
+GROUND, CEILING, SURROUNDINGS, SECTION = -1, -2, -3, -4
+"""Numbers of what is no solid.
+
+They are the ground, the ceiling, all outside of the bounds with the walls of images, and cuts of sections.
+"""
 
 Points = NDArray[np.float64]
 
@@ -88,8 +91,50 @@ def faces_of(floor: Floor) -> Faces:
         (SURROUNDINGS, _sides(rectangle[::-1], 0.0, floor.ceiling)),
     ]
     if floor.cells is not None:
-        parts.append((SURROUNDINGS, _cell_sides(floor.cells, floor.bounds, floor.ceiling)))
+        parts.append((SURROUNDINGS, _cell_sides(floor.cells, floor.ceiling)))
     parts += [(number, _prism(solid, floor.ceiling)) for number, solid in enumerate(floor.solids)]
+    return _joined(parts)
+
+
+def section_of(floor: Floor, height: float) -> Faces:
+    """Return the faces of a floor below a height, to be seen from above.
+
+    Parameters
+    ----------
+    floor : Floor
+        What stands there.
+    height : float
+        Where it is cut [m]; what stands higher gets a top there, owned by ``SECTION``.
+    """
+    x_min, y_min, x_max, y_max = floor.bounds
+    rectangle = np.array([(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)])
+    parts = [(GROUND, _level(rectangle, 0.0)[None])]
+    if floor.cells is not None:
+        parts.append((SURROUNDINGS, _cell_sides(floor.cells, height)))
+        (x, y), size = floor.cells.origin, floor.cells.resolution
+        low_row, low_column, high_row, high_column = rectangles_of(floor.cells.solid != 0).T
+        corners = [
+            (low_column, low_row),
+            (high_column, low_row),
+            (high_column, high_row),
+            (low_column, high_row),
+        ]
+        tops = np.empty((len(low_row), 4, 3))
+        for corner, (column, row) in enumerate(corners):
+            tops[:, corner, 0], tops[:, corner, 1] = x + size * column, y + size * row
+        tops[:, :, 2] = height
+        parts.append((SECTION, tops))
+    for number, solid in enumerate(floor.solids):
+        faces = _prism(replace(solid, z_high=min(solid.z_high, floor.ceiling)), height)
+        parts.append((number, faces))
+        if max(solid.z_low, 0.0) < height <= min(solid.z_high, floor.ceiling):
+            quads = [_level(quad, height) for part in convex_parts(solid) for quad in _quads(part)]
+            parts.append((SECTION, np.array(quads)))
+    return _joined(parts)
+
+
+def _joined(parts: list[tuple[int, Points]]) -> Faces:
+    """Return the faces of parts, each with its owner."""
     owners = np.concatenate([np.full(len(corners), owner, np.int32) for owner, corners in parts])
     return Faces.of_corners(np.concatenate([corners for _, corners in parts]), owners)
 
@@ -206,8 +251,8 @@ def _x_at(edges: Points, y: float) -> Points:
     return np.asarray(np.where(y == y1, x1, np.where(y == y2, x2, between)))
 
 
-def _cell_sides(cells: Raster, bounds: tuple[float, float, float, float], ceiling: float) -> Points:
-    """Return upright faces between free and solid cells of an image within the bounds, in long runs."""
+def _cell_sides(cells: Raster, ceiling: float) -> Points:
+    """Return upright faces between free and solid cells of an image, in long runs."""
     solid = np.pad(cells.solid != 0, 1, constant_values=True).astype(np.int8)
     (x, y), size = cells.origin, cells.resolution
     faces = []

@@ -81,3 +81,34 @@ def sampled(
     framed = np.pad((cells.solid != 0).astype(np.uint8), 1, constant_values=1)
     rows, columns = (np.clip(index + 1, 0, framed.shape[axis] - 1) for axis, index in enumerate(indices))
     return np.take(framed[rows], columns, axis=1)
+
+
+def rectangles_of(solid: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return rectangles that cover the cells of a grid, each once.
+
+    Parameters
+    ----------
+    solid : (rows, columns) bool
+        The cells.
+
+    Returns
+    -------
+    (N, 4) int64
+        First row, first column, row and column behind the last: runs of a row, joined with equal runs below.
+    """
+    edges = np.diff(np.pad(solid, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    rows, firsts = np.nonzero(edges > 0)
+    lasts = np.nonzero(edges < 0)[1]
+    found: list[tuple[int, int, int, int]] = []
+    begun: dict[tuple[int, int], int] = {}
+    runs = list(zip(rows.tolist(), firsts.tolist(), lasts.tolist(), strict=True))
+    place = 0
+    for row in range(len(solid) + 1):
+        here: dict[tuple[int, int], int] = {}
+        while place < len(runs) and runs[place][0] == row:
+            run = runs[place][1:]
+            here[run] = begun.pop(run, row)
+            place += 1
+        found += [(first_row, first, row, last) for (first, last), first_row in begun.items()]
+        begun = here
+    return np.array(found, np.int64).reshape(-1, 4)

@@ -30,7 +30,11 @@ from lidarium.envs.drawing.frame_parts import (
     view_around,
     with_header,
 )
+from lidarium.envs.drawing.views import camera_panel, views_of
+from lidarium.envs.floors.floor import Floor
 from lidarium.envs.outcome.scorer import THRESHOLDS
+from lidarium.envs.settings.cameras import DepthCamera
+from lidarium.envs.settings.robots import Robot
 from lidarium.evaluation.drawing.picture_parts import (
     INK,
     SOLID,
@@ -65,15 +69,20 @@ class TrackFrames:
         The record.
     size : int
         Longer side of the explored part in a frame [pixels].
+    floor : Floor or None
+        The floor of the record: what the first robot's camera sees is then beside a frame.
     """
 
-    def __init__(self, record: EpisodeRecord, size: int = SIZE) -> None:
+    def __init__(self, record: EpisodeRecord, size: int = SIZE, floor: Floor | None = None) -> None:
         self._record, self._display = record, record.display
         display = record.display
         known = display.map_at(math.inf) != UNKNOWN
         self.view = view_around(known, display.origin, display.resolution, size)
         self._agents = [f"robot_{robot}" for robot in range(display.poses.shape[1])]
         self._colours = team_colours(len(self._agents))
+        camera, robot = (record.header["settings"].get(name) for name in ("camera", "robot"))
+        self._camera = DepthCamera(**camera) if floor is not None and camera else None
+        self._views = None if floor is None else views_of(floor, Robot(**robot), len(self._agents))
 
     def draw(self, time_s: float) -> Frame:
         """Return the frame at a time: the team's map, paths, targets and robots.
@@ -96,7 +105,16 @@ class TrackFrames:
         }
         has_ended = [agent in ended for agent in self._agents]
         draw_robots(frame, view, poses, radius_of(self._record), has_ended, self._colours)
-        return with_header(frame, self._record.header["floor"], display.coverage_at(time_s), time_s)
+        frame = with_header(frame, self._record.header["floor"], display.coverage_at(time_s), time_s)
+        return frame if self._camera is None else self._with_panel(frame, self._camera, poses)
+
+    def _with_panel(self, frame: Frame, camera: DepthCamera, poses: NDArray[np.float64]) -> Frame:
+        """Put what the first robot's camera sees beside a frame."""
+        assert self._views is not None
+        level = np.zeros_like(poses)
+        depth = self._views.depth(poses, level, 0, camera)
+        panel = camera_panel(self._views, poses, level, depth, camera, len(frame))
+        return np.concatenate([frame, panel], axis=1)
 
     def _draw_targets(self, frame: Frame, time_s: float, poses: NDArray[np.float64]) -> None:
         """Draw the target of each robot as a ring, with a thin line to it."""
@@ -121,10 +139,12 @@ class TrackFrames:
                 cv2.circle(frame, there, radius << SHIFT, colour, 2, cv2.LINE_AA, SHIFT)
 
 
-def save_track_film(path: Path, record: EpisodeRecord, speed: float = 10.0, size: int = SIZE) -> None:
+def save_track_film(
+    path: Path, record: EpisodeRecord, speed: float = 10.0, size: int = SIZE, floor: Floor | None = None
+) -> None:
     """Film what a record shows (mp4, H.264).
 
-    The speed is so many simulated seconds per second.
+    The speed is so many simulated seconds per second; ``floor`` as for ``TrackFrames``.
 
     Raises
     ------
@@ -134,7 +154,7 @@ def save_track_film(path: Path, record: EpisodeRecord, speed: float = 10.0, size
         Where nothing can be written there.
     """
     check_speed(speed)
-    frames, end = TrackFrames(record, size), float(record.display.times[-1])
+    frames, end = TrackFrames(record, size, floor), float(record.display.times[-1])
     count = math.ceil(end * FRAMES_PER_SECOND / speed)
     with film_writer(path) as writer:
         for frame in range(count):

@@ -24,7 +24,7 @@ from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.state import state_sha256
 from lidarium.mapping.files.guarded_reading import reason as said_by
 
-ADDED = frozenset({"localizer"})
+ADDED = frozenset({"camera", "localizer"})
 """Settings that older records do not have."""
 
 

@@ -7,6 +7,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.faces import Faces
 from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.simulation.depth.body_drawing import draw_body
 from lidarium.envs.simulation.depth.face_drawing import (
@@ -17,7 +18,7 @@ from lidarium.envs.simulation.depth.face_drawing import (
     draw_faces,
     new_span,
 )
-from lidarium.envs.simulation.disturbances.noise import gaussian_at, mix, stream_key
+from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, gaussian_at, mix, stream_key
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.pixel_lanes import LANES
@@ -194,6 +195,52 @@ def _take_frames(cameras: Cameras, robots: int, takes: Array, frames: Array) -> 
     for row in numba.prange(takes.shape[0]):
         if takes[row]:
             _take_frame(cameras, row, robots, frames[row])
+
+
+def image_of(
+    faces: Faces,
+    poses: NDArray[np.float64],
+    attitudes: NDArray[np.float64],
+    bodies: NDArray[np.float64],
+    robot: int,
+    camera: DepthCamera,
+) -> NDArray[np.float32]:
+    """Return the depth image of one robot of a team without noise.
+
+    Parameters
+    ----------
+    faces : Faces
+        Of the floor.
+    poses, attitudes : (robots, 3) float64
+        Of the robots, see ``World``.
+    bodies : (robots, 8) float64
+        ``Robot.numbers`` of each.
+    robot : int
+        Whose image.
+    camera : DepthCamera
+        Its camera.
+
+    Returns
+    -------
+    (rows, columns) float32
+        Depths [m]; 0 for no measurement.
+    """
+    arrays = (faces.corners, faces.planes, faces.spheres)
+    cameras = Cameras(
+        np.ascontiguousarray(poses),
+        np.ascontiguousarray(attitudes),
+        bodies,
+        np.array([[*(array.ctypes.data for array in arrays), len(faces)]], np.int64),
+        view_numbers(camera),
+        camera.mount,
+        np.zeros(3),
+        np.zeros(1, np.uint64),
+        np.zeros(1, np.int64),
+        GAUSSIAN_TABLE,
+    )
+    frames = np.zeros((len(poses), camera.rows, camera.columns), np.float32)
+    take_frames_serial(cameras, len(poses), np.arange(len(poses)) == robot, frames)
+    return np.asarray(frames[robot])
 
 
 take_frames_serial = kernel(_take_frames)
