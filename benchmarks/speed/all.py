@@ -25,6 +25,7 @@ from lidarium.benchmarks.speed.cases import (
     ray_casting,
     waypoint_decision,
 )
+from lidarium.benchmarks.speed.cases.three_dimensions import depth_image
 from lidarium.benchmarks.speed.harness.lines import Line, table
 from lidarium.benchmarks.speed.harness.report import speed_result, with_effort, write_speed
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, on_cores
@@ -41,6 +42,7 @@ _MODULES: tuple[ModuleType, ...] = (
     learning_preset,
     waypoint_decision,
     cached_start,
+    depth_image,
 )
 
 QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}

@@ -14,7 +14,6 @@ from lidarium.envs.simulation.depth.face_drawing import (
     CENTRE_ROW,
     COLUMNS,
     FOCAL,
-    OVERLAP,
     ROWS,
     FaceArrays,
     Span,
@@ -93,9 +92,7 @@ def _number_faces(
         first, last = cover(faces.corners[face], axes, eye, view, span)
         start, along, across = inverse_plane(faces.planes[face], axes, eye, view)
         for row in range(first, last + 1):
-            left = int(math.ceil(span.bounds[0, row] - OVERLAP))
-            right = int(math.floor(span.bounds[1, row] + OVERLAP))
-            for column in range(left, right + 1):
+            for column in range(span.columns[0, row], span.columns[1, row] + 1):
                 value = np.float32(start + across * row + along * column)
                 if value > inverse[row, column]:
                     inverse[row, column], numbers[row, column] = value, face

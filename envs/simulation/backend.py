@@ -30,8 +30,6 @@ class World(Protocol):
         True poses at the start and now [m, rad], true speeds and turn rates [m/s, rad/s].
     moves, flags, failed : (rows,) uint8, (rows,) int64, (rows,) uint8
         Whether a robot drives; its flags (``kernels.arrays``); whether it is dead.
-    attitudes : (rows, 3) float64
-        Height of the bases above the ground, roll and pitch [m, rad]; 0 in a world that is plane.
     contacts, travelled, collisions : (rows,) uint8, float64, int64
         Whether a body touched anything in the last step, length of its path [m], how often it came into
         contact.
@@ -52,7 +50,6 @@ class World(Protocol):
     steps: NDArray[np.int64]
     starts: NDArray[np.float64]
     poses: NDArray[np.float64]
-    attitudes: NDArray[np.float64]
     velocities: NDArray[np.float64]
     moves: NDArray[np.uint8]
     flags: NDArray[np.int64]
@@ -62,6 +59,11 @@ class World(Protocol):
     collisions: NDArray[np.int64]
     faults: NDArray[np.float64]
     true_ranges: NDArray[np.float32]
+
+    @property
+    def attitudes(self) -> NDArray[np.float64]:
+        """Height of the bases above the ground, roll and pitch, (rows, 3) [m, rad]; 0 in a plane world."""
+        ...
 
     @property
     def sensors(self) -> Mapping[str, NDArray[Any]]:

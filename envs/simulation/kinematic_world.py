@@ -65,7 +65,6 @@ class KinematicWorld:
             np.zeros((rows, 3)),
             np.zeros((rows, 2)),
         )
-        self.attitudes = np.zeros((rows, 3))
         self.moves, self.flags = np.ones(rows, np.uint8), np.zeros(rows, np.int64)
         self.failed, self.faults = np.zeros(rows, np.uint8), np.zeros((rows, faults.capacity * FAULT_NUMBERS))
         self.bumpers, self.contacts = np.zeros((rows, 3), np.int8), np.zeros(rows, np.uint8)
@@ -95,6 +94,11 @@ class KinematicWorld:
             "velocity": self.measured,
             "bumper": self.bumpers,
         }
+
+    @property
+    def attitudes(self) -> NDArray[np.float64]:
+        """Height, roll and pitch of the bases, (rows, 3): 0, since the world is plane."""
+        return np.zeros((self.robots * self.episodes, 3))
 
     def place(
         self,

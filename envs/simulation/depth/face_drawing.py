@@ -58,17 +58,20 @@ class Span(NamedTuple):
     camera_corners : (4, 3) float64
         Corners in the optical frame [m].
     bounds : (2, rows) float64
-        Leftmost and rightmost covered column of each row.
+        Where the face begins and ends on each row [columns].
+    columns : (2, rows) int64
+        First and last column of each row whose centre it covers; none where the first is greater.
     """
 
     camera_corners: Array
     bounds: Array
+    columns: Array
 
 
 @kernel
 def new_span(rows: int) -> Span:
     """Return scratch for the faces of an image."""
-    return Span(np.empty((CORNERS, 3)), np.empty((2, rows)))
+    return Span(np.empty((CORNERS, 3)), np.empty((2, rows)), np.empty((2, rows), np.int64))
 
 
 @kernel(borrowing=True)
@@ -126,6 +129,28 @@ def _rows_of(corners: Array, view: Array) -> tuple[int, int]:
 
 
 @kernel(borrowing=True)
+def _is_outside(corners: Array, view: Array) -> bool:
+    """Whether all corners in the optical frame lie beyond one of the planes around the view."""
+    left, right = (
+        (-0.5 - view[CENTRE_COLUMN]) / view[FOCAL],
+        (view[COLUMNS] - 0.5 - view[CENTRE_COLUMN]) / view[FOCAL],
+    )
+    top, bottom = (-0.5 - view[CENTRE_ROW]) / view[FOCAL], (view[ROWS] - 0.5 - view[CENTRE_ROW]) / view[FOCAL]
+    beyond = 63
+    for k in range(CORNERS):
+        x, y, z = corners[k, 0], corners[k, 1], corners[k, 2]
+        beyond &= (
+            (1 if x < left * z else 0)
+            | (2 if x > right * z else 0)
+            | (4 if y < top * z else 0)
+            | (8 if y > bottom * z else 0)
+            | (16 if z <= 0.0 else 0)
+            | (32 if z > view[DEPTH_MAX] else 0)
+        )
+    return beyond != 0
+
+
+@kernel(borrowing=True)
 def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> tuple[int, int]:
     """Find the columns that a face covers on each row of an image.
 
@@ -150,9 +175,9 @@ def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> t
         x, y, z = corners[k, 0] - eye[0], corners[k, 1] - eye[1], corners[k, 2] - eye[2]
         for axis in range(3):
             places[k, axis] = axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
-    first, last = _rows_of(places, view)
-    if first > last:
+    if _is_outside(places, view):
         return 1, 0
+    first, last = _rows_of(places, view)
     low, high = span.bounds[0], span.bounds[1]
     for row in range(first, last + 1):
         low[row], high[row] = -0.5, view[COLUMNS] - 0.5
@@ -178,6 +203,10 @@ def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> t
                 last = min(last, int(math.floor(min(bound + OVERLAP, view[ROWS]))))
             else:
                 first = max(first, int(math.ceil(max(bound - OVERLAP, 0.0))))
+    begins, ends = span.columns[0], span.columns[1]
+    for row in range(first, last + 1):
+        begins[row] = int(math.ceil(low[row] - OVERLAP))
+        ends[row] = int(math.floor(high[row] + OVERLAP))
     return first, last
 
 
@@ -209,7 +238,8 @@ def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Sp
     """
     sides = scratch_grid(4, 3, np.float64)
     view_sides(axes, view, sides)
-    width = inverse.shape[1]
+    width, pixels = inverse.shape[1], inverse.ctypes.data
+    begins, ends = span.columns[0], span.columns[1]
     for face in range(faces.planes.shape[0]):
         if not is_in_view(faces, face, axes, eye, view, sides):
             continue
@@ -217,16 +247,12 @@ def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Sp
         start, along, across = inverse_plane(faces.planes[face], axes, eye, view)
         slope = np.float32(along)
         for row in range(first, last + 1):
-            left = int(math.ceil(span.bounds[0, row] - OVERLAP))
-            right = int(math.floor(span.bounds[1, row] + OVERLAP))
-            if left > right:
-                continue
-            begin = left // LANES * LANES
+            left, right = begins[row], ends[row]
             # Rounded once a block: the inverse depth at a block's first column.
-            base = start + across * row
-            for column in range(begin, right + 1, LANES):
+            base, address = start + across * row, pixels + 4 * row * width
+            for column in range(left & -LANES, right + 1, LANES):
                 raise_lanes(
-                    inverse.ctypes.data + 4 * (row * width + column),
+                    address + 4 * column,
                     np.float32(base + along * column),
                     slope,
                     left - column,

@@ -1,0 +1,1 @@
+"""The measurements of what is not plane: depth images with bodies in contact."""
