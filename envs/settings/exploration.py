@@ -92,7 +92,7 @@ class ExplorationSettings:
         Whether a robot whose bumper touches anything, or whose way is blocked, pauses until it is told to
         resume.
     backend : str
-        The world: ``kinematic``.
+        The world: ``kinematic``, ``bullet`` or another that is registered.
     time_step : float
         Simulated time of a step [s].
     horizon_s : float or None
@@ -225,7 +225,8 @@ class ExplorationSettings:
     @property
     def may_fail(self) -> bool:
         """Whether a robot can die, or take itself to be beyond its map."""
-        return self.localization != "truth" or self.faults != NO_FAULTS
+        has_forces = self.backend != "kinematic"
+        return has_forces or self.localization != "truth" or self.faults != NO_FAULTS
 
     @property
     def agents(self) -> list[str]:

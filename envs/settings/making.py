@@ -11,6 +11,7 @@ from lidarium.envs.settings.exploration import (
     PARTS,
     ExplorationSettings,
     localizer_settings,
+    with_parts,
 )
 from lidarium.envs.settings.lidar import NOISE, Lidar
 from lidarium.envs.settings.realism import REALISM
@@ -91,7 +92,7 @@ def _part(name: str, value: Any) -> Any:  # noqa: ANN401
     """Return the value of an option, where it is a part by its name or by its values."""
     if name in PARTS and isinstance(value, Mapping):
         check_values(value, rules_of(ExplorationSettings)[name].inner, name)
-        return PARTS[name](**value)
+        return with_parts(PARTS[name], value)
     if name in PARTS and name in REGISTRIES and isinstance(value, str):
         return registry(name)[value]
     return value

@@ -6,13 +6,14 @@ Pioneer P3-DX: data sheet of Adept MobileRobots. Kobuki: user guide of Yujin Rob
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.bounds import above, check_settings
+from lidarium.envs.settings.builds import Build
+from lidarium.mapping.geometry.bounds import above, check_settings, shown
 from lidarium.registry import Registry
 
 
@@ -38,6 +39,8 @@ class Robot:
         Ticks that the encoder of a wheel counts on a metre [1/m].
     length, width : float
         Outline of the body [m].
+    build : Build
+        Masses, wheels, casters and friction; only worlds with forces know them.
     """
 
     radius: Annotated[float, above(0.0, 10.0)] = 0.18
@@ -51,9 +54,17 @@ class Robot:
     ticks_per_metre: Annotated[float, above(0.0, 1e7)] = 11724.0
     length: Annotated[float, above(0.0, 20.0)] = 0.352
     width: Annotated[float, above(0.0, 20.0)] = 0.352
+    build: Build = field(default_factory=Build)
 
     def __post_init__(self) -> None:
         check_settings(self, "the robot")
+        if not isinstance(self.build, Build):
+            raise ValueError(f"build of the robot is {shown(self.build)}; want Build")
+        if self.build.clearance >= self.height:
+            raise ValueError(
+                f"clearance of the build is {self.build.clearance} m; want less than the robot's height of "
+                f"{self.height} m"
+            )
         if self.cruise_speed > self.max_speed:
             raise ValueError(
                 f"cruise_speed is {self.cruise_speed} m/s, above max_speed {self.max_speed} m/s; "
@@ -111,6 +122,17 @@ ROBOTS.register(
         ticks_per_metre=500 / (2 * math.pi * 0.0975),
         length=0.455,
         width=0.381,
+        build=Build(
+            base_mass=8.2,
+            wheel_mass=0.4,
+            mass_height=0.12,
+            clearance=0.06,
+            wheel_radius=0.0975,
+            wheel_width=0.05,
+            caster_radius=0.0375,
+            caster_offset=0.2,
+            motor_torque=4.0,
+        ),
     ),
     "Adept MobileRobots Pioneer P3-DX, 1.2 m/s at most",
 )
@@ -128,6 +150,17 @@ ROBOTS.register(
         ticks_per_metre=4000.0,
         length=0.6,
         width=0.6,
+        build=Build(
+            base_mass=38.0,
+            wheel_mass=1.0,
+            mass_height=0.35,
+            clearance=0.04,
+            wheel_radius=0.08,
+            wheel_width=0.04,
+            caster_radius=0.03,
+            caster_offset=0.24,
+            motor_torque=12.0,
+        ),
     ),
     "a tall service robot, 0.6 m across, 1.0 m/s at most",
 )
@@ -145,6 +178,17 @@ ROBOTS.register(
         ticks_per_metre=100000.0,
         length=0.02,
         width=0.02,
+        build=Build(
+            base_mass=0.2,
+            wheel_mass=0.01,
+            mass_height=0.004,
+            clearance=0.003,
+            wheel_radius=0.004,
+            wheel_width=0.002,
+            caster_radius=0.002,
+            caster_offset=0.008,
+            motor_torque=0.02,
+        ),
     ),
     "almost a point that follows commands at once; for tests and bounds",
 )

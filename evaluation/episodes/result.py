@@ -257,7 +257,7 @@ def settings_sha256(settings: ExplorationSettings) -> str:
     """Return a hash of all settings that can change a result.
 
     It is of their JSON with sorted keys, without ``threads``, and without what older records do not have
-    where it is not used.
+    where it is not used: a localizer's own settings, more rewards, the build of robots without forces.
     """
     values = asdict(settings)
     del values["threads"]
@@ -266,6 +266,8 @@ def settings_sha256(settings: ExplorationSettings) -> str:
             del values[name]
     if not values["reward"]["more"]:
         del values["reward"]["more"]
+    if values["backend"] == "kinematic":
+        del values["robot"]["build"]
     return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
