@@ -95,6 +95,9 @@ class Registry(Mapping[str, T], Generic[T]):
             self._items[name] = item
         return item
 
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and name in self._items
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._items)
 
