@@ -67,6 +67,7 @@ def begin(
     choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
     floor = choice_here.load(generator)
     radius = settings.robot.radius
+    _check_height(floor, settings.robot.height)
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     if chosen.starts is not None:
         check_starts(tables.body, radius, chosen.starts)
@@ -78,6 +79,21 @@ def begin(
         check_goal(tables.body, goal)
     seed = int(generator.integers(2**63))
     return EpisodeStart(floor, tables, starts, seed, goal)
+
+
+def _check_height(floor: Floor, height: float) -> None:
+    """Refuse robots that would not fit below the ceiling.
+
+    Raises
+    ------
+    ValueError
+        Where the robot is as high as the ceiling, or higher.
+    """
+    if height >= floor.ceiling:
+        raise ValueError(
+            f"floor {floor.name!r} has its ceiling at {floor.ceiling:g} m, the robot is {height:g} m high; "
+            "choose a lower robot (robot.height) or a floor with a higher ceiling"
+        )
 
 
 def make_simulation(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
