@@ -340,7 +340,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         return Scene(self.simulation, self.scorer, self.settings, name, has_ended)
 
     def close(self) -> None:
-        """Close the window, if there is one; closing again does nothing."""
+        """Close the window and the world, if they hold anything; closing again does nothing."""
+        self.simulation.close()
         if self._window is not None:
             self._window.close()
             self._window = None

@@ -62,6 +62,9 @@ class PlainWorld:
                     self.true_ranges[row] = self._scan(row)
                     self.sensors["scan"][row] = self.true_ranges[row]
 
+    def close(self):
+        pass
+
     def _move(self, row, command):
         robot = self.team[row % self.robots]
         was_in_contact, self.contacts[row] = bool(self.contacts[row]), 0

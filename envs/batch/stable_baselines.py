@@ -177,7 +177,8 @@ class ExplorationVecEnv(VecEnv):
             raise RuntimeError("the environment is closed; make a new one")
 
     def close(self) -> None:
-        """Close; nothing is held open."""
+        """Close, and give back what the worlds hold."""
+        self.batch.simulation.close()
         self._is_closed = True
 
     @property

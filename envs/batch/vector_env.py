@@ -153,7 +153,8 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
             raise RuntimeError("the environment is closed; make a new one")
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401
-        """Nothing is held open."""
+        """Give back what the worlds hold."""
+        self.batch.simulation.close()
 
 
 def make_vector_env(num_envs: int, **options: Any) -> ExplorationVectorEnv:  # noqa: ANN401

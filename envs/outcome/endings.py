@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.kernels.arrays import WorldArrays, world_at
+from lidarium.envs.simulation.kernels.arrays import BROKEN_PHYSICS, WorldArrays, world_at
 from lidarium.envs.simulation.simulation import Simulation
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import arrays_at
@@ -22,10 +22,15 @@ REASONS = (
     "horizon",
     "no_frontier",
     "frontier_unreachable",
+    "physics",
 )
-"""Why a robot ended, by number; 0 where it has not. Of several of the first six the first counts."""
+"""Why a robot ended, by number; 0 where it has not.
 
-_, COVERED, FAILED, BATTERY, COLLISION, REACHED, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE = range(
+Of several of the first six the first counts; ``physics`` takes the place of ``failed`` where the world says
+`BROKEN_PHYSICS`.
+"""
+
+_, COVERED, FAILED, BATTERY, COLLISION, REACHED, HORIZON, NO_FRONTIER, FRONTIER_UNREACHABLE, PHYSICS = range(
     len(REASONS)
 )
 
@@ -91,7 +96,7 @@ def ending_of(world: WorldArrays, row: int, episode: int, rules: Rules) -> int:
     if world.team_seen[episode] / max(rules.counted[episode], 1) >= bounds[STOP_COVERAGE]:
         return COVERED
     if world.failed[row] != 0:
-        return FAILED
+        return PHYSICS if world.failed[row] == BROKEN_PHYSICS else FAILED
     if rules.is_empty[row]:
         return BATTERY
     if bounds[STOPS_ON_CONTACT] != 0.0 and world.contacts[row] != 0:

@@ -29,7 +29,8 @@ class World(Protocol):
     starts, poses, velocities : (rows, 3), (rows, 3), (rows, 2) float64
         True poses at the start and now [m, rad], true speeds and turn rates [m/s, rad/s].
     moves, flags, failed : (rows,) uint8, (rows,) int64, (rows,) uint8
-        Whether a robot drives; its flags (``kernels.arrays``); whether it is dead.
+        Whether a robot drives; its flags (``kernels.arrays``); whether it is dead (1), or the physics of its
+        episode are broken (2).
     contacts, travelled, collisions : (rows,) uint8, float64, int64
         Whether a body touched anything in the last step, length of its path [m], how often it came into
         contact.
@@ -115,4 +116,8 @@ class World(Protocol):
         runs : (episodes,) bool or None
             Which episodes take the step; all where None.
         """
+        ...
+
+    def close(self) -> None:
+        """Give back what is held beyond arrays; closing again does nothing, and ``place`` opens anew."""
         ...

@@ -133,6 +133,9 @@ class KinematicWorld:
         chosen = self._everywhere if runs is None else runs
         move_and_sense(self._table, self.robots, commands, chosen, moves_bodies)
 
+    def close(self) -> None:
+        """Do nothing: all is in arrays."""
+
     def _plan_faults(
         self, floor: FloorTables, free: NDArray[np.bool_], starts: NDArray[np.float64], seed: int
     ) -> NDArray[np.float64]:

@@ -251,6 +251,10 @@ class Simulation:
         perceive = perceive_parallel if self.use_threads() > 1 else perceive_serial
         perceive(self._table, self.robots, self._everywhere if runs is None else runs)
 
+    def close(self) -> None:
+        """Give back what the world holds beyond arrays; closing again does nothing."""
+        self.world.close()
+
     def render_anew(self, row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
         """Forget a robot's map and render it of scans.
 

@@ -23,6 +23,9 @@ there, its sensors are off). Then: it believes in the frame of its own start; it
 alone; poses of teammates that the radio reported are known.
 """
 
+DEAD, BROKEN_PHYSICS = 1, 2
+"""Values of ``failed``: the robot is dead, or the physics of its episode gave no numbers."""
+
 (
     ANGLE_FIRST,
     ANGLE_INCREMENT,
