@@ -52,6 +52,8 @@ class TeamCommand(Command):
     """depth camera of the robots; `lidarium show cameras` lists them"""
     realism: str = "ideal"
     """how real the world is: ideal, lab or field; the options below change parts of it"""
+    backend: str | None = None
+    """what moves the bodies: kinematic or bullet; `lidarium show backends` lists them"""
     noise: str | None = None
     """noise of the laser's ranges: none, datasheet or thesis"""
     odometry: str | None = None
@@ -90,7 +92,7 @@ class TeamCommand(Command):
         """
         given = {
             name: getattr(self, name)
-            for name in ("camera", "noise", "odometry", "localization", "radio", "battery")
+            for name in ("camera", "backend", "noise", "odometry", "localization", "radio", "battery")
             if getattr(self, name) is not None
         }
         starts = {"known_starts": False} if self.unknown_starts else {}

@@ -54,3 +54,8 @@ def make_kinematic(settings: ExplorationSettings, episodes: int = 1) -> Simulati
 
 
 BACKENDS.register("kinematic", make_kinematic, "bodies follow commands exactly; fast")
+BACKENDS.register(
+    "bullet",
+    "lidarium.envs.simulation.bullet.making:make_bullet",
+    "PyBullet moves the bodies: wheels that slip, contact, table tops; needs the extra bullet",
+)

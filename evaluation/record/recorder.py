@@ -1,13 +1,11 @@
 """Records an episode as it runs: what re-runs it, and what can be shown of it."""
 
 import json
-import platform
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +18,7 @@ from lidarium.evaluation.episodes.result import settings_sha256
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.record.display import DisplayTrack
 from lidarium.evaluation.record.episode_record import FORMAT, EpisodeRecord
+from lidarium.evaluation.record.made_with import made_with
 from lidarium.evaluation.record.map_sampler import MapSampler
 from lidarium.evaluation.record.state import state_sha256
 
@@ -156,7 +155,7 @@ class Recorder(Watcher):
         header = {
             "format": FORMAT,
             "version": lidarium.__version__,
-            "made_with": {"numpy": np.__version__, "numba": numba.__version__, "machine": platform.machine()},
+            "made_with": made_with(settings.backend),
             **self._about,
             "floor": env.floor.name,
             "floor_sha256": env.floor.sha256,

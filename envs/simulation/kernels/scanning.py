@@ -136,6 +136,17 @@ def sense_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: 
 
 
 @kernel(spliced=True)
+def disturb_robot(world: WorldArrays, row: int, first: int, robots: int, scratch: ScanScratch) -> None:
+    """Disturb true ranges of one robot that are not of ``measure`` as the sensor does."""
+    sensor, faults = world.sensor, world.faults[row]
+    step, ranges = world.steps[first // robots], world.true_ranges[row]
+    blind_beams(faults, step, sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT], ranges, scratch.lengths)
+    world.ranges[row, :] = ranges
+    if is_noisy(sensor):
+        _add_noise(world, row, first, robots)
+
+
+@kernel(spliced=True)
 def is_noisy(sensor: Array) -> bool:
     """Whether ranges carry noise."""
     return bool(sensor[NOISE_FLOOR] > 0.0 or sensor[NOISE_SHARE] > 0.0)

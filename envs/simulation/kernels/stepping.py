@@ -42,7 +42,7 @@ from lidarium.envs.simulation.kernels.arrays import (
 from lidarium.envs.simulation.kernels.map_updates import invalidate_teammates, perceive_robot
 from lidarium.envs.simulation.kernels.masks import score_robot
 from lidarium.envs.simulation.kernels.motion import move_robots
-from lidarium.envs.simulation.kernels.scanning import scan_scratch, sense_robot
+from lidarium.envs.simulation.kernels.scanning import disturb_robot, scan_scratch, sense_robot
 from lidarium.envs.simulation.kernels.stages import sense_and_perceive
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at
@@ -261,6 +261,13 @@ def sense(table: Array, robots: int, runs: Array) -> None:
         for row in range(episode * robots, (episode + 1) * robots):
             if not world.flags[row] & ENDED:
                 sense_robot(world, row, episode * robots, robots, scratch)
+
+
+@kernel
+def disturb_scan(table: Array, row: int, robots: int) -> None:
+    """Make the scan of a row of its true ranges, which the world has put there."""
+    world = world_at(table)
+    disturb_robot(world, row, row // robots * robots, robots, scan_scratch(world))
 
 
 @kernel

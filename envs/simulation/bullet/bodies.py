@@ -1,0 +1,177 @@
+"""The bodies of an episode in PyBullet: its floor and its robots, on one server."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.settings.robots import Robot
+from lidarium.envs.simulation.bullet.client import Client
+from lidarium.envs.simulation.bullet.floor_shapes import FloorShapes
+from lidarium.envs.simulation.bullet.robot_text import LEFT, RIGHT, urdf_of
+
+SUBSTEP = 1.0 / 240.0
+"""Length of a substep, at most [s]."""
+
+GRAVITY = 9.81
+"""Of the Earth [m/s2]."""
+
+RAYS_AT_ONCE = 16_000
+"""Rays of a call, of which PyBullet takes 16,384 at most."""
+
+_JOINTS = (LEFT, RIGHT)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Where a body is and how it moves.
+
+    Attributes
+    ----------
+    place : (3,) float64
+        Of its frame, which lies on the ground between its wheels [m].
+    axes : (3, 3) float64
+        Its axes x, y, z in the columns.
+    velocity, turning : (3,) of float
+        Of its centre of mass [m/s], and around the axes of the world [rad/s].
+    """
+
+    place: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    velocity: tuple[float, float, float]
+    turning: tuple[float, float, float]
+
+
+class Bodies:
+    """The floor and the robots of one episode after another.
+
+    Parameters
+    ----------
+    team : sequence of Robot
+        The robots.
+    time_step : float
+        Length of a step [s].
+
+    Attributes
+    ----------
+    client : Client
+        Their server.
+    """
+
+    def __init__(self, team: Sequence[Robot], time_step: float) -> None:
+        self.client, self.team, self._time_step = Client(), team, time_step
+        self._substeps = max(math.ceil(time_step / SUBSTEP - 1e-9), 1)
+        self._ground, self._robots = -1, [-1] * len(team)
+        self._wheel_radii = np.array([robot.build.wheel_radius for robot in team]).reshape(-1, 1)
+        self._angles = np.zeros((len(team), 2))
+
+    def begin(self, floor: Floor, starts: NDArray[np.float64]) -> None:
+        """Put robots at rest at ``starts`` (robots, 3) of a floor; nothing of before is left."""
+        client, bullet = self.client, self.client.bullet
+        client.call("resetSimulation")
+        client.call("setGravity", 0.0, 0.0, -GRAVITY)
+        client.call(
+            "setPhysicsEngineParameter",
+            fixedTimeStep=self._time_step,
+            numSubSteps=self._substeps,
+            enableFileCaching=0,
+            deterministicOverlappingPairs=1,
+        )
+        self._ground = client.call(
+            "createMultiBody", 0.0, client.call("createCollisionShape", bullet.GEOM_PLANE)
+        )
+        client.call("changeDynamics", self._ground, -1, lateralFriction=1.0)
+        shapes = FloorShapes.of(floor)
+        client.load_text(shapes.urdf, useFixedBase=True)
+        if shapes.prisms:
+            client.call("changeDynamics", client.load_pieces(shapes.obj), -1, lateralFriction=1.0)
+        for robot in range(len(self.team)):
+            self._robots[robot] = client.load_text(
+                urdf_of(self.team[robot]), flags=bullet.URDF_USE_INERTIA_FROM_FILE
+            )
+            for link in range(-1, 3):
+                client.call(
+                    "changeDynamics", self._robots[robot], link, linearDamping=0.0, angularDamping=0.0
+                )
+            self.put(robot, starts[robot])
+        # Wheels that hang in the air by a hair would slip in the first step.
+        self.step(np.zeros((len(self.team), 2)))
+
+    def put(self, robot: int, pose: NDArray[np.float64]) -> None:
+        """Put a robot upright and at rest at x, y, theta [m, rad]."""
+        x, y, theta = pose.tolist()
+        turn = (0.0, 0.0, math.sin(0.5 * theta), math.cos(0.5 * theta))
+        body, height = self._robots[robot], self.team[robot].build.mass_height
+        self.client.call("resetBasePositionAndOrientation", body, (x, y, height), turn)
+        self.client.call("resetBaseVelocity", body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        for joint in _JOINTS:
+            self.client.call("resetJointState", body, joint, 0.0, 0.0)
+        self._angles[robot] = 0.0
+
+    def step(self, speeds: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Drive for a time step with motors that want speeds (robots, 2) of left and right wheels [m/s].
+
+        Returns the speeds at which the wheels turned on average, (robots, 2) [m/s].
+        """
+        client, bullet = self.client, self.client.bullet
+        for robot, wanted in enumerate((speeds / self._wheel_radii).tolist()):
+            # PyBullet allows a motor the impulse of a whole step in each substep.
+            torque = self.team[robot].build.motor_torque / self._substeps
+            client.call(
+                "setJointMotorControlArray",
+                self._robots[robot],
+                _JOINTS,
+                bullet.VELOCITY_CONTROL,
+                targetVelocities=wanted,
+                forces=(torque, torque),
+            )
+        client.call("stepSimulation")
+        states = [client.call("getJointStates", body, _JOINTS) for body in self._robots]
+        angles = np.array([[state[0] for state in pair] for pair in states]).reshape(-1, 2)
+        turned, self._angles = angles - self._angles, angles
+        return np.asarray(turned * self._wheel_radii / self._time_step)
+
+    def motion(self, robot: int) -> Motion:
+        """Return where a robot is and how it moves."""
+        body, client = self._robots[robot], self.client
+        centre, turn = client.call("getBasePositionAndOrientation", body)
+        velocity, turning = client.call("getBaseVelocity", body)
+        axes = np.array(client.bullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
+        place = np.array(centre) - self.team[robot].build.mass_height * axes[:, 2]
+        return Motion(place, axes, velocity, turning)
+
+    def touched(self, robot: int) -> list[tuple[float, float]]:
+        """Return x, y [m] of all points in which a robot touches anything but the ground."""
+        points: list[tuple[Any, ...]] = self.client.call("getContactPoints", bodyA=self._robots[robot])
+        found = []
+        for _, body, other, _, _, on_body, on_other, _, distance, force, *_ in points:
+            if self._ground not in (body, other) and (force > 0.0 or distance < 0.0):
+                place = on_body if body == self._robots[robot] else on_other
+                found.append((place[0], place[1]))
+        return found
+
+    def push(self, robot: int, force: Sequence[float], height: float) -> None:
+        """Push a robot by a force [N] at a height above its frame [m] in the next substep."""
+        motion = self.motion(robot)
+        place = motion.place + height * motion.axes[:, 2]
+        bullet = self.client.bullet
+        self.client.call(
+            "applyExternalForce", self._robots[robot], -1, force, place.tolist(), bullet.WORLD_FRAME
+        )
+
+    def rays(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the shares of rays (N, 3) at which they meet anything, (N,); 1 where they meet nothing."""
+        shares: list[float] = []
+        for first in range(0, len(begins), RAYS_AT_ONCE):
+            some = slice(first, first + RAYS_AT_ONCE)
+            hits = self.client.call("rayTestBatch", begins[some].tolist(), ends[some].tolist(), numThreads=1)
+            shares += [hit[2] for hit in hits]
+        return np.array(shares)
+
+    def close(self) -> None:
+        """End the server; closing again does nothing."""
+        self.client.close()

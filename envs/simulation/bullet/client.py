@@ -1,0 +1,77 @@
+"""A client of PyBullet: one physics server, closed when nobody holds it any more."""
+
+import importlib
+import tempfile
+import weakref
+from pathlib import Path
+from typing import Any
+
+MISSING = (
+    'backend "bullet" needs PyBullet; install it with: pip install "lidarium[bullet]" (its wheels end at '
+    "CPython 3.11)"
+)
+
+
+class MissingBulletError(ImportError, ValueError):
+    """PyBullet is not installed, so that the backend cannot be chosen."""
+
+
+def load_bullet() -> Any:  # noqa: ANN401
+    """Return the module ``pybullet``.
+
+    Raises
+    ------
+    MissingBulletError
+        Where it is not installed; the message says how to install it.
+    """
+    try:
+        return importlib.import_module("pybullet")
+    except ImportError as error:
+        raise MissingBulletError(MISSING) from error
+
+
+class Client:
+    """A physics server in this process, without a window.
+
+    Its calls are those of ``pybullet``, each with the number of the server.
+
+    Raises
+    ------
+    MissingBulletError
+        Where PyBullet is not installed.
+    """
+
+    def __init__(self) -> None:
+        self.bullet = load_bullet()
+        self._number = self.bullet.connect(self.bullet.DIRECT)
+        if self._number < 0:
+            raise RuntimeError("PyBullet has no free client; close environments that are not used any more")
+        self._finalizer = weakref.finalize(self, self.bullet.disconnect, self._number)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the server runs."""
+        return self._finalizer.alive
+
+    def call(self, name: str, *arguments: Any, **options: Any) -> Any:  # noqa: ANN401
+        """Call a function of PyBullet on this server."""
+        return getattr(self.bullet, name)(*arguments, **options, physicsClientId=self._number)
+
+    def load_text(self, text: str, **options: Any) -> int:  # noqa: ANN401
+        """Load a body of the text of a URDF file, and return its number."""
+        with tempfile.TemporaryDirectory(prefix="lidarium_") as folder:
+            path = Path(folder) / "body.urdf"
+            path.write_text(text)
+            return int(self.call("loadURDF", str(path), **options))
+
+    def load_pieces(self, text: str) -> int:
+        """Load a static body of the text of an OBJ file, whose objects are convex; return its number."""
+        with tempfile.TemporaryDirectory(prefix="lidarium_") as folder:
+            path = Path(folder) / "body.obj"
+            path.write_text(text)
+            shape = self.call("createCollisionShape", self.bullet.GEOM_MESH, fileName=str(path))
+            return int(self.call("createMultiBody", 0.0, shape))
+
+    def close(self) -> None:
+        """End the server; closing again does nothing."""
+        self._finalizer()
