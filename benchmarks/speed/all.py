@@ -15,6 +15,7 @@ from typing import Any
 
 from lidarium.benchmarks.speed.cases import (
     batch_step,
+    bullet_world,
     cached_start,
     environment_step,
     exploration_projects,
@@ -41,6 +42,7 @@ _MODULES: tuple[ModuleType, ...] = (
     batch_step,
     learning_preset,
     waypoint_decision,
+    bullet_world,
     cached_start,
     depth_image,
 )

@@ -43,6 +43,11 @@ STUDIES.register(
     "map merging on the half of the bank on which its limits are tuned",
 )
 STUDIES.register(
+    "parity",
+    f"{_PACKAGE}.parity:STUDY",
+    "random driving in the world of PyBullet beside the kinematic one, on 20 floors",
+)
+STUDIES.register(
     "policies",
     f"{_PACKAGE}.policies:STUDY",
     "how long the policies take on drawn floors with 1 to 3 robots",
