@@ -3,6 +3,7 @@
 import math
 import sys
 import warnings
+from importlib.util import find_spec
 
 import gymnasium
 import numpy as np
@@ -28,6 +29,8 @@ with warnings.catch_warnings():
 LEVELS = {"Exploration": "velocity", "WaypointExploration": "waypoint", "FrontierExploration": "frontier"}
 CHOICES = (["egocentric_map"], ["egocentric_map", "velocity", "bumper"], ["scan", "pose"])
 IDS = [f"lidarium/{name}-v0" for name in LEVELS]
+BULLET = {"backend": "bullet", "map_cells": 64, "lidar": "lidar_360_6m", "resolution": 0.1}
+needs_bullet = pytest.mark.skipif(find_spec("pybullet") is None, reason="the extra bullet is not installed")
 
 
 @pytest.fixture
@@ -248,3 +251,40 @@ def test_random_actions_never_break_the_bounds_of_velocity_and_heading():
         for observation in observations.values():
             assert abs(observation["velocity"][0]) <= np.float32(0.77)
             assert abs(observation["pose"][2]) <= math.pi + 1e-6
+
+
+@needs_bullet
+@pytest.mark.parametrize("level", LEVELS.values())
+def test_the_apis_hold_in_pybullet(level, capsys):
+    options = {"level": level, "robots": 2, "horizon_s": 3.0 if level == "velocity" else 20.0, **BULLET}
+    parallel_api_test(lidarium.parallel_env(**options), num_cycles=20)
+    parallel_seed_test(lambda: lidarium.parallel_env(noise="datasheet", **options), num_cycles=5)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Observation is not a NumPy array")
+        warnings.filterwarnings("ignore", message="Observation space for each agent probably should be")
+        api_test(lidarium.env(**options), num_cycles=20)
+    assert capsys.readouterr().out.count("Passed") == 2
+
+
+@needs_bullet
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.usefixtures("no_display")
+def test_gymnasiums_checker_finds_nothing_in_pybullet(name):
+    check_env(gymnasium.make(name, render_mode="rgb_array", **BULLET).unwrapped)
+
+
+@needs_bullet
+@pytest.mark.parametrize("level", LEVELS.values())
+def test_batches_step_in_pybullet(level):
+    batch = lidarium.vector_env(2, "building:5", level=level, robots=2, **BULLET)
+    lone = lidarium.parallel_env("building:5", level=level, robots=2, **BULLET)
+    observations, _ = batch.reset(seed=[4, 5])
+    theirs, _ = lone.reset(seed=5)
+    for _ in range(3):
+        for row, agent in enumerate(lone.possible_agents, 2):
+            assert all(np.array_equal(observations[key][row], theirs[agent][key]) for key in observations)
+        action = 0 if level == "frontier" else np.array([0.4, 0.1], np.float32)
+        observations, *_ = batch.step(np.stack([action] * 4))
+        theirs, *_ = lone.step(dict.fromkeys(lone.agents, action))
+    batch.close()
+    lone.close()

@@ -1,5 +1,7 @@
 """What every world does, whatever moves its bodies; and the fast one beside the plain one."""
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 from plain_world import PlainWorld
@@ -11,13 +13,19 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.envs.simulation.backends import BACKENDS, kinematic_world, simulation_of
+from lidarium.envs.simulation.bullet.bullet_world import BulletWorld
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
 from lidarium.envs.simulation.simulation import Simulation
 
-WORLDS = {"kinematic": KinematicWorld, "plain": PlainWorld}
+WORLDS = {"kinematic": KinematicWorld, "plain": PlainWorld, "bullet": BulletWorld}
+NEEDS_BULLET = pytest.mark.skipif(find_spec("pybullet") is None, reason="the extra bullet is not installed")
+BULLET = pytest.param("bullet", marks=NEEDS_BULLET)
+SLACK = {"bullet": 2e-3}
+"""How far bodies that forces move may be off, where others are exact [m]."""
+
 LIDAR = Lidar(beams=61, range_max=3.0)
 CELL = 0.1
 
@@ -51,7 +59,7 @@ def commands(seed, steps, rows=2):
     return np.repeat(held, 10, axis=0)[:steps]
 
 
-@pytest.fixture(params=WORLDS)
+@pytest.fixture(params=["kinematic", "plain", BULLET])
 def kind(request):
     return request.param
 
@@ -99,7 +107,7 @@ def test_robots_begin_at_rest_at_their_starts_before_the_first_step(kind):
 
 
 def test_limits_of_the_drive_hold(kind):
-    world, robot = placed(kind), ROBOTS["kobuki"]
+    world, robot, slack = placed(kind), ROBOTS["kobuki"], 5.0 * SLACK.get(kind, 2e-13)
     before = world.velocities.copy()
     for _ in range(20):
         world.move_and_sense(np.full((2, 2), 9.0))
@@ -107,15 +115,15 @@ def test_limits_of_the_drive_hold(kind):
         in_contact = world.contacts.any()
         assert (
             in_contact
-            or (change <= np.array([robot.max_acceleration, robot.max_turn_acceleration]) * 0.1 + 1e-12).all()
+            or (change <= np.array([robot.max_acceleration, robot.max_turn_acceleration]) * 0.1 + slack).all()
         )
-        assert (np.abs(world.velocities) <= [robot.max_speed + 1e-12, robot.max_turn_rate + 1e-12]).all()
+        assert (np.abs(world.velocities) <= np.array([robot.max_speed, robot.max_turn_rate]) + slack).all()
         before = world.velocities.copy()
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_no_body_enters_a_wall_or_another_and_touching_is_noted(kind, seed):
-    world, touched = placed(kind), 0
+    world, touched, slack = placed(kind), 0, SLACK.get(kind, 1e-9)
     body = tables().body
     rows, columns = np.nonzero(body.solid)
     low = np.stack([columns, rows], axis=1) * CELL + body.origin
@@ -124,9 +132,9 @@ def test_no_body_enters_a_wall_or_another_and_touching_is_noted(kind, seed):
         world.move_and_sense(command)
         for pose in world.poses:
             gaps = pose[:2] - np.clip(pose[:2], low, low + CELL)
-            assert np.hypot(*gaps.T).min() >= ROBOTS["kobuki"].radius - 1e-9
+            assert np.hypot(*gaps.T).min() >= ROBOTS["kobuki"].radius - slack
         apart = np.hypot(*(world.poses[0, :2] - world.poses[1, :2]))
-        assert apart >= 2 * ROBOTS["kobuki"].radius - 1e-9
+        assert apart >= 2 * ROBOTS["kobuki"].radius - slack
         assert (world.collisions - before <= world.contacts).all()
         touched += int(world.contacts.sum())
         assert ((world.sensors["bumper"].sum(axis=1) > 0) <= (world.contacts > 0)).all()
@@ -158,7 +166,7 @@ def test_who_has_ended_stands_and_senses_nothing_but_is_seen(kind):
     world.moves[1], world.flags[1] = 0, ENDED
     for command in commands(0, 20):
         world.move_and_sense(command)
-    assert np.array_equal(world.poses[1], STARTS[1])
+    assert np.allclose(world.poses[1], STARTS[1], rtol=0.0, atol=SLACK.get(kind, 0.0))
     assert np.array_equal(world.sensors["scan"][1], scan)
     assert world.travelled[1] == 0.0
 
@@ -208,7 +216,7 @@ def backends():
 
 
 @pytest.mark.usefixtures("backends")
-@pytest.mark.parametrize("backend", ["kinematic", "staged", "plain"])
+@pytest.mark.parametrize("backend", ["kinematic", "staged", "plain", BULLET])
 def test_an_environment_runs_in_any_world(backend):
     options = {"raster_resolution": CELL, "resolution": CELL, "stop_coverage": None}
     settings = make_settings(robots=2, lidar=LIDAR, backend=backend, **options)
