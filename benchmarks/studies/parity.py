@@ -19,6 +19,7 @@ from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.bullet.bullet_world import BulletWorld
+from lidarium.envs.simulation.bullet.leaning_scans import LEAN
 
 ROBOTS = ("kobuki", "pioneer", "service")
 FLOORS = ("apartment", "clinic", "scene_room", "scene_loop", *(f"building:{seed}" for seed in range(16)))
@@ -104,7 +105,7 @@ def measure(drive: Drive) -> dict[str, Any]:
         is_near = bool(np.hypot(*(bullet.poses[0] - kinematic.poses[0])[:2]) < 0.05)
         touches += here, there, is_near and here == there
         near += is_near
-        if np.abs(bullet.attitudes[0, 1:]).max() < math.radians(2.0):
+        if np.hypot(*bullet.attitudes[0, 1:]) <= LEAN:
             probe.world.poses[:] = bullet.poses
             probe.world.move_and_sense(command[None], moves_bodies=False)
             scans += 1

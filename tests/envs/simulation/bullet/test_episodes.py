@@ -20,6 +20,7 @@ from lidarium.evaluation.record.state import state_sha256
 
 pybullet = pytest.importorskip("pybullet", reason="the extra bullet is not installed")
 FLOOR = "building:5"
+PLAIN = {"resolution": 0.1, "lidar": "lidar_360_6m", "observe": ("scan", "pose")}
 
 
 def make(**options):
@@ -48,15 +49,15 @@ def test_equal_seeds_give_equal_runs_in_fresh_clients_and_after_a_reset():
 
 
 def test_the_rows_of_a_batch_are_lone_environments_to_the_bit():
-    batch = lidarium.vector_env(64, floor=FLOOR, backend="bullet", robots=2, resolution=0.1, map_cells=64)
+    batch = lidarium.vector_env(64, floor=FLOOR, backend="bullet", robots=2, **PLAIN)
     batch.reset(seed=[7] * 63 + [8])
-    for _ in range(8):
+    for _ in range(4):
         batch.step(np.full((128, 2), 0.5, np.float32))
     poses = batch.batch.world.poses.reshape(64, 2, 3)
     assert (poses[:63] == poses[0]).all()
-    env = lidarium.parallel_env(FLOOR, backend="bullet", robots=2, resolution=0.1, map_cells=64)
+    env = lidarium.parallel_env(FLOOR, backend="bullet", robots=2, **PLAIN)
     env.reset(seed=7)
-    for _ in range(8):
+    for _ in range(4):
         env.step(dict.fromkeys(env.agents, np.full(2, 0.5, np.float32)))
     assert np.array_equal(env.world.poses, poses[0])
     batch.close()
