@@ -91,6 +91,28 @@ def test_no_client_is_left_and_memory_stays_flat_after_many_episodes():
     assert clients() == 0
 
 
+def test_scans_scores_and_maps_are_the_kinematic_ones_at_the_same_poses():
+    options = {"robots": 2, "resolution": 0.05, "noise": "thesis"}
+    bullet, kinematic = (
+        ExplorationEnv(FLOOR, make_settings(backend=backend, **options))
+        for backend in ("bullet", "kinematic")
+    )
+    bullet.reset(seed=3)
+    kinematic.reset(seed=3)
+    still = np.zeros((2, 2))
+    for number in range(20):
+        for env in (bullet, kinematic):
+            env.world.poses[:] = env.world.starts + 0.02 * number * np.array([1.0, 0.5, 2.0])
+            env.simulation.step(still, moves_bodies=False)
+        assert np.array_equal(bullet.world.ranges, kinematic.world.ranges)
+    assert np.array_equal(bullet.score.seen, kinematic.score.seen)
+    assert np.array_equal(bullet.score.rewards, kinematic.score.rewards)
+    for ours, theirs in zip(bullet.beliefs.log_odds, kinematic.beliefs.log_odds, strict=True):
+        assert np.array_equal(ours, theirs)
+    for ours, theirs in zip(bullet.score.masks, kinematic.score.masks, strict=True):
+        assert np.array_equal(ours, theirs)
+
+
 def test_a_record_runs_again_and_names_the_version():
     recorder = Recorder("by hand", 2, FLOOR)
     env = WatchedExploration(FLOOR, make(odometry="typical", localization="odometry").settings)
