@@ -109,6 +109,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self._generator: np.random.Generator | None = None
         self._observations = AgentObservations(self.simulation, self.settings, self.has_goal)
         self._window: Any = None
+        # A world with a window of its own draws itself.
+        self._shows_itself = render_mode == "human" and self.world.show()
         self.floor: Floor | None = None
         self.goal: tuple[float, float] | None = None
         self.seed: int | None = None
@@ -323,6 +325,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             return None
         if self.floor is None:
             raise RuntimeError("the environment was not reset; call reset() before render()")
+        if self._shows_itself:
+            return None
         frame = draw_frame(self.scene())
         if self.render_mode == "rgb_array":
             return frame

@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from lidarium.envs.settings.exploration import OBSERVABLES, ExplorationSettings
-from lidarium.envs.settings.observables import SENSED
+from lidarium.envs.settings.sensors.observables import SENSED
 
 FARTHEST = 1000.0
 """Bound of positions in observations [m]."""

@@ -81,7 +81,7 @@ def _robots() -> tuple[dict[str, Any], str]:
 def _cameras() -> tuple[dict[str, Any], str]:
     import math
 
-    from lidarium.envs.settings.cameras import CAMERAS
+    from lidarium.envs.settings.sensors.cameras import CAMERAS
 
     header = ("camera", "pixels", "view [deg]", "from [m]", "to [m]", "height [m]", "noisy")
     rows = [

@@ -62,6 +62,9 @@ class PlainWorld:
                     self.true_ranges[row] = self._scan(row)
                     self.sensors["scan"][row] = self.true_ranges[row]
 
+    def show(self):
+        return False
+
     def close(self):
         pass
 

@@ -15,7 +15,6 @@ from typing import Any
 
 from lidarium.benchmarks.speed.cases import (
     batch_step,
-    bullet_world,
     cached_start,
     environment_step,
     exploration_projects,
@@ -26,7 +25,7 @@ from lidarium.benchmarks.speed.cases import (
     ray_casting,
     waypoint_decision,
 )
-from lidarium.benchmarks.speed.cases.three_dimensions import depth_image
+from lidarium.benchmarks.speed.cases.three_dimensions import bullet_world, depth_image
 from lidarium.benchmarks.speed.harness.lines import Line, table
 from lidarium.benchmarks.speed.harness.report import speed_result, with_effort, write_speed
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, on_cores

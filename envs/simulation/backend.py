@@ -118,6 +118,10 @@ class World(Protocol):
         """
         ...
 
+    def show(self) -> bool:
+        """Show the bodies in a window of the world's own; returns False where it has none."""
+        ...
+
     def close(self) -> None:
         """Give back what is held beyond arrays; closing again does nothing, and ``place`` opens anew."""
         ...

@@ -133,6 +133,10 @@ class KinematicWorld:
         chosen = self._everywhere if runs is None else runs
         move_and_sense(self._table, self.robots, commands, chosen, moves_bodies)
 
+    def show(self) -> bool:
+        """Return False: the world has no window of its own."""
+        return False
+
     def close(self) -> None:
         """Do nothing: all is in arrays."""
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.scoring.score import Score
-from lidarium.envs.settings.cameras import DepthCamera
 from lidarium.envs.settings.lidar import Lidar
+from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.beliefs import Beliefs
 from lidarium.envs.simulation.depth.depth_sensor import DepthSensor

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.settings.cameras import DepthCamera
+from lidarium.envs.settings.sensors.cameras import DepthCamera
 
 NEAR = 0.05
 

@@ -55,6 +55,8 @@ class Bodies:
         The robots.
     time_step : float
         Length of a step [s].
+    is_shown : bool
+        Whether they are shown in a window.
 
     Attributes
     ----------
@@ -62,8 +64,8 @@ class Bodies:
         Their server.
     """
 
-    def __init__(self, team: Sequence[Robot], time_step: float) -> None:
-        self.client, self.team, self._time_step = Client(), team, time_step
+    def __init__(self, team: Sequence[Robot], time_step: float, is_shown: bool = False) -> None:
+        self.client, self.team, self._time_step = Client(is_shown), team, time_step
         self._substeps = max(math.ceil(time_step / SUBSTEP - 1e-9), 1)
         self._ground, self._robots = -1, [-1] * len(team)
         self._wheel_radii = np.array([robot.build.wheel_radius for robot in team]).reshape(-1, 1)

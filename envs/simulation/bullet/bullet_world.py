@@ -42,11 +42,6 @@ class BulletWorld(KinematicWorld):
     robots, lidar, time_step, episodes, odometry, faults, horizon_s
         As for ``KinematicWorld``.
 
-    Attributes
-    ----------
-    attitudes : (rows, 3) float64
-        Height of the body's frame above the ground [m], roll and pitch [rad]; 0 where a robot stands flat.
-
     Raises
     ------
     MissingBulletError
@@ -65,9 +60,14 @@ class BulletWorld(KinematicWorld):
     ) -> None:
         super().__init__(robots, lidar, time_step, episodes, odometry, True, faults, horizon_s)
         self.team = list(robots)
-        self.attitudes = np.zeros((self.robots * episodes, 3))
+        self._attitudes = np.zeros((self.robots * episodes, 3))
         self._physics = [Bodies(self.team, time_step) for _ in range(episodes)]
         self._wheel_velocities = np.zeros((self.robots * episodes, 2))
+
+    @property
+    def attitudes(self) -> NDArray[np.float64]:
+        """Height of the bases above the ground, roll and pitch, (rows, 3) [m, rad]."""
+        return self._attitudes
 
     def bodies_of(self, episode: int) -> Bodies:
         """Return the bodies of an episode in PyBullet."""
@@ -86,7 +86,7 @@ class BulletWorld(KinematicWorld):
         if not self._physics[episode].client.is_open:
             self._physics[episode] = Bodies(self.team, self.time_step)
         self._physics[episode].begin(_floor_of(floor), starts)
-        self.attitudes[episode * self.robots : (episode + 1) * self.robots] = 0.0
+        self._attitudes[episode * self.robots : (episode + 1) * self.robots] = 0.0
 
     def move_and_sense(
         self,
@@ -106,6 +106,18 @@ class BulletWorld(KinematicWorld):
             encode(self._table, self.robots, self._wheel_velocities, chosen)
         sense(self._table, self.robots, chosen)
         self._sense_leaning(chosen)
+
+    def show(self) -> bool:
+        """Show the bodies of the first episode in PyBullet's window.
+
+        Raises
+        ------
+        ValueError
+            Where there is no display.
+        """
+        self._physics[0].close()
+        self._physics[0] = Bodies(self.team, self.time_step, is_shown=True)
+        return True
 
     def close(self) -> None:
         """End the servers of all episodes; ``place`` starts new ones."""
@@ -159,7 +171,7 @@ class BulletWorld(KinematicWorld):
         along = motion.velocity[0] * math.cos(theta) + motion.velocity[1] * math.sin(theta)
         self.velocities[row] = along, motion.turning[2]
         roll, pitch = math.atan2(axes[2, 1], axes[2, 2]), math.asin(min(max(-axes[2, 0], -1.0), 1.0))
-        self.attitudes[row] = height, roll, pitch
+        self._attitudes[row] = height, roll, pitch
         if axes[2, 2] < math.cos(TILT) or height < -FALL:
             self.failed[row], self.moves[row] = DEAD, 0
 
@@ -176,7 +188,7 @@ class BulletWorld(KinematicWorld):
 
     def _sense_leaning(self, chosen: NDArray[np.bool_]) -> None:
         """Take the scans of robots that lean anew, along the tilted planes of their lasers."""
-        leaning = np.hypot(self.attitudes[:, 1], self.attitudes[:, 2]) > LEAN
+        leaning = np.hypot(self._attitudes[:, 1], self._attitudes[:, 2]) > LEAN
         leaning &= np.repeat(chosen, self.robots) & (self.flags & ENDED == 0)
         for row in np.flatnonzero(leaning).tolist():
             episode, robot = divmod(row, self.robots)

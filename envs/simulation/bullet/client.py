@@ -1,6 +1,8 @@
 """A client of PyBullet: one physics server, closed when nobody holds it any more."""
 
 import importlib
+import os
+import sys
 import tempfile
 import weakref
 from pathlib import Path
@@ -31,19 +33,34 @@ def load_bullet() -> Any:  # noqa: ANN401
 
 
 class Client:
-    """A physics server in this process, without a window.
+    """A physics server in this process.
 
     Its calls are those of ``pybullet``, each with the number of the server.
+
+    Parameters
+    ----------
+    is_shown : bool
+        Whether it has a window.
 
     Raises
     ------
     MissingBulletError
         Where PyBullet is not installed.
+    ValueError
+        Where it is to be shown and there is no display.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_shown: bool = False) -> None:
         self.bullet = load_bullet()
-        self._number = self.bullet.connect(self.bullet.DIRECT)
+        if is_shown and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+            # PyBullet would end the process.
+            raise ValueError(
+                'render_mode is "human", and the environment variable DISPLAY names no display; start one, or '
+                'choose "rgb_array"'
+            )
+        self._number = self.bullet.connect(self.bullet.GUI if is_shown else self.bullet.DIRECT)
+        if is_shown:
+            self.call("configureDebugVisualizer", self.bullet.COV_ENABLE_GUI, 0)
         if self._number < 0:
             raise RuntimeError("PyBullet has no free client; close environments that are not used any more")
         self._finalizer = weakref.finalize(self, self.bullet.disconnect, self._number)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.faces import convex_parts
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.raster import Raster
+from lidarium.envs.floors.raster import Raster, rectangles_of
 from lidarium.envs.floors.solid import Solid
-from lidarium.envs.simulation.bullet.convex_pieces import convex_pieces
 
 OUTER_WALL = 1.0
 """Thickness of the walls around the bounds [m]."""
@@ -68,7 +68,7 @@ class FloorShapes:
             if box is not None:
                 boxes.append(box)
             else:
-                prisms += [(piece, low, high) for piece in convex_pieces(solid.polygon, solid.holes)]
+                prisms += [(piece, low, high) for piece in convex_parts(solid)]
         return cls(boxes, prisms)
 
     @property
@@ -129,25 +129,9 @@ def _box_of(solid: Solid, low: float, high: float) -> Box | None:
 def _cell_boxes(cells: Raster, height: float) -> Iterator[Box]:
     """Yield boxes that cover the solid cells of a raster."""
     side, (x, y) = cells.resolution, cells.origin
-    for row, end_row, column, end_column in rectangles(cells.solid):
+    for row, column, end_row, end_column in rectangles_of(cells.solid != 0).tolist():
         centre = (x + 0.5 * side * (column + end_column), y + 0.5 * side * (row + end_row), 0.5 * height)
         yield Box(centre, (side * (end_column - column), side * (end_row - row), height))
-
-
-def rectangles(solid: NDArray[np.uint8]) -> Iterator[tuple[int, int, int, int]]:
-    """Yield rectangles row, end row, column, end column that cover the solid cells, each once.
-
-    Runs of a row grow downwards for as long as the next row has the same run.
-    """
-    padded = np.pad(solid != 0, ((0, 1), (1, 1))).astype(np.int8)
-    growing: dict[tuple[int, int], int] = {}
-    for row, edges in enumerate(np.diff(padded, axis=1)):
-        begins, ends = np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist()
-        runs = dict.fromkeys(zip(begins, ends, strict=True))
-        for run in [run for run in growing if run not in runs]:
-            yield growing.pop(run), row, *run
-        for run in runs:
-            growing.setdefault(run, row)
 
 
 def _numbers(values: tuple[float, ...]) -> str:

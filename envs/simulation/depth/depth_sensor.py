@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.faces import Faces
-from lidarium.envs.settings.cameras import DepthCamera
+from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.depth.frames import (
     Cameras,

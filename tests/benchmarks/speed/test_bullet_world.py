@@ -2,7 +2,7 @@
 
 import pytest
 
-from lidarium.benchmarks.speed.cases.bullet_world import measure
+from lidarium.benchmarks.speed.cases.three_dimensions.bullet_world import measure
 from lidarium.benchmarks.speed.harness.timing import Effort
 
 pytest.importorskip("pybullet", reason="the extra bullet is not installed")

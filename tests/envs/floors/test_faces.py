@@ -1,5 +1,8 @@
 """Faces of floors are closed, convex, and look outwards."""
 
+import math
+
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -61,6 +64,36 @@ def test_parts_of_any_outline_are_convex_and_cover_it(steps):
         edges = np.roll(part, -1, axis=0) - part
         after = np.roll(edges, -1, axis=0)
         assert (edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0] >= -1e-9).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_pieces_are_convex_and_cover_what_the_outline_does(seed):
+    generator = np.random.default_rng(seed)
+    angles = np.sort(generator.uniform(0.0, math.tau, 9))
+    ring = generator.uniform(0.5, 2.0, 9)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    hole = 0.05 * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) + 0.0
+    holes = (hole,) if seed % 2 else ()
+    pieces = convex_parts(Solid(ring, holes=holes))
+    for _ in range(200):
+        point = generator.uniform(-2.0, 2.0, 2)
+
+        def holds(outline, point=point):
+            return cv2.pointPolygonTest((outline * 1e3).astype(np.float32), tuple(point * 1e3), False) > 0
+
+        inside = holds(ring) and not any(map(holds, holes))
+        near = abs(cv2.pointPolygonTest((ring * 1e3).astype(np.float32), tuple(point * 1e3), True)) < 1.0
+        if not near:
+            assert sum(map(holds, pieces)) <= 1
+            assert any(map(holds, pieces)) == inside or any(
+                abs(cv2.pointPolygonTest((piece * 1e3).astype(np.float32), tuple(point * 1e3), True)) < 1.0
+                for piece in pieces
+            )
+    assert sum(map(area_of, pieces)) == pytest.approx(_area_without(ring, holes), rel=1e-6)
+
+
+def _area_without(ring, holes):
+    # A star around the origin: its outline does not cross itself.
+    return abs(area_of(ring)) - sum(abs(area_of(hole)) for hole in holes)
 
 
 def test_what_nobody_sees_has_no_face():

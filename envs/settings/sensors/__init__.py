@@ -1,0 +1,1 @@
+"""What robots sense beside their laser, as settings say it."""
