@@ -55,8 +55,8 @@ class Client:
         if is_shown and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
             # PyBullet would end the process.
             raise ValueError(
-                'render_mode is "human", and the environment variable DISPLAY names no display; start one, or '
-                'choose "rgb_array"'
+                'render_mode is "human", and the environment variable DISPLAY names no display; start one, '
+                'or choose "rgb_array"'
             )
         self._number = self.bullet.connect(self.bullet.GUI if is_shown else self.bullet.DIRECT)
         if is_shown:
