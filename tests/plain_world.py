@@ -8,13 +8,13 @@ import math
 import numpy as np
 
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.envs.simulation.kernels.motion import (
+from lidarium.envs.simulation.kernels.contact import (
     CENTRE_BUMPER,
     CONTACT_TOLERANCE,
-    PIECE,
     PRESSED,
     SIDE_BUMPER,
 )
+from lidarium.envs.simulation.kernels.motion import PIECE
 
 
 class PlainWorld:

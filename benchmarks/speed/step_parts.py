@@ -16,17 +16,23 @@ from lidarium.envs.scoring.coverage import mark_seen
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, fill_gaussian
+from lidarium.envs.simulation.kernels.contact import TeamBodies
 from lidarium.envs.simulation.kernels.masks import window_corner
-from lidarium.envs.simulation.kernels.motion import move_robots
+from lidarium.envs.simulation.kernels.motion import body_grids, move_robots
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan
 from lidarium.mapping.grids.pooled_maps import touched_words
-from lidarium.mapping.grids.scan_geometry import beam_directions
+from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 from lidarium.mapping.grids.scan_integration import SeenScan, integrate_scan
 from lidarium.mapping.grids.scan_polygon import fill_scan_polygon, scan_ends, window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import int8_grid_at, word_grid_at
 
 ROBOTS, WARM_STEPS = 16, 30
+
+
+@kernel
+def _move(floor: Array, frame: Array, team: TeamBodies, commands: Array, duration: float) -> None:
+    move_robots(body_grids(floor, frame), team, commands, duration)
 
 
 @kernel
@@ -46,17 +52,9 @@ def _rays(
     lengths: Array,
 ) -> None:
     for row in range(places.shape[0]):
-        cast_scan(
-            floor,
-            places[row, 0],
-            places[row, 1],
-            places[row, 2],
-            angle_first,
-            increment,
-            directions[row],
-            reach,
-            lengths[row],
-        )
+        x, y, heading = places[row]
+        beams = Beams(x, y, heading, angle_first, increment, directions[row], reach)
+        cast_scan(floor, beams, lengths[row])
 
 
 @kernel
@@ -163,23 +161,17 @@ class StepParts:
 
         def move() -> None:
             moved[:], speeds[:] = poses, velocities
-            move_robots(
-                floor_row[8],
-                floor_row[9],
-                floor_row[1],
-                floor_row[2],
-                simulation.frames[0],
+            team_bodies = TeamBodies(
                 simulation.world.bodies,
                 simulation.world.moves,
                 moved,
                 speeds,
-                commands,
-                simulation.time_step,
                 bumpers,
                 contacts,
                 np.zeros(ROBOTS),
                 touched,
             )
+            _move(floor_row, simulation.frames[0], team_bodies, commands, simulation.time_step)
 
         def step() -> None:
             simulation.world.poses[:], simulation.world.velocities[:] = poses, velocities

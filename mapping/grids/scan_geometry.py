@@ -1,7 +1,8 @@
-"""The geometry of a scan: which way its beams look and how far they reach."""
+"""The geometry of a scan: directions and reach of its beams."""
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,30 @@ class ScanGeometry:
         return np.stack([np.cos(self.angles), np.sin(self.angles)])
 
 
+class Beams(NamedTuple):
+    """The beams of one scan, as kernels cast them; lengths in cells of a grid.
+
+    Attributes
+    ----------
+    x, y, heading : float
+        Pose of the laser on the grid [cells, rad].
+    angle_first, increment : float
+        Angle of the first beam against the heading, and between two beams [rad].
+    directions : (4, beams) float64
+        Unit vectors along the grid's axes (x, y) and their inverses, see ``beam_directions``.
+    reach : float
+        Longest range [cells].
+    """
+
+    x: float
+    y: float
+    heading: float
+    angle_first: float
+    increment: float
+    directions: Array
+    reach: float
+
+
 @kernel(borrowing=True)
 def beam_directions(heading: float, unit_vectors: Array, directions: Array) -> None:
     """Rotate the beams' unit vectors (2, beams) by the heading.
@@ -114,8 +139,8 @@ def beams_towards(
 
     The first beam (not rounded) and how many. The range repeats after a full turn.
 
-    Good to a few thousandths of a beam's gap at a third of a degree; a caller that must miss none looks one
-    beam further.
+    Good to a few thousandths of a beam's gap at a third of a degree; a caller that must miss none takes one
+    beam more.
     """
     squared = offset_x * offset_x + offset_y * offset_y
     beyond = squared - radius * radius

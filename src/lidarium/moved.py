@@ -1,4 +1,4 @@
-"""Old names of modules, kept for one release.
+"""Old names of modules and of what is in them, kept for one release.
 
 A module that has moved can still be imported by its old name, with a ``DeprecationWarning`` that names the
 new one. The aliases go with release 0.3.
@@ -14,6 +14,7 @@ from typing import Any
 MOVED: dict[str, tuple[str, ...]] = {
     "agents.srt.drive": ("agents.srt.motion.drive",),
     "agents.srt.intent": ("agents.srt.motion.progress",),
+    "agents.srt.motion.looks": ("agents.srt.motion.turn_plan",),
     "agents.srt.memory": (
         "agents.srt.memories.memory",
         "agents.srt.memories.map_memory",
@@ -44,7 +45,11 @@ MOVED: dict[str, tuple[str, ...]] = {
         "envs.driving.path_following",
         "envs.driving.safety_stop",
     ),
-    "envs.onboard.exchange": ("envs.radio.exchange",),
+    "envs.onboard.exchange": (
+        "envs.radio.exchange",
+        "envs.radio.map_blocks",
+        "envs.radio.radio_links",
+    ),
     "envs.onboard.frontier_offers": ("envs.levels.frontier_offers",),
     "envs.onboard.operating": ("envs.station.operating",),
     "envs.onboard.planning": ("envs.driving.planning",),
@@ -76,7 +81,10 @@ MOVED: dict[str, tuple[str, ...]] = {
         "envs.settings.lidar",
         "envs.simulation.kernels.ray_casting",
     ),
-    "envs.simulation.motion": ("envs.simulation.kernels.motion",),
+    "envs.simulation.motion": (
+        "envs.simulation.kernels.motion",
+        "envs.simulation.kernels.contact",
+    ),
     "envs.simulation.noise": ("envs.simulation.disturbances.noise",),
     "envs.simulation.odometry": (
         "envs.settings.odometry",
@@ -88,7 +96,8 @@ MOVED: dict[str, tuple[str, ...]] = {
     ),
     "envs.simulation.ray_tables": ("envs.simulation.kernels.ray_tables",),
     "envs.simulation.robots": ("envs.settings.robots",),
-    "envs.simulation.stages": ("envs.simulation.kernels.stages",),
+    "envs.simulation.kernels.stages": ("envs.simulation.kernels.map_updates",),
+    "envs.simulation.stages": ("envs.simulation.kernels.map_updates",),
     "envs.simulation.stepping": ("envs.simulation.kernels.stepping",),
     "envs.simulation.world": ("envs.simulation.backend",),
     "envs.solo": ("envs.levels.gymnasium_env",),
@@ -145,6 +154,7 @@ MOVED: dict[str, tuple[str, ...]] = {
     "mapping.grid_lines": ("mapping.grids.grid_lines",),
     "mapping.grid_planning": (
         "mapping.planning.grid_planning",
+        "mapping.planning.footprint",
         "mapping.planning.search.search_space",
     ),
     "mapping.grid_search": (
@@ -154,7 +164,7 @@ MOVED: dict[str, tuple[str, ...]] = {
     "mapping.growing": ("mapping.grids.growing_array",),
     "mapping.laser_logs": ("mapping.files.npz_logs", "mapping.files.laser_logs"),
     "mapping.merging.validation": ("mapping.merging.agreement.validation",),
-    "mapping.level_changes": ("mapping.grids.map_deltas",),
+    "mapping.level_changes": ("mapping.grids.map_deltas", "mapping.grids.overlaid_deltas"),
     "mapping.localization.branch_and_bound": ("mapping.localization.matching.branch_and_bound",),
     "mapping.localization.calibration": ("mapping.localization.slam.calibration",),
     "mapping.localization.closures": ("mapping.localization.graph.closures",),
@@ -230,20 +240,41 @@ MOVED_NAMES: dict[str, tuple[str, ...]] = {
         "envs.settings.lidar",
         "envs.settings.realism",
     ),
+    "envs.radio.exchange": ("envs.radio.map_blocks", "envs.radio.radio_links"),
+    "envs.simulation.kernels.motion": ("envs.simulation.kernels.contact",),
     "evaluation.truth": ("evaluation.truth.true_map",),
+    "evaluation.truth.map_counts": ("evaluation.truth.team_counts",),
     "mapping.files": (
         "mapping.files.output",
         "mapping.kernels.cache_folders",
     ),
     "mapping.files.laser_logs": ("mapping.files.npz_logs",),
     "mapping.files.map_files": ("mapping.files.images", "mapping.files.guarded_reading"),
+    "mapping.grids.map_deltas": ("mapping.grids.overlaid_deltas",),
     "mapping.kernels": (
         "mapping.kernels.compilation",
         "mapping.kernels.views",
     ),
     "mapping.localization.slam": ("mapping.localization.slam.localizer",),
+    "scripts.floors": ("scripts.output.floor_files",),
+    "scripts.run": ("scripts.output.run_summary",),
 }
 """Where the names of modules have gone that are there still, or are packages now."""
+
+RENAMED: dict[str, dict[str, str]] = {
+    "agents.srt.motion.looks": {"LOOK_GAIN": "TURN_GAIN", "Looks": "TurnPlan"},
+    "agents.srt.senses": {"NEWS_S": "CONTACT_AGE_S"},
+    "envs.batch.running": {"LOOKS": "SENSES"},
+    "envs.driving.safety_stop": {"LEAST_MATE_GAP": "LEAST_TEAMMATE_GAP", "MATE_GAP": "TEAMMATE_GAP"},
+    "envs.levels.frontier_choices": {"Looking": "ViewReach"},
+    "envs.station.team_mapping": {"News": "TeammateMap"},
+    "mapping.grids.map_deltas": {"LaidMaps": "OverlaidMaps"},
+    "mapping.planning.footprint_masks": {"swept": "footprint_mask"},
+    "scripts.common": {"tell": "notify"},
+}
+"""What names of modules are called now."""
+
+MOVED_NAMES.update({module: (module,) for module in RENAMED if module not in (*MOVED, *MOVED_NAMES)})
 
 _ROOT = "lidarium."
 
@@ -289,22 +320,40 @@ def moved_name(module: str, name: str) -> Any:  # noqa: ANN401
         Where the name is nowhere.
     """
     places = MOVED_NAMES[module.removeprefix(_ROOT)]
+    renamed = RENAMED.get(module.removeprefix(_ROOT), {}).get(name)
     if name.startswith("_"):
         raise AttributeError(f"module {module!r} has no attribute {name!r}")
     found = _found(module, places, name)
     place = getattr(found, "__module__", None) or " or ".join(_ROOT + place for place in places)
+    change = f"has moved to {place}" if renamed is None else f"is now called {renamed}"
     warnings.warn(
-        f"{module}.{name} has moved to {place}; the old name goes with release 0.3",
+        f"{module}.{name} {change}; the old name goes with release 0.3",
         DeprecationWarning,
         stacklevel=3,
     )
     return found
 
 
+def renamed_method(old: str, new: str) -> Any:  # noqa: ANN401
+    """Return a method for the old name of one that is called ``new`` now."""
+
+    def method(self: Any, *arguments: Any, **options: Any) -> Any:  # noqa: ANN401
+        warnings.warn(
+            f"{type(self).__name__}.{old} is now called {new}; the old name goes with release 0.3",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return getattr(self, new)(*arguments, **options)
+
+    method.__name__, method.__doc__ = old, f"Call ``{new}``, as this method is called now; it warns."
+    return method
+
+
 def _found(module: str, places: tuple[str, ...], name: str) -> Any:  # noqa: ANN401
+    name = RENAMED.get(module.removeprefix(_ROOT), {}).get(name, name)
     for place in places:
-        try:
-            return getattr(import_module(_ROOT + place), name)
-        except AttributeError:
-            continue
+        # Not by getattr: a place may itself search a name that it lacks where names have moved.
+        found = vars(import_module(_ROOT + place))
+        if name in found:
+            return found[name]
     raise AttributeError(f"module {module!r} has no attribute {name!r}")

@@ -4,11 +4,12 @@ And what the drive makes of a command.
 
 Biases belong to a robot and an episode: their signs are drawn at its beginning. Noise follows the odometry
 motion model (turn and distance, each from turn and distance) and the velocity motion model of Thrun, Burgard
-and Fox, "Probabilistic Robotics", chapter 5, with variances that grow with the way driven, so that a model
+and Fox, "Probabilistic Robotics", chapter 5, with variances that grow with the path driven, so that a model
 means the same whatever the time step.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,20 +70,35 @@ def disturb_commands(numbers: Array, noise_table: Array, seed: np.uint64, step: 
         commands[robot, 1] *= 1.0 + numbers[6] * gaussian_at(key, noise_table, 1)
 
 
+class Encoders(NamedTuple):
+    """Wheels of one robot, and what is known from them.
+
+    Attributes
+    ----------
+    wheels : (7,) float64
+        The robot's row of wheel numbers.
+    measured : (2,) float64
+        Speed and turn rate as the encoders measure them [m/s, rad/s].
+    odometry : (3,) float64
+        x, y, theta by dead reckoning [m, rad].
+    """
+
+    wheels: Array
+    measured: Array
+    odometry: Array
+
+
 @kernel(borrowing=True)
 def read_encoders(
     numbers: Array,
     noise_table: Array,
     key: np.uint32,
-    wheels: Array,
-    wheel_base: float,
-    ticks_per_metre: float,
+    body: Array,
+    encoders: Encoders,
     velocity: Array,
     duration: float,
-    measured: Array,
-    odometry: Array,
 ) -> None:
-    """Count the wheels of one robot after a step and reckon on.
+    """Count the wheels of one robot after a step, and update its dead reckoning.
 
     Parameters
     ----------
@@ -92,24 +108,22 @@ def read_encoders(
         ``GAUSSIAN_TABLE``.
     key : uint32
         Of the robot's draws in this step, ``stream_key``.
-    wheels : (7,) float64
-        The robot's row of wheel numbers; updated.
-    wheel_base, ticks_per_metre : float
-        Distance between the wheels [m], and ticks that a wheel counts on a metre [1/m].
+    body : (8,) float64
+        ``Robot.numbers``, the distance between the wheels and their ticks per metre among them.
+    encoders : Encoders
+        Of the robot; updated.
     velocity : (2,) float64
         Speed and turn rate that the wheels drove at [m/s, rad/s].
     duration : float
         Length of the step [s].
-    measured : (2,) float64
-        Result: speed and turn rate as the encoders tell [m/s, rad/s].
-    odometry : (3,) float64
-        x, y, theta by dead reckoning [m, rad]; updated.
     """
+    wheels, measured, odometry = encoders.wheels, encoders.measured, encoders.odometry
+    wheel_base, ticks_per_metre = body[WHEEL_BASE], body[TICKS_PER_METRE]
     key = mix(key ^ np.uint32(ENCODER_STREAM))
     distance, turn = velocity[0] * duration, velocity[1] * duration
-    way, angle = abs(distance), abs(turn)
-    turn_deviation = math.sqrt(numbers[0] * numbers[0] * angle + numbers[1] * numbers[1] * way)
-    distance_deviation = math.sqrt(numbers[2] * numbers[2] * way + numbers[3] * numbers[3] * angle)
+    path, angle = abs(distance), abs(turn)
+    turn_deviation = math.sqrt(numbers[0] * numbers[0] * angle + numbers[1] * numbers[1] * path)
+    distance_deviation = math.sqrt(numbers[2] * numbers[2] * path + numbers[3] * numbers[3] * angle)
     turn = (
         turn * wheels[TURN_SCALE]
         + distance * wheels[DRIFT]
@@ -123,12 +137,12 @@ def read_encoders(
             math.floor(wheels[LEFT_TRAVEL] * ticks_per_metre),
             math.floor(wheels[RIGHT_TRAVEL] * ticks_per_metre),
         )
-        left_way, right_way = (
+        left_path, right_path = (
             (left - wheels[LEFT_TICKS]) / ticks_per_metre,
             (right - wheels[RIGHT_TICKS]) / ticks_per_metre,
         )
         wheels[LEFT_TICKS], wheels[RIGHT_TICKS] = left, right
-        distance, turn = 0.5 * (left_way + right_way), (right_way - left_way) / wheel_base
+        distance, turn = 0.5 * (left_path + right_path), (right_path - left_path) / wheel_base
     measured[0], measured[1] = distance / duration, turn / duration
     middle = odometry[2] + 0.5 * turn
     chord = distance if abs(turn) < 1e-9 else distance * math.sin(0.5 * turn) / (0.5 * turn)

@@ -74,7 +74,7 @@ class WorldArrays(NamedTuple):
     sensor : (10,) float64
         Numbers of the laser, the maps and the step, see ``sensor_numbers``.
     unit_vectors : (2, beams) float64
-        Which way the beams look.
+        Directions of the beams against the heading.
     noise_table : (4096,) float32
         ``GAUSSIAN_TABLE``.
     increments : (4,) int64
@@ -115,14 +115,14 @@ class WorldArrays(NamedTuple):
         Length of each robot's path at its last reward [m], and what it has earned since rewards were last
         taken.
     odometry_model : (7,) float64
-        ``OdometrySettings.numbers``; nothing (0,) where wheels tell the truth and nobody reckons with them.
+        ``OdometrySettings.numbers``; nothing (0,) where wheels measure exactly and nobody uses them.
     wheels, odometry, measured : (rows, 7), (rows, 3), (rows, 2) float64
         What the encoders are at, poses by dead reckoning since the start, and speeds and turn rates as the
-        encoders tell; the last is ``velocities`` itself where wheels tell the truth.
+        encoders measure; the last is ``velocities`` itself where wheels measure exactly.
     faults, failed : (rows, numbers) float64, (rows,) uint8
         Faults of each robot, see ``faults``, and whether it is dead.
     driven : (rows, 2) float64
-        Scratch: speeds and turn rates that drives make of what they are told.
+        Scratch: speeds and turn rates that drives make of their commands.
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
         Of which teammates a robot knows the poses although not all are known (0 where all are), and these
         poses.

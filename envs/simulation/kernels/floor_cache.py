@@ -35,7 +35,7 @@ MADE_BY = (
     "mapping/geometry",
     "envs/simulation/kernels/arrays.py",
     "envs/simulation/kernels/floor_tables.py",
-    "envs/simulation/kernels/motion.py",
+    "envs/simulation/kernels/contact.py",
     "envs/simulation/kernels/ray_tables.py",
     "mapping/files/output.py",
     "mapping/kernels",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.faces import Faces, faces_of
 from lidarium.envs.floors.floor import Floor, Raster
-from lidarium.envs.simulation.kernels.motion import distance_bound
+from lidarium.envs.simulation.kernels.contact import distance_bound
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 
 LIMITLESS_BODY = 0.05

@@ -1,4 +1,10 @@
-"""The map of a robot in kernels: a scan at the believed pose, without the hits on teammates."""
+"""The map of a robot in kernels: a scan at the believed pose, without the hits on teammates.
+
+It is the second stage of a robot's step. The first one senses and scores, after all bodies have moved. The
+fused step runs both in one call; both forms call the same functions for each robot, so they agree to the bit.
+Where a robot's believed pose is the true one, its map has the floor's lattice and ranges carry no noise, the
+area seen is computed once for the scorer and the map.
+"""
 
 import math
 
@@ -16,14 +22,16 @@ from lidarium.envs.simulation.kernels.arrays import (
     MAP_ROWS,
     NOISE_FLOOR,
     NOISE_SHARE,
+    OWN_FRAME,
     RANGE_MAX,
     SOME_TEAMMATES,
     TOUCHED,
     TOUCHED_ROWS,
+    TRUE_POSE,
     WorldArrays,
 )
-from lidarium.envs.simulation.kernels.masks import window_corner
-from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy
+from lidarium.envs.simulation.kernels.masks import score_area, window_corner
+from lidarium.envs.simulation.kernels.scanning import ScanScratch, is_noisy, sense
 from lidarium.mapping.grids.noisy_returns import settle_returns
 from lidarium.mapping.grids.pooled_maps import touched_words
 from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
@@ -168,3 +176,24 @@ def perceive_robot(world: WorldArrays, row: int, first: int, robots: int, scratc
     scratch.windows[:] = np.uint64(0)
     beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
     update_map(world, row, first, robots, scratch, (0, 0, 0, 0), False)
+
+
+@kernel(spliced=True)
+def sense_and_perceive(
+    world: WorldArrays, row: int, first: int, robots: int, perceives: bool, scratch: ScanScratch
+) -> None:
+    """Run both stages for one robot (or the first alone, where not ``perceives``).
+
+    ``first`` is the first row of its episode.
+    """
+    scratch.windows[:] = np.uint64(0)
+    sense(world, row, first, robots, scratch.directions, scratch.lengths)
+    box = score_area(world, row, first, robots, scratch)
+    if not perceives:
+        return
+    is_same = world.flags[row] & (TRUE_POSE | OWN_FRAME) == TRUE_POSE and not is_noisy(world.sensor)
+    if not is_same:
+        scratch.windows[0] = np.uint64(0)
+        if world.believed[row, 2] != world.poses[row, 2]:
+            beam_directions(world.believed[row, 2], world.unit_vectors, scratch.directions)
+    update_map(world, row, first, robots, scratch, box, is_same)

@@ -131,7 +131,7 @@ def footprint(
     if is_noisy(sensor):
         measure(world, row, first, robots, directions, np.empty(beams, np.float32), lengths)
     else:
-        # The sensor told the true ranges: nothing has to be cast again.
+        # The sensor measured the true ranges: nothing has to be cast again.
         beam_directions(world.poses[row, 2], world.unit_vectors, directions)
         true_lengths(world.ranges[row], sensor, lengths)
     return _seen_area(world, row, first, robots, lengths, directions, ends, bits)  # type: ignore[no-any-return]

@@ -1,195 +1,65 @@
-"""Bodies: differential drive with limits, and contact of discs.
-
-Contact with solid cells and with each other is exact.
+"""Motion of bodies: differential drives with limits, and contact.
 
 Far from everything a robot drives its arc in one piece. Near contact the arc is cut into short pieces, and
-after each the disc is pushed out of what it entered along the shortest way, so that it slides along walls;
-where there is no way out the piece is undone. No robot ever ends a step inside a solid cell or another robot.
+after each the disc is pushed out of what it entered; where there is no way out the piece is undone. No robot
+ever ends a step inside a solid cell or another robot.
 """
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
-from scipy import ndimage
+from typing import Any
 
 from lidarium.envs.simulation.disturbances.odometry import (
     MAX_ACCELERATION,
     MAX_SPEED,
     MAX_TURN_ACCELERATION,
     MAX_TURN_RATE,
-    RADIUS,
 )
-from lidarium.envs.simulation.kernels.arrays import FRAME_RESOLUTION, FRAME_X, FRAME_Y
+from lidarium.envs.simulation.kernels.arrays import (
+    BODY_SOLID,
+    BOUND,
+    FLOOR_COLUMNS,
+    FLOOR_ROWS,
+    FRAME_RESOLUTION,
+    WorldArrays,
+)
+from lidarium.envs.simulation.kernels.contact import (
+    BodyGrids,
+    TeamBodies,
+    is_free_of_contact,
+    push_out,
+    wrapped,
+)
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import uint8_grid_at, vector_at
-
-CONTACT_TOLERANCE = 1e-9
-"""Gap that is left when a disc is pushed out of contact [m]."""
-
-PRESSED = 1e-6
-"""A disc that had to be pushed out by more than this touched something [m]."""
+from lidarium.mapping.kernels.views import uint8_grid_at
 
 PIECE = 0.25
 """Longest piece of an arc near contact [cells]."""
 
-_AT_ONCE = 8
-"""Cells of a row that are looked at together: most around a body are free."""
 
-CENTRE_BUMPER, SIDE_BUMPER = math.radians(30.0), math.radians(90.0)
-"""Bearings of a contact up to which it presses a bumper [rad].
-
-The first is for the centre bumper, the second for the one on the contact's side.
-"""
-
-
-def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a lower bound of the distance to the nearest solid cell.
-
-    It holds from any point of each cell, in whole cells.
-
-    Parameters
-    ----------
-    solid : (rows, columns) uint8
-        1 where the world is solid.
-
-    Returns
-    -------
-    (rows, columns) uint8
-        Floor of the distance between cell centres less a cell's diagonal, within [0, 255].
-    """
-    centres = np.asarray(ndimage.distance_transform_edt(solid == 0), np.float32)
-    return np.asarray(np.clip(np.floor(centres - math.sqrt(2.0) - 1e-4), 0, 255), np.uint8)
+@kernel(spliced=True)
+def body_grids(floor_row: Array, frame: Array) -> BodyGrids:
+    """View the grids of a floor, one of ``floor_rows``, at the height of the bodies."""
+    rows, columns = floor_row[FLOOR_ROWS], floor_row[FLOOR_COLUMNS]
+    return BodyGrids(
+        uint8_grid_at(floor_row[BOUND], rows, columns),
+        uint8_grid_at(floor_row[BODY_SOLID], rows, columns),
+        frame,
+    )
 
 
-@kernel(inline=True)
-def _wrapped(angle: float) -> float:
-    """Angle in (-pi, pi]."""
-    wrapped = angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
-    return math.pi if wrapped <= -math.pi else wrapped
-
-
-@kernel(borrowing=True)
-def deepest_wall(solid: Array, x: float, y: float, radius: float) -> tuple[float, float, float]:
-    """Find the solid cell that a disc enters deepest; positions and radius in cells.
-
-    Returns
-    -------
-    depth, normal_x, normal_y : float
-        How far the disc reaches into it (0 where it enters none), and the unit vector that leads out.
-    """
-    rows, columns = solid.shape
-    depth, normal_x, normal_y = 0.0, 0.0, 0.0
-    low_row, high_row = max(int(y - radius), 0), min(int(y + radius), rows - 1)
-    low_column, high_column = max(int(x - radius), 0), min(int(x + radius), columns - 1)
-    size = rows * columns
-    for row in range(low_row, high_row + 1):
-        gap_y = y - min(max(y, float(row)), row + 1.0)
-        if gap_y * gap_y >= (radius - depth) ** 2:
-            continue
-        column = low_column - 1
-        while column < high_column:
-            column += 1
-            place = row * columns + column
-            if place + _AT_ONCE <= size and vector_at(solid.ctypes.data + place, 1, np.uint64)[
-                0
-            ] == np.uint64(0):
-                column += _AT_ONCE - 1
-                continue
-            if solid[row, column] == 0:
-                continue
-            gap_x = x - min(max(x, float(column)), column + 1.0)
-            squared = gap_x * gap_x + gap_y * gap_y
-            if squared >= (radius - depth) ** 2:
-                continue
-            distance = math.sqrt(squared)
-            depth = radius - distance
-            if distance > 0.0:
-                normal_x, normal_y = gap_x / distance, gap_y / distance
-            else:
-                normal_x, normal_y = 0.0, 0.0
-    return depth, normal_x, normal_y
-
-
-@kernel(borrowing=True)
-def _deepest_robot(poses: Array, bodies: Array, robot: int, x: float, y: float) -> tuple[float, float, float]:
-    """Find the robot that the disc of ``robot`` at x, y [m] enters deepest."""
-    depth, normal_x, normal_y = 0.0, 0.0, 0.0
-    for other in range(poses.shape[0]):
-        if other == robot:
-            continue
-        gap_x, gap_y = x - poses[other, 0], y - poses[other, 1]
-        reach = bodies[robot, RADIUS] + bodies[other, RADIUS]
-        squared = gap_x * gap_x + gap_y * gap_y
-        if squared >= (reach - depth) ** 2:
-            continue
-        distance = math.sqrt(squared)
-        depth = reach - distance
-        if distance > 0.0:
-            normal_x, normal_y = gap_x / distance, gap_y / distance
-    return depth, normal_x, normal_y
-
-
-@kernel(borrowing=True)
-def _free_of_contact(
-    bound: Array, frame: Array, poses: Array, bodies: Array, robot: int, x: float, y: float, margin: float
-) -> bool:
-    """Whether nothing is within ``margin`` [m] of the disc at x, y, by bounds alone."""
-    resolution = frame[FRAME_RESOLUTION]
-    radius = bodies[robot, RADIUS] + margin
-    column, row = int((x - frame[FRAME_X]) / resolution), int((y - frame[FRAME_Y]) / resolution)
-    if row < 0 or row >= bound.shape[0] or column < 0 or column >= bound.shape[1]:
-        return False
-    if bound[row, column] * resolution <= radius:
-        return False
-    for other in range(poses.shape[0]):
-        reach = radius + bodies[other, RADIUS]
-        if other != robot and (x - poses[other, 0]) ** 2 + (y - poses[other, 1]) ** 2 <= reach * reach:
-            return False
-    return True
-
-
-@kernel(borrowing=True)
-def _push_out(
-    solid: Array,
-    frame: Array,
-    poses: Array,
-    bodies: Array,
-    robot: int,
-    x: float,
-    y: float,
-    heading: float,
-    bumpers: Array,
-) -> tuple[float, float, bool, bool]:
-    """Push the disc out of walls and robots.
-
-    Returns x, y [m], whether it touched, and whether it is free now; presses the bumpers on the sides of
-    contact.
-    """
-    resolution = frame[FRAME_RESOLUTION]
-    radius = bodies[robot, RADIUS]
-    touched = False
-    for _ in range(8):
-        cell_x, cell_y = (x - frame[FRAME_X]) / resolution, (y - frame[FRAME_Y]) / resolution
-        depth, normal_x, normal_y = deepest_wall(solid, cell_x, cell_y, radius / resolution)
-        depth *= resolution
-        robot_depth, robot_x, robot_y = _deepest_robot(poses, bodies, robot, x, y)
-        if robot_depth > depth:
-            depth, normal_x, normal_y = robot_depth, robot_x, robot_y
-        if depth <= 0.0:
-            return x, y, touched, True
-        if depth > PRESSED:
-            touched = True
-            side = _wrapped(math.atan2(-normal_y, -normal_x) - heading)
-            if abs(side) <= CENTRE_BUMPER:
-                bumpers[1] = 1
-            elif abs(side) <= SIDE_BUMPER:
-                bumpers[0 if side > 0.0 else 2] = 1
-        if normal_x == 0.0 and normal_y == 0.0:
-            return x, y, touched, False
-        x += normal_x * (depth + CONTACT_TOLERANCE)
-        y += normal_y * (depth + CONTACT_TOLERANCE)
-    return x, y, touched, False
+@kernel(spliced=True)
+def team_of(world: WorldArrays, first: int, last: int) -> TeamBodies:
+    """View the bodies of the robots of one episode, rows ``first`` to ``last``."""
+    return TeamBodies(
+        world.bodies,
+        world.moves[first:last],
+        world.poses[first:last],
+        world.velocities[first:last],
+        world.bumpers[first:last],
+        world.contacts[first:last],
+        world.travelled[first:last],
+        world.collisions[first:last],
+    )
 
 
 @kernel(inline=True)
@@ -215,62 +85,31 @@ def _along_arc(
 
 
 @kernel(borrowing=True)
-def move_robots(
-    bound_address: int,
-    solid_address: int,
-    rows: int,
-    columns: int,
-    frame: Array,
-    bodies: Array,
-    moves: Array,
-    poses: Array,
-    velocities: Array,
-    commands: Array,
-    duration: float,
-    bumpers: Array,
-    contacts: Array,
-    travelled: Array,
-    collisions: Array,
-) -> None:
+def move_robots(grids: BodyGrids, team: TeamBodies, commands: Array, duration: float) -> None:
     """Drive the robots of one episode for one step, in their order.
 
     Each meets the others where they are by then.
 
     Parameters
     ----------
-    bound_address, solid_address, rows, columns : int
-        ``distance_bound`` and solid cells of the floor at the bodies' height (uint8).
-    frame : (3,) float64
-        Origin x, y [m] and resolution [m/cell] of the floor's raster.
-    bodies : (robots, 6) float64
-        Radius, limits and height of each robot.
-    moves : (robots,) uint8
-        Whether the robot drives; the others stand where they are.
-    poses, velocities : (robots, 3), (robots, 2) float64
-        x, y, theta and speed, turn rate; updated.
+    grids : BodyGrids
+        Of the episode's floor.
+    team : TeamBodies
+        The robots; all but ``bodies`` and ``moves`` is updated.
     commands : (robots, 2) float64
         Wanted speed and turn rate [m/s, rad/s]; cut to the limits of the drive.
     duration : float
         Length of the step [s].
-    bumpers : (robots, 3) int8
-        Left, centre, right; 1 where pressed in this step.
-    contacts : (robots,) uint8
-        Whether the robot touched anything in this step.
-    travelled : (robots,) float64
-        Length of each robot's path, added to [m].
-    collisions : (robots,) int64
-        How often each robot came into contact, added to where a contact begins.
     """
-    bound = uint8_grid_at(bound_address, rows, columns)
-    solid = uint8_grid_at(solid_address, rows, columns)
+    poses, velocities, bumpers, contacts = team.poses, team.velocities, team.bumpers, team.contacts
     for robot in range(poses.shape[0]):
         bumpers[robot, 0] = bumpers[robot, 1] = bumpers[robot, 2] = 0
         was_in_contact = contacts[robot] != 0
         contacts[robot] = 0
-        if moves[robot] == 0:
+        if team.moves[robot] == 0:
             velocities[robot, 0] = velocities[robot, 1] = 0.0
             continue
-        body = bodies[robot]
+        body = team.bodies[robot]
         wanted_speed = min(max(commands[robot, 0], -body[MAX_SPEED]), body[MAX_SPEED])
         wanted_turn = min(max(commands[robot, 1], -body[MAX_TURN_RATE]), body[MAX_TURN_RATE])
         gain, turn_gain = body[MAX_ACCELERATION] * duration, body[MAX_TURN_ACCELERATION] * duration
@@ -279,15 +118,13 @@ def move_robots(
         x, y, heading = poses[robot, 0], poses[robot, 1], poses[robot, 2]
         start_x, start_y = x, y
         length = abs(speed) * duration
-        if length == 0.0 or _free_of_contact(bound, frame, poses, bodies, robot, x, y, length):
+        if length == 0.0 or is_free_of_contact(grids, team, robot, x, y, length):
             x, y, heading = _along_arc(x, y, heading, speed, turn_rate, duration)
         else:
-            pieces = int(math.ceil(length / (PIECE * frame[FRAME_RESOLUTION])))
+            pieces = int(math.ceil(length / (PIECE * grids.frame[FRAME_RESOLUTION])))
             for _ in range(pieces):
                 next_x, next_y, next_heading = _along_arc(x, y, heading, speed, turn_rate, duration / pieces)
-                next_x, next_y, touched, is_free = _push_out(
-                    solid, frame, poses, bodies, robot, next_x, next_y, next_heading, bumpers[robot]
-                )
+                next_x, next_y, touched, is_free = push_out(grids, team, robot, next_x, next_y, next_heading)
                 heading = next_heading
                 if touched:
                     contacts[robot] = 1
@@ -297,7 +134,14 @@ def move_robots(
                 # What the body could not do, the wheels did not do either.
                 advance = (x - start_x) * math.cos(heading) + (y - start_y) * math.sin(heading)
                 speed = min(max(advance / duration, -abs(speed)), abs(speed))
-                collisions[robot] += 0 if was_in_contact else 1
-        travelled[robot] += math.hypot(x - start_x, y - start_y)
-        poses[robot, 0], poses[robot, 1], poses[robot, 2] = x, y, _wrapped(heading)
+                team.collisions[robot] += 0 if was_in_contact else 1
+        team.travelled[robot] += math.hypot(x - start_x, y - start_y)
+        poses[robot, 0], poses[robot, 1], poses[robot, 2] = x, y, wrapped(heading)
         velocities[robot, 0], velocities[robot, 1] = speed, turn_rate
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -1,7 +1,7 @@
 """Laser scans by exact traversal of the world's cells.
 
 Two casters give the same ranges. The *quadrant caster* jumps, from the ray's cell, to the border of the
-largest free square that opens the way the ray goes; a byte per cell and quadrant tells its side. The *face
+largest free square that opens in the ray's direction; a byte per cell and quadrant holds its side. The *face
 caster* draws the wall faces in reach into the beams, nearest first wins; it is the faster one where walls are
 long and straight. Which one runs is decided for each pose by the number of faces in reach, so a scan depends
 on the pose and the floor alone.
@@ -24,10 +24,10 @@ from lidarium.envs.simulation.kernels.arrays import (
     SQUARES,
     TILE_COLUMNS,
 )
-from lidarium.envs.simulation.kernels.face_casting import cast_by_faces
+from lidarium.envs.simulation.kernels.face_casting import FaceTable, cast_by_faces
 from lidarium.envs.simulation.kernels.ray_tables import TILE
 from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares
-from lidarium.mapping.grids.scan_geometry import beam_directions, beams_towards
+from lidarium.mapping.grids.scan_geometry import Beams, beam_directions, beams_towards
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import bytes_at, int32_table_at
 
@@ -40,34 +40,19 @@ the same ranges. """
 
 
 @kernel(borrowing=True)
-def cast_scan(
-    tables: Array,
-    x: float,
-    y: float,
-    heading: float,
-    angle_first: float,
-    increment: float,
-    directions: Array,
-    reach: float,
-    ranges: Array,
-) -> None:
+def cast_scan(tables: Array, beams: Beams, ranges: Array) -> None:
     """Fill ``ranges`` with the distances to the first solid cell along each beam.
 
     Parameters
     ----------
     tables : (8,) int64
         ``RayTables.addresses`` of the floor.
-    x, y : float
-        Position of the laser [cells].
-    heading, angle_first, increment : float
-        Heading of the robot, angle of the first beam against it, angle between beams [rad].
-    directions : (4, beams) float64
-        Unit vectors of the beams in the world's axes (x, y) and their inverses.
-    reach : float
-        Longest range [cells].
+    beams : Beams
+        Of the scan, in the floor's cells.
     ranges : (beams,) float64
-        Result [cells]; ``reach`` where nothing is met.
+        Result [cells]; the reach where nothing is met.
     """
+    x, y, reach = beams.x, beams.y, beams.reach
     rows, columns, tile_columns = tables[FLOOR_ROWS], tables[FLOOR_COLUMNS], tables[TILE_COLUMNS]
     starts = int32_table_at(tables[FACE_STARTS], 1, tables[FACE_START_COUNT])[0]
     window = (
@@ -83,53 +68,29 @@ def cast_scan(
         in_reach += starts[last] - starts[first]
     if in_reach <= FACES + FACES_PER_BEAM * ranges.shape[0]:
         faces = int32_table_at(tables[FACE_TABLE], tables[FACE_COUNT], 3)
-        cast_by_faces(
-            faces,
-            starts,
-            tile_columns,
-            window,
-            x,
-            y,
-            heading + angle_first,
-            increment,
-            directions,
-            reach,
-            ranges,
-        )
+        cast_by_faces(FaceTable(faces, starts, tile_columns), window, beams, ranges)
     else:
         squares = bytes_at(tables[SQUARES], 4 * rows * columns)
-        cast_by_squares(squares, rows, columns, x, y, directions, reach, ranges)
+        cast_by_squares(squares, rows, columns, beams, ranges)
 
 
 @kernel(borrowing=True)
-def cut_by_disc(
-    x: float,
-    y: float,
-    heading: float,
-    angle_first: float,
-    increment: float,
-    directions: Array,
-    disc_x: float,
-    disc_y: float,
-    disc_radius: float,
-    reach: float,
-    ranges: Array,
-) -> None:
+def cut_by_disc(beams: Beams, disc_x: float, disc_y: float, disc_radius: float, ranges: Array) -> None:
     """Shorten the beams that meet a disc (another robot).
 
     Positions, radius and ranges in cells.
     """
-    offset_x, offset_y = disc_x - x, disc_y - y
+    directions, increment = beams.directions, beams.increment
+    offset_x, offset_y = disc_x - beams.x, disc_y - beams.y
     squared = offset_x * offset_x + offset_y * offset_y
     gap = squared - disc_radius * disc_radius
-    if gap <= 0.0 or squared > (reach + disc_radius) ** 2:
+    if gap <= 0.0 or squared > (beams.reach + disc_radius) ** 2:
         return
-    beams = ranges.shape[0]
-    begin, count = beams_towards(offset_x, offset_y, disc_radius, heading, angle_first, increment)
+    begin, count = beams_towards(offset_x, offset_y, disc_radius, beams.heading, beams.angle_first, increment)
     turn = 2.0 * math.pi / increment
     for lap in range(2):
         first = max(int(math.floor(begin - lap * turn)) - 1, 0)
-        last = min(int(math.floor(begin - lap * turn + count)) + 2, beams - 1)
+        last = min(int(math.floor(begin - lap * turn + count)) + 2, ranges.shape[0] - 1)
         for beam in range(first, last + 1):
             middle = offset_x * directions[0, beam] + offset_y * directions[1, beam]
             inside = middle * middle - gap
@@ -154,14 +115,5 @@ def cast_scans(
     directions = np.empty((4, unit_vectors.shape[1]))
     for k in range(poses.shape[0]):
         beam_directions(poses[k, 2], unit_vectors, directions)
-        cast_scan(
-            tables,
-            poses[k, 0],
-            poses[k, 1],
-            poses[k, 2],
-            angle_first,
-            increment,
-            directions,
-            reach,
-            ranges[k],
-        )
+        beams = Beams(poses[k, 0], poses[k, 1], poses[k, 2], angle_first, increment, directions, reach)
+        cast_scan(tables, beams, ranges[k])

@@ -12,7 +12,7 @@ TILE = 128
 """Side of the square tiles that group the faces [cells]."""
 
 MAX_SQUARE = 255
-"""Largest side of a free square that is told [cells]: what a byte holds."""
+"""Largest side of a free square that is kept [cells]: what a byte holds."""
 
 
 @kernel

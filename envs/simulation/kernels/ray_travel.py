@@ -1,5 +1,6 @@
 """Laser scans by travelling through the empty squares of a floor."""
 
+from lidarium.mapping.grids.scan_geometry import Beams
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 BUNDLE, INNER_BUNDLE = 32, 8
@@ -15,30 +16,20 @@ INSIDE = 1e-7
 
 @kernel(inline=True, borrowing=True)
 def _quadrant(directions: Array, beam: int) -> int:
-    """Quadrant that a beam looks into: 1 for leftwards plus 2 for downwards."""
+    """Return the quadrant of a beam's direction: 1 for leftwards plus 2 for downwards."""
     return (1 if directions[0, beam] < 0.0 else 0) + (2 if directions[1, beam] < 0.0 else 0)
 
 
 @kernel(inline=True, borrowing=True)
-def _travel(
-    squares: Array,
-    offset: int,
-    columns: int,
-    x: float,
-    y: float,
-    row: int,
-    column: int,
-    distance: float,
-    directions: Array,
-    beam: int,
-    reach: float,
-) -> float:
+def _travel(squares: Array, offset: int, columns: int, beams: Beams, beam: int, distance: float) -> float:
     """Return the distance at which one beam enters a solid cell [cells].
 
-    The beam begins at a cell and at a distance along its path.
+    It begins at a distance along its path up to which all cells are free.
     """
+    x, y, directions, reach = beams.x, beams.y, beams.directions, beams.reach
     direction_x, direction_y = directions[0, beam], directions[1, beam]
     inverse_x, inverse_y = directions[2, beam], directions[3, beam]
+    column, row = int(x + distance * direction_x), int(y + distance * direction_y)
     step_x = -1 if direction_x < 0.0 else 1
     step_y = -1 if direction_y < 0.0 else 1
     forward_x, forward_y = (1 + step_x) // 2, (1 + step_y) // 2
@@ -46,7 +37,7 @@ def _travel(
         side = int(squares[offset + row * columns + column])
         if side == 0:
             return min(distance, reach)
-        # The square spans `side` cells the way the ray goes; its far borders are the next candidates.
+        # The square spans `side` cells in the ray's direction; its far borders are the next candidates.
         distance_x = (column + forward_x + step_x * (side - 1) - x) * inverse_x
         distance_y = (row + forward_y + step_y * (side - 1) - y) * inverse_y
         # Along a lattice line rounding may put a border behind the ray; the ray itself never goes back.
@@ -75,16 +66,7 @@ def _travel(
 
 @kernel(inline=True, borrowing=True)
 def _travel_together(
-    squares: Array,
-    offset: int,
-    columns: int,
-    x: float,
-    y: float,
-    directions: Array,
-    first: int,
-    last: int,
-    distance: float,
-    reach: float,
+    squares: Array, offset: int, columns: int, beams: Beams, first: int, last: int, distance: float
 ) -> float:
     """Return the distance up to which beams run through squares that hold them all.
 
@@ -94,6 +76,7 @@ def _travel_together(
     opens from the box's nearest corner and holds the box is free for all, up to where the first of the outer
     beams leaves it.
     """
+    x, y, directions = beams.x, beams.y, beams.directions
     first_x, first_y = directions[0, first], directions[1, first]
     last_x, last_y = directions[0, last], directions[1, last]
     step_x = -1 if first_x < 0.0 else 1
@@ -116,41 +99,29 @@ def _travel_together(
         if leaving <= distance + 1.0:
             return distance
         distance = leaving
-        if distance >= reach:
+        if distance >= beams.reach:
             return distance
 
 
 @kernel(borrowing=True)
-def cast_by_squares(
-    squares: Array,
-    rows: int,
-    columns: int,
-    x: float,
-    y: float,
-    directions: Array,
-    reach: float,
-    ranges: Array,
-) -> None:
-    """Fill ``ranges`` [cells] with the distance to the first solid cell, or ``reach``."""
-    plane = rows * columns
-    beams = ranges.shape[0]
-    for first in range(0, beams, BUNDLE):
-        last = min(first + BUNDLE, beams) - 1
+def cast_by_squares(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
+    """Fill ``ranges`` [cells] with the distance to the first solid cell, or the reach."""
+    plane, directions, reach = rows * columns, beams.directions, beams.reach
+    for first in range(0, ranges.shape[0], BUNDLE):
+        last = min(first + BUNDLE, ranges.shape[0]) - 1
         together = 0.0
         quadrant = _quadrant(directions, first)
         is_bundle = quadrant == _quadrant(directions, last) and quadrant == _quadrant(
             directions, (first + last) // 2
         )
         if is_bundle:
-            together = _travel_together(
-                squares, quadrant * plane, columns, x, y, directions, first, last, 0.0, reach
-            )
+            together = _travel_together(squares, quadrant * plane, columns, beams, first, last, 0.0)
         for inner in range(first, last + 1, INNER_BUNDLE):
             inner_last = min(inner + INNER_BUNDLE - 1, last)
             distance = together
             if is_bundle and distance < reach:
                 distance = _travel_together(
-                    squares, quadrant * plane, columns, x, y, directions, inner, inner_last, together, reach
+                    squares, quadrant * plane, columns, beams, inner, inner_last, together
                 )
             for beam in range(inner, inner_last + 1):
                 if distance >= reach:
@@ -158,7 +129,4 @@ def cast_by_squares(
                     continue
                 if not is_bundle:
                     quadrant = _quadrant(directions, beam)
-                column, row = int(x + distance * directions[0, beam]), int(y + distance * directions[1, beam])
-                ranges[beam] = _travel(
-                    squares, quadrant * plane, columns, x, y, row, column, distance, directions, beam, reach
-                )
+                ranges[beam] = _travel(squares, quadrant * plane, columns, beams, beam, distance)

@@ -22,7 +22,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     WorldArrays,
 )
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cut_by_disc
-from lidarium.mapping.grids.scan_geometry import beam_directions
+from lidarium.mapping.grids.scan_geometry import Beams, beam_directions
 from lidarium.mapping.grids.scan_polygon import window_rows, window_words
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
@@ -77,7 +77,8 @@ def measure(
     )
     angle_first, increment = sensor[ANGLE_FIRST], sensor[ANGLE_INCREMENT]
     beam_directions(heading, world.unit_vectors, directions)
-    cast_scan(world.floor_rows[episode], x, y, heading, angle_first, increment, directions, reach, lengths)
+    beams = Beams(x, y, heading, angle_first, increment, directions, reach)
+    cast_scan(world.floor_rows[episode], beams, lengths)
     for other in range(robots):
         if other != robot and world.bodies[other, HEIGHT] > sensor[LASER_HEIGHT]:
             other_x, other_y = (
@@ -85,9 +86,7 @@ def measure(
                 (poses[first + other, 1] - frame[FRAME_Y]) / resolution,
             )
             radius = world.bodies[other, RADIUS] / resolution
-            cut_by_disc(
-                x, y, heading, angle_first, increment, directions, other_x, other_y, radius, reach, lengths
-            )
+            cut_by_disc(beams, other_x, other_y, radius, lengths)
     scale = 1.0 / sensor[MAP_RESOLUTION]
     longest = sensor[RANGE_MAX]
     for beam in range(lengths.shape[0]):

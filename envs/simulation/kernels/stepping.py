@@ -14,19 +14,15 @@ from lidarium.envs.scoring.rewards import add_rewards
 from lidarium.envs.simulation.disturbances.faults import DEAD_ROBOT, has_fault, kidnap, stick_wheels
 from lidarium.envs.simulation.disturbances.noise import stream_key
 from lidarium.envs.simulation.disturbances.odometry import (
-    TICKS_PER_METRE,
     WHEEL_BASE,
+    Encoders,
     disturb_commands,
     read_encoders,
     within_half_turns,
 )
 from lidarium.envs.simulation.kernels.arrays import (
-    BODY_SOLID,
-    BOUND,
     DEAD_RECKONING,
     ENDED,
-    FLOOR_COLUMNS,
-    FLOOR_ROWS,
     KNOWN_TEAMMATES,
     MASK_ROWS,
     MASK_WORDS,
@@ -39,11 +35,14 @@ from lidarium.envs.simulation.kernels.arrays import (
     WorldArrays,
     world_at,
 )
-from lidarium.envs.simulation.kernels.map_updates import invalidate_teammates, perceive_robot
+from lidarium.envs.simulation.kernels.map_updates import (
+    invalidate_teammates,
+    perceive_robot,
+    sense_and_perceive,
+)
 from lidarium.envs.simulation.kernels.masks import score_robot
-from lidarium.envs.simulation.kernels.motion import move_robots
+from lidarium.envs.simulation.kernels.motion import body_grids, move_robots, team_of
 from lidarium.envs.simulation.kernels.scanning import disturb_robot, scan_scratch, sense_robot
-from lidarium.envs.simulation.kernels.stages import sense_and_perceive
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at
 
@@ -107,13 +106,10 @@ def _encode(world: WorldArrays, episode: int, robots: int, velocities: Array) ->
             world.odometry_model,
             world.noise_table,
             stream_key(world.seeds[episode], row - first, world.steps[episode]),
-            world.wheels[row],
-            world.bodies[row - first, WHEEL_BASE],
-            world.bodies[row - first, TICKS_PER_METRE],
+            world.bodies[row - first],
+            Encoders(world.wheels[row], world.measured[row], world.odometry[row]),
             velocities[row],
             world.sensor[TIME_STEP],
-            world.measured[row],
-            world.odometry[row],
         )
 
 
@@ -126,24 +122,8 @@ def _move(world: WorldArrays, episode: int, robots: int, commands: Array, moves_
         if has_odometry or world.faults.shape[1] > 0:
             _drive(world, episode, robots, commands)
             commands = world.driven
-        table = world.floor_rows[episode]
-        move_robots(
-            table[BOUND],
-            table[BODY_SOLID],
-            table[FLOOR_ROWS],
-            table[FLOOR_COLUMNS],
-            world.frames[episode],
-            world.bodies,
-            world.moves[first:last],
-            world.poses[first:last],
-            world.velocities[first:last],
-            commands[first:last],
-            world.sensor[TIME_STEP],
-            world.bumpers[first:last],
-            world.contacts[first:last],
-            world.travelled[first:last],
-            world.collisions[first:last],
-        )
+        grids = body_grids(world.floor_rows[episode], world.frames[episode])
+        move_robots(grids, team_of(world, first, last), commands[first:last], world.sensor[TIME_STEP])
     if moves_bodies and has_odometry:
         _encode(world, episode, robots, world.velocities)
 

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.envs.settings.lidar import Lidar
-from lidarium.envs.simulation.kernels.face_casting import cast_by_faces
+from lidarium.envs.simulation.kernels.face_casting import FaceTable, cast_by_faces
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cast_scans, cut_by_disc
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
 from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares
-from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, ScanGeometry, beam_directions
+from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, Beams, ScanGeometry, beam_directions
 
 TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025
 """In cells of a raster of 2.5 cm."""
@@ -128,55 +128,34 @@ def directions_of(geometry, heading):
     return directions
 
 
-def by_squares(tables, x, y, directions, reach):
-    ranges = np.full(directions.shape[1], np.nan)
-    cast_by_squares(tables.squares.ravel(), tables.rows, tables.columns, x, y, directions, reach, ranges)
+def beams_of(x, y, heading, geometry, directions, reach):
+    return Beams(x, y, heading, geometry.angle_first, geometry.angle_increment, directions, reach)
+
+
+def by_squares(tables, beams):
+    ranges = np.full(beams.directions.shape[1], np.nan)
+    cast_by_squares(tables.squares.ravel(), tables.rows, tables.columns, beams, ranges)
     return ranges
 
 
-def by_faces(tables, x, y, heading, geometry, directions, reach):
-    ranges = np.full(directions.shape[1], np.nan)
+def by_faces(tables, beams):
+    ranges = np.full(beams.directions.shape[1], np.nan)
     tile_rows, tile_columns = -(-tables.rows // 128), tables.tile_columns
     window = (0, tile_rows - 1, 0, tile_columns - 1)
-    cast_by_faces(
-        tables.faces,
-        tables.face_starts,
-        tile_columns,
-        window,
-        x,
-        y,
-        heading + geometry.angle_first,
-        geometry.angle_increment,
-        directions,
-        reach,
-        ranges,
-    )
+    cast_by_faces(FaceTable(tables.faces, tables.face_starts, tile_columns), window, beams, ranges)
     return ranges
 
 
-def by_choice(tables, x, y, heading, geometry, directions, reach):
-    ranges = np.full(directions.shape[1], np.nan)
-    cast_scan(
-        tables.addresses,
-        x,
-        y,
-        heading,
-        geometry.angle_first,
-        geometry.angle_increment,
-        directions,
-        reach,
-        ranges,
-    )
+def by_choice(tables, beams):
+    ranges = np.full(beams.directions.shape[1], np.nan)
+    cast_scan(tables.addresses, beams, ranges)
     return ranges
 
 
 def all_casts(tables, x, y, heading, geometry, reach):
     directions = directions_of(geometry, heading)
-    return directions, (
-        by_squares(tables, x, y, directions, reach),
-        by_faces(tables, x, y, heading, geometry, directions, reach),
-        by_choice(tables, x, y, heading, geometry, directions, reach),
-    )
+    beams = beams_of(x, y, heading, geometry, directions, reach)
+    return directions, (by_squares(tables, beams), by_faces(tables, beams), by_choice(tables, beams))
 
 
 def check_against_reference(solid, tables, x, y, heading, geometry, reach):
@@ -253,8 +232,9 @@ def test_a_ray_exactly_parallel_to_an_axis_reaches_the_wall_ahead_exactly(axis):
     x, y = 20.25, 13.5
     expected = {(1.0, 0.0): 49 - x, (0.0, 1.0): 29 - y, (-1.0, 0.0): x - 1, (0.0, -1.0): y - 1}[axis]
     heading = math.atan2(axis[1], axis[0])
-    assert by_squares(tables, x, y, directions, 500.0)[0] == expected
-    assert by_faces(tables, x, y, heading, geometry, directions, 500.0)[0] == expected
+    beams = beams_of(x, y, heading, geometry, directions, 500.0)
+    assert by_squares(tables, beams)[0] == expected
+    assert by_faces(tables, beams)[0] == expected
 
 
 @pytest.mark.parametrize("slope", [(1, 1), (1, 2), (2, 1), (3, 4), (5, 1), (1, 7)])
@@ -275,10 +255,8 @@ def test_rays_through_lattice_corners_end_and_never_leak_through_a_wall_of_cells
                 if solid[y - 1 : y + 1, x - 1 : x + 1].any():
                     continue
                 low, high = reach_bounds(solid, float(x), float(y), dx, dy, 200.0)
-                cast = by_squares(tables, float(x), float(y), directions, 200.0)[0]
-                drawn = by_faces(tables, float(x), float(y), math.atan2(dy, dx), geometry, directions, 200.0)[
-                    0
-                ]
+                beams = beams_of(float(x), float(y), math.atan2(dy, dx), geometry, directions, 200.0)
+                cast, drawn = by_squares(tables, beams)[0], by_faces(tables, beams)[0]
                 assert low - 1e-6 <= cast <= high + 1e-6
                 assert low - 1e-6 <= drawn <= high + 1e-6
 
@@ -305,10 +283,9 @@ def test_rays_from_lattice_points_through_lattice_points_never_hang_or_leak(x, y
         [[unit[0]], [unit[1]], [1.0 / unit[0] if dx else math.inf], [1.0 / unit[1] if dy else math.inf]]
     )
     low, high = reach_bounds(solid, float(x), float(y), *unit, 300.0)
-    assert low - 1e-6 <= by_squares(tables, float(x), float(y), directions, 300.0)[0] <= high + 1e-6
-    drawn = by_faces(
-        tables, float(x), float(y), math.atan2(dy, dx), ScanGeometry(beams=1), directions, 300.0
-    )[0]
+    beams = beams_of(float(x), float(y), math.atan2(dy, dx), ScanGeometry(beams=1), directions, 300.0)
+    assert low - 1e-6 <= by_squares(tables, beams)[0] <= high + 1e-6
+    drawn = by_faces(tables, beams)[0]
     # Standing on a face itself the drawn faces let it be; no body can stand there.
     assert drawn >= low - 1e-6
     assert drawn <= high + 1e-6 or low == 0.0
@@ -376,9 +353,8 @@ def test_many_poses_in_one_call_are_the_scans_of_the_single_poses():
         ranges,
     )
     for pose, row in zip(poses, ranges, strict=True):
-        assert np.array_equal(
-            row, by_choice(tables, *pose, geometry, directions_of(geometry, pose[2]), 224.0)
-        )
+        beams = beams_of(*pose, geometry, directions_of(geometry, pose[2]), 224.0)
+        assert np.array_equal(row, by_choice(tables, beams))
 
 
 def disc_ranges(directions, offset, radius, reach):
@@ -404,19 +380,8 @@ def test_a_disc_cuts_exactly_the_beams_that_meet_it(angle, distance, radius, hea
     directions = directions_of(geometry, heading)
     offset = np.array([distance * math.cos(angle), distance * math.sin(angle)])
     ranges = np.full(beams, 50.0)
-    cut_by_disc(
-        10.0,
-        20.0,
-        heading,
-        geometry.angle_first,
-        geometry.angle_increment,
-        directions,
-        10.0 + offset[0],
-        20.0 + offset[1],
-        radius,
-        50.0,
-        ranges,
-    )
+    cast = beams_of(10.0, 20.0, heading, geometry, directions, 50.0)
+    cut_by_disc(cast, 10.0 + offset[0], 20.0 + offset[1], radius, ranges)
     expected = disc_ranges(directions, offset, radius, 50.0)
     grazing = abs(np.abs(offset[1] * directions[0] - offset[0] * directions[1]) - radius) < 1e-6
     assert np.abs(ranges - expected)[~grazing].max(initial=0.0) < 1e-6
@@ -425,23 +390,10 @@ def test_a_disc_cuts_exactly_the_beams_that_meet_it(angle, distance, radius, hea
 def test_a_disc_never_lengthens_a_beam_and_one_around_the_laser_is_not_seen():
     geometry = ScanGeometry(beams=90, field_of_view=2.0 * math.pi)
     directions, ranges = directions_of(geometry, 0.3), np.full(90, 2.0)
-    cut_by_disc(
-        0.0,
-        0.0,
-        0.3,
-        geometry.angle_first,
-        geometry.angle_increment,
-        directions,
-        10.0,
-        0.0,
-        3.0,
-        50.0,
-        ranges,
-    )
+    beams = beams_of(0.0, 0.0, 0.3, geometry, directions, 50.0)
+    cut_by_disc(beams, 10.0, 0.0, 3.0, ranges)
     assert (ranges == 2.0).all()
-    cut_by_disc(
-        0.0, 0.0, 0.3, geometry.angle_first, geometry.angle_increment, directions, 1.0, 0.0, 3.0, 50.0, ranges
-    )
+    cut_by_disc(beams, 1.0, 0.0, 3.0, ranges)
     assert (ranges == 2.0).all()
 
 
