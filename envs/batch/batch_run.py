@@ -7,8 +7,9 @@ from lidarium.envs.batch.levels import Level
 from lidarium.envs.batch.observation_buffers import Arrays
 from lidarium.envs.batch.running import (
     DECIDES,
-    LOOKS,
+    SENSES,
     WAITS,
+    Run,
     begin_decisions,
     follow_some,
     note_ends,
@@ -20,7 +21,7 @@ from lidarium.envs.onboard.software import Software
 from lidarium.envs.outcome.endings import Rules
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation
-from lidarium.mapping.kernels.work_queue import new_queue
+from lidarium.mapping.kernels.work_queue import new_work
 
 
 class BatchRun:
@@ -84,22 +85,19 @@ class BatchRun:
         # To and fro: the maps of the episodes that ran last are in the caches yet.
         self._orders.reverse()
         run = run_parallel if threads > 1 else run_serial
-        run(
+        sources, observed = self._writer.arguments(observations)
+        call = Run(
             self._simulation.table,
             self._robots,
             modes,
             commands,
-            self._level.drives,
-            self._level.following,
-            self._rules,
-            self._waiting,
             self._settings.decision_steps,
+            self._waiting,
             seen,
-            *self._writer.arguments(observations),
-            self._orders[0],
-            new_queue(),
-            threads,
+            sources,
         )
+        level, work = self._level, new_work(self._orders[0], threads)
+        run(call, level.drives, level.following, self._rules, observed, work)
         self._writer.copy_sensors(observations, seen)
 
     def _run_staged(
@@ -117,10 +115,10 @@ class BatchRun:
         decides = modes == DECIDES
         left = np.where(decides, self._settings.decision_steps, 1)
         begin_decisions(decides, robots, level.drives, self._waiting)
-        looks = modes == LOOKS
-        if looks.any():
-            self._software.step(commands, moves_bodies=False, runs=looks)
-            modes[looks] = WAITS
+        senses = modes == SENSES
+        if senses.any():
+            self._software.step(commands, moves_bodies=False, runs=senses)
+            modes[senses] = WAITS
         while (runs := modes != WAITS).any():
             follow_some(runs & decides, robots, table, level.drives, level.following, commands)
             self._software.step(commands, runs=runs)

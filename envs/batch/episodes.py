@@ -18,7 +18,7 @@ from lidarium.envs.batch.beginnings import Beginnings
 from lidarium.envs.batch.levels import make_level
 from lidarium.envs.batch.observation_buffers import Arrays, ObservationBuffers
 from lidarium.envs.batch.row_infos import RowInfos
-from lidarium.envs.batch.running import LOOKS, STEPS, WAITS
+from lidarium.envs.batch.running import SENSES, STEPS, WAITS
 from lidarium.envs.episode_start import EpisodeStart, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.observation_spaces import observation_space
@@ -71,7 +71,7 @@ class EpisodeBatch:
     has_endings : bool
         Whether a robot ended in the last step.
     infos : dict
-        What the last step tells beside, in arrays over rows.
+        What the last step reports beside, in arrays over rows.
     floors : list of Floor
         The floor of each episode.
 
@@ -198,7 +198,7 @@ class EpisodeBatch:
                 self._place(episode, start)
             self.is_whole = bool(self.live.all())
             self._row_infos.begin(np.repeat(np.isin(np.arange(self.episodes), beginning), robots))
-            modes[beginning] = LOOKS
+            modes[beginning] = SENSES
         seen = acted
         if begins:
             seen = acted.copy()
@@ -210,8 +210,8 @@ class EpisodeBatch:
         self.acted = acted
         self._note_endings(acted, stopping)
         self.infos = self._row_infos.of_step(terms, self.reasons, self.has_endings)
-        # Episodes that have not run in this call have nothing to be looked at again.
-        self.level.look(self.acted, self.live & seen, seen, self.observations, self.infos)
+        # Episodes that have not run in this call have nothing to be observed again.
+        self.level.observe(self.acted, self.live & seen, seen, self.observations, self.infos)
 
     def _take_terms(self, acted: NDArray[np.bool_], is_plain: bool) -> dict[str, NDArray[np.float64]]:
         """Return what each term of the reward brought in the step, and add up those that are no kernels.

@@ -64,7 +64,7 @@ class Level(Protocol):
         """
         ...
 
-    def look(
+    def observe(
         self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
     ) -> None:
         """Write what the level adds to observations and infos.
@@ -75,7 +75,7 @@ class Level(Protocol):
         ----------
         acted, live, seen : (rows,) bool
             Who took part in a step, who of those that are seen has not ended, and whose observations are
-            written: of all that acted or began anew.
+            written: of all that acted or began again.
         out : dict of arrays
             Where observations are written.
         infos : dict
@@ -145,7 +145,7 @@ class VelocityLevel:
             commands[~live] = 0.0
         scale_shares(commands, self._limits)
 
-    def look(
+    def observe(
         self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
     ) -> None:
         """Add nothing."""
@@ -184,11 +184,11 @@ class WaypointLevel:
         self.driver.prepare(np.flatnonzero(modes == STEPS))
         modes[modes == STEPS] = DECIDES
 
-    def look(
+    def observe(
         self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
     ) -> None:
         """Tell what the robots' driving is about."""
-        _tell(infos, "drive", acted, self.driver.states(), lambda number: DRIVE_STATES[number])
+        _add_info(infos, "drive", acted, self.driver.states(), lambda number: DRIVE_STATES[number])
 
 
 class FrontierLevel:
@@ -232,18 +232,18 @@ class FrontierLevel:
         commands[np.repeat(is_idle, self._robots)] = 0.0
         return stopping
 
-    def look(
+    def observe(
         self, acted: Rows, live: Rows, seen: Rows, out: dict[str, NDArray[Any]], infos: dict[str, Any]
     ) -> None:
-        """Give up what was chosen in vain, offer anew, and tell of both."""
+        """Give up what was chosen in vain, offer again, and report both."""
         reasons = self._offers.renew(live, seen)
         for name, array in (
             ("frontiers", self._offers.offers.tables),
             ("action_mask", self._offers.offers.masks),
         ):
             out[name][seen] = array[seen]
-        self._waypoints.look(acted, live, seen, out, infos)
-        _tell(
+        self._waypoints.observe(acted, live, seen, out, infos)
+        _add_info(
             infos,
             "given_up",
             reasons != 0,
@@ -252,7 +252,7 @@ class FrontierLevel:
         )
 
 
-def _tell(
+def _add_info(
     infos: dict[str, Any], name: str, rows: Rows, values: NDArray[Any], describe: Callable[[int], Any]
 ) -> None:
     """Add an info for some rows, with its mask.
@@ -260,10 +260,10 @@ def _tell(
     The mask is the one that Gymnasium's vector environments put beside it.
     """
     if rows.any():
-        told = np.full(len(rows), None, object)
+        described = np.full(len(rows), None, object)
         for row in np.flatnonzero(rows):
-            told[row] = describe(int(values[row]))
-        infos[name], infos[f"_{name}"] = told, rows.copy()
+            described[row] = describe(int(values[row]))
+        infos[name], infos[f"_{name}"] = described, rows.copy()
 
 
 def make_level(name: str, perception: Perception, settings: ExplorationSettings) -> Level:

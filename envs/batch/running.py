@@ -3,6 +3,8 @@
 Each runs for one step or for a decision of its own length.
 """
 
+from typing import Any, NamedTuple
+
 import numba
 
 from lidarium.envs.driving.drives import Drives, Following, any_newly_done, follow_team, mark_waiting
@@ -11,14 +13,47 @@ from lidarium.envs.outcome.endings import Rules, ending_of
 from lidarium.envs.simulation.kernels.arrays import WorldArrays, world_at
 from lidarium.envs.simulation.kernels.stepping import step_episode
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.work_queue import take_next
+from lidarium.mapping.kernels.work_queue import Work, take_next
 
-WAITS, LOOKS, STEPS, DECIDES = range(4)
+WAITS, SENSES, STEPS, DECIDES = range(4)
 """Modes of an episode in a call.
 
 It does nothing, takes the start scan, takes one step by the commands, or follows the robots' paths up to the
 longest decision.
 """
+
+
+class Run(NamedTuple):
+    """A call of a batch: what each episode does, and whose observations are written.
+
+    Attributes
+    ----------
+    table : (arrays, 3) int64
+        The table of the world's arrays.
+    robots : int
+        Size of a team.
+    modes : (episodes,) int8
+        What each episode does.
+    commands : (rows, 2) float64
+        Speeds and turn rates of episodes that take one step; written in decisions [m/s, rad/s].
+    longest : int
+        Most steps of a decision.
+    waiting : (rows,) bool
+        Scratch: whose orders were done when the decision began.
+    seen : (rows,) bool
+        Whose observations are written.
+    sources : (arrays, 3) int64
+        What they are written from, see ``write_row``.
+    """
+
+    table: Array
+    robots: int
+    modes: Array
+    commands: Array
+    longest: int
+    waiting: Array
+    seen: Array
+    sources: Array
 
 
 @kernel(borrowing=True)
@@ -73,83 +108,52 @@ def note_ends(modes: Array, robots: int, table: Array, drives: Drives, rules: Ru
 
 
 @kernel(borrowing=True)
-def _run_episode(
-    table: Array,
-    robots: int,
-    episode: int,
-    mode: int,
-    commands: Array,
-    drives: Drives,
-    following: Following,
-    rules: Rules,
-    waiting: Array,
-    longest: int,
-) -> None:
-    """Run one episode for a step, or for a decision of at most ``longest`` steps.
+def _run_episode(run: Run, episode: int, drives: Drives, following: Following, rules: Rules) -> None:
+    """Run one episode for a step, or for a decision.
 
-    A decision ends before when the episode is over, when something happens to a robot, or when a robot with a
-    target has newly arrived or found no way.
+    A decision ends before its longest time when the episode is over, when something happens to a robot, or
+    when a robot with a target has newly arrived or found no path.
     """
-    world = world_at(table)
-    first, last = episode * robots, (episode + 1) * robots
+    world, robots, commands = world_at(run.table), run.robots, run.commands
+    mode, first, last = run.modes[episode], episode * robots, (episode + 1) * robots
     if mode == DECIDES:
-        mark_waiting(drives, first, last, waiting)
-    for _ in range(longest if mode == DECIDES else 1):
+        mark_waiting(drives, first, last, run.waiting)
+    for _ in range(run.longest if mode == DECIDES else 1):
         if mode == DECIDES:
             follow_team(
                 drives, following, first, last, world.believed, world.measured, world.ranges, commands
             )
-        step_episode(table, episode, robots, commands, mode != LOOKS, True)
-        if _ends(world, episode, robots, drives, rules, waiting, mode == DECIDES):
+        step_episode(run.table, episode, robots, commands, mode != SENSES, True)
+        if _ends(world, episode, robots, drives, rules, run.waiting, mode == DECIDES):
             break
 
 
 def _run_episodes(
-    table: Array,
-    robots: int,
-    modes: Array,
-    commands: Array,
-    drives: Drives,
-    following: Following,
-    rules: Rules,
-    waiting: Array,
-    longest: int,
-    seen: Array,
-    sources: Array,
-    observed: Arrays,
-    order: Array,
-    turns: Array,
-    threads: int,
+    run: Run, drives: Drives, following: Following, rules: Rules, observed: Arrays, work: Work
 ) -> None:
-    """Run the episodes by their ``modes`` (episodes,), on so many threads.
-
-    The observations of ``seen`` rows are written.
+    """Run the episodes by their modes, in the order of the work's items.
 
     An episode's observations are written right after its run, while its maps are in the thread's cache.
-    Threads take the episodes by ``new_turns`` in the ``order`` (episodes,) int64.
     """
-    for _ in numba.prange(threads):
-        turn = take_next(turns)
-        while turn < order.shape[0]:
-            episode = order[turn]
-            turn = take_next(turns)
-            if modes[episode] != WAITS:
-                _run_episode(
-                    table,
-                    robots,
-                    episode,
-                    modes[episode],
-                    commands,
-                    drives,
-                    following,
-                    rules,
-                    waiting,
-                    longest,
-                )
-                for row in range(episode * robots, (episode + 1) * robots):
-                    if seen[row]:
-                        write_row(row, sources, observed)
+    # Arguments are not nested further: numba hands no tuples of tuples to threads.
+    for _ in numba.prange(work.threads):
+        place = take_next(work.taken)
+        while place < work.items.shape[0]:
+            episode = work.items[place]
+            place = take_next(work.taken)
+            if run.modes[episode] != WAITS:
+                _run_episode(run, episode, drives, following, rules)
+                for row in range(episode * run.robots, (episode + 1) * run.robots):
+                    if run.seen[row]:
+                        write_row(row, run.sources, observed)
 
 
 run_serial = kernel(_run_episodes)
 run_parallel = kernel(parallel=True)(_run_episodes)
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

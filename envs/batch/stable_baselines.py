@@ -33,8 +33,8 @@ class ExplorationVecEnv(VecEnv):
     Row = episode * robots + robot; one policy drives all rows. A robot that ends before its team is done
     once; its row then repeats its last observation with reward 0 and ``infos[row]["active"]`` False. Where
     the last robot of an episode ends, the rows that repeat are done as well, truncated, and the episode
-    begins anew in the same step. In every row that is done, ``infos[row]["terminal_observation"]`` is what
-    the robot saw last, and ``infos[row]["TimeLimit.truncated"]`` tells the horizon from an ending.
+    begins again in the same step. In every row that is done, ``infos[row]["terminal_observation"]`` is what
+    the robot saw last, and ``infos[row]["TimeLimit.truncated"]`` tells apart the horizon and an ending.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class ExplorationVecEnv(VecEnv):
     def step_wait(self) -> tuple[Arrays, NDArray[np.float32], NDArray[np.bool_], Infos]:
         """Run all episodes for one step (velocity) or decision.
 
-        Episodes that are over begin anew.
+        Episodes that are over begin again.
         """
         if self._actions is None:
             raise RuntimeError("no actions were given; call step_async() before step_wait()")
@@ -147,10 +147,10 @@ class ExplorationVecEnv(VecEnv):
                 info["terminal_observation"] = {
                     name: array[row].copy() for name, array in batch.observations.items()
                 }
-        self._begin_anew(np.flatnonzero(batch.is_over))
+        self._begin_again(np.flatnonzero(batch.is_over))
         return batch.observations, rewards, dones, infos
 
-    def _begin_anew(self, over: NDArray[np.int64]) -> None:
+    def _begin_again(self, over: NDArray[np.int64]) -> None:
         """Begin episodes in the step that ended them; the other rows keep what they see."""
         if not len(over):
             return

@@ -28,7 +28,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
 
     Row = episode * robots + robot. A robot that ends before its team returns terminated once; its row then
     repeats its last observation with reward 0 and ``infos["active"]`` False. When the last robot of an
-    episode ends, the rows that repeat return truncated, and the next step begins the episode anew whatever
+    episode ends, the rows that repeat return truncated, and the next step begins the episode again whatever
     its actions (``AutoresetMode.NEXT_STEP``). Every row sees, earns and ends as the robot of an
     ``ExplorationEnv`` with the same seed, to the bit.
 
@@ -115,12 +115,12 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
     def step(self, actions: NDArray[Any]) -> Step:
         """Run all episodes for one step (velocity) or decision.
 
-        Those that are over begin anew.
+        Those that are over begin again.
 
         Parameters
         ----------
         actions : (rows, ...) array
-            An action a row; those of rows that repeat or begin anew are ignored.
+            An action a row; those of rows that repeat or begin again are ignored.
         """
         self._check_open()
         batch = self.batch

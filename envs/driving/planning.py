@@ -1,6 +1,6 @@
 """Path planning for many robots at once, in kernels.
 
-Paths lead to their targets, round teammates, and are planned anew where one is blocked.
+Paths lead to their targets, round teammates, and are planned again where one is blocked.
 """
 
 import math
@@ -14,7 +14,7 @@ from lidarium.envs.driving.planning_arrays import Destination, Planning
 from lidarium.envs.onboard.navigation import COLUMNS, ROWS, closeness_of, log_odds_of
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.work_queue import take_next
+from lidarium.mapping.kernels.work_queue import Work, take_next
 from lidarium.mapping.planning.path_smoothing import kept_places, line_is_clear
 from lidarium.mapping.planning.search.path_search import budget_of, find_path
 from lidarium.mapping.planning.search.search_state import Passage, Terrain
@@ -227,35 +227,27 @@ def _standing(planning: Planning, drives: Drives, row: int) -> tuple[Array, Arra
     return avoided, ended
 
 
-def _prepare_teams(
-    planning: Planning,
-    drives: Drives,
-    maps: TeamMaps,
-    episodes: Array,
-    is_blocked: Array,
-    turns: Array,
-    pieces: int,
-) -> None:
+def _prepare_teams(planning: Planning, drives: Drives, maps: TeamMaps, work: Work, is_blocked: Array) -> None:
     """Prepare the live robots of some teams, in their order, on fresh maps.
 
-    The work is in so many pieces; it is noted where a robot is blocked.
+    The items of the work are episodes; it is noted where a robot is blocked.
     """
-    for piece in numba.prange(pieces):
-        k = take_next(turns)
-        while k < len(episodes):
-            first = episodes[k] * planning.robots
+    for piece in numba.prange(work.threads):
+        k = take_next(work.taken)
+        while k < len(work.items):
+            first = work.items[k] * planning.robots
             is_fresh = False
             for row in range(first, first + planning.robots):
                 if planning.has_ended[row]:
                     continue
                 if drives.is_ordered[row] and drives.passing[row] < 0:
                     if not is_fresh:
-                        refresh_team(maps, episodes[k])
+                        refresh_team(maps, work.items[k])
                         is_fresh = True
                     prepare_robot(planning, drives, row, piece)
                 if drives.states[row] == BLOCKED:
                     is_blocked[k] = True
-            k = take_next(turns)
+            k = take_next(work.taken)
 
 
 prepare_teams_serial = kernel(_prepare_teams)

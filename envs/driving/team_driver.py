@@ -31,7 +31,7 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import DriveState, Orders, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
-from lidarium.mapping.kernels.work_queue import new_queue
+from lidarium.mapping.kernels.work_queue import new_work
 
 
 class TeamDriver:
@@ -171,7 +171,7 @@ class TeamDriver:
             )
             threads = self._perception.threads_for(len(simple))
             prepare = prepare_teams_parallel if threads > 1 else prepare_teams_serial
-            prepare(planning, drives, self._perception.maps, simple, is_blocked, new_queue(), threads)
+            prepare(planning, drives, self._perception.maps, new_work(simple, threads), is_blocked)
         for episode in simple[is_blocked]:
             self._right_of_way.settle_team(int(episode))
         for episode in episodes[has_refuge]:

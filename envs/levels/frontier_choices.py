@@ -1,7 +1,7 @@
 """Which frontiers are offered to robots, one kernel for a whole batch."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -19,7 +19,7 @@ from lidarium.envs.onboard.navigation import (
 )
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.work_queue import take_next
+from lidarium.mapping.kernels.work_queue import Work, take_next
 from lidarium.mapping.planning.frontier_approach import approach_places
 from lidarium.mapping.planning.frontiers import frontier_clusters, ignore_frontiers_near
 from lidarium.mapping.planning.search.path_search import clear_memory, search_all
@@ -54,8 +54,8 @@ class Offers(NamedTuple):
     Attributes
     ----------
     tables : (rows, 16, 4) float32
-        Position along the axes of the map frame from where the robot believes to be, cost of the way and size
-        [m] of each frontier, cheapest way first, zeros behind the last.
+        Position along the axes of the map frame from where the robot believes to be, cost of the path and
+        size [m] of each frontier, cheapest path first, zeros behind the last.
     masks : (rows, 17) int8
         1 for what may be chosen; the last is to stay.
     counts : (rows,) int64
@@ -63,7 +63,7 @@ class Offers(NamedTuple):
     targets, headings : (rows, 16, 2), (rows, 16) float64
         Where to stand in the map frame [m] and how to turn there [rad], nan for any.
     cells : (rows, 16, 2) int64
-        The frontier cell (row, column) to look at.
+        The frontier cell (row, column) to observe.
     """
 
     tables: NDArray[np.float32]
@@ -98,8 +98,8 @@ class Choices(NamedTuple):
     since: NDArray[np.float64]
 
 
-class Looking(NamedTuple):
-    """How robots look at frontiers.
+class ViewReach(NamedTuple):
+    """From where robots observe frontiers.
 
     Attributes
     ----------
@@ -114,6 +114,22 @@ class Looking(NamedTuple):
     spans: NDArray[np.int64]
     reach: float
     time_step: float
+
+
+class Renewal(NamedTuple):
+    """Whose choices and offers are renewed, and what comes of it.
+
+    Attributes
+    ----------
+    is_live, is_offered : (rows,) bool
+        Whose choices are examined, and who is offered frontiers.
+    reasons : (rows,) int8
+        Result: why each robot's chosen frontier was given up, 0 where it was not.
+    """
+
+    is_live: NDArray[np.bool_]
+    is_offered: NDArray[np.bool_]
+    reasons: NDArray[np.int8]
 
 
 @kernel
@@ -163,7 +179,7 @@ def _cheapest(left: Array, is_wanted: Array, ranked: Array) -> int:
 
 @kernel
 def _offer(
-    planning: Planning, looking: Looking, offers: Offers, row: int, cells: Array, starts: Array, piece: int
+    planning: Planning, view: ViewReach, offers: Offers, row: int, cells: Array, starts: Array, piece: int
 ) -> None:
     """Offer a robot the frontier clusters that it can approach and see.
 
@@ -184,7 +200,7 @@ def _offer(
     remaining, parent, touched, least = search_all(
         log_odds, closeness_of(record), passage_in(planning), memory, start_row, start_column
     )
-    places, left, is_near = approach_places(cells, starts, log_odds, remaining, parent, least, looking.spans)
+    places, left, is_near = approach_places(cells, starts, log_odds, remaining, parent, least, view.spans)
     clear_memory(memory, record[ROWS], record[COLUMNS], touched)
     is_long = is_near.copy()
     for k in range(len(is_long)):
@@ -219,51 +235,54 @@ def _give_up(
     planning: Planning,
     maps: TeamMaps,
     drives: Drives,
-    looking: Looking,
+    view: ViewReach,
     choices: Choices,
+    renewal: Renewal,
     episode: int,
-    is_live: Array,
-    reasons: Array,
 ) -> None:
     """Give up what live robots of a team chose in vain, on fresh maps."""
     refresh_team(maps, episode)
-    time = maps.steps[episode] * looking.time_step
+    time = maps.steps[episode] * view.time_step
     for row in range(episode * planning.robots, (episode + 1) * planning.robots):
-        if not (is_live[row] and choices.is_chosen[row]):
+        if not (renewal.is_live[row] and choices.is_chosen[row]):
             continue
-        reasons[row] = _why_in_vain(planning, drives, choices, row, time)
-        if reasons[row] != 0:
+        renewal.reasons[row] = _why_in_vain(planning, drives, choices, row, time)
+        if renewal.reasons[row] != 0:
             record, cell = planning.records[row // planning.sharing], choices.cells[row]
-            ignore_frontiers_near(flags_of(record), tiles_of(record), cell[0], cell[1], looking.reach)
+            ignore_frontiers_near(flags_of(record), tiles_of(record), cell[0], cell[1], view.reach)
 
 
 def renew_teams(
     planning: Planning,
     maps: TeamMaps,
     drives: Drives,
-    looking: Looking,
+    view: ViewReach,
     offers: Offers,
     choices: Choices,
-    episodes: Array,
-    is_live: Array,
-    is_offered: Array,
-    reasons: Array,
-    turns: Array,
-    pieces: int,
+    renewal: Renewal,
+    work: Work,
 ) -> None:
-    """Give up what robots chose in vain, then offer anew, in so many pieces."""
-    for piece in numba.prange(pieces):
-        k = take_next(turns)
-        while k < len(episodes):
-            _give_up(planning, maps, drives, looking, choices, episodes[k], is_live, reasons)
+    """Give up what robots chose in vain, then offer again."""
+    for piece in numba.prange(work.threads):
+        k = take_next(work.taken)
+        while k < len(work.items):
+            episode = work.items[k]
+            _give_up(planning, maps, drives, view, choices, renewal, episode)
             cells, starts = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
             listed = -1
-            for row in range(episodes[k] * planning.robots, (episodes[k] + 1) * planning.robots):
-                if not is_offered[row]:
+            for row in range(episode * planning.robots, (episode + 1) * planning.robots):
+                if not renewal.is_offered[row]:
                     continue
                 if listed != row // planning.sharing:
                     listed = row // planning.sharing
                     record = planning.records[listed]
                     cells, starts = frontier_clusters(flags_of(record), tiles_of(record), 1)
-                _offer(planning, looking, offers, row, cells, starts, piece)
-            k = take_next(turns)
+                _offer(planning, view, offers, row, cells, starts, piece)
+            k = take_next(work.taken)
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -2,9 +2,9 @@
 
 Kernels compute them for the rows of many episodes.
 
-A robot is offered the frontiers that it can come near and see, cheapest way first. A frontier to which it has
-driven and turned and that is still there, to which there is no path, or towards which it does not get on, is
-given up by name.
+A robot is offered the frontiers that it can come near and see, cheapest path first. A frontier to which it
+has driven and turned and that is still there, to which there is no path, or towards which it does not get on,
+is given up by name.
 """
 
 import math
@@ -13,12 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.driving.team_driver import TeamDriver, footprint_of
-from lidarium.envs.levels.frontier_choices import CANDIDATES, Choices, Looking, Offers, renew_teams
+from lidarium.envs.levels.frontier_choices import (
+    CANDIDATES,
+    Choices,
+    Offers,
+    Renewal,
+    ViewReach,
+    renew_teams,
+)
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import Orders, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.kernels.work_queue import new_queue
+from lidarium.mapping.kernels.work_queue import new_work
 from lidarium.mapping.planning.frontier_approach import default_reach
 from lidarium.mapping.planning.search.search_targets import disc_spans
 
@@ -42,7 +49,7 @@ class FrontierOffers:
     settings : ExplorationSettings
         The team of every episode.
     driver : TeamDriver
-        Who drives the robots; on the same maps frontiers are looked for.
+        Who drives the robots; on the same maps frontiers are searched.
 
     Attributes
     ----------
@@ -106,14 +113,14 @@ class FrontierOffers:
         return Orders(is_taken, choices.targets, choices.headings)
 
     def renew(self, is_live: NDArray[np.bool_], is_offered: NDArray[np.bool_]) -> NDArray[np.int8]:
-        """Give up what was chosen in vain and offer anew.
+        """Give up what was chosen in vain and offer again.
 
         Called after the steps of a decision, and at the start.
 
         Parameters
         ----------
         is_live, is_offered : (rows,) bool
-            Whose choices are looked at, and who is offered frontiers.
+            Whose choices are examined, and who is offered frontiers.
 
         Returns
         -------
@@ -125,21 +132,17 @@ class FrontierOffers:
         episodes = np.unique(rows // self._robots)
         if len(episodes):
             threads = self._perception.threads_for(len(episodes))
-            looking = Looking(disc_spans(self._reach), self._reach, self._time_step)
+            view = ViewReach(disc_spans(self._reach), self._reach, self._time_step)
             renew = _renew_teams_parallel if threads > 1 else _renew_teams_serial
             renew(
                 self._driver.planning(rows, with_frontiers=True),
                 self._perception.maps,
                 self._driver.drives,
-                looking,
+                view,
                 self.offers,
                 self.choices,
-                episodes,
-                is_live,
-                is_offered,
-                reasons,
-                new_queue(),
-                threads,
+                Renewal(is_live, is_offered, reasons),
+                new_work(episodes, threads),
             )
         return reasons
 

@@ -5,7 +5,7 @@ Each thread takes the next free piece of work, so that all end at about the same
 Which thread runs a piece changes nothing in it; pieces must not touch each other.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -16,8 +16,31 @@ from numpy.typing import NDArray
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 
+class Work(NamedTuple):
+    """Items that threads work off, each taking the next one that is left.
+
+    Attributes
+    ----------
+    items : (n,) int64
+        What there is to do, in the order in which it is taken.
+    taken : (1,) int64
+        How many have been taken, see ``take_next``.
+    threads : int
+        How many threads take items.
+    """
+
+    items: NDArray[np.int64]
+    taken: NDArray[np.int64]
+    threads: int
+
+
+def new_work(items: NDArray[np.int64], threads: int) -> Work:
+    """Return work of which nothing has been taken."""
+    return Work(items, new_queue(), threads)
+
+
 def new_queue() -> NDArray[np.int64]:
-    """Return the counter of a loop that has not begun, for ``take_turn``."""
+    """Return the counter of a loop that has not begun, for ``take_next``."""
     return np.zeros(1, np.int64)
 
 
@@ -37,10 +60,10 @@ _take: Any = intrinsic(_add_one)
 
 
 @kernel(inline=True)
-def take_next(turns: Array) -> int:
-    """Return the number of the next turn of ``new_turns``, from 0 on.
+def take_next(taken: Array) -> int:
+    """Return the place of the next item by the counter of ``new_queue``, from 0 on.
 
     No two threads are given the same.
     """
-    turn: int = _take(turns.ctypes.data)
-    return turn
+    place: int = _take(taken.ctypes.data)
+    return place
