@@ -13,6 +13,7 @@ from lidarium.envs.simulation.kernels.arrays import (
     MAP_ROWS,
     TOUCHED,
     TOUCHED_ROWS,
+    WorldArrays,
     world_at,
 )
 from lidarium.envs.simulation.kernels.scanning import RANGE_GAP
@@ -68,26 +69,49 @@ RESOLUTION, LONGEST_RANGE, TOP_SPEED, TOP_TURN_RATE = range(4)
 """Places in ``Sources.limits``."""
 
 
+@kernel(spliced=True)
+def _write_maps(row: int, world: WorldArrays, given: Sources, maps: Array, egocentric_maps: Array) -> None:
+    """Write the crops of a robot's map, each where it is observed."""
+    believed, origins, beliefs = world.believed, world.origins, world.belief_rows
+    resolution = given.limits[RESOLUTION]
+    x, y = (
+        (believed[row, 0] - origins[row, 0]) / resolution,
+        (believed[row, 1] - origins[row, 1]) / resolution,
+    )
+    log_odds = int8_grid_at(beliefs[row, MAP], beliefs[row, MAP_ROWS], beliefs[row, MAP_COLUMNS])
+    if maps.size > 0:
+        crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
+    if egocentric_maps.size > 0:
+        touched = word_grid_at(
+            beliefs[row, TOUCHED], beliefs[row, TOUCHED_ROWS], touched_words(beliefs[row, MAP_COLUMNS])
+        )
+        pools = grid_at(
+            given.pools.ctypes.data + row * given.pools.shape[1] * 8, given.scales.shape[0], 3, np.int64
+        )
+        for k in range(given.scales.shape[0]):
+            if given.scales[k] > 1:
+                pool_touched(
+                    log_odds,
+                    touched,
+                    given.scales[k],
+                    int8_grid_at(pools[k, POOL], pools[k, POOL_ROWS], pools[k, POOL_COLUMNS]),
+                )
+        forget_touched(touched, log_odds.shape[0])
+        crop_turned(pools, x, y, believed[row, 2], given.scales, egocentric_maps[row])
+
+
 @kernel(borrowing=True)
 def write_row(row: int, sources: Array, observed: Arrays) -> None:
     """Write a row of the arrays of ``KEYS``.
 
     Those of keys that are not observed hold no elements. See ``ObservationWriter.arguments``.
     """
-    told = arrays_at(sources, Sources)
-    world, offsets, goals, limits, scales = (
-        world_at(told.world),
-        told.offsets,
-        told.goals,
-        told.limits,
-        told.scales,
-    )
+    given = arrays_at(sources, Sources)
+    world, offsets, goals, limits = world_at(given.world), given.offsets, given.goals, given.limits
     ranges, believed, velocities, bumpers = world.ranges, world.believed, world.measured, world.bumpers
-    beliefs, origins = world.belief_rows, world.origins
     scans, poses, motions, presses = observed[SCAN], observed[POSE], observed[VELOCITY], observed[BUMPER]
     maps, egocentric_maps, observed_goals = observed[LEVELS], observed[EGOCENTRIC_LEVELS], observed[GOAL]
-    resolution, range_max = limits[RESOLUTION], limits[LONGEST_RANGE]
-    max_speed, max_turn_rate = limits[TOP_SPEED], limits[TOP_TURN_RATE]
+    range_max, max_speed, max_turn_rate = limits[LONGEST_RANGE], limits[TOP_SPEED], limits[TOP_TURN_RATE]
     farthest = np.float32(FARTHEST)
     if scans.size > 0:
         no_return, longest = np.float32(range_max), np.float32(range_max - RANGE_GAP)
@@ -115,30 +139,7 @@ def write_row(row: int, sources: Array, observed: Arrays) -> None:
                 min(max(local, -farthest), farthest) if local == local else np.float32(0.0)
             )
     if maps.size > 0 or egocentric_maps.size > 0:
-        x, y = (
-            (believed[row, 0] - origins[row, 0]) / resolution,
-            (believed[row, 1] - origins[row, 1]) / resolution,
-        )
-        log_odds = int8_grid_at(beliefs[row, MAP], beliefs[row, MAP_ROWS], beliefs[row, MAP_COLUMNS])
-        if maps.size > 0:
-            crop_levels(log_odds, int(math.floor(y)), int(math.floor(x)), maps[row, 0])
-        if egocentric_maps.size > 0:
-            touched = word_grid_at(
-                beliefs[row, TOUCHED], beliefs[row, TOUCHED_ROWS], touched_words(beliefs[row, MAP_COLUMNS])
-            )
-            pools = grid_at(
-                told.pools.ctypes.data + row * told.pools.shape[1] * 8, scales.shape[0], 3, np.int64
-            )
-            for k in range(scales.shape[0]):
-                if scales[k] > 1:
-                    pool_touched(
-                        log_odds,
-                        touched,
-                        scales[k],
-                        int8_grid_at(pools[k, POOL], pools[k, POOL_ROWS], pools[k, POOL_COLUMNS]),
-                    )
-            forget_touched(touched, log_odds.shape[0])
-            crop_turned(pools, x, y, believed[row, 2], scales, egocentric_maps[row])
+        _write_maps(row, world, given, maps, egocentric_maps)
 
 
 @kernel

@@ -87,7 +87,7 @@ class ObservationWriter:
             for limit in (settings.lidar.range_max, robot.max_speed, robot.max_turn_rate)
         ]
         self._simulation = simulation
-        self._told = (
+        self._arrays = (
             offsets,
             offsets if goals is None else goals,
             simulation.beliefs.pool_rows,
@@ -166,7 +166,7 @@ class ObservationWriter:
 
         They are the world's table, offsets, goals, pooled maps, limits and scales.
         """
-        self._sources = table_of((self._simulation.table, *self._told))
+        self._sources = table_of((self._simulation.table, *self._arrays))
         return self._sources
 
     def __getstate__(self) -> dict[str, Any]:

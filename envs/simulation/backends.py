@@ -7,7 +7,7 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.backend import World
 from lidarium.envs.simulation.kinematic_simulation import KinematicSimulation
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
-from lidarium.envs.simulation.simulation import Simulation
+from lidarium.envs.simulation.simulation import PoseSources, Simulation
 from lidarium.registry import Registry
 
 BACKENDS: Registry[Callable[[ExplorationSettings, int], Simulation]] = Registry("backend")
@@ -40,8 +40,7 @@ def simulation_of(
         settings.threads,
         settings.egocentric_scales,
         reward_weights(settings),
-        settings.localization,
-        settings.radio.is_ideal,
+        PoseSources(settings.localization, settings.radio.is_ideal),
     )
     if settings.camera is not None:
         simulation.mount(settings.camera)

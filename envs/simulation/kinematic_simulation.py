@@ -10,7 +10,7 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.simulation.kernels.stepping import step_rows, step_serial
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
-from lidarium.envs.simulation.simulation import Simulation
+from lidarium.envs.simulation.simulation import PoseSources, Simulation
 from lidarium.mapping.grids.occupancy import OccupancySettings
 
 
@@ -40,14 +40,17 @@ class KinematicSimulation(Simulation):
         robots, lidar, occupancy, time_step, episodes
             As for ``KinematicWorld`` and ``Simulation``.
         **options
-            Further parameters of either, by name.
+            Further parameters of either and of ``PoseSources``, by name.
         """
         of_world = {
             name: options.pop(name) for name in ("odometry", "faults", "horizon_s") if name in options
         }
-        has_odometry = options.get("localization", "truth") != "truth"
+        pose_sources = PoseSources(
+            **{name: options.pop(name) for name in ("localization", "knows_teammates") if name in options}
+        )
+        has_odometry = pose_sources.localization != "truth"
         world = KinematicWorld(robots, lidar, time_step, episodes, has_odometry=has_odometry, **of_world)
-        return cls(world, lidar, occupancy, time_step, **options)
+        return cls(world, lidar, occupancy, time_step, pose_sources=pose_sources, **options)
 
     def step(
         self,

@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ from lidarium.mapping.grids.occupancy import OccupancySettings
 from lidarium.mapping.grids.scan_integration import WORD
 from lidarium.mapping.kernels.compilation import use_threads
 from lidarium.mapping.kernels.huge_pages import ArrayPool
+from lidarium.moved import renamed_method
 
 ROWS_FOR_THREADS = 8
 """Threads pay only for batches of at least this many rows."""
@@ -49,6 +51,24 @@ def within_half_turns(starts: NDArray[np.float64]) -> NDArray[np.float64]:
     wrapped = math.pi - np.mod(math.pi - headings, 2.0 * math.pi)
     poses[:, 2] = np.where((headings > -math.pi) & (headings <= math.pi), headings, wrapped)
     return poses
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSources:
+    """Where robots know their poses from.
+
+    Attributes
+    ----------
+    localization : str
+        Who localizes the robots: ``truth``, ``odometry``, or another, which writes ``beliefs.believed``
+        before ``perceive``.
+    knows_teammates : bool
+        Whether, with known starts, all poses of teammates are known at once; otherwise those that
+        ``beliefs.contact`` names.
+    """
+
+    localization: str = "truth"
+    knows_teammates: bool = True
 
 
 class Simulation:
@@ -74,12 +94,8 @@ class Simulation:
         Scales at which maps are pooled for observations [cells].
     reward_weights : (4,) float64 or None
         Weights of ``scoring.rewards.TERMS``; nothing where None.
-    localization : str
-        Who localizes the robots: ``truth``, ``odometry``, or another, which writes ``beliefs.believed``
-        before ``perceive``.
-    knows_mates : bool
-        Whether, with known starts, all poses of teammates are known at once; otherwise those that
-        ``beliefs.contact`` names.
+    pose_sources : PoseSources
+        Where robots know their poses from.
 
     Attributes
     ----------
@@ -101,16 +117,16 @@ class Simulation:
         threads: int = 1,
         scales: Sequence[int] = (),
         reward_weights: NDArray[np.float64] | None = None,
-        localization: str = "truth",
-        knows_teammates: bool = True,
+        pose_sources: PoseSources = PoseSources(),
     ) -> None:
         self.world, self.robots, self.episodes = world, world.robots, world.episodes
+        localization = pose_sources.localization
         rows, is_true = self.robots * self.episodes, localization == "truth"
         self.beliefs = Beliefs(rows, self.robots, occupancy, scales, is_true)
         self.score = Score(self.robots, self.episodes, reward_weights)
         self.lidar, self.occupancy, self.time_step = lidar, occupancy, time_step
         self._flags = {"truth": TRUE_POSE, "odometry": DEAD_RECKONING}.get(localization, 0)
-        self._teammate_flag = KNOWN_TEAMMATES if knows_teammates else SOME_TEAMMATES
+        self._teammate_flag = KNOWN_TEAMMATES if pose_sources.knows_teammates else SOME_TEAMMATES
         self.sensor = sensor_numbers(lidar, time_step, occupancy.resolution)
         self.unit_vectors, self.noise_table = lidar.unit_vectors, GAUSSIAN_TABLE
         sensors = world.sensors
@@ -154,7 +170,7 @@ class Simulation:
         multiple = self._multiple(floor)
         first, last = episode * self.robots, (episode + 1) * self.robots
         starts = within_half_turns(starts)
-        # What the laser cannot look into does not count, even where a low body could pass below it.
+        # What the laser cannot see does not count, even where a low body could pass below it.
         smallest = float(self.world.bodies[:, RADIUS].min())
         free = reachable_free_space(floor.body, smallest, starts) & (floor.laser.solid == 0)
         floors = enumerate(self.world.floors)
@@ -255,7 +271,7 @@ class Simulation:
         """Give back what the world holds beyond arrays; closing again does nothing."""
         self.world.close()
 
-    def render_anew(self, row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
+    def render_again(self, row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
         """Forget a robot's map and render it of scans.
 
         Parameters
@@ -269,6 +285,8 @@ class Simulation:
         """
         self.beliefs.wipe(row)
         render_row(self._table, row, self.robots, np.ascontiguousarray(poses), np.ascontiguousarray(ranges))
+
+    render_anew = renamed_method("render_anew", "render_again")
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in ("_table", "_pool")}

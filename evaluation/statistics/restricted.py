@@ -17,6 +17,7 @@ mean survival time, BMC Medical Research Methodology 13 (2013). Influence: Reid,
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +26,15 @@ from lidarium.evaluation.statistics.means import exponential
 from lidarium.evaluation.statistics.resampling import RESAMPLES, Counts, studentised_interval
 from lidarium.evaluation.statistics.samples import Interval, Values, checked_values
 from lidarium.mapping.kernels.compilation import Array, kernel
+
+
+class _Sample(NamedTuple):
+    """Censored times as kernels take them; see ``CensoredTimes``."""
+
+    times: Values
+    is_observed: NDArray[np.bool_]
+    order: NDArray[np.int64]
+    horizon: float
 
 
 class CensoredTimes:
@@ -69,9 +79,9 @@ class CensoredTimes:
         return len(self.times)
 
     @property
-    def arrays(self) -> tuple[Values, NDArray[np.bool_], NDArray[np.int64], float]:
+    def arrays(self) -> _Sample:
         """What the kernels take."""
-        return self.times, self.is_observed, self.order, self.horizon
+        return _Sample(self.times, self.is_observed, self.order, self.horizon)
 
 
 def checked_times(times: ArrayLike, is_observed: ArrayLike) -> tuple[Values, NDArray[np.bool_]]:
@@ -131,7 +141,7 @@ def restricted_mean(
         )
 
     def replicates(counts: Counts) -> tuple[Values, Values]:
-        return _unzipped(_means_of(counts, *sample.arrays))
+        return _unzipped(_means_of(counts, sample.arrays))
 
     found = studentised_interval(replicates, len(sample), confidence, resamples, seed)
     # The truth lies between 0 and the horizon whatever the sample.
@@ -160,7 +170,7 @@ def restricted_difference(
     _check_partners(a, b)
 
     def replicates(counts: Counts) -> tuple[Values, Values]:
-        return _unzipped(_differences_of(counts, *a.arrays, *b.arrays, False))
+        return _unzipped(_differences_of(counts, a.arrays, b.arrays, False))
 
     return studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True)
 
@@ -180,7 +190,7 @@ def restricted_ratio(
             raise ValueError(f"all times of {name} are 0; want a positive one at least for a ratio")
 
     def replicates(counts: Counts) -> tuple[Values, Values]:
-        return _unzipped(_differences_of(counts, *a.arrays, *b.arrays, True))
+        return _unzipped(_differences_of(counts, a.arrays, b.arrays, True))
 
     return exponential(
         studentised_interval(replicates, len(a), confidence, resamples, seed, is_symmetric=True)
@@ -204,46 +214,35 @@ def _unzipped(pairs: Values) -> tuple[Values, Values]:
 
 
 @kernel
-def _means_of(counts: Array, times: Array, is_observed: Array, order: Array, horizon: float) -> Array:
+def _means_of(counts: Array, sample: _Sample) -> Array:
     """Return restricted means and their standard errors, (resamples, 2).
 
     They are of resamples (resamples, n) uint16.
     """
+    size = sample.times.size
     found = np.empty((counts.shape[0], 2))
-    influences = np.empty(times.size)
-    areas = np.empty(times.size)
+    influences, areas = np.empty(size), np.empty(size)
     for k in range(counts.shape[0]):
-        found[k, 0] = _influences_on(counts[k], times, is_observed, order, horizon, areas, influences)
+        found[k, 0] = _influences_on(counts[k], sample, areas, influences)
         variance = 0.0
-        for i in range(times.size):
+        for i in range(size):
             variance += counts[k, i] * influences[i] ** 2
         found[k, 1] = math.sqrt(variance)
     return found
 
 
 @kernel
-def _differences_of(
-    counts: Array,
-    times_a: Array,
-    is_observed_a: Array,
-    order_a: Array,
-    horizon_a: float,
-    times_b: Array,
-    is_observed_b: Array,
-    order_b: Array,
-    horizon_b: float,
-    is_logarithmic: bool,
-) -> Array:
+def _differences_of(counts: Array, a: _Sample, b: _Sample, is_logarithmic: bool) -> Array:
     """Return differences of restricted means and their errors, (resamples, 2).
 
     The means may be taken as logarithms; the errors are standard errors.
     """
-    size = times_a.size
+    size = a.times.size
     found = np.empty((counts.shape[0], 2))
     of_a, of_b, areas = np.empty(size), np.empty(size), np.empty(size)
     for k in range(counts.shape[0]):
-        mean_a = _influences_on(counts[k], times_a, is_observed_a, order_a, horizon_a, areas, of_a)
-        mean_b = _influences_on(counts[k], times_b, is_observed_b, order_b, horizon_b, areas, of_b)
+        mean_a = _influences_on(counts[k], a, areas, of_a)
+        mean_b = _influences_on(counts[k], b, areas, of_b)
         scale_a = 1.0 / mean_a if is_logarithmic else 1.0
         scale_b = 1.0 / mean_b if is_logarithmic else 1.0
         variance = 0.0
@@ -255,15 +254,7 @@ def _differences_of(
 
 
 @kernel
-def _influences_on(
-    counts: Array,
-    times: Array,
-    is_observed: Array,
-    order: Array,
-    horizon: float,
-    areas: Array,
-    influences: Array,
-) -> float:
+def _influences_on(counts: Array, sample: _Sample, areas: Array, influences: Array) -> float:
     """Return the restricted mean of a resample.
 
     Write the influence of each run on it, whose squares sum to the variance.
@@ -272,6 +263,7 @@ def _influences_on(
     sum over events k up to i of c_k G_k / (Y_k (Y_k - c_k)), less G_i / (Y_i - c_i) if i is an event: the
     derivative of the area by the weight of the run. Of known times it is (T_i - mean) / n.
     """
+    times, is_observed, order, horizon = sample
     size = times.size
     at_risk = float(size)
     share, area, last = 1.0, 0.0, 0.0

@@ -24,7 +24,7 @@ from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_s
 from lidarium.mapping.geometry.rigid import composed, relative
 
 _QUIET = ("#", "NEFF", "PARAM", "SYNC", "MARKER", "RLASER", "REMISSION", "TRUEPOS")
-"""Messages that tell nothing that is needed here."""
+"""Messages that hold nothing that is needed here."""
 
 MOST_LINE_BYTES = 1 << 20
 """Longest line of a log; one of 16,384 ranges has some 150,000 bytes."""
@@ -167,7 +167,8 @@ def _robotlaser(words: list[str]) -> _Scan:
     )
 
 
-def _log(path: Path, content: _Content) -> LaserLog:
+def _scans_of_most_beams(content: _Content) -> list[tuple[_Scan, int]]:
+    """Return the scans of the most frequent geometry, and count others as skipped."""
     (beams, increment), _ = Counter(
         (len(scan.ranges), round(scan.increment, 9)) for scan, _ in content.scans
     ).most_common(1)[0]
@@ -178,6 +179,11 @@ def _log(path: Path, content: _Content) -> LaserLog:
     ]
     if len(kept) < len(content.scans):
         content.skipped[f"scans that have not {beams} beams as most"] = len(content.scans) - len(kept)
+    return kept
+
+
+def _log(path: Path, content: _Content) -> LaserLog:
+    kept = _scans_of_most_beams(content)
     first = kept[0][0]
     ranges = np.array([scan.ranges for scan, _ in kept], np.float32)
     highest = _max_range(ranges, first)

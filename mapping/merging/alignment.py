@@ -5,6 +5,7 @@ Each match proposes one, the others vote, and the walls refine it.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ class AlignmentSettings:
     inlier_share : float
         Fewest inliers as a share of the smaller number of corners.
     candidates : int
-        Number of transforms that are refined and looked at more closely.
+        Number of transforms that are refined and examined more closely.
     refinements : tuple of str
         Done in this order: ``sweep`` of the rotation over 7 degrees to either side, ``least_squares`` of the
         inliers, ``walls`` on walls.
@@ -135,39 +136,50 @@ def find_inliers(
     proposals = propose(first, second, matches)
     is_inlier = np.zeros((len(matches), len(matches)), np.bool_)
     tangent = math.tan(settings.angle_uncertainty)
-    _vote(
-        proposals,
-        first.points[matches.first],
-        second.points[matches.second],
-        matches.first,
-        matches.second,
-        (len(first), len(second)),
-        (settings.tolerance_m, tangent, 2.0 * settings.angle_uncertainty),
+    pairs = _Pairs(first.points[matches.first], second.points[matches.second], matches.first, matches.second)
+    rule = _InlierRule(
+        settings.tolerance_m,
+        tangent,
+        2.0 * settings.angle_uncertainty,
         settings.ratio if settings.inlier_rule == "ratio" else 0.0,
-        resolution,
-        is_inlier,
     )
+    _vote(proposals, pairs, (len(first), len(second)), rule, resolution, is_inlier)
     return proposals, is_inlier
+
+
+class _Pairs(NamedTuple):
+    """Matched corners: points (n, 2) of maps a and b [m], and their indices (n,)."""
+
+    p: Array
+    q: Array
+    first: Array
+    second: Array
+
+
+class _InlierRule(NamedTuple):
+    """Who agrees with a proposal; a ratio above 0 chooses the rule of coordinates.
+
+    Tolerance of distances [m], its growth with the distance, tolerance of rotations [rad].
+    """
+
+    tolerance: float
+    tangent: float
+    angle: float
+    ratio: float
 
 
 @kernel
 def _vote(
     proposals: Array,
-    p: Array,
-    q: Array,
-    first: Array,
-    second: Array,
+    pairs: _Pairs,
     counts: tuple[int, int],
-    tolerances: tuple[float, float, float],
-    ratio: float,
+    rule: _InlierRule,
     resolution: float,
     is_inlier: Array,
 ) -> None:
-    """Mark the inliers of each proposal.
-
-    A ratio above 0 chooses the rule of coordinates.
-    """
-    tolerance, tangent, angle = tolerances
+    """Mark the inliers of each proposal."""
+    p, q, first, second = pairs
+    tolerance, tangent, angle, ratio = rule
     first_taken_by, second_taken_by = np.full(counts[0], -1), np.full(counts[1], -1)
     for k in range(proposals.shape[0]):
         cosine, sine = math.cos(proposals[k, 2]), math.sin(proposals[k, 2])

@@ -62,7 +62,7 @@ def refine_on_walls(
 
     By least squares, on walls that face the same direction.
 
-    Each wall looks along its normal for the nearest wall of map a, as far as a reach, which shrinks to four
+    For each wall, the nearest wall of map a is searched along its normal, up to a reach that shrinks to four
     cells; walls that find none do not count: there the other map may know nothing.
     """
     sample = wall_sample(len(b.walls), samples)
@@ -93,7 +93,7 @@ def _settle(
     reach: float,
     last_reach: float,
 ) -> None:
-    """Move a pose so that walls come to lie on walls along their normals."""
+    """Move a pose so that walls meet walls along their normals."""
     rounds = 10
     count = walls.shape[0]
     places, facing, gaps = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
@@ -122,25 +122,7 @@ def _settle(
             return
         centre_x /= found
         centre_y /= found
-        xx, xy, yy, xt, yt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        bx, by, bt = 0.0, 0.0, 0.0
-        for i in range(found):
-            u, v, gap = facing[i, 0], facing[i, 1], gaps[i]
-            # Rotation about the middle of the walls that count, so that it does not mix with the translation.
-            t = v * (places[i, 0] - centre_x) - u * (places[i, 1] - centre_y)
-            xx += u * u
-            xy += u * v
-            yy += v * v
-            xt += u * t
-            yt += v * t
-            tt += t * t
-            bx += u * gap
-            by += v * gap
-            bt += t * gap
-        # Damped a little, so that what no wall holds stays where it is.
-        damping = 1e-3 * found
-        hessian = np.array([[xx + damping, xy, xt], [xy, yy + damping, yt], [xt, yt, tt * 1.001 + damping]])
-        move = np.linalg.solve(hessian, np.array([bx, by, bt]))
+        move = _best_move(places[:found], facing[:found], gaps[:found], centre_x, centre_y)
         cosine, sine = math.cos(move[2]), math.sin(move[2])
         x, y = pose[0] / side - centre_x, pose[1] / side - centre_y
         pose[0] = (centre_x + cosine * x - sine * y + move[0]) * side
@@ -148,6 +130,33 @@ def _settle(
         pose[2] += move[2]
         if share == 1.0 and abs(move[0]) + abs(move[1]) < 0.02 and abs(move[2]) < 1e-4:
             return
+
+
+@kernel
+def _best_move(places: Array, facing: Array, gaps: Array, centre_x: float, centre_y: float) -> Array:
+    """Return the motion that closes the gaps best, by damped least squares.
+
+    It is x, y [cells] and theta [rad] about the centre.
+    """
+    xx, xy, yy, xt, yt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    bx, by, bt = 0.0, 0.0, 0.0
+    for i in range(gaps.shape[0]):
+        u, v, gap = facing[i, 0], facing[i, 1], gaps[i]
+        # Rotation about the middle of the walls that count, so that it does not mix with the translation.
+        t = v * (places[i, 0] - centre_x) - u * (places[i, 1] - centre_y)
+        xx += u * u
+        xy += u * v
+        yy += v * v
+        xt += u * t
+        yt += v * t
+        tt += t * t
+        bx += u * gap
+        by += v * gap
+        bt += t * gap
+    # Damped a little, so that what no wall holds stays where it is.
+    damping = 1e-3 * gaps.shape[0]
+    hessian = np.array([[xx + damping, xy, xt], [xy, yy + damping, yt], [xt, yt, tt * 1.001 + damping]])
+    return np.linalg.solve(hessian, np.array([bx, by, bt]))
 
 
 @kernel(inline=True)

@@ -8,6 +8,7 @@ standard deviation of 1 cm.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where two ways run together, as `find_overlap` tells."""
+    """Where two ways run together, see `find_overlap`."""
 
     seen_from: float
     seen_to: float
@@ -67,17 +68,13 @@ def join(seen: Way, known: Way, places: Places, settings: MapSettings) -> tuple[
     most = len(seen.points) + len(known.points) + 4
     points, weights = np.empty((most, 2)), np.empty(most)
     numbers = np.array([places.seen_from, places.seen_to, places.known_from, places.known_to])
+    rule = _JoinRule(settings.most_weight, settings.least_extension, settings.blend_length)
     count, extends = _join(
-        seen.points,
-        seen.weights,
-        known.points,
-        known.weights,
+        _Weighted(seen.points, seen.weights),
+        _Weighted(known.points, known.weights),
         numbers,
-        settings.most_weight,
-        settings.least_extension,
-        settings.blend_length,
-        points,
-        weights,
+        rule,
+        _Weighted(points, weights),
     )
     return Way(points[:count].copy(), weights[:count].copy()), bool(extends)
 
@@ -111,23 +108,31 @@ def _weight_at(weights: Array, place: float) -> float:
     return float(weights[k] + share * (weights[k + 1] - weights[k]))
 
 
+class _Weighted(NamedTuple):
+    """The arrays of a ``Way``: points (n, 2) [m] and weights (n,)."""
+
+    points: Array
+    weights: Array
+
+
+class _JoinRule(NamedTuple):
+    """How ways are joined; see ``MapSettings``."""
+
+    most_weight: float
+    least_extension: float
+    blend_length: float
+
+
 @kernel
 def _join(
-    seen: Array,
-    seen_weights: Array,
-    known: Array,
-    known_weights: Array,
-    places: Array,
-    most_weight: float,
-    least_extension: float,
-    blend: float,
-    points: Array,
-    weights: Array,
+    seen_way: _Weighted, known_way: _Weighted, places: Array, rule: _JoinRule, joined: _Weighted
 ) -> tuple[int, bool]:
     """Write the joined way.
 
     Return its number of points and whether the seen way goes beyond an end of the known one.
     """
+    (seen, seen_weights), (known, known_weights), (points, weights) = seen_way, known_way, joined
+    most_weight, least_extension, blend = rule
     seen_from, seen_to, known_from, known_to = places
     last_seen, last_known = seen.shape[0] - 1.0, known.shape[0] - 1.0
     head = known_from <= 0.0 and _length_between(seen, 0.0, seen_from) >= least_extension

@@ -10,6 +10,7 @@ not.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,26 +91,16 @@ def split_merge(
     ends = np.empty(len(places) + 1, np.int64)
     lines, corners = np.empty((len(places), 5)), np.empty((len(places), 2))
     is_corner = np.zeros(len(places) + 1, np.bool_)
-    numbers = np.array(
-        [
-            settings.split_distance,
-            settings.split_sigmas,
-            settings.collinear_angle,
-            settings.corner_angle,
-            settings.corner_reach,
-        ]
-    )
-    count = _cut(
-        places,
-        noise,
-        numbers,
+    rule = _CornerRule(
+        settings.split_distance,
+        settings.split_sigmas,
+        settings.collinear_angle,
+        settings.corner_angle,
+        settings.corner_reach,
         settings.least_points,
         CORNER_RULES.index(settings.corner_rule),
-        ends,
-        lines,
-        corners,
-        is_corner,
     )
+    count = _cut(places, noise, rule, ends, lines, corners, is_corner)
     inner = np.flatnonzero(is_corner[: count + 1])
     cut_at = ends[inner]
     is_corner[0] = is_corner[count] = True
@@ -153,7 +144,7 @@ def _is_round(
     The turn [rad] was estimated from the parts low .. high.
 
     Directions a reach farther on differ no more than those at a corner do, and three times as much on an arc.
-    Only slight turns are in doubt; leaves first .. last bound where it is looked.
+    Only slight turns are in doubt; leaves first .. last bound the search.
     """
     if abs(math.atan2(math.sin(turn), math.cos(turn))) > _SURE_TURN:
         return False
@@ -165,13 +156,23 @@ def _is_round(
     return ratio > _ROUND_RATIO
 
 
+class _CornerRule(NamedTuple):
+    """When points are split, and what a corner is; see ``SegmentationSettings``."""
+
+    split_distance: float
+    split_sigmas: float
+    collinear_angle: float
+    corner_angle: float
+    corner_reach: float
+    least_points: int
+    by: int
+
+
 @kernel
 def _cut(
     points: Array,
     sigmas: Array,
-    numbers: Array,
-    least: int,
-    rule: int,
+    rule: _CornerRule,
     ends: Array,
     lines: Array,
     corners: Array,
@@ -181,7 +182,7 @@ def _cut(
 
     Return the number of leaves.
     """
-    limit, noise_sigmas, collinear, corner_angle, corner_reach = numbers
+    limit, noise_sigmas, collinear, corner_angle, corner_reach, least, by = rule
     count = split_runs(points, sigmas, limit, noise_sigmas, ends)
     count = merge_runs(points, sigmas, limit, noise_sigmas, collinear, ends, count)
     for k in range(count):
@@ -190,19 +191,19 @@ def _cut(
     for k in range(1, count):
         at = ends[k]
         reach = max(corner_reach, _REACH_SIGMAS * sigmas[at])
-        # Directions are told from the wall nearby: the leaves of a round wall turn as much as those of a
+        # Directions are measured on the wall nearby: the leaves of a round wall turn as much as those of a
         # corner do.
         low, high = max(_reach(points, at, -1, reach), last_cut), _reach(points, at, 1, reach)
         if at - low + 1 < least or high - at + 1 < least:
             continue
         before, after = fit_line(points, low, at), fit_line(points, at, high)
         turn = after[2] - before[2]
-        if rule == 1:
+        if by == 1:
             is_sharp = abs(np.tan(after[2]) - np.tan(before[2])) > np.tan(corner_angle)
         else:
             is_sharp = abs(np.arctan2(np.sin(turn), np.cos(turn))) > corner_angle
         if not is_sharp or (
-            rule == 0 and _is_round(points, ends[k - 1], low, high, ends[k + 1], reach, least, turn)
+            by == 0 and _is_round(points, ends[k - 1], low, high, ends[k + 1], reach, least, turn)
         ):
             continue
         is_corner[k] = True

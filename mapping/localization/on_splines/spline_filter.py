@@ -2,8 +2,8 @@
 
 Each particle is a pose, weighted by how well features and rays fit the map from there.
 
-A particle also has an opinion of the wheels: by what share they tell ways and turns too long or too short.
-What fits the walls survives, and carries the robot past where walls tell nothing, as along a corridor.
+A particle also has an opinion of the wheels: by what share they measure paths and turns too long or too
+short. What fits the walls survives, and carries the robot past where walls show nothing, as along a corridor.
 
 References
 ----------
@@ -14,6 +14,7 @@ weight.
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,13 +46,13 @@ class SplineFilterSettings:
     start_distance, start_turn : float
         Standard deviations of the particles around the first pose [m, rad].
     distance_bias, turn_bias : float
-        By what share odometry may tell ways and turns too long or too short all the time, as a standard
+        By what share odometry may measure paths and turns too long or too short all the time, as a standard
         deviation: particles try how much, and those that fit the walls teach it.
     bias_wander : float
-        Standard deviation by which that share is changed whenever particles are drawn anew, so that they go
+        Standard deviation by which that share is changed whenever particles are drawn again, so that they go
         on trying.
     lost_likelihood : float
-        Where rays fit worse than this in the mean for ten corrections, some particles are drawn anew; 0 for
+        Where rays fit worse than this in the mean for ten corrections, some particles are drawn again; 0 for
         never.
     recovered_share, recovery_distance, recovery_turn : float
         What share of particles, and half of the box around the pose from which they are drawn [m, rad]; then
@@ -100,11 +101,11 @@ class SplineFilter(SplineTracker):
     particles : (n, 3) float64
         Poses x, y, theta [m, rad].
     scales : (n, 2) float64
-        What each takes a way and a turn to be, of what odometry tells.
+        What each takes a path and a turn to be, of what odometry measures.
     weights : (n,) float64
         Their weights, which sum to one.
     resamplings : int
-        How often particles were drawn anew by their weights.
+        How often particles were drawn again by their weights.
     """
 
     Settings = SplineFilterSettings
@@ -158,12 +159,14 @@ class SplineFilter(SplineTracker):
         logarithms, fits = np.zeros(len(self.particles)), np.zeros(len(self.particles))
         _weigh_features(
             self.particles,
-            matches.points,
-            matches.known_points,
-            np.maximum(matches.point_sigmas, tracking.feature_sigma),
-            matches.lines,
-            matches.known_lines,
-            np.maximum(matches.line_sigmas, tracking.feature_sigma),
+            _Matched(
+                matches.points,
+                matches.known_points,
+                np.maximum(matches.point_sigmas, tracking.feature_sigma),
+            ),
+            _Matched(
+                matches.lines, matches.known_lines, np.maximum(matches.line_sigmas, tracking.feature_sigma)
+            ),
             tracking.line_angle_sigma,
             logarithms,
         )
@@ -236,19 +239,21 @@ def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:
     return np.stack([np.log(likelihoods), likelihoods], axis=1)
 
 
+class _Matched(NamedTuple):
+    """Features as seen and in the map, and their deviations; see ``Matches``."""
+
+    seen: Array
+    known: Array
+    sigmas: Array
+
+
 @kernel
 def _weigh_features(
-    particles: Array,
-    points: Array,
-    known_points: Array,
-    point_sigmas: Array,
-    lines: Array,
-    known_lines: Array,
-    line_sigmas: Array,
-    angle_sigma: float,
-    logarithms: Array,
+    particles: Array, matched_points: _Matched, matched_lines: _Matched, angle_sigma: float, logarithms: Array
 ) -> None:
     """Add to each particle's log-likelihood (particles,) how well features fit."""
+    points, known_points, point_sigmas = matched_points
+    lines, known_lines, line_sigmas = matched_lines
     cosines, sines = np.cos(particles[:, 2]), np.sin(particles[:, 2])
     for k in range(points.shape[0]):
         for i in range(particles.shape[0]):

@@ -1,6 +1,7 @@
 """Counts of how two maps agree under a motion."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,17 +40,33 @@ def pose_numbers(transform: Transform) -> tuple[float, float, float]:
     return transform.x, transform.y, transform.theta
 
 
+class WallField(NamedTuple):
+    """What walls of another map are compared with; see ``DescribedMap``.
+
+    Attributes
+    ----------
+    levels, distance, is_open : (rows, columns) uint8, float32, uint8
+        Cells of the map, distances to its walls [m], and where all around is free.
+    scale : float
+        Cells in a metre [1/m].
+    hit, miss : float
+        Distances up to which walls agree, and from which they contradict [m].
+    """
+
+    levels: Array
+    distance: Array
+    is_open: Array
+    scale: float
+    hit: float
+    miss: float
+
+
 @kernel
 def count_walls(
-    levels: Array,
-    distance: Array,
-    is_open: Array,
-    scale: float,
+    field: WallField,
     walls: Array,
     normals: Array,
     pose: tuple[float, float, float],
-    hit: float,
-    miss: float,
     counts: Array,
     facing: Array,
 ) -> None:
@@ -57,6 +74,7 @@ def count_walls(
 
     Sum the squares of the normals of those that agree.
     """
+    levels, distance, scale = field.levels, field.distance, field.scale
     rows, columns = levels.shape
     cosine, sine = math.cos(pose[2]) * scale, math.sin(pose[2]) * scale
     x0, y0 = pose[0] * scale, pose[1] * scale
@@ -65,7 +83,7 @@ def count_walls(
         row = sine * walls[i, 0] + cosine * walls[i, 1] + y0
         x, y = int(math.floor(column)), int(math.floor(row))
         if 0 <= x < columns and 0 <= y < rows:
-            if distance[y, x] <= hit:
+            if distance[y, x] <= field.hit:
                 ahead_x = FACING_DISTANCE_M * (cosine * normals[i, 0] - sine * normals[i, 1])
                 ahead_y = FACING_DISTANCE_M * (sine * normals[i, 0] + cosine * normals[i, 1])
                 if faces_away(levels, column, row, ahead_x, ahead_y):
@@ -76,7 +94,7 @@ def count_walls(
                 facing[1] += normals[i, 0] * normals[i, 1]
                 facing[2] += normals[i, 1] * normals[i, 1]
             elif levels[y, x] == FREE:
-                counts[2 if is_open[y, x] != 0 and distance[y, x] > miss else 1] += 1
+                counts[2 if field.is_open[y, x] != 0 and distance[y, x] > field.miss else 1] += 1
 
 
 @kernel

@@ -1,9 +1,9 @@
-"""Whether two maps, laid over each other, tell of one place.
+"""Whether two overlaid maps show one place.
 
 The default test counts what both maps know: walls that lie on walls, and walls of one that stand where the
-other has looked and found nothing. A transform is refused where too little agrees, where enough contradicts,
-or where another transform explains the maps nearly as well. The disc test of the thesis looks at cells around
-the inliers only, unknown ones included.
+other has observed and found nothing. A transform is refused where too little agrees, where enough
+contradicts, or where another transform explains the maps nearly as well. The disc test of the thesis compares
+cells around the inliers only, unknown ones included.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 
 from lidarium.mapping.geometry.checks import check_from_zero
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement.counts import count_overlap, count_walls, pose_numbers
+from lidarium.mapping.merging.agreement.counts import WallField, count_overlap, count_walls, pose_numbers
 from lidarium.mapping.merging.description.described_map import DescribedMap
 
 OCCUPIED_WEIGHT = 10.0
@@ -44,7 +44,7 @@ class ValidationSettings:
         contradict [m].
     least_across_m : float
         Least length of walls that hold the maps in the direction in which they are held least [m]: two
-        straight corridors agree wherever they are laid over each other.
+        straight corridors agree wherever they are overlaid.
     least_across_share : float
         The same as a share of the walls that agree, which is at most a half: along a corridor hardly any
         walls hold.
@@ -126,7 +126,7 @@ class ValidationSettings:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """What two maps laid over each other say of the transform.
+    """What two overlaid maps say of the transform.
 
     Attributes
     ----------
@@ -170,7 +170,7 @@ class Agreement:
 
 
 def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: ValidationSettings) -> Agreement:
-    """Lay map b over map a.
+    """Compare map b with map a under a transform.
 
     Parameters
     ----------
@@ -190,32 +190,9 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
     hit, miss = max(settings.hit_distance_m, 1.5 * side), max(settings.miss_distance_m, 2.5 * side)
     b_from_a = a_from_b.inverse()
     walls, facing = np.zeros((2, 3), np.int64), np.zeros((2, 3))
-    count_walls(
-        a.levels,
-        a.distance,
-        a.is_open,
-        1.0 / side,
-        b.walls,
-        b.normals,
-        pose_numbers(a_from_b),
-        hit,
-        miss,
-        walls[0],
-        facing[0],
-    )
-    count_walls(
-        b.levels,
-        b.distance,
-        b.is_open,
-        1.0 / side,
-        a.walls,
-        a.normals,
-        pose_numbers(b_from_a),
-        hit,
-        miss,
-        walls[1],
-        facing[1],
-    )
+    for k, (field_of, walls_of, transform) in enumerate(((a, b, a_from_b), (b, a, b_from_a))):
+        field = WallField(field_of.levels, field_of.distance, field_of.is_open, 1.0 / side, hit, miss)
+        count_walls(field, walls_of.walls, walls_of.normals, pose_numbers(transform), walls[k], facing[k])
     area = np.zeros(3)
     count_overlap(a.levels, b.levels, side, pose_numbers(a_from_b), area)
     both = float(area[0])

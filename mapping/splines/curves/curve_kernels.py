@@ -1,6 +1,7 @@
 """Kernels of one B-spline curve: values, length, closest point, intersection."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -160,6 +161,15 @@ def _descend(
     return parameter, squared
 
 
+class _Ray(NamedTuple):
+    """Where a ray begins [m], and its direction."""
+
+    x: float
+    y: float
+    cosine: float
+    sine: float
+
+
 @kernel
 def ray_crossing(
     knots: Array, control_points: Array, x: float, y: float, cosine: float, sine: float
@@ -188,17 +198,9 @@ def ray_crossing(
             px, py = point_at(knots, control_points, knots[span] + i * step, 0, values)
             ahead, aside = cosine * (px - x) + sine * (py - y), cosine * (py - y) - sine * (px - x)
             if i > 0 and aside_before * aside <= 0.0 and max(ahead_before, ahead) >= 0.0:
-                met = _crossing(
-                    knots,
-                    control_points,
-                    knots[span] + (i - 1) * step,
-                    knots[span] + i * step,
-                    x,
-                    y,
-                    cosine,
-                    sine,
-                    values,
-                )
+                low, high = knots[span] + (i - 1) * step, knots[span] + i * step
+                ray = _Ray(x, y, cosine, sine)
+                met = _crossing(knots, control_points, low, high, ray, values)
                 if 0.0 <= met < nearest:
                     nearest = met
             ahead_before, aside_before = ahead, aside
@@ -207,20 +209,13 @@ def ray_crossing(
 
 @kernel
 def _crossing(
-    knots: Array,
-    control_points: Array,
-    low: float,
-    high: float,
-    x: float,
-    y: float,
-    cosine: float,
-    sine: float,
-    values: Array,
+    knots: Array, control_points: Array, low: float, high: float, ray: _Ray, values: Array
 ) -> float:
     """Return how far ahead the curve crosses the ray's line.
 
     Between two parameters, by Newton's method, with bisection where it would leave them.
     """
+    x, y, cosine, sine = ray
     px, py = point_at(knots, control_points, low, 0, values)
     aside_low = cosine * (py - y) - sine * (px - x)
     parameter = (low + high) / 2.0

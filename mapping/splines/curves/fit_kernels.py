@@ -1,6 +1,7 @@
 """Kernels of the least-squares fit of a B-spline."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,61 @@ from lidarium.mapping.splines.curves.basis import ORDER, basis_of_span, find_spa
 STEP_SIGMAS = 4.0
 
 MOST_BIAS = 3.5
+
+
+class Samples(NamedTuple):
+    """Points that a curve is fitted to, in order.
+
+    Attributes
+    ----------
+    points : (m, 2) float64
+        Where they lie [m].
+    sigmas : (m,) float64
+        Their standard deviations [m].
+    parameters : (m,) float64
+        How far along the chords each lies [m].
+    """
+
+    points: Array
+    sigmas: Array
+    parameters: Array
+
+
+class Closeness(NamedTuple):
+    """How closely a curve has to follow its points.
+
+    Attributes
+    ----------
+    rms : float
+        Largest root mean square of the distances [m].
+    scales : (m,) float64
+        Distances that count as mere noise [m].
+    window : int
+        Number of neighbours over which signed distances must not add up.
+    """
+
+    rms: float
+    scales: Array
+    window: int
+
+
+class ControlRule(NamedTuple):
+    """How many control points a curve may have, and how stiff it is.
+
+    Attributes
+    ----------
+    spacing, finest : float
+        Length of curve to a control point at first, and at least [m].
+    is_sparse : bool
+        Whether to begin with as few as there can be.
+    stiffness : float
+        Weight of the second differences of the control points.
+    """
+
+    spacing: float
+    finest: float
+    is_sparse: bool
+    stiffness: float
 
 
 @kernel
@@ -58,22 +114,15 @@ def average_knots(parameters: Array, count: int, knots: Array) -> None:
 
 @kernel
 def fit_curve(
-    points: Array,
-    sigmas: Array,
-    parameters: Array,
-    length: float,
-    spacing: float,
-    finest: float,
-    wanted: float,
-    scales: Array,
-    window: int,
-    is_sparse: bool,
-    stiffness: float,
+    samples: Samples, length: float, closeness: Closeness, rule: ControlRule
 ) -> tuple[Array, Array, Array, float]:
     """Fit with more and more control points until the curve follows.
 
     Return control points, knots, normal matrix, rms.
     """
+    points, sigmas, parameters = samples
+    spacing, finest, is_sparse, stiffness = rule
+    wanted = closeness.rms
     total = points.shape[0]
     enough = max(total // 2 + 1, ORDER) if is_sparse else total
     usual = min(max(int(math.floor(length / spacing + 0.5)) + ORDER - 1, ORDER), enough)
@@ -84,20 +133,19 @@ def fit_curve(
         knots = np.empty(count + ORDER)
         average_knots(parameters, count, knots)
         normal, control_points = np.zeros((count, ORDER)), np.zeros((count, 2))
-        _accumulate(points, sigmas, parameters, knots, stiffness, normal, control_points)
+        _accumulate(samples, knots, stiffness, normal, control_points)
         if is_straight:
             is_straight = False
             line = _fit_straight(points, sigmas)
-            rms, bias = _misfit(points, parameters, knots, line, scales, window)
+            rms, bias = _misfit(samples, knots, line, closeness)
             if rms <= wanted and bias <= MOST_BIAS:
                 return line, knots, normal, rms
         factor = normal.copy()
         # With the stiffness there always is a solution; without, more control points than the points
         # determine have none.
-        issolved = factorize(factor)
-        if issolved:
+        if factorize(factor):
             solve(factor, control_points)
-            rms, bias = _misfit(points, parameters, knots, control_points, scales, window)
+            rms, bias = _misfit(samples, knots, control_points, closeness)
             if (rms <= wanted and bias <= MOST_BIAS) or count >= most:
                 return control_points, knots, normal, rms
             count = min(2 * count - ORDER + 1, most)
@@ -137,19 +185,12 @@ def _fit_straight(points: Array, sigmas: Array) -> Array:
 
 
 @kernel
-def _accumulate(
-    points: Array,
-    sigmas: Array,
-    parameters: Array,
-    knots: Array,
-    stiffness: float,
-    normal: Array,
-    right: Array,
-) -> None:
+def _accumulate(samples: Samples, knots: Array, stiffness: float, normal: Array, right: Array) -> None:
     """Sum up the normal matrix's lower band (n, 4) and the right side (n, 2).
 
     Row i holds columns i .. i - 3.
     """
+    points, sigmas, parameters = samples
     count = normal.shape[0]
     values = np.empty(ORDER)
     total = 0.0
@@ -176,7 +217,7 @@ def _accumulate(
 
 @kernel
 def _misfit(
-    points: Array, parameters: Array, knots: Array, control_points: Array, scales: Array, window: int
+    samples: Samples, knots: Array, control_points: Array, closeness: Closeness
 ) -> tuple[float, float]:
     """Return how far points lie beside the curve at their parameters.
 
@@ -191,6 +232,8 @@ def _misfit(
         be for mere noise. A bend that is cut short shows here where the rest of a long curve hides it in the
         root mean square.
     """
+    points, parameters = samples.points, samples.parameters
+    scales, window = closeness.scales, closeness.window
     count = points.shape[0]
     values, ratios = np.empty(ORDER), np.empty(count)
     total, in_window, greatest = 0.0, 0.0, 0.0

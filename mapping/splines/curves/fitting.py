@@ -10,7 +10,14 @@ from lidarium.mapping.splines.curves.banded import factorize, solve
 from lidarium.mapping.splines.curves.basis import ORDER
 from lidarium.mapping.splines.curves.bspline import Spline
 from lidarium.mapping.splines.curves.curve_kernels import curve_length
-from lidarium.mapping.splines.curves.fit_kernels import average_knots, chord_lengths, fit_curve
+from lidarium.mapping.splines.curves.fit_kernels import (
+    Closeness,
+    ControlRule,
+    Samples,
+    average_knots,
+    chord_lengths,
+    fit_curve,
+)
 from lidarium.mapping.splines.curves.settings import FitSettings
 
 _SHORTEST = 1e-9
@@ -107,17 +114,10 @@ def fit_bspline(
     window = max(len(places) // _WINDOWS, _LEAST_WINDOW) if is_noisy else 1
     scales = np.hypot(deviations, _FINE * settings.rms) if is_noisy else np.full(len(places), settings.rms)
     control_points, knots, normal, rms = fit_curve(
-        places,
-        deviations,
-        parameters,
+        Samples(places, deviations, parameters),
         length,
-        settings.spacing,
-        settings.finest_spacing,
-        wanted,
-        scales,
-        window,
-        settings.is_sparse,
-        settings.stiffness,
+        Closeness(wanted, scales, window),
+        ControlRule(settings.spacing, settings.finest_spacing, settings.is_sparse, settings.stiffness),
     )
     # The way through the points is longer than the curve; another scale of the parameter leaves the curve as
     # it is.

@@ -52,7 +52,7 @@ class SegmentationSettings:
     Attributes
     ----------
     test : str
-        What tells that two neighbouring points lie on different surfaces. ``adaptive``: farther apart than on
+        What shows that two neighbouring points lie on different surfaces. ``adaptive``: farther apart than on
         a wall at the grazing angle ``incidence`` and than noise explains; ``dietmayer``: farther apart than
         on a wall at right angles plus a constant, as in the thesis; ``pedraza``: the steps to both sides
         differ by more than ``step_ratio``, or the way turns by more than ``most_turn``.
@@ -78,7 +78,7 @@ class SegmentationSettings:
         ``angle`` between directions; ``slope``, difference of slopes as in the thesis, against the tangent of
         ``corner_angle``.
     corner_reach : float
-        Length of wall on both sides from which directions are told [m], or ten standard deviations of the
+        Length of wall on both sides on which directions are measured [m], or ten standard deviations of the
         noise.
     line_points : int
         Straight pieces of at least so many points are features.
@@ -155,7 +155,7 @@ class AssociationSettings:
         Fine step: in the overlap, curves lie at most so far apart and differ at most so much in direction, in
         the mean [m, rad].
     least_overlap : float
-        Shorter overlaps tell nothing [m].
+        Shorter overlaps show nothing [m].
     point_distance : float
         Corners and ends nearer than this are the same [m].
     line_distance, line_angle : float

@@ -77,7 +77,7 @@ def test_the_curve_is_scipys():
 def test_influences_are_the_change_by_a_little_more_of_a_run():
     sample = CensoredTimes(TIMES, OBSERVED, 150.0)
     counts, influences, areas = np.ones(80), np.empty(80), np.empty(80)
-    mean = _influences_on.py_func(counts, *sample.arrays, areas, influences)
+    mean = _influences_on.py_func(counts, sample.arrays, areas, influences)
     assert influences.sum() == pytest.approx(0.0, abs=1e-9)
     for run in (0, 17, 42, 79):
         more = counts.copy()
@@ -102,7 +102,7 @@ def _weighted_mean(weights, sample):
 def test_the_error_without_ties_is_greenwoods():
     sample = CensoredTimes(TIMES, OBSERVED, 150.0)
     influences, areas = np.empty(80), np.empty(80)
-    mean = _influences_on(np.ones(80), *sample.arrays, areas, influences)
+    mean = _influences_on(np.ones(80), sample.arrays, areas, influences)
     moments, shares = kaplan_meier(TIMES, OBSERVED & (TIMES <= 150.0))
     at_risk = np.array([(moment <= TIMES).sum() for moment in moments])
     ends = np.append(moments[1:], 150.0)
