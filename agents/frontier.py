@@ -20,9 +20,10 @@ from lidarium.envs.driving.path_planner import footprint_of
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.radio.messages import DriveState, Target
+from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
 from lidarium.mapping.planning.frontier_kernels import FRONTIER, IGNORED
-from lidarium.mapping.planning.grid_planning import Cell, Footprint, cells_of, centres_of, search
+from lidarium.mapping.planning.grid_planning import Cell, cells_of, centres_of, search
 
 PATIENCE_S = 20.0
 """Time without motion after which a robot gives up its frontier [s].
@@ -142,8 +143,8 @@ class FrontierExplorer(Policy):
             work.choice = None
             return
         if state is DriveState.NO_PATH:
-            # The map may have changed since the choice: choose anew, and give up what is chosen again without
-            # a way.
+            # The map may have changed since the choice: choose again, and give up what is chosen again
+            # without a way.
             if work.failed_at == work.choice.frontier_cell:
                 self._give_up_around(agent, work.choice, "blocked")
             self._work[agent] = _Work(failed_at=work.choice.frontier_cell)
@@ -160,7 +161,7 @@ class FrontierExplorer(Policy):
         return bool(navigation.frontiers.flags[choice.frontier_cell] == FRONTIER)
 
     def _give_up_around(self, agent: str, choice: Choice, reason: str) -> None:
-        """Ignore the frontier cells near the one looked at, and say so."""
+        """Ignore the frontier cells near the one observed, and report it."""
         navigation, belief = self.navigation(agent), self.team.belief(agent)
         count = navigation.frontiers.ignore_near(
             choice.frontier_cell, default_reach(self.footprint, navigation.resolution)

@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.frontier_approach import approach, default_reach
 from lidarium.mapping.planning.frontiers import Clusters
-from lidarium.mapping.planning.grid_planning import Cell, Footprint, Until, search
+from lidarium.mapping.planning.grid_planning import Cell, Until, search
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Where a robot goes: the cell to stand in, and the frontier cell to look at."""
+    """Where a robot goes: the cell to stand in, and the frontier cell to observe."""
 
     cell: Cell
     frontier_cell: Cell
@@ -33,7 +34,7 @@ class Reach:
     costs : (K,) float64
         Cost of the way [m]; inf where there is none, or none up to ``beyond``.
     choices : list of Choice or None
-        Where the robot would stand, and what it would look at.
+        Where the robot would stand, and what it would observe.
     beyond : float
         Clusters without a finite cost cost more than this [m]; inf where they count as out of reach.
     """

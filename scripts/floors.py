@@ -8,20 +8,18 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from tyro.conf import Positional, subcommand
 
 from lidarium.scripts.common import INTERRUPTED, Answer, Command, counted, file_name, table
-
-if TYPE_CHECKING:
-    from lidarium.envs.floors.floor import Floor
-
-LASER_HEIGHT = 0.3
-"""Height of the plane in which maps and pictures show a floor [m].
-
-It is that of the robots' lasers.
-"""
+from lidarium.scripts.output.floor_files import (
+    check_out,
+    floor_description,
+    save_picture,
+    write_floor,
+    write_result,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +120,7 @@ def list_floors(command: List) -> Answer:
     from lidarium.envs.floors.catalogue.names import SETS, about_floor, floor_names
     from lidarium.envs.floors.generation.buildings import KINDS
 
-    _check_out(command)
+    check_out(command)
     result: dict[str, Any] = {
         "floors": {name: about_floor(name) for name in floor_names()},
         "generators": ["building", *KINDS],
@@ -142,7 +140,7 @@ def list_floors(command: List) -> Answer:
         ("sets", sets),
     )
     text = "\n\n".join(f"{title}\n{table(rows)}" for title, rows in sections)
-    _write_result(command, "floors.json", result)
+    write_result(command, "floors.json", result)
     return Answer(result, text + "\n\nand any file that the importers know: lidarium floors import --help")
 
 
@@ -150,35 +148,35 @@ def show_floor(command: Show) -> Answer:
     """Describe a floor."""
     from lidarium.envs.floors.catalogue.names import about_floor, describe_floor, floor_names, load_floor
 
-    _check_out(command)
+    check_out(command)
     floor = load_floor(command.name, command.resolution)
     result = describe_floor(floor)
     about = about_floor(command.name) if command.name in floor_names() else ""
     files = []
     if command.out is not None:
-        _save_picture(command.out / f"{file_name(floor.name)}.png", floor)
-        _write_result(command, f"{file_name(floor.name)}.json", result)
+        save_picture(command.out / f"{file_name(floor.name)}.png", floor)
+        write_result(command, f"{file_name(floor.name)}.json", result)
         files = [f"{file_name(floor.name)}.json", f"{file_name(floor.name)}.png"]
-    return Answer(result, _description(result, command.out, files, about))
+    return Answer(result, floor_description(result, command.out, files, about))
 
 
 def generate_floor(command: Generate) -> Answer:
     """Generate a building and write it."""
     from lidarium.envs.floors.generation.buildings import BuildingSettings, generate_building
 
-    _check_out(command)
+    check_out(command)
     settings = BuildingSettings(
         kind=command.kind, area_m2=command.area, loops=command.loops, clutter=command.clutter
     )
-    return _written(command, generate_building(command.seed, settings), command.map_resolution)
+    return write_floor(command, generate_building(command.seed, settings), command.map_resolution)
 
 
 def import_floor(command: Import) -> Answer:
     """Read a floor and write it."""
     from lidarium.envs.floors.importers import load_file
 
-    _check_out(command)
-    return _written(command, load_file(command.file, command.resolution), command.map_resolution)
+    check_out(command)
+    return write_floor(command, load_file(command.file, command.resolution), command.map_resolution)
 
 
 def prepare_floors(command: Prepare) -> Answer:
@@ -191,7 +189,7 @@ def prepare_floors(command: Prepare) -> Answer:
     from lidarium.envs.settings.making import make_settings
     from lidarium.mapping.kernels.cache_folders import is_writable
 
-    _check_out(command)
+    check_out(command)
     store = floor_store()
     if store.folder is None or not is_writable(store.folder):
         raise ValueError(
@@ -217,7 +215,7 @@ def prepare_floors(command: Prepare) -> Answer:
         "size_mib": round(store.size() / 2**20, 1),
         "max_mib": round(store.max_bytes / 2**20, 1),
     }
-    _write_result(command, "prepared.json", result)
+    write_result(command, "prepared.json", result)
     facts = [
         ("prepared", f"{prepared:,} of {len(specs):,} floors, {made:,} of them made now"),
         ("folder", f"{store.folder}"),
@@ -261,74 +259,8 @@ def _prepare(prepare: Callable[[str], bool], specs: Sequence[str], command: Prep
     return prepared, made, False
 
 
-def _written(command: Command, floor: "Floor", resolution: float) -> Answer:
-    """Write a floor as a ROS map and a picture, with its figures."""
-    from lidarium.envs.floors.catalogue.names import describe_floor
-    from lidarium.evaluation.episodes.output import check_writable, check_written
-    from lidarium.mapping.files.map_files import write_ros_map
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
 
-    stem = file_name(floor.name)
-    folder = command.out or Path("floors") / stem
-    check_writable(folder)
-    raster = floor.raster(resolution, LASER_HEIGHT, LASER_HEIGHT)
-    result = describe_floor(floor)
-    write_ros_map(folder, stem, _levels(raster.solid, resolution), (*raster.origin, 0.0), resolution)
-    _save_picture(folder / f"{stem}.png", floor)
-    _write_result(command, f"{stem}.json", result, folder)
-    files = [f"{stem}.{kind}" for kind in ("yaml", "pgm", "png", "json")]
-    check_written(folder, files)
-    return Answer(result, _description(result, folder, files))
-
-
-def _levels(solid: Any, resolution: float) -> Any:  # noqa: ANN401
-    """Return free and occupied cells.
-
-    What is deeper in solids than a wall, no laser tells: unknown.
-    """
-    import cv2
-    import numpy as np
-
-    from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
-
-    side = 2 * max(round(0.1 / resolution), 1) + 1
-    near_free = cv2.dilate((solid == 0).astype(np.uint8), np.ones((side, side), np.uint8))
-    return np.where(
-        solid == 0, np.uint8(FREE), np.where(near_free != 0, np.uint8(OCCUPIED), np.uint8(UNKNOWN))
-    )
-
-
-def _save_picture(path: Path, floor: "Floor") -> None:
-    from lidarium.evaluation.drawing.run_picture import save_floor_picture
-
-    save_floor_picture(path, floor, LASER_HEIGHT)
-
-
-def _check_out(command: Command) -> None:
-    from lidarium.evaluation.episodes.output import check_writable
-
-    if command.out is not None:
-        check_writable(command.out)
-
-
-def _write_result(command: Command, name: str, result: dict[str, Any], folder: Path | None = None) -> None:
-    from lidarium.evaluation.episodes.output import write_json
-
-    place = folder or command.out
-    if place is not None:
-        write_json(place / name, result)
-
-
-def _description(result: dict[str, Any], folder: Path | None, files: list[str], about: str = "") -> str:
-    width, height = result["size_m"]
-    facts = [
-        ("size", f"{width:g} x {height:g} m"),
-        ("free area", f"{result['area_m2']:.1f} m2"),
-        ("rooms", f"{result['rooms']}"),
-        ("loops", f"{result['loops']}"),
-        ("clutter", f"{100.0 * result['clutter']:.1f} % of the area under furniture"),
-        ("solids", f"{result['solids'] or 'none, cells of an image'}"),
-        ("sha256", result["sha256"]),
-    ]
-    if folder is not None:
-        facts.append(("files", f"{folder}: {', '.join(files)}"))
-    return f"{result['name']}{f': {about}' if about else ''}\n{table(facts)}"
+    return moved_name(__name__, name)

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name, table
+from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name
+from lidarium.scripts.output.run_summary import run_summary
 from lidarium.scripts.process import first_start
 
 if TYPE_CHECKING:
@@ -32,12 +33,6 @@ VIEW_SIZE = 900, 1200
 
 STOP_COVERAGE = 0.99
 """Share of the floor at which a run without a goal ends."""
-
-NAMED_GIVEN_UP = 5
-"""How many of the frontiers given up are named in the summary.
-
-Result.json has all.
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +115,7 @@ def execute(command: Run) -> Answer:
     files = _write(command, episode, result, folder, recorder)
     return Answer(
         result,
-        _summary(command, episode, result, folder, files),
+        run_summary(command.chosen_policy, episode, result, folder, files),
         INTERRUPTED if episode.is_interrupted else 0,
     )
 
@@ -200,7 +195,7 @@ def _explore(command: Run, policy: Any, env: "WatchedExploration", options: dict
     progress = Progress(is_quiet=command.json)
     try:
         if not command.video:
-            return run_episode(policy, env, command.seed, options, progress.tell, raise_interrupt=False)
+            return run_episode(policy, env, command.seed, options, progress.show, raise_interrupt=False)
         return _film(command, policy, env, options, progress)
     finally:
         progress.close()
@@ -230,7 +225,7 @@ def _film(
                 camera.append(stack.enter_context(film(path, command.video_speed, draw_over=over)))
                 camera[0].begin(current)
                 env.watchers.append(camera[0])
-            progress.tell(current)
+            progress.show(current)
 
         episode = run_episode(policy, env, command.seed, options, on_decision, raise_interrupt=False)
         env.watchers[:] = [watcher for watcher in env.watchers if watcher not in camera]
@@ -295,53 +290,8 @@ def _save_view(path: Path, episode: "Episode") -> None:
         imageio.imwrite(beside, views.from_above(env.world.poses, VIEW_SIZE), extension=".png")
 
 
-def _summary(command: Run, episode: "Episode", result: dict[str, Any], folder: Path, files: list[str]) -> str:
-    env = episode.env
-    area = float(env.score.counted[0]) * env.settings.occupancy.resolution**2
-    thresholds = [
-        f"{share} % at {result[f't{share}_s']:.1f} s"
-        for share in (85, 90, 95, 99)
-        if result[f"t{share}_s"] is not None
-    ]
-    counted = max(int(env.score.counted[0]), 1)
-    ended = [
-        (agent, reason or "still at work", f"{length:.1f} m", f"{100.0 * seen / counted:.1f} %")
-        for (agent, reason), length, seen in zip(
-            result["ended_because"].items(), result["path_m"], env.score.seen, strict=True
-        )
-    ]
-    facts = [
-        (
-            "explored",
-            f"{100.0 * result['coverage_final']:.2f} % of {area:.1f} m2 in {result['time_s']:.1f} s of "
-            "simulated time",
-        ),
-        ("reached", ", ".join(thresholds) or "not 85 %"),
-        (
-            "together",
-            f"{sum(result['path_m']):.1f} m driven, overlap {result['overlap']:.2f}, {result['collisions']} "
-            "collisions",
-        ),
-        ("map", f"IoU of occupied cells {result['iou_occupied']:.3f}"),
-        ("given up", _given_up(result["given_up"])),
-        ("speed", f"{episode.wall_seconds:.1f} s, {result['steps_per_s'] or 0.0:,.0f} steps/s"),
-        ("files", f"{folder}: {', '.join(files)}"),
-    ]
-    how = " (interrupted)" if episode.is_interrupted else ""
-    title = (
-        f"{result['floor']}: {command.chosen_policy}, seed {command.seed}, realism {result['realism']}{how}"
-    )
-    return "\n".join([title, table(facts), "", table(ended, ("robot", "ended because", "drove", "saw"))])
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
 
-
-def _given_up(entries: list[dict[str, Any]]) -> str:
-    """Name the longest frontiers that were given up, with reason and place."""
-    if not entries:
-        return "nothing"
-    longest = sorted(entries, key=lambda entry: -float(entry["size_m"]))[:NAMED_GIVEN_UP]
-    named = ", ".join(
-        f"{entry['reason']} at ({entry['x']:.1f}, {entry['y']:.1f}) {entry['size_m']:.2f} m"
-        for entry in longest
-    )
-    more = len(entries) - len(longest)
-    return f"{len(entries)} on the way: {named}{f', and {more} shorter' if more else ''}"
+    return moved_name(__name__, name)

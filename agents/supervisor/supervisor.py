@@ -21,7 +21,7 @@ from lidarium.agents.supervisor.tree import (
     Leaf,
 )
 from lidarium.envs.radio.messages import OperatingState, OrderKind, Target
-from lidarium.mapping.planning.grid_planning import Footprint
+from lidarium.mapping.planning.footprint import Footprint
 
 STICKINESS_M = 1.0
 """Distance by which a robot's present goal counts as nearer [m].
@@ -46,7 +46,7 @@ class Command:
         In words.
     target : Target or None
         Where to go, in its map frame.
-    looks_at : (float, float) or None
+    observes : (float, float) or None
         The frontier to see from there, in its map frame [m].
     is_home : bool
         Whether it ends where it gets to.
@@ -57,7 +57,7 @@ class Command:
     rule: int
     why: str
     target: Target | None = None
-    looks_at: tuple[float, float] | None = None
+    observes: tuple[float, float] | None = None
     is_home: bool = False
 
 
@@ -86,7 +86,7 @@ class Supervisor:
         self._silent: set[str] = set()
         self._judge = Judge(station, self.standing_by)
 
-    def look(self, time_s: float, given_up: Mapping[str, NDArray[np.float64]]) -> list[Command]:
+    def decide(self, time_s: float, given_up: Mapping[str, NDArray[np.float64]]) -> list[Command]:
         """Decide about all robots.
 
         Parameters
@@ -104,7 +104,7 @@ class Supervisor:
         commands: list[Command] = []
         grouped = self.station.groups()
         for group in grouped:
-            commands += self._look_at(group, time_s, given_up)
+            commands += self._decide_group(group, time_s, given_up)
         for agent in self.station.agents:
             if not any(agent in group for group in grouped):
                 self._pass_over(agent, time_s)
@@ -120,7 +120,7 @@ class Supervisor:
                 StationEvent(time_s, "silent", (agent,), "it has not reported yet, and gets no orders")
             )
 
-    def _look_at(
+    def _decide_group(
         self, group: list[str], time_s: float, given_up: Mapping[str, NDArray[np.float64]]
     ) -> list[Command]:
         """Decide about the robots of a group."""
@@ -185,12 +185,15 @@ class Supervisor:
     def _command(self, one: Judged, survey: Survey, time_s: float, group: tuple[str, ...]) -> Command | None:
         """Return the order to a robot, and log the decision."""
         agent, leaf = one.case.robot.agent, one.leaf
-        looks_at = None
+        observes = None
         if leaf.order is OrderKind.GO_TO and leaf.aim == HOME:
             start = self.station.reports[agent].start
             one.target = Target(start.x, start.y)
         elif leaf.order is OrderKind.GO_TO:
-            one.target, looks_at = Target(*survey.stand(agent, one.goal)), survey.looks_at(agent, one.goal)
+            one.target, observes = (
+                Target(*survey.stand(agent, one.goal)),
+                survey.observed_cell(agent, one.goal),
+            )
         self._log(time_s, group, one)
         if leaf.order is None:
             if leaf.rule != 2:
@@ -200,7 +203,7 @@ class Supervisor:
             self.standing_by.add(agent)
         else:
             self.standing_by.discard(agent)
-        return Command(agent, leaf.order, leaf.rule, leaf.why, one.target, looks_at, leaf.aim == HOME)
+        return Command(agent, leaf.order, leaf.rule, leaf.why, one.target, observes, leaf.aim == HOME)
 
     def _log(self, time_s: float, group: tuple[str, ...], one: Judged) -> None:
         case, leaf, target = one.case, one.leaf, one.target

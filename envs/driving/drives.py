@@ -82,19 +82,19 @@ class Following(NamedTuple):
     Attributes
     ----------
     unit_vectors : (2, beams) float64
-        Which way the beams look.
+        Directions of the beams.
     radii : (robots,) float64
         Of the bodies [m].
     limits : (4,) float64
         Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
-    knows_mates : bool
+    knows_teammates : bool
         Whether all teammates' poses are known at once.
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
         Where they are not: of whom each robot heard lately, and where they were then [m, rad].
     present : (robots,) uint8
         Which robots are bodies to keep clear of.
     foresight : (K,) float64
-        Times at which others are looked for [s].
+        Times at which others are predicted [s].
     """
 
     unit_vectors: NDArray[np.float64]

@@ -79,7 +79,7 @@ FACING = 0.1
 """Heading error at which a wanted final heading counts as reached [rad]."""
 
 BACKING_SPEED = 0.05
-"""A robot that a wall blocks backs out the way it came at this speed [m/s]."""
+"""A robot that a wall blocks backs out along its path at this speed [m/s]."""
 
 BLOCKED_S = 1.0
 """A robot that wants to drive and has stood for this long is blocked [s]."""

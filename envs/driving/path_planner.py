@@ -12,7 +12,8 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.mapping.planning.clearance import limit_of
-from lidarium.mapping.planning.grid_planning import Cell, Footprint, cells_of, passage_of
+from lidarium.mapping.planning.footprint import Footprint, passage_of
+from lidarium.mapping.planning.grid_planning import Cell, cells_of
 from lidarium.mapping.planning.search.search_state import Passage
 
 BODY_MARGIN = 0.002

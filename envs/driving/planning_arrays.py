@@ -13,7 +13,7 @@ class Planning(NamedTuple):
     ----------
     robots : int
         Robots of a team.
-    knows_mates : bool
+    knows_teammates : bool
         Whether all teammates' poses are known at once.
     contact, heard : (rows, robots) uint8, (rows, robots * 3) float64
         Where they are not: of whom each robot heard lately, and where they were then [m, rad].
@@ -24,7 +24,7 @@ class Planning(NamedTuple):
     tight : float
         Clearance below which a path ends in the middle of its last cell [m].
     farthest : float
-        Clearance is told up to this [m].
+        Clearance is measured up to this [m].
     limit, half_costs, roomy, least_clearance, preferred : as of ``Passage``
         How a body passes over a map; written out, because loops on threads take no tuples within tuples.
     records, sharing : (maps, 10) int64 and int

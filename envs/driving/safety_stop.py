@@ -6,7 +6,7 @@ other pass.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,10 @@ from lidarium.mapping.kernels.views import scratch_grid
 STANDSTILL = 0.006
 """Gap to a return at which a robot stands [m]."""
 
-MATE_GAP = 0.03
+TEAMMATE_GAP = 0.03
 """Gap that robots keep to each other [m]."""
 
-LEAST_MATE_GAP = 0.004
+LEAST_TEAMMATE_GAP = 0.004
 """Gap that the lower-numbered robot keeps in passing [m].
 
 It holds where two robots stand nearer than the usual gap.
@@ -33,7 +33,7 @@ The swath is this much wider than the body.
 """
 
 FORESIGHT_TIMES = np.array([0.0, 0.4, 0.8])
-"""How far ahead the robot with the higher number looks where another will be [s]."""
+"""How far ahead the robot with the higher number predicts where another will be [s]."""
 
 CRUISE, TURN_LIMIT, BRAKING, TIME_STEP = range(4)
 """Places in ``Bodies.limits``."""
@@ -71,18 +71,18 @@ class Bodies(NamedTuple):
         Of the bodies [m].
     limits : (4,) float64
         Cruise speed, greatest turn rate, braking and length of a step [m/s, rad/s, m/s2, s].
-    knows_mates : bool
+    knows_teammates : bool
         Whether teammates' poses are known (and comparable).
     present : (robots,) uint8
         Which robots are bodies to keep clear of.
     foresight : (K,) float64
-        Times at which the other is looked for, the first 0 [s].
+        Times at which the other is predicted, the first 0 [s].
     """
 
     unit_vectors: NDArray[np.float64]
     radii: NDArray[np.float64]
     limits: NDArray[np.float64]
-    knows_mates: bool
+    knows_teammates: bool
     present: NDArray[np.uint8]
     foresight: NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def _gap_in_scan(ranges: Array, unit_vectors: Array, radius: float) -> float:
 
 
 @kernel(borrowing=True)
-def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
+def _gap_to_teammates(robot: int, poses: Array, velocities: Array, bodies: Bodies, present: Array) -> float:
     """Return how far the disc can go straight to a known teammate [m].
 
     The teammate counts now or where it will be soon.
@@ -116,7 +116,7 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, p
         for k in range(foresight.shape[0]):
             if k > 0 and other > robot:
                 break
-            reach = radii[robot] + radii[other] + MATE_GAP
+            reach = radii[robot] + radii[other] + TEAMMATE_GAP
             drift = velocities[other, 0] * foresight[k]
             gap_x = poses[other, 0] + drift * math.cos(poses[other, 2]) - poses[robot, 0]
             gap_y = poses[other, 1] + drift * math.sin(poses[other, 2]) - poses[robot, 1]
@@ -124,7 +124,7 @@ def _gap_to_mates(robot: int, poses: Array, velocities: Array, bodies: Bodies, p
             if x * x + y * y <= reach * reach:
                 # Nearer than robots should be: the one with the lower number may pass where it does not
                 # touch, else apart.
-                touching = radii[robot] + radii[other] + LEAST_MATE_GAP
+                touching = radii[robot] + radii[other] + LEAST_TEAMMATE_GAP
                 if x > 0.0 and (robot > other or -touching < y < touching):
                     gap = 0.0
             elif x > 0.0 and -reach < y < reach:
@@ -155,7 +155,8 @@ def _gap_to_heard(robot: int, sensed: Sensed, bodies: Bodies) -> float:
             known[other, axis] = sensed.heard[robot, 3 * other + axis]
     for axis in range(3):
         known[robot, axis] = sensed.poses[robot, axis]
-    return _gap_to_mates(robot, known, still, bodies, sensed.contact[robot])  # type: ignore[no-any-return]
+    gap: float = _gap_to_teammates(robot, known, still, bodies, sensed.contact[robot])
+    return gap
 
 
 @kernel(inline=True, borrowing=True)
@@ -168,10 +169,17 @@ def safe_speed(sensed: Sensed, bodies: Bodies, robot: int) -> float:
     own, speed = bodies.radii[robot] + SIDE_GAP, sensed.velocities[robot, 0]
     gap = _gap_in_scan(sensed.ranges[robot], bodies.unit_vectors, own)
     allowed = math.sqrt(2.0 * braking * max(gap - STANDSTILL - 0.5 * time_step * speed, 0.0))
-    if bodies.knows_mates:
-        mate_gap = _gap_to_mates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
-        allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
+    if bodies.knows_teammates:
+        teammate_gap = _gap_to_teammates(robot, sensed.poses, sensed.velocities, bodies, bodies.present)
+        allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
     elif _hears_any(sensed.contact, robot):
-        mate_gap = _gap_to_heard(robot, sensed, bodies)
-        allowed = min(allowed, math.sqrt(braking * max(mate_gap - time_step * speed, 0.0)))
+        teammate_gap = _gap_to_heard(robot, sensed, bodies)
+        allowed = min(allowed, math.sqrt(braking * max(teammate_gap - time_step * speed, 0.0)))
     return allowed
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lidarium.envs.onboard.navigation import NavigationMap
-from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, Until, centres_of, search
+from lidarium.mapping.planning.footprint import Footprint
+from lidarium.mapping.planning.grid_planning import Cell, Disc, Until, centres_of, search
 
 FARTHEST_REFUGE = (3.0, 12.0, 40.0)
-"""How far a robot looks for a place aside, in turn [m]."""
+"""How far a robot searches a place aside, in turn [m]."""
 
 SAMPLE = 0.05
 """Distance between the points at which a path is compared with places [m]."""

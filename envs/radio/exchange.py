@@ -2,115 +2,46 @@
 
 The module also keeps what has reached whom.
 
-In every step each robot tells where it is; once a period, over each link, what the other does not have of any
-map that it holds: its own, and copies of others that reached it. So news travels on over robots that meet
+In every step each robot sends its pose; once a period, over each link, what the other does not have of any
+map that it holds: its own, and copies of others that reached it. So maps travel on over robots that meet
 later. A message carries blocks of 64 cells.
 
 Where robots report, a station listens at the place where the first of them started. With every map goes what
-its robot told of itself when the map was as it is, and the station gets both over the same links, from the
+its robot reported of itself when the map was as it is. The station gets both over the same links, from the
 robots themselves or from those that hold copies.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.radio.map_blocks import (
+    BLOCK,
+    BLOCK_BYTES,
+    HEADER_BYTES,
+    NO_BLOCKS,
+    NO_CELLS,
+    POSE_BYTES,
+    STATUS_BYTES,
+    Message,
+    differing_blocks,
+)
 from lidarium.envs.radio.messages import Status
+from lidarium.envs.radio.radio_links import RadioLinks
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.disturbances.faults import DEAD_RADIO, has_fault
-from lidarium.envs.simulation.disturbances.radio import RADIO_STREAM, links, links_to
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.envs.simulation.simulation import Simulation
-from lidarium.mapping.kernels.compilation import Array, kernel
-
-BLOCK = 64
-"""Cells of a block of a map."""
-
-POSE_BYTES = 32
-"""A message that tells a pose: x, y, theta and the time, 8 bytes each."""
-
-HEADER_BYTES, BLOCK_BYTES = 32, 4 + BLOCK
-"""A message with a part of a map: sender, whose map, when, and how many blocks.
-
-Each block is its number and a byte for each cell.
-"""
-
-STATUS_BYTES = 80
-"""Bytes of the status that a robot sends with its map.
-
-The status is pose, target and three figures, 8 bytes each, and the robot's states.
-"""
-
-STATION_STREAM = 1
-"""Separates the draws for the station's links from those of the robots.
-
-The robots' draws are the same with and without the station.
-"""
 
 NEVER = -2
-"""Step of news that never came.
+"""Step of a message that never came.
 
 The scan at the start is of step 0, before which is -1.
 """
 
 CONTACT_S = 0.5
 """A teammate's pose is good for driving round it for this long [s]."""
-
-
-@kernel
-def _differing_blocks(source: Array, target: Array, low: int, high: int, found: Array) -> int:
-    """Fill ``found`` with the differing blocks of two maps; return their count.
-
-    Blocks are numbered, over rows ``low`` to ``high``.
-    """
-    columns, count = source.shape[1], 0
-    words = columns // 64
-    for row in range(low, high):
-        for word in range(words):
-            for column in range(64 * word, 64 * word + 64):
-                if source[row, column] != target[row, column]:
-                    found[count] = row * words + word
-                    count += 1
-                    break
-    return count
-
-
-@dataclass(frozen=True, slots=True)
-class _Message:
-    """Something on its way: a pose, or blocks of a map where there are any.
-
-    Attributes
-    ----------
-    arrives : int
-        The step at which it is there.
-    receiver, source : int
-        Who gets it, and whom it is about.
-    step : int
-        The step at which it was true.
-    pose : (3,) float64 or None
-        x, y, theta as the source believed [m, rad].
-    has_ended : bool
-        Whether the source had ended.
-    blocks, cells : (blocks,) int64, (blocks, 64) int8
-        Blocks of the source's map.
-    status : Status or None
-        What the source told of itself with its map.
-    """
-
-    arrives: int
-    receiver: int
-    source: int
-    step: int
-    pose: NDArray[np.float64] | None
-    has_ended: bool
-    blocks: NDArray[np.int64]
-    cells: NDArray[np.int8]
-    status: Status | None = None
-
-
-_NO_BLOCKS, _NO_CELLS = np.zeros(0, np.int64), np.zeros((0, BLOCK), np.int8)
 
 
 class Exchange:
@@ -127,8 +58,6 @@ class Exchange:
 
     Attributes
     ----------
-    links : (robots, robots) bool
-        Who reached whom in the last step: sender, receiver.
     heard, heard_at : (robots, robots, 3) float64, (robots, robots) int64
         The last pose of each robot that reached each other (receiver, source), and the step at which it was
         true.
@@ -140,15 +69,13 @@ class Exchange:
     copied_at : (robots + 1, robots) int64
         The step at which each copy was true.
     statuses : list of list of Status or None
-        What each robot, and last the station, holds of what each robot told of itself (receiver, source) with
-        its map.
-    tells : callable or None
-        Takes the number of a robot and returns what it tells of itself; where None, nobody reports and there
-        is no station.
-    station_links : (robots,) bool
-        Who reached the station, and was reached by it, when maps were told or an order was sent last.
+        What each robot, and last the station, holds of what each robot reported of itself with its map
+        (receiver, source).
+    report_of : callable or None
+        Takes the number of a robot and returns what it reports of itself; where None, nobody reports and
+        there is no station.
     windows : (robots, 4) int64
-        What part of the copies that each robot holds has changed since it was last looked at: rows and
+        What part of the copies that each robot holds has changed since it was last taken: rows and
         columns, low and high.
     bytes_sent : (robots,) int64
         Bytes that each robot has sent to others, lost ones included.
@@ -164,10 +91,19 @@ class Exchange:
         self._first = episode * robots
         self._period = max(round(settings.radio.period_s / settings.time_step), 1)
         self._latency = round(settings.radio.latency_s / settings.time_step)
-        self.links = np.zeros((robots, robots), np.bool_)
-        self.station_links = np.zeros(robots, np.bool_)
-        self.tells: Callable[[int], Status] | None = None
+        self._radio = RadioLinks(simulation.world, settings, episode)
+        self.report_of: Callable[[int], Status] | None = None
         self.start(0)
+
+    @property
+    def links(self) -> NDArray[np.bool_]:
+        """Who reached whom in the last step, (robots, robots): sender, receiver."""
+        return self._radio.links
+
+    @property
+    def station_links(self) -> NDArray[np.bool_]:
+        """Who reached the station at its last maps or order, (robots,)."""
+        return self._radio.station_links
 
     def start(self, seed: int) -> None:
         """Begin an episode in which nobody knows anything of the others.
@@ -178,12 +114,8 @@ class Exchange:
             self._settings.robots,
             self._beliefs.log_odds[self._first : self._first + self._settings.robots],
         )
-        self._generator = np.random.default_rng([seed, RADIO_STREAM])
-        self._station_generator = np.random.default_rng([seed, RADIO_STREAM, STATION_STREAM])
-        self._station_chance = np.zeros(robots)
-        self._chance = np.zeros((robots, robots))
-        self._under_way: list[_Message] = []
-        self.links[:], self.station_links[:] = False, False
+        self._radio.start(seed)
+        self._in_transit: list[Message] = []
         self.heard, self.heard_at = np.zeros((robots, robots, 3)), np.full((robots, robots), NEVER, np.int64)
         self.heard_ended = np.zeros((robots, robots), np.bool_)
         self.copies = [
@@ -215,50 +147,18 @@ class Exchange:
 
         Called once in every step of the episode and at its start.
         """
-        world, radio = self._world, self._settings.radio
-        step = int(world.steps[self._episode])
+        step = int(self._world.steps[self._episode])
         is_time = step % self._period == 0
-        if is_time and radio.shadowing > 0.0:
-            self._chance = self._generator.standard_normal(self._chance.shape)
-        floor = world.floors[self._episode]
-        assert floor is not None
-        rows = slice(self._first, self._first + self._settings.robots)
-        self.links = links(
-            radio, world.poses[rows], floor.laser, self._chance if radio.shadowing > 0.0 else None
-        )
-        works = self._works(step)
-        self.links &= works[:, None] & works[None, :]
-        if is_time and self.tells is not None:
-            if radio.shadowing > 0.0:
-                self._station_chance = self._station_generator.standard_normal(len(self.station_links))
-            self._find_station()
-        self._tell_poses(step)
+        self._radio.find(step, draws=is_time)
+        if is_time and self.report_of is not None:
+            self._radio.find_station(draws=True)
+        self._send_poses(step)
         if is_time:
-            self._tell_maps(step)
-        due = [message for message in self._under_way if message.arrives <= step]
-        self._under_way = [message for message in self._under_way if message.arrives > step]
+            self._send_maps(step)
+        due = [message for message in self._in_transit if message.arrives <= step]
+        self._in_transit = [message for message in self._in_transit if message.arrives > step]
         for message in due:
             self._receive(message)
-
-    def _works(self, step: int) -> NDArray[np.bool_]:
-        """Return whose radio works, (robots,)."""
-        world, rows = self._world, range(self._first, self._first + self._settings.robots)
-        return np.array(
-            [world.failed[row] == 0 and not has_fault(world.faults[row], DEAD_RADIO, step) for row in rows]
-        )
-
-    def _find_station(self) -> None:
-        """Find out which robots reach the place where the first of them started."""
-        world, radio, team = (
-            self._world,
-            self._settings.radio,
-            slice(self._first, self._first + self._settings.robots),
-        )
-        floor = world.floors[self._episode]
-        assert floor is not None
-        chance = self._station_chance if radio.shadowing > 0.0 else None
-        is_linked = links_to(radio, world.poses[team], world.starts[self._first], floor.laser, chance)
-        self.station_links = is_linked & self._works(int(world.steps[self._episode]))
 
     def order_delay(self, receiver: int) -> int | None:
         """Return the delay in steps of an order of the station sent now to a robot.
@@ -266,23 +166,15 @@ class Exchange:
         An order goes over links that stand now, from robot to robot; None where there are none, or it is lost
         by chance.
         """
-        self._find_station()
-        reached, known = self.station_links.copy(), np.zeros_like(self.station_links)
-        while (reached != known).any():
-            known = reached
-            reached = known | self.links[known].any(axis=0)
-        is_lost = self._is_lost(self._station_generator)
-        return self._latency if reached[receiver] and not is_lost else None
+        self._radio.find_station()
+        is_reached, is_lost = self._radio.reached()[receiver], self._radio.is_lost(is_of_station=True)
+        return self._latency if is_reached and not is_lost else None
 
-    def _is_lost(self, generator: np.random.Generator) -> bool:
-        return self._settings.radio.loss > 0.0 and bool(generator.random() < self._settings.radio.loss)
+    def _send(self, message: Message) -> None:
+        if not self._radio.is_lost(is_of_station=message.receiver == self._settings.robots):
+            self._in_transit.append(message)
 
-    def _send(self, message: _Message) -> None:
-        is_to_station = message.receiver == self._settings.robots
-        if not self._is_lost(self._station_generator if is_to_station else self._generator):
-            self._under_way.append(message)
-
-    def _tell_poses(self, step: int) -> None:
+    def _send_poses(self, step: int) -> None:
         for sender in np.flatnonzero(self.links.any(axis=1)).tolist():
             row = self._first + sender
             pose, has_ended = self._beliefs.believed[row].copy(), bool(self._world.flags[row] & ENDED)
@@ -290,26 +182,26 @@ class Exchange:
             self.bytes_sent[sender] += POSE_BYTES
             for receiver in np.flatnonzero(self.links[sender]).tolist():
                 self._send(
-                    _Message(
-                        step + self._latency, receiver, sender, step, pose, has_ended, _NO_BLOCKS, _NO_CELLS
+                    Message(
+                        step + self._latency, receiver, sender, step, pose, has_ended, NO_BLOCKS, NO_CELLS
                     )
                 )
 
-    def _tell_maps(self, step: int) -> None:
+    def _send_maps(self, step: int) -> None:
         robots = self._settings.robots
         np.fill_diagonal(self.copied_at, step)
-        if self.tells is not None:
+        if self.report_of is not None:
             for robot in range(robots):
-                self.statuses[robot][robot] = self.tells(robot)
+                self.statuses[robot][robot] = self.report_of(robot)
         # What is sent is what was held when the exchange began: nothing goes on over two links at once.
         chosen = [
             (self._best_sender(receiver, source), receiver, source)
-            for receiver in range(robots if self.tells is None else robots + 1)
+            for receiver in range(robots if self.report_of is None else robots + 1)
             for source in range(robots)
             if receiver != source
         ]
         messages = [
-            (sender, self._news(sender, receiver, source, step))
+            (sender, self._part_to_send(sender, receiver, source, step))
             for sender, receiver, source in chosen
             if sender is not None
         ]
@@ -325,11 +217,11 @@ class Exchange:
     def _best_sender(self, receiver: int, source: int) -> int | None:
         """Return which of the robots that reach a receiver holds the latest copy of a map.
 
-        None where none has news or it is under way.
+        None where none has a later one, or it is being sent.
         """
         if any(
             message.pose is None and (message.receiver, message.source) == (receiver, source)
-            for message in self._under_way
+            for message in self._in_transit
         ):
             return None
         robots = self._settings.robots
@@ -338,28 +230,13 @@ class Exchange:
         best = int(np.argmax(held_at))
         return best if held_at[best] > self.copied_at[receiver, source] else None
 
-    def _news(self, sender: int, receiver: int, source: int, step: int) -> _Message:
+    def _part_to_send(self, sender: int, receiver: int, source: int, step: int) -> Message:
         """Return what a sender holds of a map that the receiver does not."""
-        held = self.copies[sender][source]
-        copy = self._copy_of(receiver, source)
-        # A correction of the past may have emptied rows that the receiver still holds.
-        used = np.flatnonzero(held.view(np.uint64).any(axis=1) | copy.view(np.uint64).any(axis=1))
-        low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
-        found = np.empty((high - low) * (held.shape[1] // BLOCK), np.int64)
-        blocks = found[: _differing_blocks(held, copy, low, high, found)].copy()
-        cells = held.reshape(-1, BLOCK)[blocks]
-        true_at = int(self.copied_at[sender, source])
-        return _Message(
-            step + self._latency,
-            receiver,
-            source,
-            true_at,
-            None,
-            False,
-            blocks,
-            cells,
-            self.statuses[sender][source],
-        )
+        held, copy = self.copies[sender][source], self._copy_of(receiver, source)
+        true_at, status = int(self.copied_at[sender, source]), self.statuses[sender][source]
+        arrives = step + self._latency
+        blocks, cells = differing_blocks(held, copy)
+        return Message(arrives, receiver, source, true_at, None, False, blocks, cells, status)
 
     def _copy_of(self, receiver: int, source: int) -> NDArray[np.int8]:
         """Return what a robot holds of another's map, blank at first."""
@@ -369,7 +246,7 @@ class Exchange:
             )
         return self.copies[receiver][source]
 
-    def _receive(self, message: _Message) -> None:
+    def _receive(self, message: Message) -> None:
         receiver, source = message.receiver, message.source
         if message.pose is not None:
             if message.step > self.heard_at[receiver, source]:
@@ -389,3 +266,10 @@ class Exchange:
                 min(window[2], BLOCK * words.min()),
                 max(window[3], BLOCK * (words.max() + 1)),
             )
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -62,7 +62,7 @@ class OperatingState(Enum):
 
 
 class OrderKind(Enum):
-    """What a robot can be told to do."""
+    """What a robot can be ordered to do."""
 
     PAUSE = "pause"
     RESUME = "resume"
@@ -79,7 +79,7 @@ class OrderKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What a robot is told to do.
+    """What a robot is ordered to do.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What a robot tells of itself beside its map; positions are in its map frame.
+    """What a robot reports of itself beside its map; positions are in its map frame.
 
     Attributes
     ----------

@@ -15,8 +15,8 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.metrics import overlap
 from lidarium.evaluation.truth.footprints import Footprints
-from lidarium.evaluation.truth.map_counts import COUNTED, KNOWABLE, VALID
 from lidarium.evaluation.truth.map_tally import MapTally
+from lidarium.evaluation.truth.team_counts import COUNTED, KNOWABLE, VALID
 from lidarium.evaluation.truth.true_map import Truth, truth_of
 
 WHOLE = 0.99

@@ -8,17 +8,18 @@ from numpy.typing import NDArray
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.record.display import MapChanges
 from lidarium.evaluation.truth.beliefs import cells_beyond
-from lidarium.mapping.grids.map_deltas import LaidMaps, note_changes, note_overlaid_changes
+from lidarium.mapping.grids.map_deltas import note_changes
+from lidarium.mapping.grids.overlaid_deltas import OverlaidMaps, note_overlaid_changes
 
 FAR = 1e5
-"""How far from a robot a map may have changed that was rendered anew [m]."""
+"""How far from a robot a map may have changed that was rendered again [m]."""
 
 
 class MapSampler:
     """Follows the team's map of an episode; the first sample is taken when it is made.
 
-    The map is the sign of the sum of the robots' log-odds, those that do not know their starts laid over the
-    floor by their true starts, as in ``result.json`` and the map files.
+    The map is the sign of the sum of the robots' log-odds, those that do not know their starts overlaid over
+    the floor by their true starts, as in ``result.json`` and the map files.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ class MapSampler:
                 first_row, first_column = cells_beyond(env, row)
                 self._maps[row, 0] += first_row * self._maps[row, 2] + first_column
         self._renderings = env.beliefs.renderings.copy()
-        self._lays = _overlays_of(env, self.origin)
+        self._placements = _overlays_of(env, self.origin)
         self._before = (
             [np.zeros(log_odds.shape, np.int8) for log_odds in env.beliefs.log_odds]
             if self._is_overlaid
@@ -86,8 +87,10 @@ class MapSampler:
         reach = FAR if is_new else self._reach
         self._renderings[:] = self._env.beliefs.renderings
         if self._is_overlaid:
-            laid = LaidMaps(self._env.beliefs.belief_rows, self._before_at, self._lays, self._resolution)
-            count = note_overlaid_changes(laid, self._env.beliefs.believed, self._last, reach, *planes)
+            overlaid = OverlaidMaps(
+                self._env.beliefs.belief_rows, self._before_at, self._placements, self._resolution
+            )
+            count = note_overlaid_changes(overlaid, self._env.beliefs.believed, self._last, reach, *planes)
         else:
             count = note_changes(
                 self._maps, self._env.beliefs.believed, self._last, reach, self._frame, *planes
@@ -110,7 +113,7 @@ class MapSampler:
 def _overlays_of(env: ExplorationEnv, origin: tuple[float, float]) -> NDArray[np.float64]:
     """Return how maps in the frames of the starts lie over the floor's lattice.
 
-    It is in the form that ``note_laid_changes`` takes.
+    It is in the form that ``note_overlaid_changes`` takes.
     """
     world = env.world
     return np.array(

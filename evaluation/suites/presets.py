@@ -1,9 +1,8 @@
 """Suites as other projects evaluate: sensor, team, stop rule and figures.
 
-They run on these projects' floors where any are at hand.
-
-Sources: the projects' own scripts at the commits named. What cannot be the same is said in ``differences``;
-the figures of such a run stand beside a project's only where none of them matters.
+They run on these projects' floors where any are at hand. Sources: the projects' own scripts at the commits
+named. What cannot be the same is said in ``differences``; the figures of such a run stand beside a project's
+only where none of them matters.
 """
 
 import difflib

@@ -1,6 +1,7 @@
 """Kernels that count which cells of maps are right."""
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,20 +17,18 @@ from lidarium.envs.simulation.kernels.arrays import (
     WorldArrays,
     world_at,
 )
+from lidarium.evaluation.truth.team_counts import (
+    FREE,
+    KNOWABLE,
+    KNOWN,
+    CountedMaps,
+    Team,
+    cells_beyond,
+    recount_free,
+    sum_up,
+)
 from lidarium.mapping.kernels.cell_blocks import negative_cells, positive_cells
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import int8_grid_at
-
-KNOWABLE, VALID, COUNTED = range(3)
-"""Places of the true masks, and of the counts made with them.
-
-Counted are known cells within the first and the second, and free cells within the third.
-"""
-
-
-KNOWN, FREE = range(2)
-"""Places of the bits of a map."""
-
 
 SLACK = 4
 """Cells by which a map may change beyond the longest range.
@@ -38,23 +37,34 @@ A hit lies in the cell beyond its beam.
 """
 
 
-@kernel
-def _cells_beyond(world: WorldArrays, row: int, episode: int) -> tuple[int, int]:
-    """Rows and columns by which a map on the floor's lattice begins before the masks."""
-    frame, origin, resolution = world.frames[episode], world.origins[row], world.sensor[MAP_RESOLUTION]
-    return int(round((frame[1] - origin[1]) / resolution)), int(round((frame[0] - origin[0]) / resolution))
+class LastVisit(NamedTuple):
+    """Where robots stood and what has changed since their maps were counted last.
+
+    Attributes
+    ----------
+    poses, travelled : (robots, 3), (robots,) float64
+        Where each robot stood [m, rad], and how far it had driven by then [m].
+    changes : (robots, 4) int64
+        What part of each map has changed since, of ``note_changes``.
+    """
+
+    poses: Array
+    travelled: Array
+    changes: Array
 
 
 @kernel
 def _box(
-    world: WorldArrays, row: int, episode: int, pose: Array, way: float, change: Array, shape: tuple[int, int]
+    world: WorldArrays, team: Team, robot: int, last: LastVisit, shape: tuple[int, int]
 ) -> tuple[int, int, int, int]:
-    """Return the rows and words that a robot's scans may have changed since a pose.
+    """Return the rows and words that scans may have changed since the last visit.
 
-    They are row_low, row_high, word_low, word_high, since the robot stood at the pose.
+    They are row_low, row_high, word_low, word_high.
     """
+    row, episode = team.first + robot, team.first // team.robots
+    pose, change = last.poses[robot], last.changes[robot]
     resolution, frame = world.sensor[MAP_RESOLUTION], world.frames[episode]
-    first_row, first_column = _cells_beyond(world, row, episode)
+    first_row, first_column = cells_beyond(world, row, episode)
     if not world.flags[row] & TRUE_POSE:
         # Whoever does not know where he is may map what is far from there.
         return (
@@ -63,7 +73,7 @@ def _box(
             max(change[2] - first_column, 0) >> 6,
             min((change[3] - first_column + 63) >> 6, shape[1]),
         )
-    reach = (world.sensor[RANGE_MAX] + world.travelled[row] - way) / resolution + SLACK
+    reach = (world.sensor[RANGE_MAX] + world.travelled[row] - last.travelled[robot]) / resolution + SLACK
     x, y = (pose[0] - frame[0]) / resolution, (pose[1] - frame[1]) / resolution
     row_low, row_high = max(int(math.floor(y - reach)), 0), min(int(math.ceil(y + reach)), shape[0])
     column_low, column_high = (
@@ -76,94 +86,17 @@ def _box(
 
 
 @kernel
-def _free_of_sum(
-    world: WorldArrays, first: int, robots: int, line: int, word: int, cells: np.uint64
-) -> np.uint64:
-    """Say which of some cells of aligned maps have a negative sum."""
-    free = np.uint64(0)
-    while cells != np.uint64(0):
-        bit = cells & (~cells + np.uint64(1))
-        cells ^= bit
-        column, total = word * 64 + count_bits(bit - np.uint64(1)), 0
-        for row in range(first, first + robots):
-            belief = world.belief_rows[row]
-            first_row, first_column = _cells_beyond(world, row, first // robots)
-            total += int8_grid_at(belief[0], belief[1], belief[2])[line + first_row, column + first_column]
-        if total < 0:
-            free |= bit
-    return free
-
-
-@kernel(inline=True)
-def _recount_free(
-    truth: Array, bits: Array, counts: Array, who: int, i: int, j: int, free: np.uint64
-) -> None:
-    """Replace old bits of free cells by new ones, and update the count.
-
-    The count changes by the difference.
-    """
-    old = bits[who, i, j, FREE]
-    if free != old:
-        counts[who, COUNTED] += count_bits(free & truth[COUNTED, i, j]) - count_bits(
-            old & truth[COUNTED, i, j]
-        )
-        bits[who, i, j, FREE] = free
-
-
-@kernel(inline=True)
-def _sum_up(
-    world: WorldArrays,
-    first: int,
-    robots: int,
-    shares: bool,
-    truth: Array,
-    bits: Array,
-    disputed: Array,
-    counts: Array,
-    i: int,
-    j: int,
-) -> None:
-    """Bring a word of the team's map up to date, and the counts by the difference."""
-    known, free, occupied = np.uint64(0), np.uint64(0), np.uint64(0)
-    for robot in range(robots):
-        known |= bits[robot, i, j, KNOWN]
-        free |= bits[robot, i, j, FREE]
-        occupied |= bits[robot, i, j, KNOWN] & ~bits[robot, i, j, FREE]
-    old = bits[robots, i, j, KNOWN]
-    if known != old:
-        for kind in (KNOWABLE, VALID):
-            counts[robots, kind] += count_bits(known & truth[kind, i, j]) - count_bits(
-                old & truth[kind, i, j]
-            )
-        bits[robots, i, j, KNOWN] = known
-    if shares:
-        disputed[i, j] = free & occupied & truth[COUNTED, i, j]
-        free &= ~occupied
-        if disputed[i, j] != np.uint64(0):
-            free |= _free_of_sum(world, first, robots, i, j, disputed[i, j])
-        _recount_free(truth, bits, counts, robots, i, j, free)
-
-
-@kernel
-def _take_in_aligned(
-    world: WorldArrays,
-    first: int,
-    robot: int,
-    robots: int,
-    shares: bool,
-    truth: Array,
-    bits: Array,
-    disputed: Array,
-    counts: Array,
-    box: tuple[int, int, int, int],
+def _count_aligned(
+    world: WorldArrays, team: Team, robot: int, maps: CountedMaps, box: tuple[int, int, int, int]
 ) -> None:
     """Update the counts for a map on the floor's lattice.
 
     The update is in a box of rows and words.
     """
-    own, columns = bits[robot], world.belief_rows[first + robot, MAP_COLUMNS]
-    first_row, first_column = _cells_beyond(world, first + robot, first // robots)
-    address = world.belief_rows[first + robot, MAP] + first_row * columns + first_column
+    truth, disputed, own, row = maps.truth, maps.disputed, maps.bits[robot], team.first + robot
+    columns = world.belief_rows[row, MAP_COLUMNS]
+    first_row, first_column = cells_beyond(world, row, team.first // team.robots)
+    address = world.belief_rows[row, MAP] + first_row * columns + first_column
     for i in range(box[0], box[1]):
         for j in range(box[2], box[3]):
             if truth[KNOWABLE, i, j] == np.uint64(0):
@@ -173,27 +106,18 @@ def _take_in_aligned(
             known = negative | positive_cells(place)
             has_changed = negative != own[i, j, FREE] or known != own[i, j, KNOWN]
             own[i, j, KNOWN] = known
-            if shares:
+            if team.shares:
                 own[i, j, FREE] = negative
             else:
-                _recount_free(truth, bits, counts, robot, i, j, negative)
+                recount_free(maps, robot, i, j, negative)
             # What is disputed may be settled by another sum, though no map has changed its mind.
-            if has_changed or (shares and disputed[i, j] != np.uint64(0)):
-                _sum_up(world, first, robots, shares, truth, bits, disputed, counts, i, j)
+            if has_changed or (team.shares and disputed[i, j] != np.uint64(0)):
+                sum_up(world, team, maps, i, j)
 
 
 @kernel
-def _take_in_turned(
-    world: WorldArrays,
-    first: int,
-    robot: int,
-    robots: int,
-    truth: Array,
-    signs: Array,
-    bits: Array,
-    disputed: Array,
-    counts: Array,
-    change: Array,
+def _count_turned(
+    world: WorldArrays, team: Team, robot: int, maps: CountedMaps, signs: Array, change: Array
 ) -> None:
     """Update the counts for a map in a frame of its own.
 
@@ -202,12 +126,12 @@ def _take_in_turned(
     ``signs`` (rows, words, 2) are the bits on the map's own lattice. As in `beliefs.maps_on_floor`, a cell of
     the floor is what the cell of the map says in which its centre lies.
     """
-    row = first + robot
+    row, truth = team.first + robot, maps.truth
     belief, start, origin, frame = (
         world.belief_rows[row],
         world.starts[row],
         world.origins[row],
-        world.frames[first // robots],
+        world.frames[team.first // team.robots],
     )
     resolution = world.sensor[MAP_RESOLUTION]
     cosine, sine = math.cos(start[2]), math.sin(start[2])
@@ -238,28 +162,18 @@ def _take_in_turned(
                         if int(math.floor((cosine * north - sine * east - origin[1]) / resolution)) != line:
                             continue
                         cell = np.uint64(1) << np.uint64(j & 63)
-                        own = bits[robot, i, j >> 6]
+                        own = maps.bits[robot, i, j >> 6]
                         own[KNOWN] = own[KNOWN] | cell if known & bit else own[KNOWN] & ~cell
                         free = own[FREE] | cell if negative & bit else own[FREE] & ~cell
-                        _recount_free(truth, bits, counts, robot, i, j >> 6, free)
-                        _sum_up(world, first, robots, False, truth, bits, disputed, counts, i, j >> 6)
+                        recount_free(maps, robot, i, j >> 6, free)
+                        sum_up(world, team, maps, i, j >> 6)
 
 
 @kernel
 def count_maps(
-    table: Array,
-    episode: int,
-    shares: bool,
-    truth: Array,
-    signs: Array,
-    bits: Array,
-    disputed: Array,
-    counts: Array,
-    poses: Array,
-    ways: Array,
-    changes: Array,
+    table: Array, episode: int, shares: bool, maps: CountedMaps, signs: Array, last: LastVisit
 ) -> None:
-    """Bring the bits and counts of an episode's maps up to date.
+    """Update the bits and counts of an episode's maps.
 
     Parameters
     ----------
@@ -269,35 +183,26 @@ def count_maps(
         Which episode.
     shares : bool
         Whether all robots hold the sum of the maps, which lie on one lattice then.
-    truth : (3, rows, words) uint64
-        The true masks.
+    maps : CountedMaps
+        The maps on the floor's lattice; updated.
     signs : (robots, map rows, map words, 2) uint64
         Which cells maps in frames of their own know, and which of them they say are free, on their own
         lattices; not used for maps that lie on the floor's. Updated.
-    bits : (robots + 1, rows, words, 2) uint64
-        The same of each robot's own map on the floor's lattice; those of the team at the end. Updated.
-    disputed : (rows, words) uint64
-        Cells of F of which one map says that they are free, and another that they are not. Updated.
-    counts : (robots + 1, 3) int64
-        Of the team, known cells within ``KNOWABLE`` and ``VALID``; free cells within ``COUNTED`` of the map
-        that all robots share, else of each robot's. Updated.
-    poses, ways : (robots, 3) float64 and (robots,) float64
-        Where each robot stood at the last call, and how far it had driven by then. Updated.
-    changes : (robots, 4) int64
-        What part of each map has changed since, of ``note_changes``. Begun anew.
+    last : LastVisit
+        Of the last call; updated, and its changes are begun again.
     """
-    world, robots = world_at(table), poses.shape[0]
+    world, poses, changes = world_at(table), last.poses, last.changes
+    robots = poses.shape[0]
     first = episode * robots
     for robot in range(robots):
         row = first + robot
         if world.flags[row] & OWN_FRAME:
-            _take_in_turned(
-                world, first, robot, robots, truth, signs[robot], bits, disputed, counts, changes[robot]
-            )
+            team = Team(first, robots, False)
+            _count_turned(world, team, robot, maps, signs[robot], changes[robot])
         else:
-            box = _box(world, row, episode, poses[robot], ways[robot], changes[robot], truth[0].shape)
-            _take_in_aligned(world, first, robot, robots, shares, truth, bits, disputed, counts, box)
-        ways[robot] = world.travelled[row]
+            team = Team(first, robots, shares)
+            _count_aligned(world, team, robot, maps, _box(world, team, robot, last, maps.truth[0].shape))
+        last.travelled[robot] = world.travelled[row]
         for axis in range(3):
             poses[robot, axis] = world.poses[row, axis]
         changes[robot, 0], changes[robot, 1] = world.belief_rows[row, MAP_ROWS], 0
@@ -308,7 +213,7 @@ def count_maps(
 def note_changes(windows: Array, changes: Array) -> None:
     """Extend the windows of changes (robots, 4) by those of the maps.
 
-    Planning begins the latter anew whenever it takes a map in.
+    Planning begins the latter again whenever it takes a map in.
     """
     for row in range(changes.shape[0]):
         changes[row, 0], changes[row, 1] = (
@@ -319,3 +224,10 @@ def note_changes(windows: Array, changes: Array) -> None:
             min(changes[row, 2], windows[row, 2]),
             max(changes[row, 3], windows[row, 3]),
         )
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.scoring.coverage import pack_bits
 from lidarium.evaluation.truth.beliefs import held_maps, shares_one_map
-from lidarium.evaluation.truth.map_counts import COUNTED, KNOWABLE, KNOWN, count_maps, note_changes
+from lidarium.evaluation.truth.map_counts import LastVisit, count_maps, note_changes
+from lidarium.evaluation.truth.team_counts import COUNTED, KNOWABLE, KNOWN, CountedMaps
 from lidarium.evaluation.truth.true_map import Truth
 from lidarium.mapping.grids.scan_integration import WORD
 
@@ -41,36 +42,25 @@ class MapTally:
         self._truth = np.stack([pack_bits(mask) for mask in (truth.knowable, truth.valid, truth.counted)])
         self.sizes = np.bitwise_count(self._truth).sum(axis=(1, 2), dtype=np.int64)
         rows, words = self._truth.shape[1:]
-        self._bits, self._disputed = (
+        self.counts = np.zeros((robots + 1, 3), np.int64)
+        self._maps = CountedMaps(
+            self._truth,
             np.zeros((robots + 1, rows, words, 2), np.uint64),
             np.zeros((rows, words), np.uint64),
+            self.counts,
         )
-        self.counts = np.zeros((robots + 1, 3), np.int64)
-        self._poses, self._ways = world.poses.copy(), world.travelled.copy()
-        self._changes = env.beliefs.windows.copy()
+        self._last = LastVisit(world.poses.copy(), world.travelled.copy(), env.beliefs.windows.copy())
         map_rows, map_columns = (0, 0) if env.settings.known_starts else env.beliefs.log_odds[0].shape
         self._signs = np.zeros((robots, map_rows, map_columns // WORD, 2), np.uint64)
         self.shares = shares_one_map(env)
 
     def note_step(self, env: ExplorationEnv) -> None:
         """Note where maps have changed; wanted after every step."""
-        note_changes(env.beliefs.windows, self._changes)
+        note_changes(env.beliefs.windows, self._last.changes)
 
     def take_in(self, env: ExplorationEnv) -> None:
-        """Bring the counts up to date."""
-        count_maps(
-            env.simulation.table,
-            0,
-            self.shares,
-            self._truth,
-            self._signs,
-            self._bits,
-            self._disputed,
-            self.counts,
-            self._poses,
-            self._ways,
-            self._changes,
-        )
+        """Update the counts."""
+        count_maps(env.simulation.table, 0, self.shares, self._maps, self._signs, self._last)
         if env.perception.hears:
             for robot, held in enumerate(held_maps(env)):
                 self.counts[robot, COUNTED] = int(
@@ -83,7 +73,7 @@ class MapTally:
 
         The last update is when the maps were taken in last.
         """
-        known = np.bitwise_count(self._bits[:-1, :, :, KNOWN] & self._truth[KNOWABLE]).sum(
+        known = np.bitwise_count(self._maps.bits[:-1, :, :, KNOWN] & self._truth[KNOWABLE]).sum(
             axis=(1, 2), dtype=np.int64
         )
         return np.asarray(known / max(int(self.sizes[KNOWABLE]), 1))

@@ -72,10 +72,10 @@ def left_by_failed(env: ExplorationEnv) -> Mask | None:
             body.origin[0] + (columns + 0.5) * resolution - x, body.origin[1] + (rows + 0.5) * resolution - y
         )
         solid[near < env.settings.robot.radius - resolution] = 1
-    swept = reachable_free_space(
+    reachable = reachable_free_space(
         Raster(solid, body.origin, resolution), float(world.bodies[:, RADIUS].min()), world.poses[~failed]
     )
-    free = swept & (tables.laser.solid == 0)
+    free = reachable & (tables.laser.solid == 0)
     left = counted_cells(free, round(env.settings.occupancy.resolution / resolution))
     counted = unpack_bits(env.score.counted_masks[0], left.shape[1])
     return np.asarray(left & counted)

@@ -22,7 +22,7 @@ Window = tuple[int, int, int, int]
 
 
 STAMPS_PER_CELL = 1.0 / 200.0
-"""Stamping one disc costs about as much as computing 200 cells anew."""
+"""Stamping one disc costs about as much as computing 200 cells again."""
 
 
 @kernel

@@ -1,5 +1,7 @@
 """What a body covers of a grid while it drives along a trail."""
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ _SUBCELL = 4
 _CELL = 1 << _SUBCELL
 
 
-def swept(
+def footprint_mask(
     shape: tuple[int, int],
     origin: tuple[float, float],
     trail: NDArray[np.float64],
@@ -64,7 +66,7 @@ def passed(
 
     No wall is where a body was, but beside it there may be one.
     """
-    covered = swept(shape, origin, trail, radius, resolution, 0.0).astype(np.uint8)
+    covered = footprint_mask(shape, origin, trail, radius, resolution, 0.0).astype(np.uint8)
     if len(trail):
         stand = _pixels(trail[-1:], origin, resolution)[0].tolist()
         cv2.circle(
@@ -85,3 +87,10 @@ def _pixels(points: NDArray[np.float64], origin: tuple[float, float], resolution
     Pixels are addressed by their centres.
     """
     return np.rint(((points - origin) / resolution - 0.5) * _CELL).astype(np.int32)
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.grid_lines import line_is_open
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.planning.clearance import ClearanceField
+from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.frontier_kernels import FRONTIER
 from lidarium.mapping.planning.frontiers import Clusters, FrontierMap
-from lidarium.mapping.planning.grid_planning import Cell, Disc, Footprint, Until, search
+from lidarium.mapping.planning.grid_planning import Cell, Disc, Until, search
 from lidarium.mapping.planning.search.search_space import Search, SearchSpace
 from lidarium.mapping.planning.search.search_state import LEAVING, NO_ENTRY
 from lidarium.mapping.planning.search.search_targets import disc_spans
@@ -104,7 +105,7 @@ def approach(
         How near is near enough [m], between centres of cells.
     thin : (K,) bool, optional
         Which of the clusters a thinner body reaches (``approach(...).reachable`` of a search with a smaller
-        radius in another space), to tell narrow from blocked ways.
+        radius in another space), to distinguish narrow from blocked paths.
 
     Returns
     -------
@@ -158,7 +159,7 @@ def nearest_frontier(
     Parameters
     ----------
     frontiers : FrontierMap
-        What to look for.
+        What to search.
     space, log_odds, clearance, start, footprint, blocked
         As for :func:`lidarium.mapping.planning.grid_planning.search`.
     reach : float, optional

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.grid_lines import line_is_free
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.grid_planning import Disc, Footprint, centres_of
+from lidarium.mapping.planning.footprint import Footprint
+from lidarium.mapping.planning.grid_planning import Disc, centres_of
 from lidarium.mapping.planning.search.search_state import Passage, Terrain
 
 STEP = 0.5

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.frontier_approach import approach
-from lidarium.mapping.planning.grid_planning import Cell, Footprint, search
+from lidarium.mapping.planning.grid_planning import Cell, search
 
 NONE = -1
 """Instead of the number of a goal, or of a cell: there is none."""
@@ -31,8 +32,8 @@ class Goals:
         What is unknown around each, within the range of the laser [m2].
     costs : (R, K) float64
         Cost of each robot's way to where it sees the frontier [m], inf where there is none.
-    stands, looks : (R, K, 2) int64
-        Where it stands then, and the frontier cell that it looks at.
+    stands, observed : (R, K, 2) int64
+        Where it stands then, and the frontier cell that it observes.
     """
 
     cells: NDArray[np.int64]
@@ -42,7 +43,7 @@ class Goals:
     areas: NDArray[np.float64]
     costs: NDArray[np.float64]
     stands: NDArray[np.int64]
-    looks: NDArray[np.int64]
+    observed: NDArray[np.int64]
 
 
 def find_goals(
@@ -66,14 +67,14 @@ def find_goals(
     footprint : Footprint
         How they pass over the map.
     reach : float
-        From how far a robot may look at a frontier [m].
+        From how far a robot may observe a frontier [m].
     range_m : float
         Of the laser [m].
     """
     clusters = navigation.frontiers.clusters(origin)
     count, robots = len(clusters), len(cells)
     costs = np.full((robots, count), math.inf)
-    stands, looks = (
+    stands, observed = (
         np.full((robots, count, 2), NONE, np.int64),
         np.full((robots, count, 2), NONE, np.int64),
     )
@@ -89,7 +90,7 @@ def find_goals(
         )
         near = approach(clusters, found, navigation.log_odds, reach)
         costs[row] = np.where(near.reachable, near.costs, math.inf)
-        stands[row], looks[row] = near.cells, near.frontier_cells
+        stands[row], observed[row] = near.cells, near.frontier_cells
     areas = _unknown_around(
         navigation.log_odds, clusters.representatives, range_m / 2.0, navigation.resolution
     )
@@ -101,7 +102,7 @@ def find_goals(
         areas,
         costs,
         stands,
-        looks,
+        observed,
     )
 
 

@@ -12,7 +12,7 @@ from lidarium.mapping.grids.occupancy import UNKNOWN
 
 
 class ReceivedReports:
-    """The reports of a team, the latest of each robot beside what its earlier ones tell.
+    """The reports of a team: the latest of each robot, and what earlier ones say.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ class MergeStation:
     events : list of StationEvent
         What happened.
     left_behind : list of (str, (N, 2) float64)
-        Who is to be told where a robot drove that has failed, and that trail in its map frame [m].
+        Who is to be sent where a robot drove that has failed, and that trail in its map frame [m].
     """
 
     def __init__(

@@ -17,8 +17,9 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.grid_lines import visible
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.frontier_approach import default_reach
-from lidarium.mapping.planning.grid_planning import Cell, Footprint, Until, cells_of, centres_of, search
+from lidarium.mapping.planning.grid_planning import Cell, Until, cells_of, centres_of, search
 
 _MARGIN = 1
 
@@ -150,16 +151,16 @@ class Survey:
         Both are in its own map frame.
         """
         row = self.workers.index(agent)
-        place, look = (
+        place, cell = (
             centres_of(cells[row, goal], self.origin, self.resolution)
-            for cells in (self.goals.stands, self.goals.looks)
+            for cells in (self.goals.stands, self.goals.observed)
         )
         own = self.frames[agent].inverse()
         x, y = own.apply(place).tolist()
-        looked_at = own.apply(look)
-        return x, y, math.atan2(looked_at[1] - y, looked_at[0] - x)
+        observed = own.apply(cell)
+        return x, y, math.atan2(observed[1] - y, observed[0] - x)
 
-    def looks_at(self, agent: str, goal: int) -> tuple[float, float]:
+    def observed_cell(self, agent: str, goal: int) -> tuple[float, float]:
         """Return the frontier cell of a goal that a robot observes [m].
 
         It is in the robot's own map frame.
@@ -168,7 +169,7 @@ class Survey:
         x, y = (
             self.frames[agent]
             .inverse()
-            .apply(centres_of(self.goals.looks[row, goal], self.origin, self.resolution))
+            .apply(centres_of(self.goals.observed[row, goal], self.origin, self.resolution))
             .tolist()
         )
         return x, y
@@ -190,7 +191,7 @@ class Survey:
         return found.cost(self._inside((at.x, at.y)))
 
     def _goal_at(self, place: tuple[float, ...] | None) -> int:
-        """Return the goal that a robot at a place [m] looks at, -1 for none."""
+        """Return the goal that a robot at a place [m] observes, -1 for none."""
         if place is None or not len(self.goals.cells):
             return NONE
         cells = centres_of(self.goals.cells, self.origin, self.resolution)

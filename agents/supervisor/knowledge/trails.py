@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.grids.occupancy import OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.growing_maps import GrowingMap
-from lidarium.mapping.planning.footprint_masks import swept
+from lidarium.mapping.planning.footprint_masks import footprint_mask
 
 
 def without_own_trail(
@@ -33,7 +33,7 @@ def without_own_trail(
         Of its body, and side of a cell [m].
     """
     levels = one.levels.copy()
-    levels[swept(one.levels.shape, one.origin, trail, radius, resolution)] = UNKNOWN
+    levels[footprint_mask(one.levels.shape, one.origin, trail, radius, resolution)] = UNKNOWN
     return GrowingMap(levels, one.origin)
 
 
@@ -53,7 +53,7 @@ def without_bodies(
     """
     levels = one.levels.copy()
     for trail in trails:
-        levels[swept(one.levels.shape, one.origin, trail, radius, resolution) & (levels == OCCUPIED)] = (
-            UNKNOWN
-        )
+        levels[
+            footprint_mask(one.levels.shape, one.origin, trail, radius, resolution) & (levels == OCCUPIED)
+        ] = UNKNOWN
     return GrowingMap(levels, one.origin)

@@ -108,14 +108,14 @@ class Watch(Watcher):
         localizers[:] = [
             None if localizer is None else TimedLocalizer(localizer, self.seconds) for localizer in localizers
         ]
-        render = env.simulation.render_anew
+        render = env.simulation.render_again
 
         def render_timed(row: int, poses: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
             began = time.perf_counter()
             render(row, poses, ranges)
             self.seconds[-1] = (self.seconds[-1][0] + time.perf_counter() - began, True)
 
-        env.simulation.render_anew = render_timed  # type: ignore[method-assign]
+        env.simulation.render_again = render_timed  # type: ignore[method-assign]
 
     def step(self, env: ExplorationEnv, _commands: NDArray[np.float64]) -> None:
         """Note how far dead reckoning is off, and where robots are and believe to be."""

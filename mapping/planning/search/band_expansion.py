@@ -70,7 +70,7 @@ def expand_band(
 ) -> int:
     """Expand the cells of one band of costs from number ``first`` on (kernel).
 
-    Return where the buckets were too full, or the end. ``wanted`` is how many targets to look for.
+    Return where the buckets were too full, or the end. ``wanted`` is how many targets to find.
     """
     slot = band & (state.buckets.shape[0] - 1)
     columns = terrain.log_odds.shape[1]

@@ -118,7 +118,7 @@ def search_in(
     task : Task
         From where to where.
     lookout : Lookout
-        What to look for.
+        What to search.
 
     Returns
     -------

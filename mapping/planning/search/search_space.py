@@ -83,7 +83,7 @@ class Search:
     settled : int
         Costs up to this one [units] are final; a cell beyond counts as not reached.
     hits : (M, 2) int64
-        The first targets (row, column), by cost and then by row and column; empty where none was looked for
+        The first targets (row, column), by cost and then by row and column; empty where none was searched
         or reached.
     """
 

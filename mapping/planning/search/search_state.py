@@ -132,7 +132,7 @@ class Task(NamedTuple):
 
 
 class Lookout(NamedTuple):
-    """What a search looks for, and where it notes what it has found.
+    """The targets of a search, and where it notes what it has found.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ class Targets:
     Attributes
     ----------
     mask : (rows, columns) uint8
-        1 in the cells looked for; other values are ignored.
+        1 in the cells that are searched; other values are ignored.
     near : (ceil(rows / 16), ceil(columns / 16)) uint8
         Not 0 in tiles from which a cell of the mask may be within reach.
     spans : (2 k + 1,) int64

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidarium.mapping.grids.map_deltas import LaidMaps, levels_of_planes, note_changes, note_overlaid_changes
+from lidarium.mapping.grids.map_deltas import levels_of_planes, note_changes
+from lidarium.mapping.grids.overlaid_deltas import OverlaidMaps, note_overlaid_changes
 
 FAR = 1e3
 
@@ -97,7 +98,7 @@ def test_turned_maps_are_laid_over_the_lattice_where_they_changed(seed, robots):
     resolution, rows, words = 0.1, 70, 2
     maps = [np.zeros((128, 128), np.int8) for _ in range(robots)]
     before = [np.zeros((128, 128), np.int8) for _ in range(robots)]
-    lays = np.array(
+    placements = np.array(
         [
             (-1.0, -2.0, *generator.uniform(0.0, 5.0, 2), math.cos(theta), math.sin(theta), -6.4, -6.4)
             for theta in generator.uniform(-math.pi, math.pi, robots)
@@ -110,17 +111,18 @@ def test_turned_maps_are_laid_over_the_lattice_where_they_changed(seed, robots):
         for log_odds in maps:
             row, column = generator.integers(0, 110, 2)
             log_odds[row : row + 9, column : column + 15] = generator.integers(-127, 128, (9, 15))
-        laid = LaidMaps(records_of(maps), addresses, lays, resolution)
-        note_overlaid_changes(laid, poses, last, FAR, known, occupied, buffer)
+        overlaid = OverlaidMaps(records_of(maps), addresses, placements, resolution)
+        note_overlaid_changes(overlaid, poses, last, FAR, known, occupied, buffer)
         np.testing.assert_array_equal(
-            levels_of_planes(known, occupied), levels_of_sum(laid_slowly(maps, lays, resolution, rows, words))
+            levels_of_planes(known, occupied),
+            levels_of_sum(laid_slowly(maps, placements, resolution, rows, words)),
         )
 
 
-def laid_slowly(maps, lays, resolution, rows, words):
+def laid_slowly(maps, placements, resolution, rows, words):
     total = np.zeros((rows, words * 64), np.int64)
     for log_odds, (corner_x, corner_y, start_x, start_y, cosine, sine, own_x, own_y) in zip(
-        maps, lays, strict=True
+        maps, placements, strict=True
     ):
         y, x = np.meshgrid(
             (np.arange(rows) + 0.5) * resolution, (np.arange(words * 64) + 0.5) * resolution, indexing="ij"

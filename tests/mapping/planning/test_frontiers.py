@@ -10,9 +10,10 @@ from scipy import ndimage
 
 from lidarium.mapping.grids.grid_lines import visible
 from lidarium.mapping.planning.clearance import ClearanceField
+from lidarium.mapping.planning.footprint import Footprint
 from lidarium.mapping.planning.frontier_approach import approach, default_reach, nearest_frontier
 from lidarium.mapping.planning.frontiers import FrontierMap
-from lidarium.mapping.planning.grid_planning import Footprint, search
+from lidarium.mapping.planning.grid_planning import search
 from lidarium.mapping.planning.search.search_space import SearchSpace
 
 RESOLUTION = 0.025

@@ -11,15 +11,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from lidarium.mapping.planning.clearance import ClearanceField, clearance
-from lidarium.mapping.planning.grid_planning import (
-    Footprint,
-    Until,
-    cells_of,
-    centres_of,
-    discs_of,
-    plan,
-    search,
-)
+from lidarium.mapping.planning.footprint import Footprint
+from lidarium.mapping.planning.grid_planning import Until, cells_of, centres_of, discs_of, plan, search
 from lidarium.mapping.planning.path_smoothing import line_keeps_clearance, shortened, waypoints
 from lidarium.mapping.planning.search.search_space import SearchSpace
 from lidarium.mapping.planning.search.search_targets import Targets

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.grid_planning import Footprint, passage_of, plan, search
+from lidarium.mapping.planning.footprint import Footprint, passage_of
+from lidarium.mapping.planning.grid_planning import plan, search
 from lidarium.mapping.planning.search.path_search import (
     SearchMemory,
     budget_of,

@@ -35,7 +35,7 @@ def led(compass, nodes, drift, turns=0.0, seed=0):
         turn = turns * math.sin(node)
         true += turn
         believed += turn + drift * generator.normal()
-        compass.look(seen(true, 1000 * seed + node, turn))
+        compass.observe(seen(true, 1000 * seed + node, turn))
         correction, variance = compass.turn(node, turn, STEP**2, believed)
         believed += correction
     return believed - true, variance
@@ -68,7 +68,7 @@ def test_a_place_without_walls_is_no_survey():
 def test_walls_run_as_was_surveyed_from_the_nodes_heading():
     compass = WallCompass(CompassSettings())
     assert compass.survey(seen(0.0, 1), 3, 0.25)
-    compass.look(seen(0.1, 2))
+    compass.observe(seen(0.1, 2))
     turn, _ = compass.turn(4, 0.0, math.radians(5.0) ** 2, 0.34)
     assert turn == pytest.approx(0.01, abs=math.radians(0.2))
 
@@ -78,7 +78,7 @@ def test_a_wing_at_another_angle_turns_nothing():
     led(compass, 20, 0.0)
     known = len(compass.bearings)
     for node in range(21, 40):
-        compass.look(seen(math.radians(20.0), node))
+        compass.observe(seen(math.radians(20.0), node))
         assert compass.turn(node, 0.0, STEP**2, 0.0)[0] == 0.0
     assert len(compass.bearings) == known
 
@@ -88,7 +88,7 @@ def test_a_heading_that_is_lost_is_left_alone_until_it_is_known_again():
     led(compass, 20, 0.0)
 
     def turned(node, variance, heading):
-        compass.look(seen(0.0, node, noise=0.0))
+        compass.observe(seen(0.0, node, noise=0.0))
         return compass.turn(node, 0.0, variance, heading)[0]
 
     assert turned(21, 0.5**2, math.radians(1.0)) == 0.0
@@ -100,7 +100,7 @@ def test_a_heading_that_is_lost_is_left_alone_until_it_is_known_again():
 def test_what_was_seen_before_a_gap_says_nothing_after_it():
     compass = surveyed()
     led(compass, 20, 0.0)
-    compass.look(seen(0.0, 3, noise=0.0))
+    compass.observe(seen(0.0, 3, noise=0.0))
     compass.forget()
     assert compass.turn(21, 0.0, STEP**2, 0.01) == (0.0, compass.turn(22, 0.0, 0.0, 0.01)[1])
 
