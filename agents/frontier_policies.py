@@ -23,7 +23,7 @@ The excess is over the cheapest frontier; one that costs more is not considered.
 
 
 FIRST_SLACK = 4.0
-"""How far beyond the cheapest frontier others are looked for at first [m].
+"""How far beyond the cheapest frontier others are searched at first [m].
 
 Further where that does not settle the choice.
 """
@@ -162,7 +162,7 @@ class UtilityFrontier(FrontierExplorer):
         self._cost_weight, self._range, self._minimum_size = cost_weight, sensor_range, minimum_size
 
     def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
-        """Assign frontiers to all robots anew, best pair first."""
+        """Assign frontiers to all robots again, best pair first."""
         if not self._are_together(agents):
             return {agent: self._assign([agent])[agent] for agent in open_agents}
         return self._assign(agents)

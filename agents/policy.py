@@ -68,18 +68,18 @@ class Team(Protocol):
         """
         ...
 
-    def tell(self, agent: str, others: FusedMap | None) -> bool:
-        """Tell an agent that does not know its start what others know, in its map frame.
+    def send_map(self, agent: str, others: FusedMap | None) -> bool:
+        """Send an agent that does not know its start what others know, in its map frame.
 
         Return whether that reached it.
 
-        It plans and explores on that from now on, where its policy looks at the shared map. None takes back
-        what was told.
+        It plans and explores on that from now on, where its policy uses the shared map. None takes back
+        what was sent.
         """
         ...
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        """Tell an agent where another robot drove, (N, 2) in its map frame [m].
+        """Send an agent where another robot drove, (N, 2) in its map frame [m].
 
         Return whether that reached it.
 
@@ -227,14 +227,14 @@ class _Alone:
             f"{self._agent} asked for the report of {agent}; a decentralised policy has no station"
         )
 
-    def tell(self, agent: str, others: FusedMap | None) -> bool:
+    def send_map(self, agent: str, others: FusedMap | None) -> bool:
         raise ValueError(
-            f"{self._agent} would tell {agent} what others know; a decentralised policy has no station"
+            f"{self._agent} would send {agent} what others know; a decentralised policy has no station"
         )
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
         raise ValueError(
-            f"{self._agent} would tell {agent} where others drove; a decentralised policy has no station"
+            f"{self._agent} would send {agent} where others drove; a decentralised policy has no station"
         )
 
 

@@ -89,7 +89,7 @@ def execute(command: Animate) -> Answer:
     env = WatchedExploration(command.floor, settings)
     env.watchers.append(_camera(policy, moments, FRAME_MS / 1000.0 * command.speed))
     with closing(Progress(is_quiet=command.json)) as progress:
-        run_episode(policy, env, command.seed, on_decision=progress.tell)
+        run_episode(policy, env, command.seed, on_decision=progress.show)
     cell, pairs = settings.occupancy.resolution, zip(moments[-1].own, env.beliefs.origins, strict=True)
     views = [view_around(own.toarray() != 0, (float(x), float(y)), cell, TILE) for own, (x, y) in pairs]
     frames = [_picture(env, moment, views) for moment in moments]

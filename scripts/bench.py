@@ -6,7 +6,7 @@ It includes the other simulators that are installed.
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from lidarium.scripts.common import INTERRUPTED, Answer, Command, table, tell
+from lidarium.scripts.common import INTERRUPTED, Answer, Command, notify, table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class Bench(Command):
 
 
 def execute(command: Bench) -> Answer:
-    """Measure, tell, and write ``speed.md`` and ``speed.json`` where asked to."""
+    """Measure, print, and write ``speed.md`` and ``speed.json`` where asked to."""
     from lidarium.benchmarks.speed.all import QUESTIONS, ask, result_of
     from lidarium.benchmarks.speed.harness.report import write_speed
     from lidarium.benchmarks.speed.harness.timing import EFFORTS
@@ -46,7 +46,7 @@ def execute(command: Bench) -> Answer:
     is_interrupted = False
     try:
         for place, name in enumerate(names, 1):
-            tell(f"measuring {name} ({place} of {len(names)})")
+            notify(f"measuring {name} ({place} of {len(names)})")
             lines += ask(name, effort)
             done.append(name)
     except KeyboardInterrupt:

@@ -57,7 +57,7 @@ class TeamCommand(Command):
     noise: str | None = None
     """noise of the laser's ranges: none, datasheet or thesis"""
     odometry: str | None = None
-    """how well wheels tell the way: ideal, good, typical or poor"""
+    """how well wheels measure the path: ideal, good, typical or poor"""
     localization: str | None = None
     """who says where a robot is: truth, odometry or a localizer.
 
@@ -128,7 +128,7 @@ class Answer:
     code: int = DONE
 
 
-def tell(message: str) -> None:
+def notify(message: str) -> None:
     """Print a message on standard error.
 
     Where nobody reads it any more the work goes on all the same.
@@ -142,7 +142,7 @@ def announce_compiling() -> None:
     from lidarium.mapping.kernels.compilation import is_cache_empty
 
     if is_cache_empty():
-        tell("compiling the kernels, a minute or two; later starts find them")
+        notify("compiling the kernels, a minute or two; later starts find them")
 
 
 def table(rows: Iterable[Sequence[object]], header: Sequence[str] = (), indent: str = "  ") -> str:
@@ -198,7 +198,7 @@ def counted(
         yield item
         if (now := clock()) - last >= LINE_PERIOD_S:
             last = now
-            tell(f"{what}: {count:,} of {total:,}")
+            notify(f"{what}: {count:,} of {total:,}")
 
 
 class Progress:
@@ -225,7 +225,7 @@ class Progress:
                 total=100.0, file=sys.stderr, bar_format=bar_format, leave=False, dynamic_ncols=True
             )
 
-    def tell(self, env: "ExplorationEnv") -> None:
+    def show(self, env: "ExplorationEnv") -> None:
         """Tell where the episode is."""
         scorer = env.scorer
         if self._bar is not None:
@@ -233,10 +233,17 @@ class Progress:
             self._bar.update(100.0 * scorer.coverage - self._bar.n)
         elif (now := self._clock()) - self._last >= LINE_PERIOD_S:
             self._last = now
-            tell(f"explored {100.0 * scorer.coverage:.1f} %, simulated {scorer.time:.0f} s")
+            notify(f"explored {100.0 * scorer.coverage:.1f} %, simulated {scorer.time:.0f} s")
 
     def close(self) -> None:
         """Take the bar away."""
         if self._bar is not None:
             self._bar.close()
             self._bar = None
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, table, tell
+from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, notify, table
 from lidarium.scripts.process import first_start
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
     from lidarium.evaluation.suites.episodes_file import read_episodes
 
     for trial, error in campaign.failures:
-        tell(f"{trial.key}: {type(error).__name__}: {error}")
+        notify(f"{trial.key}: {type(error).__name__}: {error}")
     keys = {trial.key for trial in campaign.suite.trials()}
     episodes = [episode for episode in read_episodes(folder / EPISODES_FILE) if episode["key"] in keys]
     if len(episodes) < campaign.done:

@@ -33,7 +33,7 @@ from lidarium.scripts.common import (
     Answer,
     Command,
     announce_compiling,
-    tell,
+    notify,
 )
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             code = _ended(arguments)
         except KeyboardInterrupt:
             code = INTERRUPTED
-            tell("interrupted")
+            notify("interrupted")
         if code == INTERRUPTED:
             code = code_of(termination.is_asked)
             if is_process:
@@ -128,20 +128,20 @@ def _ended(arguments: Sequence[str] | None) -> int:
     except SystemExit as leaving:  # tyro, having printed help (0) or what is wrong with the options (2)
         return leaving.code if isinstance(leaving.code, int) else BAD_INPUT
     except (ValueError, OSError) as error:
-        tell(f"lidarium: {_message(error)}")
+        notify(f"lidarium: {_message(error)}")
         return BAD_INPUT
     except MemoryError:
-        tell(
+        notify(
             "lidarium: this needs more memory than there is; try a smaller floor, a coarser --resolution or "
             "--map-resolution"
         )
         return BAD_INPUT
     except Exception:
-        tell(
+        notify(
             "lidarium: this is a defect of lidarium, not of your input. Please report it with the command "
             "line and the lines below.\n"
         )
-        tell(traceback.format_exc())
+        notify(traceback.format_exc())
         return DEFECT
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from lidarium.scripts.common import DONE, NO, Answer, Command, table, tell
+from lidarium.scripts.common import DONE, NO, Answer, Command, notify, table
 
 if TYPE_CHECKING:
     from lidarium.envs.exploration import ExplorationEnv
@@ -83,7 +83,7 @@ def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
         save_track_picture(command.picture, record)
         files.append(str(command.picture))
     if command.video is not None:
-        tell(f"filming {record.display.times[-1]:.0f} s")
+        notify(f"filming {record.display.times[-1]:.0f} s")
         save_track_film(command.video, record, command.video_speed, floor=_floor_of_camera(command, record))
         files.append(str(command.video))
     display = record.display
@@ -117,7 +117,7 @@ def _floor_of_camera(command: Replay, record: "EpisodeRecord") -> "Floor | None"
     except ValueError as error:
         if command.floor is not None:
             raise
-        tell(f"the film is without cameras: {error}")
+        notify(f"the film is without cameras: {error}")
         return None
 
 

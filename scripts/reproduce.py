@@ -1,4 +1,4 @@
-"""`lidarium reproduce`: published results, made anew by one command."""
+"""`lidarium reproduce`: published results, made again by one command."""
 
 import os
 import time
@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, Command, counted, tell
+from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, Command, counted, notify
 
 if TYPE_CHECKING:
     from lidarium.evaluation.suites.campaign import Campaign
 
 DEFAULT_FOLDER = Path("docs/results")
-SECONDS_BETWEEN_NEWS = 10.0
+SECONDS_BETWEEN_LINES = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,17 +69,19 @@ def execute(command: Reproduce) -> Answer:
     }
     for name, campaign in campaigns.items():
         if not _ran(campaign, name, command.json):
-            return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
+            return Answer(_progress_of(campaigns), "interrupted; the same command goes on", INTERRUPTED)
     if study.work is not None and not _worked(study.work(folder, command.data, every, workers), command.json):
-        return Answer(_told(campaigns), "interrupted; the same command goes on", INTERRUPTED)
+        return Answer(_progress_of(campaigns), "interrupted; the same command goes on", INTERRUPTED)
     if study.pictures is not None:
         study.pictures(folder, out)
     page = out / f"{command.name}.md"
     write_text(page, study.page(folder, _command_line(command)))
     failures = [(trial, error) for campaign in campaigns.values() for trial, error in campaign.failures]
     for trial, error in failures:
-        tell(f"{trial.key}: {type(error).__name__}: {error}")
-    return Answer({**_told(campaigns), "page": str(page)}, f"{page} is written", DEFECT if failures else 0)
+        notify(f"{trial.key}: {type(error).__name__}: {error}")
+    return Answer(
+        {**_progress_of(campaigns), "page": str(page)}, f"{page} is written", DEFECT if failures else 0
+    )
 
 
 def _every(command: Reproduce) -> int:
@@ -108,22 +110,22 @@ def _ran(campaign: "Campaign", name: str, is_quiet: bool) -> bool:
 
 
 def _worked(work: Iterator[tuple[str, int, int]], is_quiet: bool) -> bool:
-    """Do an experiment's own work, and tell of it now and then.
+    """Do an experiment's own work, and show its progress now and then.
 
     False where the user broke it off.
     """
-    before, told_at = "", 0.0
+    before, shown_at = "", 0.0
     try:
         for what, done, total in work:
-            if not is_quiet and (what != before or time.monotonic() - told_at > SECONDS_BETWEEN_NEWS):
-                tell(f"{what}: {done} of {total}" if total > done else f"{what}: {done}")
-                before, told_at = what, time.monotonic()
+            if not is_quiet and (what != before or time.monotonic() - shown_at > SECONDS_BETWEEN_LINES):
+                notify(f"{what}: {done} of {total}" if total > done else f"{what}: {done}")
+                before, shown_at = what, time.monotonic()
     except KeyboardInterrupt:
         return False
     return True
 
 
-def _told(campaigns: dict[str, "Campaign"]) -> dict[str, Any]:
+def _progress_of(campaigns: dict[str, "Campaign"]) -> dict[str, Any]:
     parts = {
         name: {
             "episodes": campaign.total,

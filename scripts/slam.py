@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import Answer, Command, counted, table, tell
+from lidarium.scripts.common import Answer, Command, counted, notify, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -135,15 +135,15 @@ def settings_of(command: Slam) -> "SlamSettings":
 
 
 def _log(command: Slam) -> "LaserLog":
-    """Read the log and tell what was left out of it."""
+    """Read the log and print what was left out of it."""
     from lidarium.mapping.files.carmen_logs import read_carmen_log
     from lidarium.mapping.files.npz_logs import read_npz_log
 
     log = read_npz_log(command.log) if command.log.suffix == ".npz" else read_carmen_log(command.log)
     for reason, count in log.skipped.items():
-        tell(f"{command.log}: left out: {count} {reason}")
+        notify(f"{command.log}: left out: {count} {reason}")
     if log.odometry is None:
-        tell(f"{command.log}: there is no odometry; scans are matched around the last motion")
+        notify(f"{command.log}: there is no odometry; scans are matched around the last motion")
     return log.limited(command.range, command.clear_without_return)
 
 
@@ -225,7 +225,9 @@ def _relations(command: Slam, log: "LaserLog") -> "Relations":
             f"{command.relations}: {error} with --clock-shift, which is {command.clock_shift}"
         ) from error
     if len(found.begin) < len(every.begin):
-        tell(f"{command.relations}: left out: {len(every.begin) - len(found.begin)} of times beyond the log")
+        notify(
+            f"{command.relations}: left out: {len(every.begin) - len(found.begin)} of times beyond the log"
+        )
     return found
 
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from lidarium.moved import MOVED, MOVED_NAMES
+from lidarium.moved import MOVED, MOVED_NAMES, RENAMED, renamed_method
 
 
 @pytest.mark.parametrize("old", sorted(MOVED))
@@ -38,6 +38,11 @@ def test_a_module_that_has_moved_is_found_by_its_old_name(old):
         ("mapping.files", "write_whole", "mapping.files.output"),
         ("mapping.kernels", "vector_at", "mapping.kernels.views"),
         ("mapping.localization.slam", "Slam", "mapping.localization.slam.localizer"),
+        ("envs.radio.exchange", "STATION_STREAM", "envs.radio.radio_links"),
+        ("envs.simulation.kernels.motion", "distance_bound", "envs.simulation.kernels.contact"),
+        ("evaluation.truth.map_counts", "COUNTED", "evaluation.truth.team_counts"),
+        ("scripts.floors", "LASER_HEIGHT", "scripts.output.floor_files"),
+        ("scripts.run", "NAMED_GIVEN_UP", "scripts.output.run_summary"),
     ],
 )
 def test_a_name_that_has_moved_is_found_where_it_was(old, name, new):
@@ -47,11 +52,37 @@ def test_a_name_that_has_moved_is_found_where_it_was(old, name, new):
     assert found is getattr(importlib.import_module(f"lidarium.{new}"), name)
 
 
+@pytest.mark.parametrize(("module", "old"), [(module, old) for module in RENAMED for old in RENAMED[module]])
+def test_a_name_that_has_changed_is_found_by_the_old_one(module, old):
+    new = RENAMED[module][old]
+    sys.modules.pop(f"lidarium.{module}", None) if module in MOVED else None
+    with pytest.warns(DeprecationWarning, match=f"has moved to|is now called {new}"):
+        found = getattr(importlib.import_module(f"lidarium.{module}"), old)
+    places = MOVED.get(module) or MOVED_NAMES[module]
+    assert any(found is getattr(importlib.import_module(f"lidarium.{place}"), new, None) for place in places)
+
+
+def test_a_method_that_has_changed_is_found_by_the_old_name():
+    class Sender:
+        def send(self, what, *, twice=False):
+            return what * (2 if twice else 1)
+
+        tell = renamed_method("tell", "send")
+
+    with pytest.warns(DeprecationWarning, match=r"Sender\.tell is now called send"):
+        assert Sender().tell("a", twice=True) == "aa"
+
+
 def test_what_never_was_is_still_not_found():
     with pytest.raises(ModuleNotFoundError, match=r"lidarium\.nothing"):
         importlib.import_module("lidarium.nothing")
     with pytest.raises(ImportError, match="cannot import name 'nothing'"):
         exec("from lidarium.mapping.kernels import nothing")
+
+
+@pytest.mark.parametrize("module", sorted(RENAMED.keys() - MOVED.keys()))
+def test_a_module_with_changed_names_lacks_what_it_never_had(module):
+    assert not hasattr(importlib.import_module(f"lidarium.{module}"), "nothing")
 
 
 def test_the_warning_names_the_line_that_imports(tmp_path):

@@ -60,7 +60,7 @@ class Candidate:
     opening : Opening or None
         What for; None in the base algorithm, for the goal and for a frontier of the map.
     focus : (2,) float64
-        What there is to look at [m].
+        What there is to observe [m].
     is_frontier : bool
         Whether it is for a frontier of the map.
     """

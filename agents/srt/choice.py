@@ -82,7 +82,7 @@ class WayChooser:
 
         There are none where nothing is left to visit.
 
-        Nodes are looked at along the tree's ways, nearest first; with ``backtrack`` ``parent`` only the node
+        Nodes are examined along the tree's paths, nearest first; with ``backtrack`` ``parent`` only the node
         itself is.
 
         Parameters
@@ -291,6 +291,6 @@ def _left_by(targets: Sequence[Candidate], found: list[Candidate]) -> list[Candi
 
 
 def _to_focus(node: Node, legs: list[NDArray[np.float64]], focus: NDArray[np.float64]) -> list[Choice]:
-    """Return a way across the map to where a frontier is looked at."""
+    """Return a path across the map to where a frontier is observed."""
     candidate = Candidate(node.number, legs[-1], None, focus, is_frontier=True)
     return [*(Choice(place, None) for place in legs[:-1]), Choice(legs[-1], None, candidate)]

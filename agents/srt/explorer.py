@@ -13,8 +13,8 @@ from lidarium.agents.srt.choice import Choice, WayChooser, home_way
 from lidarium.agents.srt.memories.memory import Memory
 from lidarium.agents.srt.motion.blocks import Blocks, Remedy, place_aside
 from lidarium.agents.srt.motion.drive import Drive, Phase, driven, free_way, limits_of
-from lidarium.agents.srt.motion.looks import LOOK_GAIN, Looks
 from lidarium.agents.srt.motion.progress import Progress
+from lidarium.agents.srt.motion.turn_plan import TURN_GAIN, TurnPlan
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node, Tree
@@ -23,13 +23,13 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
 
 BLIND_S = 10.0
-"""A robot whose laser tells nothing for this long gives up [s]."""
+"""A robot whose laser measures nothing for this long gives up [s]."""
 
 BACKING_S, BACKING_SPEED = 1.5, 0.12
 """How long and how fast a blocked robot backs out [s, m/s]."""
 
 FINAL = ("budget", "goal_missed", "blocked")
-"""Endings after which a robot looks for nothing any more."""
+"""Endings after which a robot searches for nothing any more."""
 
 REVIEW_S = 0.5
 """Time between checks of whether a target still stands [s]."""
@@ -100,7 +100,7 @@ class Explorer:
         self._route: list[Choice] = []
         self._drive: Drive | None = None
         self._chose_at = np.zeros(2)
-        self._looks = Looks()
+        self._turns = TurnPlan()
         self._backs_until = self._blind_since = -math.inf
         self._progress = Progress()
         self._blocks = Blocks()
@@ -132,18 +132,18 @@ class Explorer:
         if self.root < 0:
             self._growth.plant(senses, memory)
             self._progress.stand(senses)
-            self._look_around(senses)
+            self._turn_around(senses)
         if senses.time_s < self._backs_until:
             return -BACKING_SPEED, 0.0
-        if not self._looks.is_over:
-            turn = self._look(senses)
+        if not self._turns.is_over:
+            turn = self._turn_on(senses)
             if turn is not None:
                 return turn
         if self._route and senses.time_s - self._reviewed_at >= REVIEW_S:
             self._review(senses, memory, targets)
         if not self._route and not (self.is_home and senses.time_s - self._reviewed_at < REVIEW_S):
             self._decide(senses, memory, targets)
-        if not self._looks.is_over:
+        if not self._turns.is_over:
             return REST
         return self._follow(senses, memory) if self._route else REST
 
@@ -155,23 +155,23 @@ class Explorer:
         self._progress.stand(senses)
         return REST
 
-    def _look_around(self, senses: Senses) -> None:
+    def _turn_around(self, senses: Senses) -> None:
         if self._settings.looks_around:
-            self._looks.plan_circle(senses, self._lidar)
+            self._turns.plan_circle(senses, self._lidar)
 
-    def _look(self, senses: Senses) -> Command | None:
-        """Turn to the next heading to look at.
+    def _turn_on(self, senses: Senses) -> Command | None:
+        """Turn to the next heading of the plan.
 
         None when all were seen, which the node then knows.
         """
-        error = self._looks.error(senses)
+        error = self._turns.error(senses)
         if abs(error) > self._settings.turning_ends and not self._progress.is_stuck(senses):
             turn_rate = self._limits.turn_rate
-            return 0.0, max(-turn_rate, min(turn_rate, LOOK_GAIN * error))
+            return 0.0, max(-turn_rate, min(turn_rate, TURN_GAIN * error))
         self._growth.widen_view(senses)
-        self._looks.end_turn()
+        self._turns.end_turn()
         self._progress.stand(senses)
-        return None if self._looks.is_over else REST
+        return None if self._turns.is_over else REST
 
     def _review(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
         """Review the target, the need for a new node, and the goal.
@@ -217,9 +217,9 @@ class Explorer:
 
     def _decide(self, senses: Senses, memory: Memory, targets: Sequence[Candidate]) -> None:
         """Choose where to go next, or to go home."""
-        if self._looks.focus is not None:
-            memory.give_up(self._looks.focus)
-            self._looks.focus = None
+        if self._turns.focus is not None:
+            memory.give_up(self._turns.focus)
+            self._turns.focus = None
         self._reviewed_at = senses.time_s
         if self.ending in FINAL or self._is_spent(senses):
             self._go_home(self.ending if self.ending in FINAL else "budget", senses, memory)
@@ -229,19 +229,19 @@ class Explorer:
         if way:
             self.ending, self.is_home, self._blocks.asides = None, False, 0
             self._set_out(way, senses)
-        elif self._may_look(node):
-            node.has_looked = True
-            self._look_around(senses)
+        elif self._may_turn(node):
+            node.has_turned = True
+            self._turn_around(senses)
         elif self._settings.backtrack == "parent" and node.parent is not None:
             self._set_out([Choice(self._tree.nodes[node.parent].place, node.parent)], senses)
         else:
             self._go_home("explored" if senses.goal is None else "unreachable", senses, memory)
 
-    def _may_look(self, node: Node) -> bool:
+    def _may_turn(self, node: Node) -> bool:
         return (
             self._settings.memory == "regions"
             and self._settings.looks_around
-            and not node.has_looked
+            and not node.has_turned
             and node.number != self.root
         )
 
@@ -307,7 +307,7 @@ class Explorer:
                 self._source.intent.settle()
                 if leg.candidate.is_frontier and memory.is_frontier(leg.candidate.focus):
                     # What stays unseen then is given up.
-                    self._looks.plan_frontier(leg.candidate.focus, senses)
+                    self._turns.plan_frontier(leg.candidate.focus, senses)
 
     def _return_to(self, number: int, senses: Senses, memory: Memory) -> None:
         """Be at a node again.

@@ -3,7 +3,7 @@
 They are arcs of free rays, gaps beside edges that hide something, and the border of a blind sector.
 
 An opening is kept as points along it, each with a point just beyond. It stays open as long as enough of what
-lies beyond was not seen, whoever looked; so openings are found once, when their node is made, and are only
+lies beyond was not seen by anybody; so openings are found once, when their node is made, and are only
 looked up afterwards.
 """
 
@@ -23,7 +23,7 @@ BEYOND = 0.1
 """How far beyond the border of what was seen an opening asks [m]."""
 
 PAST_EDGE = 0.5
-"""A robot that looks behind an edge goes at most this far beyond it [m]."""
+"""A robot that explores behind an edge goes at most this far beyond it [m]."""
 
 WIDER, WIDER_COUNT = math.radians(3.0), 20
 """Angle between directions past an edge [rad], and their number.
@@ -56,7 +56,7 @@ class Opening:
     is_closed : bool
         Whether it was seen through.
     is_tried : bool
-        Whether a robot was where it looks through it, or could not get there.
+        Whether a robot was where it sees through it, or could not get there.
     """
 
     points: NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lidarium.agents.policy import Action, Policy, Stop, Team
 from lidarium.agents.srt.explorer import Explorer
-from lidarium.agents.srt.senses import NEWS_S, memory_of, senses_of
+from lidarium.agents.srt.senses import CONTACT_AGE_S, memory_of, senses_of
 from lidarium.agents.srt.settings import make_srt_settings
 from lidarium.agents.srt.tree import Tree
 from lidarium.envs.exploration import Observation
@@ -84,14 +84,14 @@ class SensorBasedRandomTree(Policy):
         return actions
 
     def _contacts(self, agent: str) -> list[str]:
-        """Return the teammates with whom a robot has a frame and fresh news in common."""
+        """Return the teammates that share a frame with a robot and were heard recently."""
         belief = self._team.belief(agent)
         if belief.shared_map is None:
             return []
         return [
             name
             for name, teammate in belief.teammates.items()
-            if teammate.age_s <= NEWS_S and name in self._explorers
+            if teammate.age_s <= CONTACT_AGE_S and name in self._explorers
         ]
 
 

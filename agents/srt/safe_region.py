@@ -49,7 +49,7 @@ def no_return(geometry: ScanGeometry) -> float:
 
 
 def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -> NDArray[np.float64]:
-    """Return what a scan tells of each direction.
+    """Return what a scan shows in each direction.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def view_of(scan: NDArray[np.float32], geometry: ScanGeometry, heading: float) -
     Returns
     -------
     (directions,) float64
-        Range of the nearest beam [m], inf where nothing was met, nan where no valid beam looks.
+        Range of the nearest beam [m], inf where nothing was met, nan where there is no valid beam.
     """
     ranges = np.asarray(scan, np.float64)
     with np.errstate(invalid="ignore"):

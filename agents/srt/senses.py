@@ -6,6 +6,7 @@ They are pose, scan and goal in the frame of the team's graph, and what it remem
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,8 @@ from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
-NEWS_S = 1.0
-"""Robots whose news are at most this old are in contact [s]."""
+CONTACT_AGE_S = 1.0
+"""Robots whose messages are at most this old are in contact [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,13 +35,13 @@ class Senses:
     pose : (3,) float64
         Where it takes itself to be, in the frame of the map's first cell [m, rad].
     scan : (beams,) float32
-        What the laser tells [m].
+        What the laser measures [m].
     is_pressed : bool
         Whether the bumper is pressed.
     goal : (2,) float64 or None
         Where it has to go [m].
     teammates : list of (2,) float64
-        Where teammates are, of those whom it has news of [m].
+        Where teammates are, of those that it heard from recently [m].
     """
 
     time_s: float
@@ -51,7 +52,7 @@ class Senses:
     teammates: list[NDArray[np.float64]]
 
     def is_blind(self, geometry: ScanGeometry) -> bool:
-        """Whether no beam tells anything."""
+        """Whether no beam measures anything."""
         with np.errstate(invalid="ignore"):
             return not bool((self.scan >= geometry.range_min).any())
 
@@ -65,7 +66,9 @@ def senses_of(time_s: float, observation: Observation, belief: Belief) -> Senses
     origin = np.array(belief.map_origin)
     pose = np.asarray(belief.pose, np.float64)
     teammates = [
-        teammate.pose[:2] - origin for teammate in belief.teammates.values() if teammate.age_s <= NEWS_S
+        teammate.pose[:2] - origin
+        for teammate in belief.teammates.values()
+        if teammate.age_s <= CONTACT_AGE_S
     ]
     return Senses(
         time_s,
@@ -86,3 +89,10 @@ def memory_of(belief: Belief, known: Iterable[Node], settings: SrtSettings) -> M
         return RegionMemory(known)
     shared = belief.shared_map
     return MapMemory(belief.map if shared is None else shared, belief.radius)
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

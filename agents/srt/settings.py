@@ -39,7 +39,7 @@ class SrtSettings:
         Where to go from a node without openings: ``open`` (the cheapest node that has one, along the tree and
         its bridges) or ``parent``.
     memory : str
-        What tells space that was seen: ``map`` (the robot's map) or ``regions`` (the nodes' own scans).
+        What shows which space was seen: ``map`` (the robot's map) or ``regions`` (the nodes' own scans).
     drive : str
         ``turn_advance`` (turn, advance, done) or ``controls`` (the best of a list of controls).
     places_nodes_at_targets : bool

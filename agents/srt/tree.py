@@ -40,7 +40,7 @@ class Node:
         The node from which the robot came; None for a robot's first one.
     neighbours : dict of int to float
         Nodes to which a straight way leads, with its length [m]: parent, children and bridges.
-    has_looked : bool
+    has_turned : bool
         Whether a robot turned there to see what lay behind it.
     view : (directions,) float64
         What was seen, as ``view_of`` gives it.
@@ -55,7 +55,7 @@ class Node:
     parent: int | None
     view: NDArray[np.float64]
     neighbours: dict[int, float] = field(default_factory=dict)
-    has_looked: bool = False
+    has_turned: bool = False
 
     @property
     def place(self) -> NDArray[np.float64]:

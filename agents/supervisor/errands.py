@@ -86,7 +86,7 @@ class Errands:
         if (
             state in (DriveState.ARRIVED, DriveState.NO_PATH)
             or is_stuck
-            or not _is_frontier(belief, errand.command.looks_at)
+            or not _is_frontier(belief, errand.command.observes)
         ):
             del self._errands[agent]
 

@@ -15,7 +15,7 @@ from lidarium.agents.supervisor.tree import OTHER, RICH, Case, Leaf, RobotInputs
 from lidarium.envs.radio.messages import Target
 
 LEAST_WAY_M = 1.0
-"""What a metre costs a battery is told after a way of this length [m]."""
+"""What a metre costs a battery is estimated after a path of this length [m]."""
 
 
 @dataclass(slots=True)
@@ -176,7 +176,7 @@ class Judge:
             return False
         metre = (full - report.energy_left_j) / report.travelled_m
         way = survey.way_home_m(agent, report.start)
-        # Where the merged map knows no way, the way that it came is one.
+        # Where the merged map knows no path, the one that it came is one.
         return report.energy_left_j < self._settings.battery_margin * metre * min(way, report.travelled_m)
 
     def _decide(self, case: Case) -> Judged:

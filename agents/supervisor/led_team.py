@@ -10,6 +10,7 @@ from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.radio.messages import DriveState, OperatingState, Order
 from lidarium.envs.station.reports import Report
 from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.moved import renamed_method
 
 
 class LedTeam:
@@ -51,9 +52,11 @@ class LedTeam:
         """Return the last order that it took."""
         return self._team.last_order(agent)
 
-    def tell(self, agent: str, others: FusedMap | None) -> bool:
+    def send_map(self, agent: str, others: FusedMap | None) -> bool:
         """Send it what others know."""
-        return self._team.tell(agent, others)
+        return self._team.send_map(agent, others)
+
+    tell = renamed_method("tell", "send_map")
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
         """Let it forget walls where another robot drove."""

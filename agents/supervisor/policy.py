@@ -30,8 +30,8 @@ class Supervised(Policy):
 
     Robots explore by that policy, the station merges their maps, and the tree redirects and stops them.
 
-    Robots that are joined are told what the others know, so the policy explores on the merged map where it
-    looks at the shared one.
+    Robots that are joined are sent what the others know, so the policy explores on the merged map where it
+    uses the shared one.
 
     Parameters
     ----------
@@ -49,8 +49,8 @@ class Supervised(Policy):
     decisions, events, joins : list
         What was decided, what happened at the station, and how the robots' frames lie as it found.
     tick_seconds, merge_seconds : list of float
-        Wall time of each look at the tree, its merge and what the robots are told included, and of each merge
-        between looks [s].
+        Wall time of each decision by the tree, its merge and what the robots are sent included, and of each
+        merge between decisions [s].
 
     Raises
     ------
@@ -142,7 +142,7 @@ class Supervised(Policy):
         self._errands = Errands(team)
         self._given_up: dict[str, NDArray[np.float64]] = {}
         self._informed: set[str] = set()
-        self._look_due, self._merge_due = settings.period_s, 0.0
+        self._decision_due, self._merge_due = settings.period_s, 0.0
         self._exploring: set[str] = set()
         self.tick_seconds, self.merge_seconds = [], []
         self.policy.reset(LedTeam(team, self._exploring), seed)
@@ -168,7 +168,7 @@ class Supervised(Policy):
             if agent in stops:
                 actions[agent] = stops[agent]
             elif self._errands.is_away(agent):
-                # Who is on his way needs no action: he goes on as he was told.
+                # A robot that is driving needs no action: it goes on with its last order.
                 if (action := self._errands.action(agent)) is not None:
                     actions[agent] = action
             elif agent in standing:
@@ -181,33 +181,33 @@ class Supervised(Policy):
         return actions
 
     def _supervise(self) -> dict[str, Action]:
-        """Take in reports, merge and look at the tree where it is time.
+        """Take in reports, merge and decide by the tree where it is time.
 
         Return the robots that stop.
         """
         now = self._team.time_s
-        is_look, is_merge = now >= self._look_due, now >= self._merge_due
-        if not (is_look or is_merge):
+        is_decision, is_merge = now >= self._decision_due, now >= self._merge_due
+        if not (is_decision or is_merge):
             return {}
         began = time.perf_counter()
-        stops = self._tick(now, is_look)
-        (self.tick_seconds if is_look else self.merge_seconds).append(time.perf_counter() - began)
+        stops = self._tick(now, is_decision)
+        (self.tick_seconds if is_decision else self.merge_seconds).append(time.perf_counter() - began)
         return stops
 
-    def _tick(self, now: float, is_look: bool) -> dict[str, Action]:
+    def _tick(self, now: float, is_decision: bool) -> dict[str, Action]:
         """Do what `_supervise` does when it is time."""
         settings, station = self.settings, self._supervisor.station
         self._collect(now)
         self._merge_due = _next(now, settings.merge_period_s)
-        # A station that looks as often as it merges has no other time to search.
-        station.merge(now, may_search=not is_look or settings.period_s <= settings.merge_period_s)
+        # A station that decides as often as it merges has no other time to search.
+        station.merge(now, may_search=not is_decision or settings.period_s <= settings.merge_period_s)
         if self._informs:
             self._inform()
-        if not is_look:
+        if not is_decision:
             return {}
-        self._look_due = _next(now, settings.period_s)
+        self._decision_due = _next(now, settings.period_s)
         stops: dict[str, Action] = {}
-        for command in self._supervisor.look(now, self._given_up):
+        for command in self._supervisor.decide(now, self._given_up):
             self._obey(command, stops)
         return stops
 
@@ -244,7 +244,7 @@ class Supervised(Policy):
                 others = [teammate for teammate in group if teammate != agent]
                 if not others and agent not in self._informed:
                     continue
-                if self._team.tell(agent, station.fused(others, agent) if others else None):
+                if self._team.send_map(agent, station.fused(others, agent) if others else None):
                     (self._informed.add if others else self._informed.discard)(agent)
 
     def _obey(self, command: Command, stops: dict[str, Action]) -> None:

@@ -17,12 +17,12 @@ class SupervisorSettings:
     Attributes
     ----------
     period_s : float
-        Simulated time between two looks at the tree [s].
+        Simulated time between two decisions by the tree [s].
     merge_period_s : float
         Simulated time between two merges of the maps [s].
     searches_per_merge : int
-        For how many pairs of maps a merge searches at most; the others wait for their turn. With a look there
-        is no search: it has work of its own.
+        For how many pairs of maps a merge searches at most; the others wait for their turn. With a decision
+        there is no search: it has work of its own.
     merge_resolution_m : float
         Maps are compared in cells of this side, or of theirs where that is more [m].
     confirmation_growth_m2 : float
@@ -47,7 +47,7 @@ class SupervisorSettings:
         What a robot at its goal sees, and how far around the map there may be more of it [m].
     assignment : str
         Who is given goals: ``pairs`` those robots alone that the rules redirect, one after the other;
-        ``hungarian`` all robots of a group at each look, by the least sum of costs; ``utility`` likewise,
+        ``hungarian`` all robots of a group at each decision, by the least sum of costs; ``utility`` likewise,
         best pair of robot and goal first.
     is_stop_final : bool
         Whether a robot that the rules stop while its teammates work has ended; otherwise it stands by and

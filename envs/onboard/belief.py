@@ -1,4 +1,4 @@
-"""What a policy may look at of what one robot knows."""
+"""What a policy may read of what one robot knows."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +36,12 @@ class Belief:
 
     @property
     def velocity(self) -> NDArray[np.float64]:
-        """Speed and turn rate as odometry tells [m/s, rad/s], shape (2,)."""
+        """Speed and turn rate as odometry measures them [m/s, rad/s], shape (2,)."""
         return np.array(self._perception.simulation.measured[self._row])
 
     @property
     def spread(self) -> NDArray[np.float64]:
-        """Standard deviation of the pose as the localizer tells [m, m, rad], shape (3,).
+        """Estimated standard deviation of the pose [m, m, rad], shape (3,).
 
         Zero where it claims to know.
         """
@@ -79,7 +79,7 @@ class Belief:
     def shared_map(self) -> NavigationMap | None:
         """The team's map, where it reached this robot.
 
-        With unknown starts None until the robot is told what others know.
+        With unknown starts None until the robot is sent what others know.
         """
         return self._perception.shared_map(self._row)
 

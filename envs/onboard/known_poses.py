@@ -30,7 +30,7 @@ class KnownPoses:
     knows_teammates : bool
         Whether all teammates' poses are known at once.
     localizers : list of Localizer or None
-        What tells each robot's pose, by row; None where kernels do.
+        What estimates each robot's pose, by row; None where kernels do.
     goals : list of tuple or None
         The goal of each episode in the frame of the floor (x, y) [m]; None where it has none.
     """
@@ -44,7 +44,7 @@ class KnownPoses:
     ) -> None:
         self._settings, self._offsets, self._exchanges = settings, offsets, exchanges
         self._world, self._beliefs, self._robots = simulation.world, simulation.beliefs, settings.robots
-        # Without known starts no robot can tell where another is, whatever it hears.
+        # Without known starts no robot can know where another is, whatever it hears.
         self._hears = settings.known_starts and settings.robots > 1 and not settings.radio.is_ideal
         self.knows_teammates = settings.known_starts and settings.radio.is_ideal
         self.localizers: list[Localizer | None] = [None] * (settings.robots * simulation.episodes)

@@ -1,6 +1,6 @@
 """Meters on board: distance by wheels, and battery use, of an episode's robots.
 
-Nothing is done in a step where wheels tell the truth and batteries have no limit.
+Nothing is done in a step where wheels measure exactly and batteries have no limit.
 """
 
 import math
@@ -33,14 +33,17 @@ class Meters:
 
     def __init__(self, world: World, settings: ExplorationSettings) -> None:
         self._world, self._battery, self._time_step = world, settings.battery, settings.time_step
-        self._reckons_way, self._reckons_energy = not settings.odometry.is_ideal, settings.battery.is_limited
-        self.is_active = self._reckons_way or self._reckons_energy
-        self.used_j, self._way = np.zeros(settings.robots), np.zeros(settings.robots)
+        self._measures_path, self._measures_energy = (
+            not settings.odometry.is_ideal,
+            settings.battery.is_limited,
+        )
+        self.is_active = self._measures_path or self._measures_energy
+        self.used_j, self._path = np.zeros(settings.robots), np.zeros(settings.robots)
         self.start()
 
     def start(self) -> None:
         """Begin an episode, after its robots were placed, with full batteries."""
-        self.used_j[:], self._way[:], self._taken_in = 0.0, 0.0, 0
+        self.used_j[:], self._path[:], self._taken_in = 0.0, 0.0, 0
         self._remember()
 
     def _remember(self) -> None:
@@ -52,23 +55,25 @@ class Meters:
         if not self.is_active or step == self._taken_in:
             return
         self._taken_in = step
-        if self._reckons_way:
-            self._way += np.abs(self._world.sensors["velocity"][:, 0]) * self._time_step
-        if self._reckons_energy:
+        if self._measures_path:
+            self._path += np.abs(self._world.sensors["velocity"][:, 0]) * self._time_step
+        if self._measures_energy:
             self._use_energy()
 
     def _use_energy(self) -> None:
         world, battery = self._world, self._battery
         turning = np.abs((world.poses[:, 2] - self._headings + math.pi) % (2.0 * math.pi) - math.pi)
-        way = world.travelled - self._travelled
-        used = battery.idle_w * self._time_step + battery.per_metre_j * way + battery.per_radian_j * turning
+        driven = world.travelled - self._travelled
+        used = (
+            battery.idle_w * self._time_step + battery.per_metre_j * driven + battery.per_radian_j * turning
+        )
         # Who has ended is switched off.
         self.used_j += np.where(world.flags & ENDED, 0.0, used)
         self._remember()
 
     def travelled_m(self, row: int) -> float:
-        """Return how far a robot has come as its wheels tell [m]."""
-        return float(self._way[row] if self._reckons_way else self._world.travelled[row])
+        """Return how far a robot has come as its wheels measure [m]."""
+        return float(self._path[row] if self._measures_path else self._world.travelled[row])
 
     def left_j(self, row: int) -> float | None:
         """Return what is left in a robot's battery [J], None where it has no limit."""

@@ -27,7 +27,7 @@ from lidarium.mapping.planning.frontiers import FrontierMap
 from lidarium.mapping.planning.search.search_space import SearchSpace
 
 CLEARANCE_LIMIT = 0.6
-"""Clearance is told exactly up to this [m]."""
+"""Clearance is known exactly up to this [m]."""
 
 
 LOG_ODDS, ROWS, COLUMNS, CLOSENESS, FLAGS, TILES, ROW_LOW, ROW_HIGH, COLUMN_LOW, COLUMN_HIGH = range(10)

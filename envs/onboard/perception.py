@@ -3,7 +3,7 @@
 This includes what reached each of the others.
 
 With known starts and the ideal radio all robots of a team share one map, the sum of their log-odds. A robot
-that does not know its start can be told what others know, laid over its own map. All maps come with what
+that does not know its start can be sent what others know, overlaid on its own map. All maps come with what
 planning needs (clearance and frontiers), brought up to date only where the map has changed.
 """
 
@@ -180,10 +180,10 @@ class Perception:
     def shared_map(self, row: int = 0) -> NavigationMap | None:
         """Return the team's map as it reached a robot, up to date.
 
-        A lone robot's is its own, with unknown starts what it was told.
+        A lone robot's is its own, with unknown starts what it was sent.
         """
         if not self.settings.known_starts:
-            return self._heard_map(row) if self.received.was_told(row) else None
+            return self._heard_map(row) if self.received.has_merged_map(row) else None
         if self.hears:
             return self._heard_map(row)
         if not self._shares:

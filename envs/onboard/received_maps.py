@@ -19,7 +19,7 @@ from lidarium.mapping.planning.frontiers import IGNORED
 class ReceivedMaps:
     """What the robots of all episodes know together with what reached them from others.
 
-    That is what came by radio where the starts are known, else what a robot was told.
+    That is what came by radio where the starts are known, else what the station sent to a robot.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class ReceivedMaps:
         self.adds_up = self.hears
         self.records = np.zeros((rows, RECORD), np.int64)
         self._sums: list[NavigationMap | None] = [None] * rows
-        self._told: list[NDArray[np.int8] | None] = [None] * rows
+        self._others: list[NDArray[np.int8] | None] = [None] * rows
 
     def start(self, rows: range) -> None:
         """Begin the episode of some rows: their robots have received nothing."""
@@ -65,17 +65,17 @@ class ReceivedMaps:
             if navigation is not None:
                 # Whoever still holds a map of the last episode may go on reading it.
                 navigation.keep_record_in(np.zeros(RECORD, np.int64))
-            self._sums[row], self._told[row] = None, None
+            self._sums[row], self._others[row] = None, None
             self.records[row] = 0
-        self.adds_up = self.hears or any(told is not None for told in self._told)
+        self.adds_up = self.hears or any(others is not None for others in self._others)
 
     def has_sum(self, row: int) -> bool:
         """Whether there is a sum for a robot yet."""
         return self._sums[row] is not None
 
-    def was_told(self, row: int) -> bool:
-        """Whether a robot was told what others know."""
-        return self._told[row] is not None
+    def has_merged_map(self, row: int) -> bool:
+        """Whether a robot has received what others know."""
+        return self._others[row] is not None
 
     def sum_of(self, row: int, own: NavigationMap | None) -> NavigationMap:
         """Return the sum of a robot's own map and those received.
@@ -96,16 +96,16 @@ class ReceivedMaps:
         return navigation
 
     def sum_window(self, row: int, window: NDArray[np.int64]) -> None:
-        """Bring the sum of what reached a robot up to date in a window (4,)."""
+        """Update the sum of what reached a robot in a window (4,)."""
         episode, robot = divmod(row, self._robots)
-        told = self._told[row]
+        received = self._others[row]
         if self.hears:
             copies = self._exchanges[episode].copies[robot]
             held = [
                 copy.ctypes.data for teammate, copy in enumerate(copies) if teammate != robot and copy.size
             ]
         else:
-            held = [] if told is None else [told.ctypes.data]
+            held = [] if received is None else [received.ctypes.data]
         beliefs = np.array(
             [
                 (address, *self._beliefs.log_odds[row].shape)
@@ -116,8 +116,8 @@ class ReceivedMaps:
         limit = limit_of(CLEARANCE_LIMIT, self._settings.occupancy.resolution)
         sum_maps(self.records[row], beliefs, limit, stamp_of(limit), window)
 
-    def tell(self, row: int, others: FusedMap | None) -> None:
-        """Let a robot that does not know its start know what others know.
+    def receive(self, row: int, others: FusedMap | None) -> None:
+        """Let a robot that does not know its start receive what others know.
 
         It plans and explores on that as on its own map.
 
@@ -126,8 +126,8 @@ class ReceivedMaps:
         row : int
             Which robot.
         others : FusedMap or None
-            What the others know, in the robot's map frame; it takes the place of what was told before. None
-            takes that back.
+            What the others know, in the robot's map frame; it takes the place of what was received before.
+            None takes that back.
 
         Raises
         ------
@@ -139,21 +139,21 @@ class ReceivedMaps:
         if self._settings.known_starts:
             raise ValueError(
                 "robots that know their starts have the team's map; want robots with unknown starts to be "
-                "told of others"
+                "sent what others know"
             )
         if others is not None and others.resolution != resolution:
             raise ValueError(
-                f"the map that is told has cells of {others.resolution} m; want {resolution} m, as the "
+                f"the map that is sent has cells of {others.resolution} m; want {resolution} m, as the "
                 "robots' own maps"
             )
-        if others is None and self._told[row] is None:
+        if others is None and self._others[row] is None:
             return
-        told = np.zeros(self._beliefs.log_odds[row].shape, np.int8)
+        received = np.zeros(self._beliefs.log_odds[row].shape, np.int8)
         if others is not None:
-            overlay(told, others, self._poses.origin_in_frame(row))
-        before = self._told[row]
-        is_other = told != 0 if before is None else told != before
-        self._told[row], self.adds_up = told, True
+            overlay(received, others, self._poses.origin_in_frame(row))
+        before = self._others[row]
+        is_other = received != 0 if before is None else received != before
+        self._others[row], self.adds_up = received, True
         rows, columns = np.flatnonzero(is_other.any(axis=1)), np.flatnonzero(is_other.any(axis=0))
         if self._sums[row] is not None and len(rows):
             self.sum_window(row, np.array([rows[0], rows[-1] + 1, columns[0], columns[-1] + 1]))

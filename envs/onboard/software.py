@@ -99,7 +99,7 @@ class Software:
             )
             correction = localizer.take_correction()
             if correction is not None:
-                simulation.render_anew(row, correction.poses, correction.ranges)
+                simulation.render_again(row, correction.poses, correction.ranges)
                 self._perception.trails.forget_again(row)
 
     def _exchange(self, episode: int) -> None:

@@ -49,7 +49,7 @@ def _sum_maps(beliefs: Array, window: Window, total: Array) -> Array:
             changed, count = list_cells(changed, count, word, row, window[2])
             continue
         for block in range(window[2], window[3], BLOCK):
-            # The last block may overlap the one before, whose cells it sums anew.
+            # The last block may overlap the one before, whose cells it sums again.
             column = min(block, window[3] - BLOCK)
             word = _sum_block(beliefs, row * columns + column, total, nothing)
             if word != np.uint64(0):
@@ -79,7 +79,7 @@ def _sum_block(beliefs: Array, place: int, total: Array, nothing: Array) -> np.u
 
 @kernel(inline=True)
 def _sum_cell(beliefs: Array, place: int, total: Array) -> bool:
-    """Sum a cell of the maps; tell whether it became occupied or ceased to be."""
+    """Sum a cell of the maps; return whether it became occupied or ceased to be."""
     value = int(int8_at(beliefs[0, MAP] + place, 1)[0])
     for k in range(1, beliefs.shape[0]):
         value = min(max(value + int(int8_at(beliefs[k, MAP] + place, 1)[0]), -127), 127)
@@ -127,7 +127,7 @@ def sum_maps(record: Array, beliefs: Array, limit: int, stamp: Array, window: Ar
     The maps have its shape and changed in this window.
     """
     inside = is_inside(record, window)
-    # Nobody else writes a sum: where it changed is known without a look at its clearance, which takes twice
+    # Nobody else writes a sum: where it changed is known without reading its clearance, which takes twice
     # the memory of a map.
     take_in(record, limit, stamp, inside, _sum_maps(beliefs, inside, log_odds_of(record)))
 

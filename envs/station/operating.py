@@ -3,9 +3,9 @@
 They hold whether each robot takes part in the work, its last order, and what came of it.
 
 A robot that operates takes any order. One that is paused stands still and takes only the orders to resume and
-to stop; one that was stopped or has failed takes none. A robot pauses when it is told to, and, where
+to stop; one that was stopped or has failed takes none. A robot pauses when it is ordered to, and, where
 ``pauses_when_blocked`` is set, by itself when its bumper touches anything or its way is blocked. What it
-touched it cannot see, else it had not driven there: told to resume after that, it first backs out a little
+touched it cannot see, else it had not driven there: ordered to resume after that, it first backs out a little
 the way it came, and then goes on with the target that it had.
 """
 
@@ -121,7 +121,7 @@ class Operating:
         self.start()
 
     def start(self) -> None:
-        """Begin an episode: all operate, and nobody was told anything."""
+        """Begin an episode: all operate, and nobody has got an order."""
         robots = self._settings.robots
         self.states = [OperatingState.OPERATING] * robots
         self.orders: list[Order | None] = [None] * robots
@@ -273,7 +273,7 @@ class Operating:
         self._note(row, "state", state.value, reason)
 
     def _note(self, row: int, kind: str, what: str, reason: str = "", target: Target | None = None) -> None:
-        """Add an event; an order that comes to the same again and again is told once."""
+        """Add an event; an order that comes to the same again and again is listed once."""
         event = OperatingEvent(
             self._step * self._settings.time_step, self._settings.agents[row], kind, what, reason, target
         )

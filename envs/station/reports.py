@@ -25,7 +25,7 @@ from lidarium.mapping.merging.growing_maps import GrowingMap
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Report(Status):
-    """What a robot tells the station: of itself (`Status`), and its map.
+    """What a robot reports to the station: of itself (`Status`), and its map.
 
     It is of the robot's own belief throughout.
 
@@ -95,7 +95,7 @@ class Station:
         # the garbage is collected.
         self.operating = Operating(perception, perception.settings, partial(_order_delay, perception))
         if self._exchange is not None:
-            self._exchange.tells = partial(_call, WeakMethod(self._status))
+            self._exchange.report_of = partial(_call, WeakMethod(self._status))
         self.start()
 
     @property
@@ -127,8 +127,8 @@ class Station:
             )
         return self._received[row]
 
-    def tell(self, row: int, others: FusedMap | None) -> bool:
-        """Tell a robot what others know (`ReceivedMaps.tell`), if the links to it stand.
+    def send_map(self, row: int, others: FusedMap | None) -> bool:
+        """Send a robot what others know, if the links to it stand.
 
         Return whether they do.
 
@@ -136,7 +136,7 @@ class Station:
         """
         if _order_delay(self._perception, row) is None:
             return False
-        self._perception.received.tell(row, others)
+        self._perception.received.receive(row, others)
         return True
 
     def forget_walls(self, row: int, trail: NDArray[np.float64]) -> bool:
@@ -155,7 +155,7 @@ class Station:
         return Report(**of_itself, time_s=time_s, map=known, start=self._starts[row], frame=self._frame(row))
 
     def _frame(self, row: int) -> Transform | None:
-        """Return how a robot's map frame lies in the floor's, where it knows or is told."""
+        """Return how a robot's map frame lies in the floor's, where it knows that."""
         if self._perception.settings.known_starts:
             return Transform(*self._perception.poses.offset(row).tolist())
         return (
@@ -165,7 +165,7 @@ class Station:
         )
 
     def _status(self, row: int) -> Status:
-        """Return what a robot tells of itself now."""
+        """Return what a robot reports of itself now."""
         self._meters.advance()
         drive, target, path_left_m = self._drive(row)
         state, meters = self.operating.states[row], self._meters

@@ -5,7 +5,7 @@ They exchange maps, merge them, and remember what they received.
 
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ class Joined(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class News:
+class TeammateMap:
     """What a robot has last got of another.
 
     Attributes
@@ -54,7 +54,7 @@ class News:
     pose : Transform
         Where it believed to be in that map's frame.
     own_from_other : Transform
-        Its map frame in that of the robot that got the news.
+        Its map frame in that of the robot that received it.
     time_s : float
         When [s].
     """
@@ -78,7 +78,7 @@ class TeamMapping:
 
     Attributes
     ----------
-    news : dict of (str, str) to News
+    received : dict of (str, str) to TeammateMap
         By a robot and another: what the one has last got of the other, while it knew how their frames lie.
     fused : dict of str to FusedMap
         Each robot's own map and all that it has got, in its own frame.
@@ -86,7 +86,7 @@ class TeamMapping:
 
     perception: Perception
     settings: MergeSettings = field(default_factory=MergeSettings)
-    news: dict[tuple[str, str], News] = field(default_factory=dict)
+    received: dict[tuple[str, str], TeammateMap] = field(default_factory=dict)
     fused: dict[str, FusedMap] = field(default_factory=dict)
     _merger: IncrementalMerger = field(init=False)
 
@@ -95,7 +95,7 @@ class TeamMapping:
 
     def start(self) -> None:
         """Forget the last episode."""
-        self.news, self.fused = {}, {}
+        self.received, self.fused = {}, {}
         self._merger = IncrementalMerger(self.perception.settings.occupancy.resolution, self.settings)
 
     def exchange(
@@ -136,8 +136,8 @@ class TeamMapping:
         else:
             joined = {(a, b): Joined(frames[a, b], places[b]) for a, b in pairs}
         for (a, b), (a_from_b, *_) in joined.items():
-            self.news[a, b] = News(maps[b], poses[b], a_from_b, time_s)
-            self.news[b, a] = News(maps[a], poses[a], a_from_b.inverse(), time_s)
+            self.received[a, b] = TeammateMap(maps[b], poses[b], a_from_b, time_s)
+            self.received[b, a] = TeammateMap(maps[a], poses[a], a_from_b.inverse(), time_s)
         self.fused = {agent: self._fused(agent, maps[agent]) for agent in agents}
         return joined
 
@@ -165,9 +165,12 @@ class TeamMapping:
         return joined
 
     def _fused(self, agent: str, own: GrowingMap) -> FusedMap:
-        got = [news for (to, _), news in self.news.items() if to == agent]
-        levels = [own.levels, *(news.map.levels for news in got)]
-        places = [placed(own.origin), *(news.own_from_other @ placed(news.map.origin) for news in got)]
+        got = [received for (to, _), received in self.received.items() if to == agent]
+        levels = [own.levels, *(received.map.levels for received in got)]
+        places = [
+            placed(own.origin),
+            *(received.own_from_other @ placed(received.map.origin) for received in got),
+        ]
         return fuse(levels, places, self.perception.settings.occupancy.resolution)
 
 
@@ -188,3 +191,10 @@ def crop_around(fused: FusedMap, x: float, y: float, cells: int) -> NDArray[np.u
     ]
     crop[top - row : top - row + part.shape[0], left - column : left - column + part.shape[1]] = part
     return crop
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -33,7 +33,7 @@ They do not know where the others are, so more may contradict than in maps of ro
 """
 
 OLDEST_S = 3600.0
-"""Bound of the age of news in observations [s]."""
+"""Bound of the age of what was received, in observations [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class MergingSettings:
     period_s : float
         Simulated time between two exchanges [s].
     known_starts : bool
-        Whether the robots are told how their frames lie, for comparison; nothing is searched for then.
+        Whether the robots know how their frames lie, for comparison; nothing is searched for then.
     merge : MergeSettings
         How maps are merged; by default with `TEAM_VALIDATION`.
     """
@@ -93,9 +93,9 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
 
     The observation has, beside that of the environment below, ``team_map`` uint8 (1, M, M) like ``map``, as
     of the last exchange, and ``teammates`` float32 (robots - 1, 5), one row for each of the others in their
-    order: x, y [m], theta [rad] in the robot's own map frame, the age of that news [s] and whether there is
-    any; zeros where there is none. ``infos[agent]["merges"]`` lists with whom it was joined in this step,
-    ``infos[agent]["truth"]["merges"]`` the `MergeEvent` of each.
+    order: x, y [m], theta [rad] in the robot's own map frame, the age of what was received [s] and whether
+    there is any; zeros where there is none. ``infos[agent]["merges"]`` lists with whom it was joined in this
+    step, ``infos[agent]["truth"]["merges"]`` the `MergeEvent` of each.
 
     Parameters
     ----------
@@ -257,10 +257,10 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         others = [other for other in self.possible_agents if other != agent]
         table = np.zeros((len(others), 5), np.float32)
         for row, other in enumerate(others):
-            news = self.team.news.get((agent, other))
-            if news is not None:
-                pose = news.own_from_other @ news.pose
-                age = min(time_s - news.time_s, OLDEST_S)
+            received = self.team.received.get((agent, other))
+            if received is not None:
+                pose = received.own_from_other @ received.pose
+                age = min(time_s - received.time_s, OLDEST_S)
                 table[row] = (
                     np.clip(pose.x, -FARTHEST, FARTHEST),
                     np.clip(pose.y, -FARTHEST, FARTHEST),

@@ -42,10 +42,10 @@ def operating_events(env: ExplorationEnv) -> list[dict[str, Any]]:
 
 
 def _operating_event(env: ExplorationEnv, event: OperatingEvent) -> dict[str, Any]:
-    told = {"time_s": round(event.time_s, 6), "kind": event.kind, "agent": event.agent}
-    told["state" if event.kind == "state" else "order"] = event.what
+    row = {"time_s": round(event.time_s, 6), "kind": event.kind, "agent": event.agent}
+    row["state" if event.kind == "state" else "order"] = event.what
     place = {} if event.target is None else place_of(env, event.agent, (event.target.x, event.target.y))
-    return {**told, **place, "reason": event.reason}
+    return {**row, **place, "reason": event.reason}
 
 
 def merge_event(env: ExplorationEnv, merge: MergeEvent) -> dict[str, Any]:

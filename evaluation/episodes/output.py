@@ -49,7 +49,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def _bring_to_disk(path: Path) -> None:
-    """Wait until a file is on the disk: some disks tell only then that they are full."""
+    """Wait until a file is on the disk: some report only then that they are full."""
     handle = os.open(path, os.O_RDWR)
     try:
         os.fsync(handle)

@@ -23,6 +23,7 @@ from lidarium.evaluation.episodes.events import merge_event
 from lidarium.evaluation.episodes.interrupts import PatientInterrupt
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.moved import renamed_method
 
 Progress = Callable[[ExplorationEnv], None]
 
@@ -101,15 +102,17 @@ class RunningTeam:
         """Return the last order that an agent took, None where it took none."""
         return self._env.operating.orders[self._env.possible_agents.index(agent)]
 
-    def tell(self, agent: str, others: FusedMap | None) -> bool:
-        """Tell an agent that does not know its start what others know, in its map frame.
+    def send_map(self, agent: str, others: FusedMap | None) -> bool:
+        """Send an agent that does not know its start what others know, in its map frame.
 
         Return whether that reached it.
         """
-        return self._env.station.tell(self._env.possible_agents.index(agent), others)
+        return self._env.station.send_map(self._env.possible_agents.index(agent), others)
+
+    tell = renamed_method("tell", "send_map")
 
     def forget_walls(self, agent: str, trail: NDArray[np.float64]) -> bool:
-        """Tell an agent where another robot drove, in its map frame.
+        """Send an agent where another robot drove, in its map frame.
 
         Return whether that reached it.
         """
@@ -187,7 +190,7 @@ def _note_merges(episode: Episode, merges: list[MergeEvent]) -> None:
     env, episode.merges = episode.env, merges
     if isinstance(env, WatchedExploration):
         for merge in merges:
-            env.tell(merge_event(env, merge))
+            env.note_event(merge_event(env, merge))
 
 
 def _driver_of(

@@ -70,7 +70,7 @@ class WatchedExploration(ExplorationEnv):
     floor, settings, image_resolution
         As for ``ExplorationEnv``.
     watchers : iterable of Watcher
-        Who looks on, in this order; the list ``watchers`` may change between steps.
+        Who watches, in this order; the list ``watchers`` may change between steps.
     """
 
     def __init__(
@@ -85,10 +85,10 @@ class WatchedExploration(ExplorationEnv):
 
     def start(self, beginning: EpisodeStart) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode, as ``ExplorationEnv.start``."""
-        told = super().start(beginning)
+        found = super().start(beginning)
         for watcher in self.watchers:
             watcher.begin(self)
-        return told
+        return found
 
     def drive_at(self, commands: NDArray[np.float64]) -> None:
         """Run one time step, as ``ExplorationEnv.drive_at``."""
@@ -102,17 +102,17 @@ class WatchedExploration(ExplorationEnv):
         dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
         """Return what ``step`` returns, as ``ExplorationEnv.outcome``."""
-        told = super().outcome()
+        found = super().outcome()
         for watcher in self.watchers:
             watcher.outcome(self)
-        return told
+        return found
 
     def decided(self, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
         """Show the watchers a decision that has been carried out."""
         for watcher in self.watchers:
             watcher.decision(self, orders, given_up)
 
-    def tell(self, event: dict[str, Any]) -> None:
+    def note_event(self, event: dict[str, Any]) -> None:
         """Show the watchers an event, such as a merge: ``kind``, ``time_s``, ``agent``, further details."""
         for watcher in self.watchers:
             watcher.note(**event)

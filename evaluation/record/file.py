@@ -89,7 +89,7 @@ def read_record(path: Path) -> EpisodeRecord:
         except NewerFormatError as error:
             raise ValueError(f"{path} {error}") from error
         events = json.loads(archive.read(_EVENTS))
-        # Members are read as a whole first, which looks at the checksum: nothing damaged is parsed.
+        # Members are read as a whole first, which checks the checksum: nothing damaged is parsed.
         arrays = {name: archive.array(f"{name}.npy") for name in _ARRAYS}
         return _unpacked(header, events, arrays)
 

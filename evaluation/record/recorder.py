@@ -71,7 +71,7 @@ class Recorder(Watcher):
         self._endings: list[tuple[int, str, str]] = []
         self._events: list[dict[str, Any]] = []
         self._collisions = world.collisions.copy()
-        self._told_collisions = self._collisions.tobytes()
+        self._noted_collisions = self._collisions.tobytes()
         self._live, self._decided_at = len(env.agents), 0
         self._targets: list[tuple[float, float] | None] = [None] * settings.robots
         self._given_up: set[GivenUp] = set()
@@ -87,7 +87,7 @@ class Recorder(Watcher):
         """
         self._commands += commands.tobytes()
         world = env.world
-        if world.collisions.tobytes() != self._told_collisions:
+        if world.collisions.tobytes() != self._noted_collisions:
             self._note_contacts(env)
         self._steps_to_sample -= 1
         if not self._steps_to_sample:
@@ -106,7 +106,7 @@ class Recorder(Watcher):
         ]
 
     def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
-        """Note where robots were sent anew, and what was given up."""
+        """Note where robots were sent next, and what was given up."""
         time_s = self._decided_at * env.settings.time_step
         self._decided_at = int(env.world.steps[0])
         if orders is not None:
@@ -229,4 +229,4 @@ class Recorder(Watcher):
         collisions = env.world.collisions
         for robot in np.flatnonzero(collisions > self._collisions).tolist():
             self.note("contact", env.scorer.time, env.possible_agents[robot])
-        self._collisions, self._told_collisions = collisions.copy(), collisions.tobytes()
+        self._collisions, self._noted_collisions = collisions.copy(), collisions.tobytes()

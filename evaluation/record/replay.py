@@ -42,7 +42,7 @@ def rerun(
     floor : str, Path, Floor or None
         The floor, where the one that the record names is not found any more.
     watchers : iterable of Watcher
-        Who looks on.
+        Who watches.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def rerun(
 def drive_again(
     record: EpisodeRecord, floor: str | Path | Floor | None = None, watchers: Iterable[Watcher] = ()
 ) -> ExplorationEnv:
-    """Run a recorded episode again, as `rerun`, without a look at how it ends."""
+    """Run a recorded episode again, as `rerun`, without a check of how it ends."""
     header = record.header
     if header["version"] != lidarium.__version__:
         raise ValueError(

@@ -17,7 +17,7 @@ from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
 from lidarium.evaluation.episodes.output import check_writable, check_written, write_text
 from lidarium.evaluation.report.plain_text import code, plain
-from lidarium.evaluation.report.sections import Section, tell_group
+from lidarium.evaluation.report.sections import Section, describe_group
 
 
 def write_report(directory: Path, out: Path, baseline: str | None = None, seed: int = 0) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
     episodes = read_episodes(directory)
     baseline = _baseline(episodes, baseline)
     records, warnings = read_records(directory, episodes.rows)
-    sections = [tell_group(group, records, out, baseline, seed) for group in grouped(episodes.rows)]
+    sections = [describe_group(group, records, out, baseline, seed) for group in grouped(episodes.rows)]
     warnings = [*episodes.warnings, *_about_names(episodes), *warnings, *_about_records(episodes, records)]
     result = {
         "version": lidarium.__version__,

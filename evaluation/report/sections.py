@@ -45,7 +45,7 @@ _OF_FEW = (
 
 @dataclass(slots=True)
 class Section:
-    """What a report tells of one group.
+    """What a report says of one group.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Section:
     warnings: list[str] = field(default_factory=list)
 
 
-def tell_group(group: Group, records: dict[Key, Entry], out: Path, baseline: str, seed: int) -> Section:
+def describe_group(group: Group, records: dict[Key, Entry], out: Path, baseline: str, seed: int) -> Section:
     """Return the section of a group and write its plots.
 
     Parameters
@@ -88,16 +88,16 @@ def tell_group(group: Group, records: dict[Key, Entry], out: Path, baseline: str
         "floors": group.floors,
         "horizon_s": group.horizon_s,
     }
-    _tell_times(section, seed)
-    _tell_values(section, seed)
-    _tell_comparisons(section, baseline, seed)
+    _describe_times(section, seed)
+    _describe_values(section, seed)
+    _describe_comparisons(section, baseline, seed)
     _draw_plots(section, records, out)
     _draw_floors(section, records, out)
-    _tell_floors(section)
+    _describe_floors(section)
     return section
 
 
-def _tell_times(section: Section, seed: int) -> None:
+def _describe_times(section: Section, seed: int) -> None:
     group = section.group
     section.numbers["times"] = {}
     for key, title in TIMES.items():
@@ -139,7 +139,7 @@ def _missed(policy: str, figure: TimeFigure) -> str:
     return f"{missed} of {figure.size} runs of {code(policy)} ({censored})"
 
 
-def _tell_values(section: Section, seed: int) -> None:
+def _describe_values(section: Section, seed: int) -> None:
     figures = {
         policy: {value.key: value_figure([value.of(row) for row in rows], seed) for value in VALUES}
         for policy, rows in section.group.runs.items()
@@ -155,7 +155,7 @@ def _tell_values(section: Section, seed: int) -> None:
         section.markdown += ["### Further figures", text]
 
 
-def _tell_comparisons(section: Section, baseline: str, seed: int) -> None:
+def _describe_comparisons(section: Section, baseline: str, seed: int) -> None:
     group = section.group
     section.numbers["comparisons"] = []
     others = [policy for policy in group.runs if policy != baseline]
@@ -267,7 +267,7 @@ def _picture(section: Section, out: Path, name: str, title: str) -> Path:
     return out / name
 
 
-def _tell_floors(section: Section) -> None:
+def _describe_floors(section: Section) -> None:
     group = section.group
     section.numbers["by_floor"] = {
         floor: {

@@ -46,7 +46,7 @@ def interval(
 
 
 def p_value(value: float) -> str:
-    """Return a p value with as many digits as tell something."""
+    """Return a p value with as many digits as matter."""
     return "< 0.0001" if value < 1e-4 else f"{value:.2g}" if value < 0.01 else f"{value:.3f}"
 
 

@@ -23,7 +23,7 @@ Starts = tuple[tuple[float, float, float], ...]
 
 
 def check_members(name: str, values: Sequence[Any]) -> None:
-    """Check that there is something, that it can be told apart, and nothing is there twice.
+    """Check that there is something, with names, and nothing is there twice.
 
     Raises
     ------

@@ -3,8 +3,8 @@
 They are written at once, never in part, by one writer at a time.
 
 What is in the file stays there. A line that was cut off when its writer was killed is dropped, with a
-warning; anything else that is wrong is told and left to the user, and so is a file that no writer of episodes
-has made. An episode counts as kept when it is on the disk, in the file that bears the name.
+warning; anything else that is wrong is reported and left to the user, and so is a file that no writer of
+episodes has made. An episode counts as kept when it is on the disk, in the file that bears the name.
 """
 
 import errno
@@ -23,7 +23,7 @@ from lidarium.mapping.files.guarded_reading import read_bytes, reason
 from lidarium.mapping.geometry.bounds import shown
 
 KEY = "key"
-"""What tells an episode from all others of its file."""
+"""What identifies an episode in its file."""
 
 TIMINGS = ("decision_ms", "tick_ms", "steps_per_s", "wall_s", "peak_mb")
 """What differs between two runs of the same episode."""

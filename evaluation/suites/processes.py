@@ -12,7 +12,7 @@ _STOPPED = frozenset("Tt")
 """States of processes that run no more until they are continued, as the system names them."""
 
 
-def end_workers(grace_s: float = GRACE_S, *, is_told: bool = False) -> None:
+def end_workers(grace_s: float = GRACE_S, *, are_ending: bool = False) -> None:
     """End all processes that this one has begun, and wait until they are gone.
 
     A process that is stopped does not hear that it is to end; it is killed.
@@ -21,11 +21,11 @@ def end_workers(grace_s: float = GRACE_S, *, is_told: bool = False) -> None:
     ----------
     grace_s : float
         Wall time in which they may end by themselves [s].
-    is_told : bool
+    are_ending : bool
         Whether they know already that they are to end.
     """
     processes = multiprocessing.active_children()
-    if not is_told:
+    if not are_ending:
         for process in processes:
             process.terminate()
     ends = time.monotonic() + grace_s
@@ -47,7 +47,7 @@ def kill_workers() -> None:
 def stopped_workers() -> list[int]:
     """Return the numbers of workers that are stopped (SIGSTOP, Ctrl-Z).
 
-    None where the system does not tell.
+    None where the system does not say.
     """
     numbers = [process.pid for process in multiprocessing.active_children() if process.pid is not None]
     return [number for number in numbers if _state(number) in _STOPPED]
@@ -55,8 +55,8 @@ def stopped_workers() -> list[int]:
 
 def _state(number: int) -> str:
     try:
-        told = Path(f"/proc/{number}/stat").read_text(encoding="utf-8", errors="replace")
+        status = Path(f"/proc/{number}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:  # it is gone, or the system has no such files
         return ""
     # The state is behind the program's name, which is in brackets and may hold any character.
-    return told.rpartition(")")[2].strip()[:1]
+    return status.rpartition(")")[2].strip()[:1]

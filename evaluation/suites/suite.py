@@ -183,7 +183,7 @@ class Suite:
         Raises
         ------
         ValueError
-            Where there is no such policy, or its settings cannot be used; the name is told.
+            Where there is no such policy, or its settings cannot be used; the message names it.
         """
         options = dict(self.policy_settings.get(name, {}))
         try:

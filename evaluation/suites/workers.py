@@ -27,8 +27,8 @@ _TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" el
 WAITING_PER_WORKER = 2
 """Tasks that are handed over before a worker is free, so that it never waits."""
 
-LOOKED_AFTER_S = 10.0
-"""Wall time between two looks at whether a worker is stopped [s]."""
+CHECK_PERIOD_S = 10.0
+"""Wall time between two checks whether a worker is stopped [s]."""
 
 
 class WorkerDiedError(RuntimeError):
@@ -102,8 +102,8 @@ def _in_pool(
         for task in islice(tasks, WAITING_PER_WORKER * workers):
             running[pool.submit(_done, work, task)] = task
         while running:
-            ready = wait(running, LOOKED_AFTER_S, FIRST_COMPLETED).done
-            watch.look()
+            ready = wait(running, CHECK_PERIOD_S, FIRST_COMPLETED).done
+            watch.check()
             for future in ready:
                 task = running.pop(future)
                 error = future.exception()
@@ -124,25 +124,25 @@ def _in_pool(
     finally:
         # Not waited for without end: a worker that is stopped would never leave.
         pool.shutdown(wait=False, cancel_futures=True)
-        end_workers(is_told=is_whole)
+        end_workers(are_ending=is_whole)
     return lost
 
 
 class _Watch:
-    """Tells of workers that are stopped, of each once."""
+    """Warns of workers that are stopped, once of each."""
 
     def __init__(self) -> None:
-        self._told: set[int] = set()
-        self._looked = time.monotonic()
+        self._named: set[int] = set()
+        self._checked_at = time.monotonic()
 
-    def look(self) -> None:
-        """Look whether a worker is stopped, if the last look was long ago."""
-        if time.monotonic() - self._looked < LOOKED_AFTER_S:
+    def check(self) -> None:
+        """Check whether a worker is stopped, if the last check was long ago."""
+        if time.monotonic() - self._checked_at < CHECK_PERIOD_S:
             return
-        self._looked = time.monotonic()
+        self._checked_at = time.monotonic()
         for number in stopped_workers():
-            if number not in self._told:
-                self._told.add(number)
+            if number not in self._named:
+                self._named.add(number)
                 warnings.warn(
                     f"worker process {number} is stopped, and its work waits; continue it with `kill -CONT "
                     f"{number}`, or end this command with Ctrl-C",

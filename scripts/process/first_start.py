@@ -11,7 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
-from lidarium.scripts.common import counted, tell
+from lidarium.scripts.common import counted, notify
 
 LIST = Path(__file__).parents[1] / "data" / "kernels_of_run.json"
 """The kernels that ``lidarium run`` calls from Python; ``scripts/dev/list_kernels.py`` writes it."""
@@ -43,7 +43,7 @@ def compile_first(is_quiet: bool) -> None:
     processes = min(len(os.sched_getaffinity(0)), MOST_PROCESSES)
     if folder is None or processes == 1 or 2 * count_compiled(folder) > listed["compiled"]:
         return
-    tell(f"the first start compiles kernels in {processes} processes; later starts find them")
+    notify(f"the first start compiles kernels in {processes} processes; later starts find them")
     for _ in counted(
         _compiled(folder, listed["kernels"], processes), listed["compiled"], "kernels compiled", is_quiet
     ):

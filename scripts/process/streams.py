@@ -56,7 +56,7 @@ def print_result(text: str) -> None:
 
 
 def flush_streams() -> None:
-    """Write what is left to tell, as Python does at exit, but without complaints."""
+    """Write what is left in the buffers, as at exit, but without complaints."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

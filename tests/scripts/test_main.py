@@ -522,7 +522,7 @@ def test_progress_is_a_line_every_few_seconds_where_there_is_no_terminal(capsys)
     progress = Progress(is_quiet=False, clock=lambda: next(times))
     env = SimpleNamespace(scorer=SimpleNamespace(coverage=0.5, time=12.0))
     for _ in range(3):
-        progress.tell(env)
+        progress.show(env)
     progress.close()
     assert capsys.readouterr().err == "explored 50.0 %, simulated 12 s\n" * 2
 

@@ -21,7 +21,7 @@ WALL = 0.08
 """What is unknown this near to something occupied may well be its inside [m]."""
 
 AHEAD = 0.5
-"""Which way a way leads is told by the place this far along it [m]."""
+"""The direction of a path is that of the place this far along it [m]."""
 
 
 class MapMemory:
@@ -128,7 +128,7 @@ class MapMemory:
         targets = Targets.at(stands, self._map.log_odds.shape)
         for k, stand in enumerate(stands[:-1]):
             targets.mask[stand] = 0
-            # There is always the way past where the robot is: nothing beyond it needs to be looked at.
+            # There is always the way past where the robot is: nothing beyond it needs to be examined.
             until = Until(
                 targets=targets,
                 count=len(set(stands[k + 1 :]) - {stand}),

@@ -81,5 +81,5 @@ class Memory(Protocol):
         ...
 
     def give_up(self, focus: Place) -> None:
-        """Ask no more for a frontier that was looked at and cannot be seen through."""
+        """Ask no more for a frontier that was observed and cannot be seen through."""
         ...

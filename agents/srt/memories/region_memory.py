@@ -11,7 +11,7 @@ from lidarium.agents.srt.tree import Node
 
 
 class RegionMemory:
-    """The nodes tell: space is seen where it lies in another node's safe region.
+    """Memory of nodes: space is seen where it lies in another node's safe region.
 
     A way is clear within one node's safe region.
 

@@ -102,7 +102,7 @@ def free_way(scan: NDArray[np.float32], geometry: ScanGeometry, radius: float, h
     radius : float
         Radius of the body [m].
     heading : float
-        Direction of the way against the robot's heading [rad].
+        Direction of the path against the robot's heading [rad].
 
     Returns
     -------
@@ -145,7 +145,7 @@ def driven(
     pose : (3,) float64
         Where the robot takes itself to be [m, rad].
     free : float
-        How far the way ahead is free [m].
+        How far the path ahead is free [m].
     limits : Limits
         What it can do.
     settings : SrtSettings
@@ -188,7 +188,7 @@ def best_control(
     target : (2,) float64
         Where it wants to be [m].
     fastest : float
-        Speed that the way ahead allows [m/s]; controls are no faster.
+        Speed that the path ahead allows [m/s]; controls are no faster.
     limits : Limits
         What the robot can do.
     """

@@ -59,7 +59,7 @@ KEPT_NEAR = 0.5
 class Intent:
     """What a robot goes for.
 
-    Two targets may each look the nearer one from where the robot is on its way to the other. It would turn
+    Two targets may each seem the nearer one from where the robot is on its way to the other. It would turn
     between them for ever; with every time that it comes back to one that it had left, what it goes for is
     kept for twice the gain.
 

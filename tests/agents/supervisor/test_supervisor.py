@@ -24,7 +24,7 @@ def looked(reports, time_s=10.0, given_up=None, agents=None, **settings):
         station.receive(agent, one, time_s)
     station.merge(time_s)
     supervisor = Supervisor(station, footprint_of(RADIUS))
-    return supervisor, {command.agent: command for command in supervisor.look(time_s, given_up or {})}
+    return supervisor, {command.agent: command for command in supervisor.decide(time_s, given_up or {})}
 
 
 def rules(supervisor):
@@ -39,7 +39,7 @@ def test_of_two_robots_with_one_goal_the_farther_one_is_sent_to_the_other_openin
     assert rules(supervisor) == {"a": (3, None), "b": (3, "go_to")}
     target = commands["b"].target
     assert np.hypot(target.x, target.y - 2.0) < 0.7
-    assert commands["b"].looks_at[0] < 0.1
+    assert commands["b"].observes[0] < 0.1
 
 
 def test_where_there_is_no_other_goal_the_farther_one_stands_by_and_goes_on_when_there_is_one():
@@ -52,7 +52,7 @@ def test_where_there_is_no_other_goal_the_farther_one_stands_by_and_goes_on_when
     for agent, x, target in (("a", 7.0, (7.7, 2.0)), ("b", 5.0, None)):
         supervisor.station.receive(agent, report(more, x, 2.0, target, time_s=20.0), 20.0)
     supervisor.station.merge(20.0)
-    (command,) = supervisor.look(20.0, {})
+    (command,) = supervisor.decide(20.0, {})
     assert (command.agent, command.kind, command.rule) == ("b", OrderKind.GO_TO, 3)
     assert supervisor.standing_by == set()
 
@@ -96,7 +96,7 @@ def test_a_robot_that_drives_far_and_maps_little_within_walls_is_stopped():
     station.receive("a", report(big, 8.0, 2.0, (10.7, 2.0), time_s=12.0), 12.0)
     station.merge(12.0)
     supervisor = Supervisor(station, footprint_of(RADIUS))
-    (command,) = supervisor.look(12.0, {})
+    (command,) = supervisor.decide(12.0, {})
     assert (command.agent, command.kind, command.rule) == ("b", OrderKind.STOP, 4)
 
 
@@ -128,7 +128,7 @@ def test_a_robot_that_never_reports_is_noted_once_and_gets_no_orders():
     supervisor, commands = looked(
         {"a": report(hall(openings=(EAST,)), 6.0, 2.0, (7.7, 2.0))}, agents=["a", "b"]
     )
-    supervisor.look(20.0, {})
+    supervisor.decide(20.0, {})
     assert commands == {}
     assert [(event.event, event.agents) for event in supervisor.station.events] == [("silent", ("b",))]
 
@@ -196,5 +196,5 @@ def test_a_robot_turns_back_before_its_battery_is_too_low_to_bring_it_home(left,
             time_s,
         )
         station.merge(time_s)
-        supervisor.look(time_s, {})
+        supervisor.decide(time_s, {})
     assert supervisor.decisions[-1].rule == rule

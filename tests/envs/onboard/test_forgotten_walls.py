@@ -5,7 +5,7 @@ import pytest
 
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
-from lidarium.mapping.planning.footprint_masks import MARGIN_M, passed, swept
+from lidarium.mapping.planning.footprint_masks import MARGIN_M, footprint_mask, passed
 
 RESOLUTION = 0.05
 
@@ -32,7 +32,9 @@ def test_walls_along_the_trail_become_unknown_and_nothing_else_changes(env):
     trail = middle + np.array([(-0.4, 0.0), (0.4, 0.0), (0.4, 3.0)])
     env.perception.trails.forget_walls(0, trail)
     after = belief.map.log_odds
-    where = swept(before.shape, belief.map_origin, trail, belief.radius, RESOLUTION, 0.0) & (before > 0)
+    where = footprint_mask(before.shape, belief.map_origin, trail, belief.radius, RESOLUTION, 0.0) & (
+        before > 0
+    )
     assert where[tuple(walls[len(walls) // 2])]
     assert (after[where] == 0).all()
     assert (after[~where] == before[~where]).all()
@@ -78,7 +80,7 @@ def test_a_map_that_is_rendered_anew_forgets_them_again_until_the_next_episode(e
     middle = walls[len(walls) // 2]
     place = centres(belief, middle[None])[0]
     perception.trails.forget_walls(0, place + np.array([(0.0, 0.0), (20.0, 0.0)]))
-    env.simulation.render_anew(0, poses, scan)
+    env.simulation.render_again(0, poses, scan)
     perception.trails.forget_again(0)
     assert belief.map.log_odds[tuple(middle)] == 0
     env.reset(seed=0)
@@ -116,7 +118,7 @@ def test_a_wall_beside_the_trail_stays(env):
 @pytest.mark.parametrize("margin", [0.0, MARGIN_M])
 def test_a_body_sweeps_a_band_as_wide_as_it_is_and_its_margin(margin):
     rows, columns = np.nonzero(
-        swept((80, 120), (0.0, 0.0), np.array([[1.0, 2.0], [4.0, 2.0]]), 0.2, RESOLUTION, margin)
+        footprint_mask((80, 120), (0.0, 0.0), np.array([[1.0, 2.0], [4.0, 2.0]]), 0.2, RESOLUTION, margin)
     )
     reach = 0.2 + margin
     assert (rows.min() + 0.5) * RESOLUTION == pytest.approx(2.0 - reach, abs=RESOLUTION)

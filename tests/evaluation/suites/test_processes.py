@@ -28,7 +28,7 @@ def continue_the_stopped(is_over):
 
 
 def test_a_stopped_worker_is_told_and_its_work_is_done_when_it_goes_on(monkeypatch):
-    monkeypatch.setattr(workers, "LOOKED_AFTER_S", 0.2)
+    monkeypatch.setattr(workers, "CHECK_PERIOD_S", 0.2)
     is_over = threading.Event()
     helper = threading.Thread(target=continue_the_stopped, args=(is_over,))
     helper.start()

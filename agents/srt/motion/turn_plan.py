@@ -1,4 +1,4 @@
-"""The turns of a robot on the spot, to look around or at a frontier."""
+"""The turns of a robot on the spot, to scan all around or a frontier."""
 
 import math
 
@@ -10,13 +10,13 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.mapping.geometry.rigid import wrapped
 
 MOST_TURNS = 8
-"""A laser that would need more turns than this does not look around."""
+"""A laser that would need more turns than this does not turn around."""
 
-LOOK_GAIN = 2.0
+TURN_GAIN = 2.0
 """Turn rate by the error of the heading [1/s]."""
 
 
-class Looks:
+class TurnPlan:
     """The headings to which a robot still has to turn.
 
     Attributes
@@ -31,7 +31,7 @@ class Looks:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing is left to look at."""
+        """Whether no turn is left."""
         return not self._headings
 
     def plan_circle(self, senses: Senses, lidar: Lidar) -> None:
@@ -55,5 +55,5 @@ class Looks:
         return wrapped(self._headings[0] - float(senses.pose[2]))
 
     def end_turn(self) -> None:
-        """Have seen what lies at the next heading."""
+        """Note that the robot has turned to the next heading."""
         self._headings.pop(0)
