@@ -24,7 +24,7 @@ class AgentInfos:
     operating : Operating
         The robots' operating states and orders.
     meters : Meters
-        Where the robots' use of energy is told.
+        Where the robots' use of energy is reported.
     """
 
     def __init__(

@@ -296,7 +296,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
         It takes effect at once or, over a radio that is not ideal, when it arrives; one that does not reach
         the robot, or that the robot does not take, is noted in ``operating.events``. An agent that was given
-        an order may be left out of the actions of later steps: it then goes on as it was told.
+        an order may be left out of the actions of later steps: it then goes on with its last order.
 
         Raises
         ------

@@ -39,7 +39,7 @@ def check_extent(what: str, bounds: Iterable[float], rings: Iterable[NDArray[np.
     Raises
     ------
     ValueError
-        Where it is; the message says in which way.
+        Where it is; the message says how.
     """
     low_x, low_y, high_x, high_y = bounds
     side, farthest = max(high_x - low_x, high_y - low_y), max(map(abs, (low_x, low_y, high_x, high_y)))

@@ -131,15 +131,15 @@ def reachable_free_space(raster: Raster, radius: float, starts: NDArray[np.float
 
     def make() -> NDArray[np.bool_]:
         box = _box_of_free_cells(raster)
-        swept = np.zeros(found.labels.shape, dtype=np.bool_)
+        covered = np.zeros(found.labels.shape, dtype=np.bool_)
         if box is not None and kept:
             chosen = np.zeros(found.areas.size, dtype=np.bool_)
             chosen[kept] = True
             reach = _cells_of(raster, radius)
             steps = np.arange(math.floor(reach + 1e-9) + 2)
             disc = steps[:, None] ** 2 + steps[None, :] ** 2 <= reach**2 + 1e-9
-            swept[box] = _dilated(chosen[found.labels[box]], disc) & (raster.solid[box] == 0)
-        return _frozen(swept)
+            covered[box] = _dilated(chosen[found.labels[box]], disc) & (raster.solid[box] == 0)
+        return _frozen(covered)
 
     return _kept(raster, ("swept", radius, *kept), make)
 

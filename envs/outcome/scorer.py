@@ -100,7 +100,10 @@ class Scorer:
         return np.asarray(self._world.contacts != 0)
 
     def take_rewards(self) -> list[float]:
-        """Return each robot's reward since the last call, and start anew; ``terms`` says of what."""
+        """Return each robot's reward since the last call, and begin again.
+
+        ``terms`` says of what.
+        """
         score = self._score
         rewards: list[float] = score.rewards.tolist()
         self.terms = [dict(zip(TERMS, row)) for row in score.reward_terms.tolist()]  # noqa: B905 (hot)

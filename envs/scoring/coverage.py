@@ -13,7 +13,7 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.kernels.views import word_grid_at
 
 ROWS_AHEAD = 24
-"""So many rows before a row of a mask is looked at it is fetched from memory."""
+"""So many rows before a row of a mask is read it is fetched from memory."""
 
 
 def pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
@@ -54,7 +54,7 @@ def mark_seen(
     box: tuple[int, int, int, int],
     row_offset: int,
     word_offset: int,
-    news: Array,
+    changes: Array,
 ) -> int:
     """Add a scan's seen cells to a robot's mask.
 
@@ -68,7 +68,7 @@ def mark_seen(
         row_low, row_high, word_low, word_high of the window that may hold bits.
     row_offset, word_offset : int
         Place of the window in the masks.
-    news : (4,) int64
+    changes : (4,) int64
         Result: the part of the mask that holds the cells new to the robot (row_low, row_high, word_low,
         word_high).
 
@@ -94,12 +94,17 @@ def mark_seen(
                 found |= value
         if found != np.uint64(0):
             row_low, row_high = min(row_low, i), i + 1
-    news[0], news[1], news[2], news[3] = row_low, row_high, word_low + word_offset, word_high + word_offset
+    changes[0], changes[1], changes[2], changes[3] = (
+        row_low,
+        row_high,
+        word_low + word_offset,
+        word_high + word_offset,
+    )
     return new
 
 
 @kernel(borrowing=True)
-def share_new_cells(owns: Array, team: Array, news: Array, first: int, robots: int, gains: Array) -> int:
+def share_new_cells(owns: Array, team: Array, changes: Array, first: int, robots: int, gains: Array) -> int:
     """Credit each cell that is new to the team to the robots that saw it.
 
     Those that saw it in this step share it equally, in robot order.
@@ -112,7 +117,7 @@ def share_new_cells(owns: Array, team: Array, news: Array, first: int, robots: i
         Addresses of the robots' masks, of the shape of ``team``.
     team : (rows, words) uint64
         What the team has seen; updated.
-    news : (maps, 4) int64
+    changes : (maps, 4) int64
         Where ``mark_seen`` found cells that are new to each robot.
     first, robots : int
         The episode's robots in these arrays.
@@ -129,14 +134,14 @@ def share_new_cells(owns: Array, team: Array, news: Array, first: int, robots: i
     for robot in range(first, first + robots):
         gain = 0.0
         own = word_grid_at(owns[robot], rows, words)
-        for row in range(news[robot, 0], news[robot, 1]):
-            for word in range(news[robot, 2], news[robot, 3]):
+        for row in range(changes[robot, 0], changes[robot, 1]):
+            for word in range(changes[robot, 2], changes[robot, 3]):
                 value = own[row, word] & ~team[row, word]
                 if value == np.uint64(0):
                     continue
                 others = np.uint64(0)
                 for other in range(first, first + robots):
-                    if other != robot and news[other, 0] < news[other, 1]:
+                    if other != robot and changes[other, 0] < changes[other, 1]:
                         others |= word_grid_at(owns[other], rows, words)[row, word]
                 gain += count_bits(value & ~others)
                 value &= others
@@ -151,8 +156,8 @@ def share_new_cells(owns: Array, team: Array, news: Array, first: int, robots: i
         gains[robot] = gain
     for robot in range(first, first + robots):
         own = word_grid_at(owns[robot], rows, words)
-        for row in range(news[robot, 0], news[robot, 1]):
-            for word in range(news[robot, 2], news[robot, 3]):
+        for row in range(changes[robot, 0], changes[robot, 1]):
+            for word in range(changes[robot, 2], changes[robot, 3]):
                 value = own[row, word] & ~team[row, word]
                 total += count_bits(value)
                 team[row, word] |= value

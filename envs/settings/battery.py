@@ -21,7 +21,7 @@ class Battery:
     Attributes
     ----------
     capacity_j : float or None
-        What it holds at the beginning [J]; None for no limit, where nothing is reckoned.
+        What it holds at the beginning [J]; None for no limit, where nothing is counted.
     idle_w : float
         What electronics and sensors take, whatever the robot does [W].
     per_metre_j : float

@@ -74,14 +74,14 @@ class ExplorationSettings:
     known_starts : bool
         Whether the robots know where they start; otherwise each believes to start at (0, 0, 0).
     reveals_starts : bool
-        Whether reports tell where robots with unknown starts truly started, as a bound for what merging maps
+        Whether reports hold where robots with unknown starts truly started, as a bound for what merging maps
         can reach.
     localization : str
         Who says where the robot is: ``truth`` or the name of a localizer.
     localizer : object or None
         Own settings of that localizer, of its class ``Settings``; None for its defaults.
     odometry : OdometrySettings
-        How well wheels tell the way.
+        How well wheels measure the path.
     radio : RadioSettings
         How robots reach each other.
     faults : FaultSettings
@@ -89,7 +89,7 @@ class ExplorationSettings:
     battery : Battery
         What energy each has.
     pauses_when_blocked : bool
-        Whether a robot whose bumper touches anything, or whose way is blocked, pauses until it is told to
+        Whether a robot whose bumper touches anything, or whose way is blocked, pauses until it is ordered to
         resume.
     backend : str
         The world: ``kinematic``, ``bullet`` or another that is registered.

@@ -1,4 +1,4 @@
-"""Limits that no single bound tells: what can be observed, and how much a step may ask for.
+"""Limits beyond single bounds: what can be observed, and how much a step does.
 
 Without the latter a step of settings that are each within their bounds would take all memory, or hours.
 """
@@ -70,7 +70,7 @@ def _observed(settings: Any) -> float:  # noqa: ANN401
 
 PRODUCTS = (
     Product(
-        "the way that a scan covers in cells of the maps, lidar.range_max / occupancy.resolution,",
+        "the path that a scan covers in cells of the maps, lidar.range_max / occupancy.resolution,",
         lambda settings: settings.lidar.range_max / settings.occupancy.resolution,
         MOST_SCAN_CELLS,
         "a shorter range or coarser maps",

@@ -12,12 +12,12 @@ from lidarium.registry import Registry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySettings:
-    """How well wheels tell the way.
+    """How well wheels measure the path.
 
     Attributes
     ----------
     distance_bias, turn_bias : float
-        Share by which distances and turns are told too long or too short all through an episode [1].
+        Share by which distances and turns are measured too long or too short all through an episode [1].
     drift : float
         Turn that a metre feigns, to the left or to the right all through an episode [rad/m].
     turn_noise_of_turn, turn_noise_of_distance : float
@@ -49,12 +49,12 @@ class OdometrySettings:
 
     @property
     def is_ideal(self) -> bool:
-        """Whether wheels tell the truth and drives do as they are told."""
+        """Whether wheels measure exactly and drives do as they are commanded."""
         return self == OdometrySettings()
 
     @property
     def disturbs_drives(self) -> bool:
-        """Whether drives do not quite what they are told."""
+        """Whether drives do not quite what they are commanded."""
         return self.speed_noise > 0.0 or self.turn_rate_noise > 0.0
 
     @property

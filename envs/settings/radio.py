@@ -32,7 +32,7 @@ class RadioSettings:
     reference_distance, reference_loss : float
         Where the loss in free space is known [m], and what it is there [dB].
     free_exponent, wall_exponent : float
-        How loss grows with the free way and with the way through what is solid [1].
+        How loss grows with the free path and with the path through what is solid [1].
     wall_loss : float
         Loss where anything solid is between [dB].
     shadowing : float
@@ -42,7 +42,7 @@ class RadioSettings:
     latency_s : float
         Time until a message arrives [s].
     period_s : float
-        Time between exchanges of maps; poses are told in every step [s].
+        Time between exchanges of maps; poses are sent in every step [s].
     """
 
     kind: str = "all"

@@ -1,4 +1,4 @@
-"""What ``reset`` may be told, and which floor an episode takes."""
+"""The options of ``reset``, and which floor an episode takes."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -23,7 +23,7 @@ def map_around_start(pages: ArrayPool, floor: FloorTables, resolution: float) ->
     It does so however the floor is turned.
     """
     rows, columns = floor.laser.solid.shape
-    # A square around the start, in steps of 32 m: its size and place tell nothing of the floor's shape.
+    # A square around the start, in steps of 32 m: its size and place show nothing of the floor's shape.
     diagonal = math.hypot(rows, columns) * floor.laser.resolution
     half = math.ceil(math.ceil(diagonal / 32.0) * 32.0 / resolution / WORD) * WORD
     return pages.blank((2 * half, 2 * half), np.int8), (-half * resolution, -half * resolution)

@@ -48,7 +48,7 @@ class Beliefs:
         Of which teammates a robot knows the pose although not all are known, and these poses [m, rad]; the
         radio writes them.
     renderings : (rows,) int64
-        How often each map was rendered anew.
+        How often each map was rendered again.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Beliefs:
         shape: tuple[int, int],
         pages: ArrayPool,
     ) -> None:
-        """Start anew with a blank map.
+        """Begin again with a blank map.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class Beliefs:
             self.pool_rows[row, k] = (pooled.ctypes.data, *pooled.shape)
 
     def wipe(self, row: int) -> None:
-        """Make a robot's map blank again, to be rendered anew."""
+        """Make a robot's map blank again, to be rendered again."""
         wipe(self.log_odds[row], self._touched[row], self.windows[row])
         self.renderings[row] += 1
 
@@ -127,7 +127,7 @@ class Beliefs:
         blank(self.log_odds[row], where, corner, self._touched[row], self.windows[row])
 
     def forget_changes(self, first: int, last: int) -> None:
-        """Start anew to note which part of the maps changes.
+        """Begin again to note which part of the maps changes.
 
         This concerns rows ``first`` to ``last``.
         """

@@ -40,7 +40,7 @@ MOST_LETTERS = 1000
 _GROUPS = ("path_m", "ended_because")
 _MAY_BE_NULL = ("horizon_s", "t90_s", "t99_s")
 _OF_SETTINGS = ("backend", "localization", "realism", "horizon_s")
-"""Keys of a line that tell something of the settings behind their hash."""
+"""Keys of a line that say something of the settings behind their hash."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ def read_episodes(directory: Path) -> Episodes:
     FileNotFoundError
         Where there is no such file.
     ValueError
-        Where there are no episodes, a line cannot be read or lacks something, two lines tell of the same
+        Where there are no episodes, a line cannot be read or lacks something, two lines are of the same
         episode differently, or versions or settings differ. A last line that breaks off is dropped with a
         warning, and so is a line that is there twice.
     """
@@ -102,7 +102,7 @@ def read_episodes(directory: Path) -> Episodes:
 
 
 def key_of(row: Row) -> tuple[Any, ...]:
-    """Return what tells episodes apart: who ran, and the pairing key."""
+    """Return what identifies episodes: who ran, and the pairing key."""
     return str(row["policy"]), *pair_key_of(row)
 
 
@@ -203,12 +203,12 @@ def _check_alike(numbered: Iterable[tuple[int, Row]], path: Path) -> None:
                 for key in _OF_SETTINGS
                 if known.get(key) != row.get(key)
             ]
-            told = (
+            differing = (
                 ", ".join(seen)
                 or f"settings_sha256 {known['settings_sha256'][:12]}... and {row['settings_sha256'][:12]}..."
             )
             raise ValueError(
                 f"{path} has episodes of two settings with {row['robots']} robots, in lines {known_number} "
-                f"and {number}: {told}; "
+                f"and {number}: {differing}; "
                 "want a name for each set of settings"
             )

@@ -17,7 +17,7 @@ from lidarium.evaluation.suites.episodes_file import TIMINGS
 from lidarium.evaluation.suites.suite import DEFAULT_VARIANT
 
 _NAMES = ("seed", "key", "record")
-"""What tells a run from others, without saying what came of it."""
+"""What identifies a run, without saying what came of it."""
 
 
 @dataclass(frozen=True, slots=True)

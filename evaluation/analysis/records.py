@@ -23,7 +23,7 @@ Empty for no record.
 """
 
 _SAME = ("policy", "floor", "floor_sha256", "seed", "robots", "settings_sha256")
-"""What a record and the line of its episode both tell."""
+"""What a record and the line of its episode both hold."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -145,14 +145,14 @@ def save_visits(
     for axes, (policy, each) in zip(panels, visits.items(), strict=True):
         _show_map(axes, tracks[policy], extent)
         shown = np.ma.masked_less(each.seconds, 1e-9)
-        look: dict[str, Any] = {
+        appearance: dict[str, Any] = {
             "norm": scale,
             "cmap": _COLOUR_MAP,
             "interpolation": "nearest",
             "zorder": 2,
             "alpha": 0.92,
         }
-        axes.imshow(shown, origin="lower", extent=each.extent, **look)
+        axes.imshow(shown, origin="lower", extent=each.extent, **appearance)
         _caption(axes, policy, f"{each.runs} run{'s' if each.runs != 1 else ''}")
     bar = figure.colorbar(
         ScalarMappable(scale, _COLOUR_MAP), ax=panels, alpha=0.92, shrink=0.85, pad=0.015, aspect=28

@@ -100,7 +100,7 @@ def save_coverage(path: Path, group: Group, curves: Curves) -> None:
 def save_boxes(path: Path, group: Group) -> None:
     """Draw box plots of times, paths and overlap by policy.
 
-    Runs that missed a share are told above their box.
+    Runs that missed a share are counted above their box.
     """
     values = [
         value

@@ -117,7 +117,7 @@ def _draw_tree(
 
 
 def _draw_map(axes: Axes, spline_map: SplineMap) -> list[Line2D]:
-    """Draw curves in turn in several colours, so that one can be told from the next.
+    """Draw curves in several colours, neighbours in different ones.
 
     Return entries of the legend.
     """

@@ -28,7 +28,7 @@ GRID, FRAME = "#e5e7eb", "#d1d5db"
 
 
 def colours(count: int) -> list[str]:
-    """Return colours for policies or robots; beyond those that all tell apart, others."""
+    """Return colours for policies or robots, first those that all can distinguish."""
     return [*COLOURS, *(f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in team_colours(count))][
         :count
     ]
@@ -59,9 +59,9 @@ def band(
     colour: str,
     step: Literal["pre", "post", "mid"] | None = None,
 ) -> None:
-    """Shade an interval, with thin edges by which overlapping ones are told apart."""
-    look: dict[str, Any] = {"facecolor": f"{colour}1f", "edgecolor": f"{colour}80", "linewidth": 0.7}
-    axes.fill_between(np.asarray(x), np.asarray(low), np.asarray(high), step=step, **look)
+    """Shade an interval, with thin edges that show where several overlap."""
+    appearance: dict[str, Any] = {"facecolor": f"{colour}1f", "edgecolor": f"{colour}80", "linewidth": 0.7}
+    axes.fill_between(np.asarray(x), np.asarray(low), np.asarray(high), step=step, **appearance)
 
 
 def save(path: Path, figure: Figure, title: str, subtitle: str = "") -> None:

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 TOLERANCE = 0.05
-"""Within this distance a curve tells of a wall [m]."""
+"""Within this distance a curve shows a wall [m]."""
 
 Points = NDArray[np.float64]
 Edges = NDArray[np.float64]

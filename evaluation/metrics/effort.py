@@ -20,12 +20,12 @@ def decision_percentiles(seconds: Sequence[float]) -> dict[str, float | None]:
 def peak_megabytes() -> float | None:
     """Return the most memory that this process has held so far [1e6 bytes].
 
-    None where the system does not tell.
+    None where the system does not say.
     """
     try:
         import resource
     except ImportError:
         return None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    # macOS tells bytes, the others kilobytes of 1024.
+    # macOS reports bytes, the others kilobytes of 1024.
     return float(peak if sys.platform == "darwin" else peak * 1024) / 1e6

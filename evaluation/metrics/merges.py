@@ -46,7 +46,7 @@ def transform_error(
         x, y, theta [m, m, rad].
     at : (x, y)
         a, the point at which translations are compared [m]: the centre of what the maps have in common, since
-        at a far origin a small error of the rotation looks like a large one of the translation.
+        at a far origin a small error of the rotation seems a large one of the translation.
     """
     points = []
     for x, y, theta in (np.asarray(found, np.float64), np.asarray(true, np.float64)):

@@ -91,7 +91,7 @@ def read_relations(path: Path) -> Relations:
 
 
 def covered(relations: Relations, stamps: NDArray[np.float64]) -> Relations:
-    """Return the relations of times of which a log tells.
+    """Return the relations of times that a log covers.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def covered(relations: Relations, stamps: NDArray[np.float64]) -> Relations:
     Raises
     ------
     ValueError
-        Where it tells of none, as with clocks that differ.
+        Where it covers none, as with clocks that differ.
     """
     first, last = np.minimum(relations.begin, relations.end), np.maximum(relations.begin, relations.end)
     is_inside = (first >= stamps[0] - BEYOND_S) & (last <= stamps[-1] + BEYOND_S)
@@ -161,12 +161,12 @@ def log_relation_errors(
     which : str
         Pose at a relation's time: ``between`` those of the scans around it at constant speed, or ``before``,
         the last one before, for logs whose scans carry the stamp of the odometry before them; the log's
-        odometry then tells the way between scans.
+        odometry then gives the motion between scans.
 
     Raises
     ------
     ValueError
-        Where the log tells of none of their times.
+        Where the log covers none of their times.
     """
     stamps = log.stamps + clock_shift
     relations = covered(relations, stamps)

@@ -63,7 +63,7 @@ def check_file(path: Path) -> None:
 def open_guarded(path: Path, most: int = MOST_FILE_BYTES) -> Iterator[BinaryIO]:
     """Open a regular file of bounded size to read its bytes.
 
-    A pipe is not waited for, and a device is not read from: what was opened is looked at, not its name.
+    A pipe is not waited for, and a device is not read from: what was opened is checked, not its name.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def read_bytes(path: Path, most: int = MOST_FILE_BYTES) -> bytes:
     """
     with open_guarded(path, most) as file:
         content = file.read(most + 1)
-    # A file that grows, or one of /proc, tells less than it holds.
+    # A file that grows, or one of /proc, reports less than it holds.
     if len(content) > most:
         raise ValueError(f"{path} has more than {most:,} bytes; want at most so many")
     return content
@@ -210,7 +210,7 @@ def reading(path: Path | None, what: str, cure: str = "") -> Iterator[None]:
     Parameters
     ----------
     path : Path or None
-        The file; None where messages name it already, and only their length and kind are looked after.
+        The file; None where messages name it already, and only their length and kind are checked.
     what : str
         What it should be: ``a whole episode record``.
     cure : str

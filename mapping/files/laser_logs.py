@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, ScanGeometry
 
 MOST_REACH_M = 10_000.0
-"""Longest range of a laser that a log may tell of [m]."""
+"""Longest range of a laser that a log may have [m]."""
 
 MOST_POSE_M = 1e8
 """Farthest that a log may lead [m]."""
@@ -27,7 +27,7 @@ class LaserLog:
     ranges : (scans, beams) float32
         Scans [m]; inf for no return, nan for an invalid beam.
     geometry : ScanGeometry
-        Which way the beams look.
+        Directions of the beams.
     odometry : (scans, 3) float64 or None
         x, y, theta of the robot by dead reckoning [m, rad]; None where the log has none.
     laser_pose : (3,) float64

@@ -11,7 +11,7 @@ from pathlib import Path
 def errors_named(path: Path) -> Iterator[None]:
     """Give errors of the system that name no file the name of the one that is written.
 
-    A full disk, for instance, is told of an open file, whose name the system does not know.
+    A full disk, for instance, is reported of an open file, whose name the system does not know.
     """
     try:
         yield
@@ -34,8 +34,8 @@ def write_whole(path: Path, content: bytes, *, is_lasting: bool = True) -> None:
     content : bytes
         What it shall hold.
     is_lasting : bool
-        Whether to wait until it is on the disk: some disks tell only then that they are full. For all but
-        what can be made anew.
+        Whether to wait until it is on the disk: some disks report only then that they are full. For all but
+        what can be made again.
 
     Raises
     ------

@@ -153,7 +153,7 @@ def from_compact_arrays(arrays: dict[str, NDArray[Any]], settings: SplineSetting
         raise ValueError("its arrays do not fit together")
     split = int(corner_count)
     spline_map.updates = _counted(updates)
-    # When landmarks were last seen is not kept: those on trial begin anew.
+    # When landmarks were last seen is not kept: those on trial begin again.
     now = np.full(len(marks), spline_map.updates, np.int64)
     spline_map.corners = Landmarks(marks[:split], mark_weights[:split], counts[:split], now[:split])
     spline_map.peaks = Landmarks(marks[split:], mark_weights[split:], counts[split:], now[split:])

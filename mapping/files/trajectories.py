@@ -74,7 +74,7 @@ def read_numbers(path: Path, columns: int, what: str) -> NDArray[np.float64]:
     path = Path(path)
     lines = read_lines(path, MOST_LINE_BYTES)
     with reading(path, what), warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of a file without numbers, which is told below
+        warnings.simplefilter("ignore", UserWarning)  # of a file without numbers, which is reported below
         table = np.loadtxt(lines, np.float64, ndmin=2)
     if table.shape[0] == 0 or table.shape[1] != columns or not np.isfinite(table).all():
         raise ValueError(f"{path} is not {what}: want lines of {columns} numbers, at least one")
@@ -133,7 +133,7 @@ def last_before(
 
     Where the nearest stamp is farther than a tolerance [s], the pose with the last stamp before.
 
-    Of poses with one and the same stamp the mean: a clock of few digits does not tell them apart.
+    Of poses with one and the same stamp the mean: a clock of few digits does not distinguish them.
     """
     order = np.argsort(stamps, kind="stable")
     known = stamps[order]

@@ -28,9 +28,9 @@ def visible(
     log_odds : (rows, columns) int8
         The belief; > 0 is occupied.
     from_cell : (row, column)
-        Where one looks from.
+        Where the line of sight begins.
     cells : (N, 2) int
-        Cells (row, column) looked at; their own state does not matter.
+        Cells (row, column) at the other end; their own state does not matter.
     maximum_range : float
         Range of sight in cells, between centres.
 

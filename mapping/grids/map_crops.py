@@ -202,7 +202,7 @@ def _places(half: int, width: int, step_x: int, step_y: int, cells: int) -> Arra
         left_x, left_y = np.int32((cells - 1 - 2 * i) * step_y), np.int32((2 * i + 1 - cells) * step_x)
         places_of_row = places[i]
         for j in range(cells):
-            # The compiler widens sums to 64 bits unless told otherwise, and goes through half as many at a
+            # The compiler widens sums to 64 bits unless asked otherwise, and goes through half as many at a
             # time.
             x, y = (
                 np.uint32(left_x + forward_x[j]) >> np.uint32(16),
@@ -228,7 +228,7 @@ def crop_turned(pools: Array, x: float, y: float, heading: float, scales: Array,
     x, y : float
         Where the robot is [cells of the map].
     heading : float
-        Where it looks in the map [rad].
+        Its heading in the map [rad].
     scales : (scales,) int64
         Side of a crop's cell [cells of the map].
     crops : (scales, side, side) uint8

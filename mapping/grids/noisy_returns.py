@@ -1,9 +1,9 @@
 """Returns with noise: one that ends just behind a known wall has met that wall.
 
 Noise puts ends of beams behind walls too, into cells that no beam passes through, so that no later scan takes
-them back: walls grow thick from behind for as long as they are looked at. So where a beam ends behind an
-occupied cell, within what noise explains, its end is laid into that cell. What a single hit has marked counts
-as occupied: beams that pass in front of a wall take a stray hit back.
+them back: walls grow thick from behind for as long as they are seen. So where a beam ends behind an
+occupied cell, within what noise explains, its end is moved into that cell. What a single hit has marked
+counts as occupied: beams that pass in front of a wall take a stray hit back.
 
 A cell beside a free one may be the surface of something, such as the next piece of a wall along which a beam
 grazes: its returns stay.
@@ -54,7 +54,7 @@ def _unsettled(
 
     Those neither in an occupied cell nor beside a free one, as most are, and those at the map's border.
 
-    They are listed without branches, which could not be foreseen; tells how many there are.
+    They are listed without branches, which could not be foreseen; returns how many there are.
     """
     rows, columns = log_odds.shape
     beams = lengths.shape[0]

@@ -151,7 +151,7 @@ class OccupancyGrid:
         ranges : (beams,)
             Ranges [m]; inf for no return, nan for an invalid beam.
         geometry : ScanGeometry
-            Which way the beams look.
+            Directions of the beams.
         noise : tuple of float
             Standard deviation of the ranges: the larger of the first [m] and the second, a share of the
             range. Returns that it may have put behind a wall count as returns of the wall.

@@ -2,9 +2,8 @@
 
 They are kept beside a map and recomputed only where it has changed.
 
-Where that is, is told by bits: one for each word of 64 cells in which a level has changed, and one for each
-row that has such words, behind the last row, so that rows in which nothing has changed are not even looked
-at.
+Where that is, is marked by bits: one for each word of 64 cells in which a level has changed, and one for each
+row that has such words, behind the last row, so that rows in which nothing has changed are not even read.
 """
 
 import numpy as np

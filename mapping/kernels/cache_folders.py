@@ -21,7 +21,7 @@ _ROOT = 0
 
 
 def user_cache_folder() -> Path | None:
-    """Return the folder in which the user's programs keep what they can make anew.
+    """Return the folder in which the user's programs keep what they can make again.
 
     None where the user has no home.
     """
@@ -97,14 +97,14 @@ def trusted_folder(base: Path, names: Collection[str], owners: Collection[int] =
     return folder
 
 
-def is_private(told: os.stat_result, trusted: Collection[int]) -> bool:
+def is_private(status: os.stat_result, trusted: Collection[int]) -> bool:
     """Whether what was found is a folder that only trusted users can write to.
 
     It was found without following links.
     """
-    if not stat.S_ISDIR(told.st_mode):
+    if not stat.S_ISDIR(status.st_mode):
         return False
-    return not _HAS_OWNERS or (told.st_uid in trusted and not told.st_mode & _BY_OTHERS)
+    return not _HAS_OWNERS or (status.st_uid in trusted and not status.st_mode & _BY_OTHERS)
 
 
 def is_writable(folder: Path | None) -> bool:
@@ -153,14 +153,14 @@ def _is_made_ours(folder: Path, trusted: Collection[int], *, is_inner: bool) -> 
     """Make a folder if absent, and return whether it is ours alone.
 
     An outer one of ours to which others can write, as some masks leave them, is closed to them: what they
-    could have put there is another folder, and that is looked at by itself. The inner one may hold files of
+    could have put there is another folder, and that is checked by itself. The inner one may hold files of
     theirs, and is not taken.
     """
     try:
         os.mkdir(folder, PRIVATE)
     except FileExistsError:
-        told = os.lstat(folder)
-        is_mine = stat.S_ISDIR(told.st_mode) and _HAS_OWNERS and told.st_uid == os.geteuid()
-        if is_mine and told.st_mode & _BY_OTHERS and not is_inner:
-            os.chmod(folder, stat.S_IMODE(told.st_mode) & ~_BY_OTHERS)
+        status = os.lstat(folder)
+        is_mine = stat.S_ISDIR(status.st_mode) and _HAS_OWNERS and status.st_uid == os.geteuid()
+        if is_mine and status.st_mode & _BY_OTHERS and not is_inner:
+            os.chmod(folder, stat.S_IMODE(status.st_mode) & ~_BY_OTHERS)
     return is_private(os.lstat(folder), trusted)

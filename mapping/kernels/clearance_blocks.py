@@ -79,7 +79,7 @@ def _count_rows(
 
 
 def _squares(typing_context: Any, steps: Any, far: Any, cap: Any, result: Any) -> Any:  # noqa: ANN401
-    """Write the squared distances in half cells after some steps; tell the fewest."""
+    """Write the squared distances in half cells after some steps; return the fewest."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
         steps_at, far, cap, result_at = arguments

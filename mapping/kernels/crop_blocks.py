@@ -115,7 +115,7 @@ def _store_levels(builder: Any, rows: list[Any], places_at: Any, crop_at: Any, s
     first, second, third = registers
     place = builder.load(_address(builder, places_at, _REGISTER), align=1)
     near, far = _call(builder, "vpermi2var", first, place, second), _call(builder, "permvar", third, place)
-    # The highest bit of a place tells whether it lies in the third register; the picks do not look at it.
+    # The highest bit of a place says whether it lies in the third register; the picks ignore it.
     zero, occupied, unknown, free = (_constant(_REGISTER, value) for value in (0, *LEVELS))
     log_odds = builder.select(builder.icmp_signed("<", place, zero), far, near)
     known = builder.select(builder.icmp_signed(">", log_odds, zero), occupied, unknown)

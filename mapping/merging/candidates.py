@@ -62,7 +62,7 @@ def corner_candidates(
     if settings.validation.test == "discs":
         order = np.lexsort((_residuals(a, b, matches, proposals, is_inlier), -counts))
     else:
-        # Walls tell more than corners which of many proposals is good, and cost little.
+        # Walls show better than corners which of many proposals is good, and cost little.
         walls = rank_by_walls(a, b, proposals, alignment.wall_samples // 2)
         order = np.lexsort((-counts, -walls))
         order = order[counts[order] >= wanted]
@@ -156,7 +156,7 @@ def ambiguity(
 ) -> str | None:
     """Return which other transform explains the maps nearly as well, or None.
 
-    Rooms look alike most of all after quarter turns and shifts, so the best translations at these rotations
+    Rooms are alike most of all after quarter turns and shifts, so the best translations at these rotations
     are tried too.
     """
     validation, transform = settings.validation, best.candidate.a_from_b

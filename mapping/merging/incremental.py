@@ -2,8 +2,8 @@
 
 Only what has changed is described, and verified transforms are not searched for again.
 
-A robot's map keeps its frame while it grows: its origin tells where the array's lower left corner lies in
-that frame. Two maps that know little can look alike without being of one place. Who acts on a merge can ask
+A robot's map keeps its frame while it grows: its origin is where the array's lower left corner lies in
+that frame. Two maps that know little can seem alike without being of one place. Who acts on a merge can ask
 for a second finding: it is joined only when it is found once more, by a search of its own on maps that have
 grown, where it was before.
 """
@@ -77,11 +77,11 @@ class IncrementalMerger:
     confirmation_own_m2 : float
         When two maps are joined, each knows so much that the other one does not [m2], or both know
         `PLENTY_M2`: of what a map knows beyond the overlap nothing has contradicted, though in rooms that
-        merely look alike something would have.
+        merely seem alike something would have.
     searches_per_update : int or None
         Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn
         was longest ago; pairs that others join are only verified then. All where None. Verifying costs
-        little: whatever has news is verified.
+        little: whatever has changed is verified.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class IncrementalMerger:
 
     def _due(self, pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
         """Return the pairs whose turn it is to be verified or searched for."""
-        due = [pair for pair in pairs if self._has_news(pair)]
+        due = [pair for pair in pairs if self._has_grown(pair)]
         if self.searches_per_update is not None:
             due.sort(
                 key=lambda pair: (not self._waits(pair), self._pairs[pair].at if pair in self._pairs else 0)
@@ -177,7 +177,7 @@ class IncrementalMerger:
         before = self._pairs.get(pair)
         return before is not None and before.frames is not None and not before.is_confirmed
 
-    def _has_news(self, pair: tuple[str, str]) -> bool:
+    def _has_grown(self, pair: tuple[str, str]) -> bool:
         """Whether maps have changed enough since a pair was last tried to retry it."""
         before = self._pairs.get(pair)
         if before is not None and max(self._described.changed_at[name] for name in pair) <= before.at:

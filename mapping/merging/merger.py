@@ -85,7 +85,7 @@ def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSetti
     """Merge maps of robots that know nothing of each other's start.
 
     Pairs of maps that know most are searched for first, by corners before all rotations and translations are
-    tried. Where two maps are joined through others already, they are laid over each other as these imply, and
+    tried. Where two maps are joined through others already, they are overlaid as these imply, and
     searched for only where they do not agree so.
 
     Parameters

@@ -82,7 +82,7 @@ def _find_breaks(
         ax, ay = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
         bx, by = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
         before, after = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
-        # Steps and turns that noise alone can make tell nothing.
+        # Steps and turns that noise alone can make show nothing.
         noise = noise_sigmas * sigmas[k]
         if max(before, after) > step_ratio * max(min(before, after), noise):
             is_break[k if before > after else k + 1] = True

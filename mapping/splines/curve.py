@@ -25,7 +25,7 @@ Box = tuple[float, float, float, float]
 _END_WEIGHT = 4.0
 
 LEAST_LINE = 0.4
-"""Shorter lines tell no direction [m]."""
+"""Shorter lines have no clear direction [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

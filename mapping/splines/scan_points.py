@@ -31,7 +31,7 @@ class ScanPoints:
     scan : (beams,) float64
         The whole scan [m]; inf for no return, nan for what is invalid or out of the laser's reach.
     geometry : ScanGeometry
-        Which way the beams look.
+        Directions of the beams.
     """
 
     points: NDArray[np.float64]

@@ -4,11 +4,11 @@ It has arrays that are expensive to make and small to keep, found by what determ
 
 An entry is one file of compressed arrays. It is written beside and renamed, so that it appears whole; it
 carries a hash of its key and content, so that one that is damaged, cut short or another's is seen and made
-anew. Keys hold a hash of the code and libraries that make the arrays, so that a stale entry is never found.
+again. Keys hold a hash of the code and libraries that make the arrays, so that a stale entry is never found.
 Only files with names of entries are read and removed, and nothing is reached through links.
 
 The entries lie in a few folders, each bounded by its share of the whole: a process that writes makes room in
-one of them without looking at the others, and no process has to know what others write. The entry used
+one of them without reading the others, and no process has to know what others write. The entry used
 longest ago goes first; who reads it meanwhile reads on.
 """
 
@@ -242,9 +242,9 @@ def _files(folder: Path) -> list[tuple[float, int, Path]]:
             if not _NAME.fullmatch(entry.name):
                 continue
             with contextlib.suppress(OSError):
-                told = entry.stat(follow_symlinks=False)
-                if stat.S_ISREG(told.st_mode):
-                    files.append((told.st_mtime, _on_disk(told.st_size), Path(entry.path)))
+                status = entry.stat(follow_symlinks=False)
+                if stat.S_ISREG(status.st_mode):
+                    files.append((status.st_mtime, _on_disk(status.st_size), Path(entry.path)))
     return files
 
 

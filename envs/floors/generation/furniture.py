@@ -2,8 +2,8 @@
 
 A laser thus sees the legs of a table, and a tall body meets its top.
 
-A piece is described in its own frame: x to the right of who looks at it, y from its front (0) to its back
-(depth), which stands against a wall. Seats and low tables are closed down to the floor: what a low robot
+A piece is described in its own frame: x to the right of who stands before it, y from its front (0) to its
+back (depth), which stands against a wall. Seats and low tables are closed down to the floor: what a low robot
 (below 0.6 m) would touch, a laser at 0.3 m sees; table tops, desks and basins meet taller bodies only. Pieces
 called open stand on legs or feet, as most real ones do: what is above them, a planar laser misses. Parts are
 boxes ``(x_low, y_low, x_high, y_high, z_low, z_high)``.
@@ -236,7 +236,7 @@ def place(
     x, y : float
         Middle of its footprint [m].
     theta : float
-        Direction in which its back looks [rad]: pi / 2 for a piece whose back is against the wall of the
+        Direction of its back [rad]: pi / 2 for a piece whose back is against the wall of the
         larger y.
     width, depth : float, optional
         Its size [m]; without it the middle of the kind's range.

@@ -20,7 +20,7 @@ class Sensing:
     time_s : float
         When the odometry was read and the last beam of the scan was taken [s].
     odometry : (3,) float64
-        x, y, theta as dead reckoning tells since its own arbitrary beginning [m, rad].
+        x, y, theta by dead reckoning since its own arbitrary beginning [m, rad].
     ranges : (beams,) float32
         The scan [m]; inf for no return, nan for an invalid beam.
     """
@@ -51,7 +51,7 @@ class Localizer(Protocol):
     """Tells where a robot is, from what it senses."""
 
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
-        """Begin anew at x, y, theta (3,) [m, rad]; whatever is drawn comes from ``seed``."""
+        """Begin again at x, y, theta (3,) [m, rad]; whatever is drawn comes from ``seed``."""
         ...
 
     def localize(self, sensing: Sensing) -> NDArray[np.float64]:
@@ -70,7 +70,7 @@ class Localizer(Protocol):
         ...
 
     def take_correction(self) -> KeyScans | None:
-        """Return the scans for rendering the whole map anew; else None.
+        """Return the scans for rendering the whole map again; else None.
 
         Once after each correction of past poses.
         """

@@ -1,4 +1,4 @@
-"""Dead reckoning: the pose is the start moved as the wheels tell."""
+"""Dead reckoning: the pose is the start moved as the wheels measure."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class Odometry:
         self.reset(np.zeros(3), 0)
 
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
-        """Begin anew at x, y, theta (3,) [m, rad]; nothing is drawn."""
+        """Begin again at x, y, theta (3,) [m, rad]; nothing is drawn."""
         self._pose = np.array(pose, np.float64)
         self._covariance = np.zeros((3, 3))
         self._odometry: NDArray[np.float64] | None = None

@@ -59,7 +59,7 @@ class ClosureFinder:
     settings : ClosureSettings
         How places are recognised.
     matching : MatchingSettings
-        How scans are laid on maps.
+        How scans are matched with maps.
     """
 
     def __init__(self, settings: ClosureSettings, matching: MatchingSettings) -> None:
@@ -152,8 +152,8 @@ class ClosureFinder:
         # stays there.
         weak = np.diag(1.0 / np.array([settings.search_m, settings.search_m, settings.search_angle]) ** 2)
         match, here = (
-            self._laid(old, points, best.pose, np.zeros((3, 3))),
-            self._laid(old, points, around, weak),
+            self._matched_on(old, points, best.pose, np.zeros((3, 3))),
+            self._matched_on(old, points, around, weak),
         )
         if here.contradiction <= settings.most_contradiction and here.score >= settings.as_good * match.score:
             # What the map knows agrees with where the robot believes to be; what lies beyond it may be the
@@ -184,7 +184,7 @@ class ClosureFinder:
         covariance = turned(match.covariance + floor, -float(place_of_node[2]))
         return Closure(node, len(poses) - 1, relative(place_of_node, match.pose), covariance, match.score)
 
-    def _laid(
+    def _matched_on(
         self,
         old: _Remembered,
         points: NDArray[np.float64],
@@ -228,7 +228,7 @@ class ClosureFinder:
         if np.hypot(move[0], move[1]) <= settings.confirmed_beyond_m and not is_improbable:
             return [closure]
         agreeing = [(first, other) for first, other in self._doubtful if self._agree(other, closure, poses)]
-        # One local map may look like another place, to all scans that are taken there.
+        # One local map may resemble another place, to all scans that are taken there.
         is_single = (is_improbable or settings.doubts_one_map) and all(
             first == first_node for first, _ in agreeing
         )

@@ -91,7 +91,7 @@ def factorise(places: Elimination, blocks: Array) -> bool:
         Where its blocks are.
     blocks : (blocks, 3, 3) float64
         The blocks, zero where only the factor has any; changed. Of those on the diagonal only the lower
-        triangle is looked at.
+        triangle is read.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def _subtract_product(of: Array, left: Array, right: Array) -> None:
 
 @kernel(inline=True)
 def _factorise_block(block: Array, factor: Array) -> bool:
-    """Write the factor of a block on the diagonal, and tell whether it has one."""
+    """Write the factor of a block on the diagonal; return whether it has one."""
     factor[:] = 0.0
     for i in range(3):
         for k in range(i + 1):

@@ -94,7 +94,7 @@ def find_placements(
     blocks = (window.width + (1 << top) - 1) >> top
     cells = _cells_of(points, window)
     bounds = _bounds_of_blocks(coarse, cells, top, blocks)
-    looked_at = bounds.shape[0]
+    examined = bounds.shape[0]
     best = least
     stack = np.empty((CHILDREN * (top + 2) + CHILDREN, 5), np.int64)
     children = np.empty((CHILDREN, 3), np.int64)
@@ -114,11 +114,11 @@ def find_placements(
                     best = bound
                     found[COLUMN], found[ROW], found[TURN], found[SUM] = column, row, turn, bound
                 continue
-            if looked_at >= evaluations:
+            if examined >= evaluations:
                 return False
             block = (level, column, row)
-            number, looked = _divide(coarse, cells[turn], block, window.width, best, children)
-            looked_at += looked
+            number, examined = _divide(coarse, cells[turn], block, window.width, best, children)
+            examined += examined
             for k in range(number):
                 _push(stack, depth, (children[k, 0], level - 1, turn, children[k, 1], children[k, 2]))
                 depth += 1
@@ -181,18 +181,18 @@ def _divide(
     """Fill ``children`` with the parts of a block that can beat the best.
 
     They are in the order of their bounds; each is bound, column and row. Returns how many there are, and how
-    many were looked at.
+    many were examined.
     """
     level, column, row = block
     below, maxima = level - 1, coarse.maxima
     begin, rows, columns = coarse.shapes[below]
-    half, number, looked = 1 << below, 0, 0
+    half, number, examined = 1 << below, 0, 0
     for child in range(CHILDREN):
         x, y = column + (child & 1) * half, row + (child >> 1) * half
         if x >= width or y >= width:
             continue
         value = _bound(maxima, begin, rows, columns, below, cells, x, y)
-        looked += 1
+        examined += 1
         if value > best:
             at = number
             while at > 0 and children[at - 1, 0] > value:
@@ -200,4 +200,4 @@ def _divide(
                 at -= 1
             children[at, 0], children[at, 1], children[at, 2] = value, x, y
             number += 1
-    return number, looked
+    return number, examined

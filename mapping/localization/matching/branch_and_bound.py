@@ -106,7 +106,7 @@ def place(
     least_score : float
         What a placement has to reach, from 0 to 1.
     evaluations : int
-        At most so many placements and blocks of them are looked at.
+        At most so many placements and blocks of them are examined.
     apart : ((3,) float64, float, float) or None
         A pose of which placements keep away: by the first distance [m], or by the second angle [rad].
 

@@ -73,7 +73,7 @@ class LocalMapper:
     settings : SlamSettings
         How.
     geometry : ScanGeometry
-        Which way the beams look.
+        Directions of the beams.
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:

@@ -22,7 +22,7 @@ class LocalMatcher:
     settings : SlamSettings
         How.
     geometry : ScanGeometry
-        Which way the beams look.
+        Directions of the beams.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class LocalMatcher:
         Near what odometry says it is searched first, weighing both. Where that does not convince, odometry
         may be wrong (a wheel slips, the robot was pushed), and the search goes farther, without it, for scans
         of enough returns; what is found there has to be clearly better. On new ground, and where a scan
-        hardly has a return, nothing but odometry tells where the robot is.
+        hardly has a return, nothing but odometry measures where the robot is.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class LocalMatcher:
         is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
         far = None if is_sparse else self._match_far(submap, points, predicted, reach)
         if self._uses_odometry and is_blind and far is not None:
-            # So far from odometry something that looks a little alike, or in part, is soon found.
+            # So far from odometry something a little similar, or in part, is soon found.
             is_alike = (
                 far.score >= settings.convincing_share * self.usual_score
                 and far.overlap >= settings.blind_overlap

@@ -47,7 +47,7 @@ STILL_M, STILL_ANGLE = 1e-4, 1e-5
 """Smaller steps end the descent [m, rad]."""
 
 PROBES = 4
-"""Places around a pose at which curvature is looked at, half a cell to each side."""
+"""Places around a pose at which curvature is measured, half a cell to each side."""
 
 
 class Objective(NamedTuple):
@@ -90,24 +90,24 @@ class Match:
         Share of the points that do.
     contradiction : float
         Share of the points that lie in what the map knows to be free.
-    told, prior : (3, 3) float64
-        What the points alone tell of the pose, and what was known before [1/m^2, 1/(m rad), 1/rad^2].
+    information, prior : (3, 3) float64
+        What the points alone say of the pose, and what was known before [1/m^2, 1/(m rad), 1/rad^2].
     """
 
     pose: NDArray[np.float64]
     score: float
     overlap: float
     contradiction: float
-    told: NDArray[np.float64]
+    information: NDArray[np.float64]
     prior: NDArray[np.float64]
 
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the pose, (3, 3) [m^2, m rad, rad^2].
 
-        A metre and a radian at most, for what nothing tells.
+        A metre and a radian at most, for what nothing measures.
         """
-        return np.asarray(np.linalg.inv(self.told + self.prior + np.eye(3)), np.float64)
+        return np.asarray(np.linalg.inv(self.information + self.prior + np.eye(3)), np.float64)
 
 
 def refine(
@@ -146,29 +146,29 @@ def refine(
         ends would hold the robot back to where the scan covers the known part of it, and in a bare corridor
         nothing else speaks.
     surface_m : float
-        Points of a surface so near to a point tell which way it runs there; 0 for the nearest two [m].
+        Points of a surface so near to a point give its direction there; 0 for the nearest two [m].
     """
-    pose, hessian, told = np.array(start, np.float64), np.empty((3, 3)), np.zeros(3)
+    pose, hessian, judgement = np.array(start, np.float64), np.empty((3, 3)), np.zeros(3)
     count = len(points)
     if count == 0:
         return Match(pose, 0.0, 0.0, 0.0, np.zeros((3, 3)), information)
     normals = np.zeros((count, 2))
     find_normals(points, surface_m, normals)
     objective = Objective(grid, points, normals, prior, information, weight / count, unseen)
-    _refine(objective, pose, hessian, told)
-    score, overlap, contradiction = told.tolist()
+    _refine(objective, pose, hessian, judgement)
+    score, overlap, contradiction = judgement.tolist()
     return Match(pose, score, overlap, contradiction, hessian, information)
 
 
 @kernel
-def _refine(objective: Objective, pose: Array, hessian: Array, told: Array) -> None:
+def _refine(objective: Objective, pose: Array, hessian: Array, judgement: Array) -> None:
     """Move a pose to where the cost is least.
 
     Tell the Hessian and what ``_judge`` says.
     """
     _descend(objective, pose, hessian)
     _curve_around(objective, pose, hessian)
-    _judge(objective.grid, objective.points, pose, told)
+    _judge(objective.grid, objective.points, pose, judgement)
 
 
 @kernel
@@ -260,7 +260,7 @@ def _normal_equations(objective: Objective, pose: Array, hessian: Array, gradien
 
 
 @kernel(borrowing=True)
-def _judge(grid: AgreementGrid, points: Array, pose: Array, told: Array) -> None:
+def _judge(grid: AgreementGrid, points: Array, pose: Array, judgement: Array) -> None:
     """Compute agreement and shares of points that are known or in free space.
 
     Mean agreement of the points near observed cells, their share, and the share of points in free space.
@@ -279,7 +279,7 @@ def _judge(grid: AgreementGrid, points: Array, pose: Array, told: Array) -> None
             lowest, highest = extremes_around(levels, int(math.floor(x)), int(math.floor(y)))
             known += highest > UNSEEN
             contradicting += lowest == FREE_LEVEL and highest == FREE_LEVEL
-    told[0], told[1], told[2] = (
+    judgement[0], judgement[1], judgement[2] = (
         agreeing / max(known, 1),
         known / points.shape[0],
         contradicting / points.shape[0],

@@ -26,7 +26,7 @@ def at_last_beam(
     ranges : (beams,) float32
         The scan, first beam first [m]; inf for no return, nan for an invalid beam.
     geometry : ScanGeometry
-        Which way the beams look.
+        Directions of the beams.
     motion : (3,) float64
         Motion x, y, theta of the robot in the period that ended with the last beam, in the frame in which it
         began [m, rad].
@@ -56,7 +56,7 @@ def _undo_motion(
     share: float,
     seen: Array,
 ) -> None:
-    """Note each beam's end at the beam that looks there from the last pose.
+    """Note each beam's end at the beam of that direction from the last pose.
 
     The nearer one where two fall together.
     """
@@ -103,7 +103,7 @@ def scan_points(
     ranges : (beams,) float32
         The scan [m]; inf for no return, nan for an invalid beam.
     unit_vectors : (2, beams) float64
-        Which way the beams look.
+        Directions of the beams.
     increment : float
         Angle between neighbouring beams [rad].
     longest : float

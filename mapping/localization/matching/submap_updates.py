@@ -79,7 +79,7 @@ def insert_scan(
     seen = fill_scan_polygon(lengths, directions, ends, local_x, local_y, increment, full_circle != 0.0, bits)
     points = _surface_points(lengths, ends, is_hit, increment, full_circle != 0.0)
     if behind_share > 0.0:
-        seen = _look_behind(
+        seen = _mark_behind(
             weights, points, (local_x, local_y), (behind, behind_share), bits, seen, row_offset, column_offset
         )
     _count_ends(shares, weights, counts, levels, points, bits, row_offset, column_offset)
@@ -133,7 +133,7 @@ def _surface_points(
 
 
 @kernel
-def _look_behind(
+def _mark_behind(
     weights: Array,
     points: Array,
     laser: tuple[float, float],

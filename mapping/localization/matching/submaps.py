@@ -102,7 +102,7 @@ class Submap:
         ranges : (beams,) float32
             The scan [m]; inf for no return, nan for an invalid beam.
         geometry : ScanGeometry
-            Which way the beams look.
+            Directions of the beams.
         longest : float
             Longest range that counts [m]; a return beyond it says that the way there is free.
 

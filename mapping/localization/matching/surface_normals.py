@@ -33,7 +33,7 @@ def find_normals(points: Array, reach: float, normals: Array) -> None:
 
     The surface at each point is that of the point and its neighbours; zero for a point alone.
 
-    Two neighbours tell it where the surface bends; elsewhere all within reach do, since noise turns what lies
+    Two neighbours give it where the surface bends; elsewhere all within reach do, since noise turns what lies
     between two near points.
     """
     count = points.shape[0]

@@ -37,7 +37,7 @@ class WallCompass:
     It collects directions of walls between nodes. The walls are those of the building.
 
     Where walls run is surveyed once, over the first local map. From then on both are estimated together, by a
-    Kalman filter: what the next nodes show tells more of the building, what later ones show more of the
+    Kalman filter: what the next nodes show says more of the building, what later ones show more of the
     headings.
 
     Parameters
@@ -88,11 +88,11 @@ class WallCompass:
             return False
         noise = 1.0 / information + self._settings.deviation_angle**2
         self.bearings.append(Bearing(node, direction, 1.0 / noise))
-        # Headings have drifted since by what is told of each; the local map's own node has not.
+        # Headings have drifted since as far as each is uncertain; the local map's own node has not.
         self._walls, self._walls_variance, self._covariance = heading + direction, noise, 0.0
         return True
 
-    def look(self, points: NDArray[np.float64]) -> None:
+    def observe(self, points: NDArray[np.float64]) -> None:
         """Take in the points (points, 2) of a scan, in the frame of the last node [m]."""
         if self.is_surveyed:
             self._points.append(points)
@@ -169,11 +169,11 @@ class WallCompass:
 
         Each measures the turn (poses, 3) between the two, and may be wrong.
         """
-        told, share = [], self._settings.drift**2
+        edges, share = [], self._settings.drift**2
         for bearing in self.bearings:
             heading = float(nodes[bearing.node, 2])
             turn = heading + self.rest(bearing, heading) - float(nodes[0, 2])
-            told.append(
+            edges.append(
                 (
                     0,
                     bearing.node,
@@ -182,7 +182,7 @@ class WallCompass:
                     True,
                 )
             )
-        return told
+        return edges
 
     def rest(self, bearing: Bearing, heading: float) -> float:
         """Return the turn of a heading that would align its walls with the building's.

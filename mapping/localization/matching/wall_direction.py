@@ -1,8 +1,8 @@
-"""Which way the walls of a scan, or of many, run.
+"""Direction of the walls of a scan, or of many.
 
 In most buildings walls run in two directions, at right angles. Seen along either, all points of a wall fall
 together: of all pairs of axes at right angles, projections onto those of the walls have the least entropy.
-This measurement tells a heading, up to quarter turns, and does not drift. Points need not lie in rows, so
+This measurement gives a heading, up to quarter turns, and does not drift. Points need not lie in rows, so
 that far ones, which noise parts from each other, count as well.
 
 References
@@ -22,10 +22,10 @@ QUARTER = 0.5 * math.pi
 """Turns by so much change nothing about the directions of walls [rad]."""
 
 LEAST_POINTS = 20
-"""Of fewer points nothing is told."""
+"""Of fewer points nothing is estimated."""
 
 COARSE_POINTS = 600
-"""At most so many points are looked at in all directions."""
+"""At most so many points are examined in all directions."""
 
 COARSE_CELL_M, COARSE_STEPS = 0.05, 180
 """Side of the coarse counting cells [m], and steps per quarter turn.

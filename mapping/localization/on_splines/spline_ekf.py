@@ -240,7 +240,7 @@ class SplineEkf(SplineTracker):
 def _stacked(parts: list[_Measured]) -> _Measured:
     """Return several measurements as one.
 
-    What one part does not tell of is nothing to it.
+    What one part does not concern is nothing to it.
     """
     columns = max(part.jacobian.shape[1] for part in parts)
     jacobians = [np.pad(part.jacobian, ((0, 0), (0, columns - part.jacobian.shape[1]))) for part in parts]

@@ -47,7 +47,7 @@ class TrackingSettings:
     curve_sigma : float
         Standard deviation of the distance between a ray's end and its curve [m].
     curve_distance : float
-        Rays that end farther from any curve see what is new, and tell nothing of the pose [m].
+        Rays that end farther from any curve see what is new, and say nothing of the pose [m].
     ray_stride : int
         Every so many-th beam that returned counts.
     ray_share : float
@@ -57,7 +57,7 @@ class TrackingSettings:
     least_features, least_rays : int
         With fewer matches of both kinds the pose is predicted only.
     still_distance, still_turn : float
-        A robot that has moved less since its last correction is not corrected again: what it sees is no news
+        A robot that has moved less since its last correction is not corrected again: what it sees is not new
         [m, rad].
     map_distance, map_turn : float
         The map takes in a scan whenever the robot has moved as far since the last one [m, rad].
@@ -111,7 +111,7 @@ class SplineTracker(ABC):
         self.reset(np.zeros(3), 0)
 
     def reset(self, pose: NDArray[np.float64], seed: int) -> None:
-        """Begin anew at x, y, theta (3,) [m, rad] with a blank map.
+        """Begin again at x, y, theta (3,) [m, rad] with a blank map.
 
         Whatever is drawn comes from ``seed``.
         """

@@ -2,7 +2,7 @@
 
 Wheels differ in size and spacing from their assumed values.
 
-Matches tell how far the robot really went, wherever walls show it; where they do not, as along a bare
+Matches show how far the robot really went, wherever walls show it; where they do not, as along a bare
 corridor, odometry that knows its errors goes on without them. The errors are the scales of distance and turn,
 and a turn for each metre; their estimate is that of recursive least squares (a Kalman filter without motion),
 and old matches fade.
@@ -32,7 +32,7 @@ class OdometryCalibration:
     Attributes
     ----------
     errors : (3,) float64
-        Share by which a distance is longer than told, share by which a turn is larger, and turn for each
+        Share by which a distance is longer than measured, share by which a turn is larger, and turn for each
         metre [m/m, rad/rad, rad/m].
     covariance : (3, 3) float64
         Of the errors.
@@ -79,11 +79,11 @@ class OdometryCalibration:
         Parameters
         ----------
         distance, turn : float
-            What odometry told since the last match [m, rad].
+            What odometry measured since the last match [m, rad].
         difference : (3,) float64
             Where the match lies in the frame of where the robot was expected: x, y, theta [m, rad].
         information : (3, 3) float64
-            What the points of the scan alone tell of that, in the same frame [1/m^2, 1/(m rad), 1/rad^2].
+            What the points of the scan alone measure of that, in the same frame [1/m^2, 1/(m rad), 1/rad^2].
         prior : (3, 3) float64
             What was known before, which the match has in it too.
         """
@@ -93,12 +93,12 @@ class OdometryCalibration:
         share = np.linalg.inv(
             np.eye(3) + information @ (settings.noise(distance, turn) + np.linalg.pinv(information + prior))
         )
-        told = share @ information
+        weighted = share @ information
         seen = share @ (information + prior) @ difference
         faded = 1.0 - (1.0 - settings.fading) ** (abs(distance) + abs(turn))
         grown = (1.0 - faded) * self.covariance + faded * self._at_first()
         before = np.linalg.inv(grown)
-        after = before + lever.T @ told @ lever
+        after = before + lever.T @ weighted @ lever
         self.covariance = np.asarray(np.linalg.inv(0.5 * (after + after.T)), np.float64)
         self.errors = self.errors + self.covariance @ (lever.T @ seen)
         bound = settings.most_deviations * np.sqrt(np.diag(self._at_first()))

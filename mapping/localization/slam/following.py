@@ -85,9 +85,9 @@ def follow(
     log : LaserLog
         The log.
     settings : SlamSettings
-        How; whether there is odometry and how fast the beams turn is told by the log.
+        How; whether there is odometry and how fast the beams turn is in the log.
     watch : callable
-        Passes the scans' numbers on and may tell how many there were.
+        Passes the scans' numbers on and may print how many there were.
     clock : callable
         CPU time [s].
     """

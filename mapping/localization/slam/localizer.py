@@ -49,7 +49,7 @@ class Slam:
     settings : SlamSettings
         How.
     geometry : ScanGeometry
-        Which way the beams look.
+        Directions of the beams.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Slam:
         self._has_begun = False
         # After so much of the path it is surveyed where walls run.
         self._orients_at = settings.graph.start_path_m
-        # The first scan's points and pose, until the map tells how well it lies on them.
+        # The first scan's points and pose, until the map shows how well they match.
         self._first: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._motion = OdometryMotion(settings)
         # Poses in the frame of the older local map: now, at the last match, at the last node.
@@ -215,7 +215,7 @@ class Slam:
             return
         if match.prior.any():
             heading = float(self._local[2])
-            measured, prior = turned(match.told, -heading), turned(match.prior, -heading)
+            measured, prior = turned(match.information, -heading), turned(match.prior, -heading)
             self._motion.learn(relative(self._local, match.pose), measured, prior)
         self._motion.begin_interval()
         self.counts.matches += 1
@@ -346,7 +346,7 @@ class Slam:
 
     def _measure_walls(self, ranges: NDArray[np.float32]) -> None:
         if self._compass is not None and self._compass.is_surveyed:
-            self._compass.look(
+            self._compass.observe(
                 Transform(*relative(self._at_node, self._local)).apply(self._all_points(ranges))
             )
 

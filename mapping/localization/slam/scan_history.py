@@ -16,7 +16,7 @@ class ScanHistory:
     Parameters
     ----------
     geometry : ScanGeometry
-        Which way the beams look.
+        Directions of the beams.
     resolution : float
         Side of the map's cells [m].
     """

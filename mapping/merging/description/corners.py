@@ -43,10 +43,10 @@ class CornerSettings:
     Attributes
     ----------
     neighbours : tuple of int
-        Numbers of occupied neighbours that are looked at, any of 4 (corner without its corner cell), 5 (whole
+        Numbers of occupied neighbours that are examined, any of 4 (corner without its corner cell), 5 (whole
         corner), 6 (jog of a wall) and 7 (dead end one cell wide).
     rule : str
-        ``table``: the sixteen codes that look alike in all directions (and eight with 7 neighbours);
+        ``table``: the sixteen codes that are alike in all directions (and eight with 7 neighbours);
         ``literal``: the printed rules of parity, with codes that hold two or three separate openings.
     separation_m : float
         Of corners nearer than this only the best is kept: 5 neighbours before 4, 6 and 7 [m]; 0 keeps all.
@@ -90,7 +90,7 @@ class Corners:
     points : (n, 2) float64
         Centres of these cells in the map's frame [m].
     angles : (n,) float64
-        Which way each opens [rad], in [0, 2 pi).
+        Direction in which each opens [rad], in [0, 2 pi).
     neighbours : (n,) int64
         Number of occupied neighbours.
     """
@@ -132,7 +132,7 @@ def detect_corners(
     """
     settings = settings or CornerSettings()
     rows, columns = levels.shape
-    # Cells are looked at in words of eight; a border of unknown cells lets every word have neighbours.
+    # Cells are read in words of eight; a border of unknown cells lets every word have neighbours.
     right = -columns % _WORD + _WORD
     padded = cv2.copyMakeBorder(levels, 1, 1, _WORD, right, cv2.BORDER_CONSTANT, value=UNKNOWN)
     three = (

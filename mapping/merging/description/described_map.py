@@ -23,7 +23,7 @@ A wall that an error of 4 cm of two maps puts at the rim of free space is not op
 """
 
 FACING_DISTANCE_M = 0.075
-"""How far before and behind a wall is looked to tell its side [m].
+"""How far before and behind a wall cells are read to find its side [m].
 
 Half of what thin walls measure.
 """
@@ -46,7 +46,7 @@ class DescribedMap:
     walls : (n, 2) float64
         Centres of the occupied cells that border on a free one: what a laser has seen of walls [m].
     normals : (n, 2) float64
-        Which way each of them faces: unit vectors towards the free space around it, zero where that has no
+        Normal of each of them: unit vectors towards the free space around it, zero where that has no
         side.
     distance : (rows, columns) float32
         Distance to the nearest of these walls [m]; large where there is none.

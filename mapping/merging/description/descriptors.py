@@ -2,8 +2,8 @@
 
 Samples on rings form arrays of radius by angle, which a rotation of the map merely shifts.
 
-Column 0 looks where the corner opens to, so that descriptors of one corner in two maps differ by the error of
-that angle alone.
+Column 0 points where the corner opens to, so that descriptors of one corner in two maps differ by the error
+of that angle alone.
 """
 
 import math

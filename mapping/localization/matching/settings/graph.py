@@ -39,7 +39,7 @@ class ClosureSettings:
     deviations : float
         How many standard deviations of the pose the search reaches.
     evaluations : int
-        At most so many placements are looked at in a search; one that is not over by then found nothing.
+        At most so many placements are examined in a search; one that is not over by then found nothing.
     least_score, least_overlap : float
         Agreement of a closure, and share of the returns near what the local map has observed.
     least_share : float
@@ -57,7 +57,7 @@ class ClosureSettings:
         No closure is better than this [m, rad].
     confirmed_beyond_m : float
         A closure that would move the robot by more is taken only together with others that say the same: less
-        than the thickness of walls, since the other side of one looks like this side [m].
+        than the thickness of walls, since the other side of one resembles this side [m].
     confirmed_beyond_deviations : float
         So is one that would move it by more standard deviations of the way since; those have to be of at
         least two local maps.

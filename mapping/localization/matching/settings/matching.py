@@ -21,7 +21,7 @@ from lidarium.mapping.geometry.bounds import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatchingSettings:
-    """How scans are laid on the local map.
+    """How scans are matched with the local map.
 
     Attributes
     ----------
@@ -51,14 +51,14 @@ class MatchingSettings:
         Share of the returns near what the local map has observed below which a match does not count where
         odometry led nowhere.
     evaluations : int
-        At most so many placements, and blocks of them, are looked at in such a search.
+        At most so many placements, and blocks of them, are examined in such a search.
     independent_points, independent_share : float
         As how many independent measurements the returns of a scan count, all of them at most and each:
         neighbouring ones err together.
     deviation : float
         Standard deviation of how far a return is from full agreement with the map, which is 1.
     surface_m : float
-        Returns of a surface so near to one tell which way it runs there, across which the return is moved; 0
+        Returns of a surface so near to one give its direction there, across which the return is moved; 0
         for the nearest two [m].
     unseen : float
         Square of the disagreement with which a return counts that lies in what the local map has not
