@@ -17,7 +17,7 @@ class Bench(Command):
     """
 
     effort: Literal["quick", "moderate", "full"] = "moderate"
-    """how long to measure: coarse figures, figures to look at, or those to publish"""
+    """how long to measure: coarse figures, figures to read, or those to publish"""
     only: tuple[str, ...] = ()
     """questions to ask, all where left out.
 

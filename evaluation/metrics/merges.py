@@ -161,19 +161,18 @@ def merge_figures(
         ``accepted``, ``correct`` and ``false`` (not correct) are numbers of events by what the starts say,
         ``worst_m`` and ``worst_rad`` the largest errors so, and ``off`` is how many err by more than
         ``WRONG_TRANSLATION`` or ``WRONG_ROTATION``. ``wrong``, ``worst_here_m`` and ``worst_here_rad`` are
-        the same by `drifted_truth` of maps that were laid on each other: where others lie between two maps,
+        the same by `drifted_truth` of maps that were compared directly: where others lie between two maps,
         what those have drifted and the lever of small angles come to what is between the two, and the merges
-        that join them are judged themselves. ``first_correct_s`` is a time. None where there is nothing to
-        tell.
+        that join them are judged themselves. ``first_correct_s`` is a time. None where there is none.
     """
     accepted = np.ones(len(events), np.bool_)
     errors = [transform_error(one.found, one.true, one.at) for one in events]
-    laid = [one for one in events if one.is_direct]
+    direct = [one for one in events if one.is_direct]
     here = [
         transform_error(
             one.found, one.true if trajectories is None else drifted_truth(one, trajectories), one.at
         )
-        for one in laid
+        for one in direct
     ]
     correct = np.array([is_correct(*error, resolution) for error in errors], np.bool_)
     right = int(np.count_nonzero(correct))

@@ -23,8 +23,8 @@ def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
         return np.stack([on_floor(env, row, log_odds) for row, log_odds in enumerate(env.beliefs.log_odds)])
     origin = tables.laser.origin
     rows, words = env.score.counted_masks[0].shape
-    on_floor = np.zeros((settings.robots, rows, words * 64), np.int8)
-    y, x = np.meshgrid(*((np.arange(size) + 0.5) * resolution for size in on_floor.shape[1:]), indexing="ij")
+    placed = np.zeros((settings.robots, rows, words * 64), np.int8)
+    y, x = np.meshgrid(*((np.arange(size) + 0.5) * resolution for size in placed.shape[1:]), indexing="ij")
     for row, log_odds in enumerate(env.beliefs.log_odds):
         start_x, start_y, theta = world.starts[row]
         east, north = x + origin[0] - start_x, y + origin[1] - start_y
@@ -34,8 +34,8 @@ def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
         is_inside = (
             (lines >= 0) & (lines < log_odds.shape[0]) & (columns >= 0) & (columns < log_odds.shape[1])
         )
-        on_floor[row][is_inside] = log_odds[lines[is_inside], columns[is_inside]]
-    return on_floor
+        placed[row][is_inside] = log_odds[lines[is_inside], columns[is_inside]]
+    return placed
 
 
 def cells_beyond(env: ExplorationEnv, row: int) -> tuple[int, int]:

@@ -37,7 +37,7 @@ def write_floor(command: Command, floor: "Floor", resolution: float) -> Answer:
 def _levels(solid: Any, resolution: float) -> Any:  # noqa: ANN401
     """Return free and occupied cells.
 
-    What is deeper in solids than a wall, no laser tells: unknown.
+    What is deeper in solids than a wall, no laser sees: unknown.
     """
     import cv2
     import numpy as np

@@ -12,7 +12,7 @@ from typing import TextIO
 def open_closed_streams() -> None:
     """Give this process the standard streams that it was started without.
 
-    They lead to nowhere. A file opened later would take their numbers else, and whatever is told would be
+    They lead to nowhere. A file opened later would take their numbers else, and whatever is printed would be
     written into it.
     """
     for number in range(3):

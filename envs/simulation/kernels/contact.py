@@ -100,8 +100,8 @@ def distance_bound(solid: NDArray[np.uint8]) -> NDArray[np.uint8]:
 @kernel(inline=True)
 def wrapped(angle: float) -> float:
     """Return an angle in (-pi, pi]."""
-    wrapped = angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
-    return math.pi if wrapped <= -math.pi else wrapped
+    turned = angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+    return math.pi if turned <= -math.pi else turned
 
 
 @kernel(borrowing=True)

@@ -189,7 +189,7 @@ def _distance(shape: tuple[int, ...], cells: NDArray[np.int32], resolution: floa
         return np.full(shape, _FAR, np.float32)
     mask = np.ones(shape, np.uint8)
     # To the faces, not to any occupied cell: within a wall that noise has made thick, the distance still
-    # tells where its face is.
+    # shows where its face is.
     mask[cells[:, 1], cells[:, 0]] = 0
     return np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, 5) * np.float32(resolution), np.float32)
 

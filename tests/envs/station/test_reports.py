@@ -139,7 +139,7 @@ def test_late_reports_come_late_and_older_ones_are_dropped():
     newest = env.station.report(0)
     assert newest.time_s == 1.0
     exchange = env.perception.exchanges[0]
-    late = exchange._news(0, 1, 0, 0)
+    late = exchange._part_to_send(0, 1, 0, 0)
     exchange.copied_at[-1, 0] = 10
     for step in (3, 10):
         exchange._receive(type(late)(14, 1, 0, step, None, False, late.blocks, late.cells, None))

@@ -159,10 +159,10 @@ class CompassSettings:
         neighbouring scans are matched with one local map, and do not err each on its own.
     deviations : float
         A direction that contradicts the heading by more standard deviations does not count: not all walls run
-        that way.
+        so.
     most_deviation : float
         Headings that are known less well than this are left alone: they may be off by more than walls can
-        tell [rad].
+        show [rad].
     """
 
     spacing_m: Annotated[float, within(1e-4, 100.0)] = 0.01
