@@ -34,7 +34,8 @@ class ExplorationVecEnv(VecEnv):
     once; its row then repeats its last observation with reward 0 and ``infos[row]["active"]`` False. Where
     the last robot of an episode ends, the rows that repeat are done as well, truncated, and the episode
     begins again in the same step. In every row that is done, ``infos[row]["terminal_observation"]`` is what
-    the robot saw last, and ``infos[row]["TimeLimit.truncated"]`` says whether it was the horizon or an ending.
+    the robot saw last, and ``infos[row]["TimeLimit.truncated"]`` says whether it was the horizon or an
+    ending.
 
     Parameters
     ----------
