@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from lidarium.scripts.common import tell
+from lidarium.scripts.common import notify
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="streams are closed as on Unix")
 
@@ -63,9 +63,9 @@ def test_work_goes_on_where_nobody_reads_its_messages(monkeypatch):
     os.close(reading)
     with os.fdopen(writing, "w", buffering=1) as stream:
         monkeypatch.setattr(sys, "stderr", stream)
-        tell("explored 50 %")
-        tell("explored 60 %")
+        notify("explored 50 %")
+        notify("explored 60 %")
         monkeypatch.undo()
         os.dup2(os.open(os.devnull, os.O_WRONLY), writing)
     monkeypatch.setattr(sys, "stderr", stream)
-    tell("the stream is closed now")
+    notify("the stream is closed now")
