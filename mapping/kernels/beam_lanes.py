@@ -1,4 +1,4 @@
-"""Ranges of eight beams that a face lowers at once."""
+"""Lanes that a face changes at once: ranges of eight beams, inverse depths of sixteen pixels."""
 
 from typing import Any
 
@@ -11,6 +11,9 @@ LANES = 8
 
 FLOAT = 8
 """Bytes of a float64."""
+
+PIXEL_LANES = 16
+"""Pixels into which a face is drawn at once."""
 
 _BEAMS = ir.VectorType(ir.DoubleType(), LANES)
 
@@ -54,3 +57,47 @@ def _lower_lanes(
 
 
 lower_lanes: Any = intrinsic(_lower_lanes)
+
+
+_PIXELS, _PIXEL_PLACES = (
+    ir.VectorType(ir.FloatType(), PIXEL_LANES),
+    ir.VectorType(ir.IntType(32), PIXEL_LANES),
+)
+
+
+def _raise_lanes(
+    typing_context: Any,  # noqa: ANN401
+    address: Any,  # noqa: ANN401
+    start: Any,  # noqa: ANN401
+    slope: Any,  # noqa: ANN401
+    first: Any,  # noqa: ANN401
+    last: Any,  # noqa: ANN401
+) -> Any:  # noqa: ANN401
+    """Raise the pixels from lane ``first`` to lane ``last`` to ``start + slope * lane``."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        number = ir.IntType(32)
+        zeros = ir.Constant(_PIXEL_PLACES, [0] * PIXEL_LANES)
+
+        def spread(value: Any, kind: Any) -> Any:  # noqa: ANN401
+            nothing = ir.Constant(kind, ir.Undefined)
+            lone = builder.insert_element(nothing, value, ir.Constant(number, 0))
+            return builder.shuffle_vector(lone, nothing, zeros)
+
+        lanes = ir.Constant(_PIXEL_PLACES, list(range(PIXEL_LANES)))
+        ramp = ir.Constant(_PIXELS, [float(lane) for lane in range(PIXEL_LANES)])
+        low, high = (spread(builder.trunc(value, number), _PIXEL_PLACES) for value in arguments[3:])
+        slopes, starts = spread(arguments[2], _PIXELS), spread(arguments[1], _PIXELS)
+        pointer = builder.inttoptr(arguments[0], _PIXELS.as_pointer())
+        old = builder.load(pointer, align=4)
+        new = builder.fadd(starts, builder.fmul(slopes, ramp))
+        is_within = builder.and_(
+            builder.icmp_signed("<=", low, lanes), builder.icmp_signed("<=", lanes, high)
+        )
+        is_raised = builder.and_(is_within, builder.fcmp_ordered(">", new, old))
+        builder.store(builder.select(is_raised, new, old), pointer, align=4)
+
+    return types.void(types.int64, types.float32, types.float32, types.int64, types.int64), generate
+
+
+raise_lanes: Any = intrinsic(_raise_lanes)

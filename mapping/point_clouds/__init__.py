@@ -1,1 +1,1 @@
-"""Points in space, as depth cameras and files have them."""
+"""Points in space."""

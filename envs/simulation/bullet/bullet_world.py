@@ -16,10 +16,11 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.robots import Robot
 from lidarium.envs.simulation.bullet.bodies import Bodies, Motion
+from lidarium.envs.simulation.bullet.client import has_display
 from lidarium.envs.simulation.bullet.leaning_scans import LEAN, scan_leaning
 from lidarium.envs.simulation.kernels.arrays import BROKEN_PHYSICS, DEAD, ENDED
+from lidarium.envs.simulation.kernels.contact import CENTRE_BUMPER, SIDE_BUMPER
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
-from lidarium.envs.simulation.kernels.motion import CENTRE_BUMPER, SIDE_BUMPER
 from lidarium.envs.simulation.kernels.stepping import disturb_scan, drive, encode, sense
 from lidarium.envs.simulation.kinematic_world import KinematicWorld
 
@@ -108,13 +109,9 @@ class BulletWorld(KinematicWorld):
         self._sense_leaning(chosen)
 
     def show(self) -> bool:
-        """Show the bodies of the first episode in PyBullet's window.
-
-        Raises
-        ------
-        ValueError
-            Where there is no display.
-        """
+        """Show the bodies of the first episode in PyBullet's window; False where there is no display."""
+        if not has_display():
+            return False
         self._physics[0].close()
         self._physics[0] = Bodies(self.team, self.time_step, is_shown=True)
         return True

@@ -32,6 +32,11 @@ def load_bullet() -> Any:  # noqa: ANN401
         raise MissingBulletError(MISSING) from error
 
 
+def has_display() -> bool:
+    """Whether there is a display for a window; without one PyBullet would end the process."""
+    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY"))
+
+
 class Client:
     """A physics server in this process.
 
@@ -46,18 +51,10 @@ class Client:
     ------
     MissingBulletError
         Where PyBullet is not installed.
-    ValueError
-        Where it is to be shown and there is no display.
     """
 
     def __init__(self, is_shown: bool = False) -> None:
         self.bullet = load_bullet()
-        if is_shown and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-            # PyBullet would end the process.
-            raise ValueError(
-                'render_mode is "human", and the environment variable DISPLAY names no display; start one, '
-                'or choose "rgb_array"'
-            )
         self._number = self.bullet.connect(self.bullet.GUI if is_shown else self.bullet.DIRECT)
         if is_shown:
             self.call("configureDebugVisualizer", self.bullet.COV_ENABLE_GUI, 0)

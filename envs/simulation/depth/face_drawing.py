@@ -14,8 +14,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from lidarium.mapping.kernels.beam_lanes import PIXEL_LANES, raise_lanes
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.pixel_lanes import LANES, raise_lanes
 from lidarium.mapping.kernels.views import scratch_grid
 
 FOCAL, CENTRE_COLUMN, CENTRE_ROW, DEPTH_MIN, DEPTH_MAX, COLUMNS, ROWS = range(7)
@@ -234,7 +234,7 @@ def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Sp
     span : Span
         Scratch.
     inverse : (rows, columns + padding) float32
-        Greatest inverse depths so far; raised [1/m]. Its columns are a multiple of ``LANES``.
+        Greatest inverse depths so far; raised [1/m]. Its columns are a multiple of ``PIXEL_LANES``.
     """
     sides = scratch_grid(4, 3, np.float64)
     view_sides(axes, view, sides)
@@ -250,7 +250,7 @@ def draw_faces(faces: FaceArrays, axes: Array, eye: Array, view: Array, span: Sp
             left, right = begins[row], ends[row]
             # Rounded once a block: the inverse depth at a block's first column.
             base, address = start + across * row, pixels + 4 * row * width
-            for column in range(left & -LANES, right + 1, LANES):
+            for column in range(left & -PIXEL_LANES, right + 1, PIXEL_LANES):
                 raise_lanes(
                     address + 4 * column,
                     np.float32(base + along * column),

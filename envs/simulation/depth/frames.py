@@ -20,8 +20,8 @@ from lidarium.envs.simulation.depth.face_drawing import (
 )
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, gaussian_at, mix, stream_key
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
+from lidarium.mapping.kernels.beam_lanes import PIXEL_LANES
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.pixel_lanes import LANES
 from lidarium.mapping.kernels.views import grid_at, scratch_grid, vector_at
 
 DEPTH_STREAM = 0x64657074
@@ -171,7 +171,9 @@ def _take_frame(cameras: Cameras, row: int, robots: int, depth: Array) -> None:
     episode, first = row // robots, row // robots * robots
     axes, eye = np.empty((3, 3)), np.empty(3)
     place_camera(cameras.poses[row], cameras.attitudes[row], cameras.mount, axes, eye)
-    inverse = np.empty((depth.shape[0], (depth.shape[1] + LANES - 1) // LANES * LANES), np.float32)
+    inverse = np.empty(
+        (depth.shape[0], (depth.shape[1] + PIXEL_LANES - 1) // PIXEL_LANES * PIXEL_LANES), np.float32
+    )
     draw_view(_faces_at(cameras.face_rows[episode]), axes, eye, cameras.pinhole, inverse)
     centre = np.empty(3)
     for other in range(first, first + robots):
