@@ -1,0 +1,1 @@
+"""Sparse maps of point clouds, from codes to paths."""

@@ -1,0 +1,1 @@
+"""The topological graph of a sparse map."""
