@@ -4,7 +4,9 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
+
+from lidarium.mapping.kernels import plain_forms
+from lidarium.mapping.kernels.interpreted import machine_code
 
 LANES = 8
 """Beams into which a face is drawn at once."""
@@ -56,7 +58,7 @@ def _lower_lanes(
     return types.void(*(types.int64,) * 3, *(types.float64,) * 4), generate
 
 
-lower_lanes: Any = intrinsic(_lower_lanes)
+lower_lanes = machine_code(_lower_lanes, plain_forms.lower_lanes)
 
 
 _PIXELS, _PIXEL_PLACES = (
@@ -100,4 +102,4 @@ def _raise_lanes(
     return types.void(types.int64, types.float32, types.float32, types.int64, types.int64), generate
 
 
-raise_lanes: Any = intrinsic(_raise_lanes)
+raise_lanes = machine_code(_raise_lanes, plain_forms.raise_lanes)

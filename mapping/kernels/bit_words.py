@@ -9,9 +9,10 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
+from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.interpreted import machine_code
 from lidarium.mapping.kernels.processor import has_feature
 
 _WORD = ir.IntType(64)
@@ -60,8 +61,8 @@ def _running_xor(typing_context: Any, word: Any) -> Any:  # noqa: ANN401
 CAN_MULTIPLY_WITHOUT_CARRY = has_feature("pclmul")
 """Whether the processor multiplies without carrying."""
 
-_first: Any = intrinsic(_place_of_first)
-_run: Any = intrinsic(_running_xor)
+_first = machine_code(_place_of_first, plain_forms.first_bit)
+_run = machine_code(_running_xor, plain_forms.running_xor)
 
 
 @kernel(inline=True)

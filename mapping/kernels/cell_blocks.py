@@ -14,9 +14,10 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
+from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.interpreted import machine_code
 from lidarium.mapping.kernels.vectors import (
     BLOCK,
     BYTES,
@@ -162,7 +163,7 @@ def _levels_of(cells: int) -> Any:  # noqa: ANN401
 
         return types.void(types.int64, types.int64), generate
 
-    return intrinsic(levels_of)
+    return levels_of
 
 
 def _negative_block(typing_context: Any, block: Any) -> Any:  # noqa: ANN401
@@ -201,14 +202,15 @@ def _sign_bits(typing_context: Any, sums: Any) -> Any:  # noqa: ANN401
     return pair(types.uint64, 2)(types.int64), generate
 
 
-_update: Any = intrinsic(_update_block)
-_fetch_line: Any = intrinsic(_fetch)
-_sum: Any = intrinsic(_sum_blocks)
-_greatest: Any = intrinsic(_greatest_of_groups)
-_block_of_levels, _half_block_of_levels = _levels_of(BLOCK), _levels_of(HALF_BLOCK)
-_signs: Any = intrinsic(_sign_bits)
-_negative: Any = intrinsic(_negative_block)
-_positive: Any = intrinsic(_positive_block)
+_update = machine_code(_update_block, plain_forms.update_block)
+_fetch_line = machine_code(_fetch, plain_forms.fetch_block)
+_sum = machine_code(_sum_blocks, plain_forms.sum_blocks)
+_greatest = machine_code(_greatest_of_groups, plain_forms.write_greatest)
+_block_of_levels = machine_code(_levels_of(BLOCK), plain_forms.write_block_of_levels)
+_half_block_of_levels = machine_code(_levels_of(HALF_BLOCK), plain_forms.write_levels)
+_signs = machine_code(_sign_bits, plain_forms.sign_bits)
+_negative = machine_code(_negative_block, plain_forms.negative_cells)
+_positive = machine_code(_positive_block, plain_forms.positive_cells)
 
 
 @kernel(inline=True)

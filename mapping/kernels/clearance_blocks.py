@@ -9,9 +9,10 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
+from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.interpreted import machine_code
 from lidarium.mapping.kernels.vectors import (
     BLOCK,
     BYTES,
@@ -156,12 +157,12 @@ def _raise_block(typing_context: Any, block: Any, other: Any) -> Any:  # noqa: A
     return types.void(types.int64, types.int64), generate
 
 
-_differs: Any = intrinsic(_positive_differs)
-_count: Any = intrinsic(_count_rows)
-_square: Any = intrinsic(_squares)
-_least: Any = intrinsic(_least_sums)
-_raise: Any = intrinsic(_raise_block)
-_same: Any = intrinsic(_same_block)
+_differs = machine_code(_positive_differs, plain_forms.cells_that_differ)
+_count = machine_code(_count_rows, plain_forms.count_rows)
+_square = machine_code(_squares, plain_forms.write_squares)
+_least = machine_code(_least_sums, plain_forms.write_least_sums)
+_raise = machine_code(_raise_block, plain_forms.raise_block)
+_same = machine_code(_same_block, plain_forms.same_cells)
 
 
 @kernel(inline=True)

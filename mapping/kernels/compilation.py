@@ -3,9 +3,10 @@
 Arithmetic is exact, and kernels are cached where a directory can be written.
 
 Numba caches compiled code per source file and does not see a change in another file that the kernel calls
-into. The cache directory is therefore keyed by a hash of all sources with kernels and of what they import. It
-lies in the package's own folder, the user's cache folder or the temporary folder: the first that this user
-can write to, and nobody else.
+into. The cache directory is therefore keyed by a hash of all sources with kernels and of what they import,
+and of the settings of numba that change the code, such as ``NUMBA_BOUNDSCHECK``. It lies in the package's own
+folder, the user's cache folder or the temporary folder: the first that this user can write to, and nobody
+else.
 """
 
 import hashlib
@@ -20,6 +21,8 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.cache_folders import cache_folder
+from lidarium.mapping.kernels.interpreted import IS_INTERPRETED, interpreted
+from lidarium.mapping.kernels.kept_code import keep
 
 Array = NDArray[Any]
 """An array in the signature of a kernel; its docstring gives shape and type."""
@@ -28,6 +31,9 @@ _numba_config: Any = config
 
 PACKAGE_FOLDERS = ("mapping", "envs", "evaluation")
 """Folders whose kernels call each other."""
+
+CHOICES = ("BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE")
+"""Settings of numba that change compiled code, and by which its own cache does not tell it apart."""
 
 _ROOT = Path(__file__).resolve().parents[2]
 _IMPORTS = re.compile(rb"^from lidarium\.([\w.]+) import", re.MULTILINE)
@@ -52,6 +58,7 @@ def key_sources(root: Path = _ROOT) -> list[Path]:
 
 def _sources_hash(root: Path = _ROOT) -> str:
     digest = hashlib.sha256(numba.__version__.encode())
+    digest.update(repr([getattr(_numba_config, name) for name in CHOICES]).encode())
     for path in key_sources(root):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
@@ -63,14 +70,14 @@ def _cache_folder() -> Path | None:
     return cache_folder("kernels", _sources_hash(), beside=Path(__file__).resolve())
 
 
-_CHOSEN_BY_USER = bool(os.environ.get("NUMBA_CACHE_DIR"))
-_FOLDER = None if _CHOSEN_BY_USER else _cache_folder()
+_CHOSEN_BY_USER = bool(os.environ.get("NUMBA_CACHE_DIR")) and not IS_INTERPRETED
+_FOLDER = None if _CHOSEN_BY_USER or IS_INTERPRETED else _cache_folder()
 _CAN_CACHE = _CHOSEN_BY_USER or _FOLDER is not None
 
 
 def kernel_cache() -> Path | None:
     """Return the folder of the compiled kernels, or None where nothing can be cached."""
-    folder = os.environ.get("NUMBA_CACHE_DIR") or _FOLDER
+    folder = os.environ["NUMBA_CACHE_DIR"] if _CHOSEN_BY_USER else _FOLDER
     return None if folder is None else Path(folder)
 
 
@@ -119,6 +126,8 @@ def kernel(
     callable
         The compiled function.
     """
+    if IS_INTERPRETED:
+        return interpreted if function is None else interpreted(function)
 
     def decorate(target: Callable[..., Any]) -> Any:  # noqa: ANN401
         # Division by zero gives inf or nan, as in numpy: a check before each division would keep loops off
@@ -128,7 +137,6 @@ def kernel(
             "fastmath": False,
             "error_model": "numpy",
             "parallel": parallel,
-            "cache": _CAN_CACHE,
         }
         # Told to every kernel: one that says nothing would take over what the first of its callers says.
         options["_nrt"] = not borrowing
@@ -142,7 +150,10 @@ def kernel(
         # knows no options.
         _numba_config.CACHE_DIR = os.path.join(folder, "parallel") if parallel and folder else folder
         try:
-            return numba.njit(**options)(target)
+            compiled = numba.njit(**options)(target)
+            if _CAN_CACHE:
+                keep(compiled)
+            return compiled
         finally:
             _numba_config.CACHE_DIR = previous
 

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 import numba
 import numpy as np
 from numba import types
-from numba.extending import intrinsic
 from numba.np import arrayobj
 from numpy.typing import NDArray
 
+from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.interpreted import machine_code, room_for
 
 _numba_arrays: Any = arrayobj
 _numba_types: Any = types
@@ -109,10 +110,10 @@ def _arrays_of(typing_context: Any, table: Any, kind: Any) -> Any:  # noqa: ANN4
     return named(table, kind), generate
 
 
-_vector_view: Any = intrinsic(_vector_of)
-_grid_view: Any = intrinsic(_grid_of)
-_named_views: Any = intrinsic(_arrays_of)
-_room: Any = intrinsic(_room_for)
+_vector_view = machine_code(_vector_of, plain_forms.vector_view)
+_grid_view = machine_code(_grid_of, plain_forms.grid_view)
+_named_views = machine_code(_arrays_of, plain_forms.named_views)
+_room = machine_code(_room_for, room_for)
 
 
 @kernel(spliced=True)

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.interpreted import machine_code
 
 
 class Work(NamedTuple):
@@ -56,7 +57,7 @@ def _add_one(typing_context: Any, address: Any) -> Any:  # noqa: ANN401
     return types.int64(address), generate
 
 
-_take: Any = intrinsic(_add_one)
+_take = machine_code(_add_one, plain_forms.add_one)
 
 
 @kernel(inline=True)

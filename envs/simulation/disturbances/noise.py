@@ -43,7 +43,7 @@ def stream_key(seed: int, robot: int, step: int) -> np.uint32:
     key = mix(low ^ np.uint32(0x9E3779B9))
     key = mix(key ^ high)
     key = mix(key ^ np.uint32(robot))
-    return np.uint32(mix(key ^ np.uint32(step)))
+    return np.uint32(mix(key ^ np.uint32(step & 0xFFFFFFFF)))  # a step may be -1
 
 
 @kernel(inline=True, borrowing=True)

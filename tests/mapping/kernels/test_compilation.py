@@ -198,6 +198,36 @@ def test_kernels_are_made_by_the_one_decorator_only():
             assert "fastmath" not in text, path
 
 
+@pytest.mark.parametrize("name", compilation.CHOICES)
+def test_settings_of_numba_that_change_the_code_have_a_cache_of_their_own(monkeypatch, name):
+    before = compilation._sources_hash()
+    monkeypatch.setattr(numba.core.config, name, 1 - int(getattr(numba.core.config, name) or 0))
+    assert compilation._sources_hash() != before
+
+
+def test_indices_are_checked_where_that_is_asked_for(tmp_path):
+    script = tmp_path / "beyond.py"
+    script.write_text(
+        "import numpy as np\n"
+        "from lidarium.mapping.kernels.compilation import kernel\n"
+        "from lidarium.mapping.kernels.views import scratch_vector, vector_at\n"
+        "@kernel(borrowing=True)\n"
+        "def beyond(address, place):\n"
+        "    scratch = scratch_vector(4, np.float64)\n"
+        "    scratch[place % 4] = 1.0\n"
+        "    return vector_at(address, 3, np.float64)[place] + scratch[place % 4]\n"
+        "values = np.ones(4)\n"
+        "print(beyond(values.ctypes.data, 3))\n"
+    )
+    for asked, ends in (("0", "2.0"), ("1", "IndexError")):
+        cache = str(tmp_path / asked)
+        environment = {**os.environ, "NUMBA_BOUNDSCHECK": asked, "NUMBA_CACHE_DIR": cache}
+        result = subprocess.run(
+            [sys.executable, str(script)], capture_output=True, text=True, env=environment
+        )
+        assert ends in result.stdout + result.stderr
+
+
 def test_the_cache_lies_beside_the_sources_and_nowhere_where_nothing_can_be_written(monkeypatch):
     folder = compilation._cache_folder()
     assert folder is not None
