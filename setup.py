@@ -12,6 +12,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 FOLDERS = ("envs", "agents", "mapping", "evaluation", "benchmarks", "scripts")
+COMMAND = "lidarium_command"
 ROOT = Path(__file__).resolve().parent
 
 
@@ -34,10 +35,11 @@ def link_folders() -> None:
 
 if "editable_wheel" in sys.argv:
     link_folders()
-    setup(package_dir={"": "src"}, packages=find_packages("src"))
+    setup(package_dir={"": "src"}, packages=find_packages("src"), py_modules=[COMMAND])
 else:
     patterns = [pattern for folder in FOLDERS for pattern in (folder, f"{folder}.*")]
     setup(
-        package_dir={"lidarium": "src/lidarium", **{f"lidarium.{folder}": folder for folder in FOLDERS}},
+        package_dir={"": "src", **{f"lidarium.{folder}": folder for folder in FOLDERS}},
         packages=["lidarium", *(f"lidarium.{package}" for package in find_packages(".", include=patterns))],
+        py_modules=[COMMAND],
     )

@@ -5,7 +5,19 @@ They include the choices of the thesis.
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Annotated, Any
+
+from lidarium.mapping.geometry.bounds import (
+    Bounds,
+    Count,
+    Distance,
+    Length,
+    Positive,
+    above,
+    check_settings,
+    share,
+    within,
+)
 
 SHAPES = ("ball", "star", "radial")
 """Shapes of safe regions: one radius, one for each laser region, one for each ray."""
@@ -19,6 +31,11 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "drive": ("turn_advance", "controls"),
 }
 """Settings that are one of several words."""
+
+Limit = Annotated[float, Bounds(0.0, 1e7, has_least=False, never=True)]
+"""A limit, or infinity for none."""
+HalfTurn = Annotated[float, above(0.0, math.pi)]
+"""An angle by which a robot may have to turn [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,56 +113,33 @@ class SrtSettings:
     drive: str = "turn_advance"
     places_nodes_at_targets: bool = False
     repeats_nodes: bool = False
-    step_share: float = 0.8
-    random_share: float = 0.0
-    way_weight: float = 0.7
-    least_step: float = 0.3
-    least_frontier: float = 0.8
-    tries: int = 20
-    nodes: int = 500
-    time_s: float = math.inf
-    perception: float = math.inf
-    margin: float = 0.05
-    turn_room: float = 0.0
-    passing_distance: float = 1.5
+    step_share: Annotated[float, share(has_least=False, has_most=False)] = 0.8
+    random_share: Annotated[float, share()] = 0.0
+    way_weight: Positive = 0.7
+    least_step: Length = 0.3
+    least_frontier: Length = 0.8
+    tries: Annotated[int, within(1, 10_000)] = 20
+    nodes: Count = 500
+    time_s: Limit = math.inf
+    perception: Limit = math.inf
+    margin: Distance = 0.05
+    turn_room: Distance = 0.0
+    passing_distance: Limit = 1.5
     looks_around: bool = True
-    turning_starts: float = math.radians(40.0)
-    turning_ends: float = math.radians(15.0)
-    speed: float = math.inf
-    turn_rate: float = 1.5
-    arrived: float = 0.1
+    turning_starts: HalfTurn = math.radians(40.0)
+    turning_ends: HalfTurn = math.radians(15.0)
+    speed: Limit = math.inf
+    turn_rate: Positive = 1.5
+    arrived: Length = 0.1
 
     def __post_init__(self) -> None:
+        check_settings(self, "the tree")
         for name, words in CHOICES.items():
             if getattr(self, name) not in words:
                 raise ValueError(
                     f"{name} of the tree is {getattr(self, name)!r}; want one of {', '.join(words)}"
                 )
-        for name in (
-            "way_weight",
-            "least_step",
-            "least_frontier",
-            "time_s",
-            "perception",
-            "passing_distance",
-            "speed",
-            "turn_rate",
-            "arrived",
-            "turning_ends",
-        ):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} of the tree is {getattr(self, name)}; want more than 0")
-        for name in ("margin", "turn_room"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} of the tree is {getattr(self, name)} m; want 0 or more")
-        for name in ("tries", "nodes"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} of the tree is {getattr(self, name)}; want at least 1")
-        if not 0.0 < self.step_share < 1.0:
-            raise ValueError(f"step_share of the tree is {self.step_share}; want a share in (0, 1)")
-        if not 0.0 <= self.random_share <= 1.0:
-            raise ValueError(f"random_share of the tree is {self.random_share}; want a share in [0, 1]")
-        if not self.turning_ends < self.turning_starts <= math.pi:
+        if not self.turning_ends < self.turning_starts:
             raise ValueError(
                 f"turning_starts is {self.turning_starts} rad; want more than turning_ends "
                 f"({self.turning_ends} rad) and at most pi"

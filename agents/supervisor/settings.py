@@ -3,11 +3,13 @@
 They are its periods, what the thesis leaves open, and what goes beyond it.
 """
 
-import math
-from dataclasses import dataclass, fields
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
+
+from lidarium.mapping.geometry.bounds import Count, Distance, FromZero, Length, above, check_settings
 
 Assignment = Literal["pairs", "hungarian", "utility"]
+Period = Annotated[float, above(0.0, 1e7)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,49 +73,30 @@ class SupervisorSettings:
         Where a setting cannot be used; it is named.
     """
 
-    period_s: float = 10.0
-    merge_period_s: float = 2.0
-    searches_per_merge: int = 1
-    merge_resolution_m: float = 0.05
-    confirmation_growth_m2: float = 2.0
-    confirmation_own_m2: float = 6.0
-    same_goal_m: float = 1.0
-    least_frontier_m: float = 0.5
-    least_left_m: float = 0.5
-    unbalanced_share: float = 0.5
-    enclosed_way_m: float = 10.0
-    enclosed_gain_m2_per_m: float = 0.1
-    cost_weight: float = 0.05
-    sensor_range_m: float = 5.6
+    period_s: Period = 10.0
+    merge_period_s: Period = 2.0
+    searches_per_merge: Count = 1
+    merge_resolution_m: Distance = 0.05
+    confirmation_growth_m2: FromZero = 2.0
+    confirmation_own_m2: FromZero = 6.0
+    same_goal_m: Distance = 1.0
+    least_frontier_m: Distance = 0.5
+    least_left_m: Distance = 0.5
+    unbalanced_share: FromZero = 0.5
+    enclosed_way_m: Length = 10.0
+    enclosed_gain_m2_per_m: FromZero = 0.1
+    cost_weight: FromZero = 0.05
+    sensor_range_m: Length = 5.6
     assignment: Assignment = "pairs"
     is_stop_final: bool = False
     avoids_rendezvous: bool = False
-    rendezvous_m: float = 3.0
+    rendezvous_m: Distance = 3.0
     returns_home: bool = False
-    battery_margin: float = 0.0
+    battery_margin: FromZero = 0.0
     trusts_starts: bool = False
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.type is bool and not isinstance(value, bool):
-                raise ValueError(f"{field.name} of the supervisor is {value!r}; want true or false")
-            if field.type is float and not (
-                isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0
-            ):
-                raise ValueError(f"{field.name} of the supervisor is {value!r}; want a number of at least 0")
-        if (
-            isinstance(self.searches_per_merge, bool)
-            or not isinstance(self.searches_per_merge, int)
-            or self.searches_per_merge < 1
-        ):
-            raise ValueError(
-                f"searches_per_merge of the supervisor is {self.searches_per_merge!r}; want a whole number "
-                "of at least 1"
-            )
-        for name in ("period_s", "merge_period_s", "enclosed_way_m", "sensor_range_m"):
-            if getattr(self, name) == 0.0:
-                raise ValueError(f"{name} of the supervisor is 0; want a positive number")
+        check_settings(self, "the supervisor")
         if self.assignment not in get_args(Assignment):
             raise ValueError(
                 f"assignment of the supervisor is {self.assignment!r}; want one of "

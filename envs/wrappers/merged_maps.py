@@ -5,7 +5,7 @@ Each sees the team's map and its teammates in its own frame.
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from gymnasium import spaces
@@ -20,6 +20,7 @@ from lidarium.envs.observation_spaces import FARTHEST
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.station.team_mapping import Frames, TeamMapping, crop_around
 from lidarium.envs.wrappers.contacts import CanTalk, check_links, clusters_of
+from lidarium.mapping.geometry.bounds import above, check_settings
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.settings import MergeSettings
@@ -50,13 +51,12 @@ class MergingSettings:
         How maps are merged; by default with `TEAM_VALIDATION`.
     """
 
-    period_s: float = 1.0
+    period_s: Annotated[float, above(0.0, 1e7)] = 1.0
     known_starts: bool = False
     merge: MergeSettings = field(default_factory=lambda: MergeSettings(validation=TEAM_VALIDATION))
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.period_s) and self.period_s > 0.0):
-            raise ValueError(f"period_s of merging is {self.period_s}; want a positive time in seconds")
+        check_settings(self, "merging")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,11 @@
-"""Processes of workers: which of them are stopped, and how they are ended."""
+"""Processes of workers: how they are begun and ended, and which of them are stopped."""
 
 import multiprocessing
+import signal
+import threading
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 GRACE_S = 2.0
@@ -10,6 +13,32 @@ GRACE_S = 2.0
 
 _STOPPED = frozenset("Tt")
 """States of processes that run no more until they are continued, as the system names them."""
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C and SIGTERM back while processes are begun: half-begun ones would complain.
+
+    Ctrl-C is blocked, which they take over, and so hear nothing of it until they leave it to their parent.
+    """
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    came: list[int] = []
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    for number, handler in handlers.items():
+        if callable(handler):
+            signal.signal(number, lambda number, _frame: came.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            if callable(handler):
+                signal.signal(number, handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        for each in came:
+            signal.raise_signal(each)
 
 
 def end_workers(grace_s: float = GRACE_S, *, are_ending: bool = False) -> None:

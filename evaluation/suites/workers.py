@@ -16,7 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import TypeVar
 
-from lidarium.evaluation.suites.processes import end_workers, stopped_workers
+from lidarium.evaluation.suites.processes import end_workers, interrupts_held, stopped_workers
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -100,7 +100,8 @@ def _in_pool(
     is_whole, watch = False, _Watch()
     try:
         for task in islice(tasks, WAITING_PER_WORKER * workers):
-            running[pool.submit(_done, work, task)] = task
+            with interrupts_held():
+                running[pool.submit(_done, work, task)] = task
         while running:
             ready = wait(running, CHECK_PERIOD_S, FIRST_COMPLETED).done
             watch.check()
@@ -117,7 +118,8 @@ def _in_pool(
                     continue
                 for following in islice(tasks, 1):
                     try:
-                        running[pool.submit(_done, work, following)] = following
+                        with interrupts_held():
+                            running[pool.submit(_done, work, following)] = following
                     except BrokenProcessPool:
                         lost.append(following)
         is_whole = True

@@ -8,7 +8,7 @@ import math
 import reprlib
 import types
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass
 from numbers import Integral, Real
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -18,6 +18,7 @@ UNBOUNDED = 1e9
 """What a number without bounds of its own may be at most, to both sides of zero."""
 
 _MOST_LETTERS = 80
+_PLAIN = (int, float, bool, str)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +119,8 @@ class Rule:
     Attributes
     ----------
     kind : type
-        ``int``, ``float``, ``bool`` or ``str``; ``object`` for what its class checks itself.
+        ``int``, ``float``, ``bool``, ``str`` or the class of a part; ``object`` for what its class checks
+        itself.
     is_optional : bool
         Whether it may be None.
     bounds : Bounds
@@ -135,7 +137,8 @@ class Rule:
     @property
     def wanted(self) -> str:
         """What it has to be, in words."""
-        kind = {int: "a whole number", bool: "true or false", str: "text"}.get(self.kind, self.bounds.what)
+        kinds = {float: self.bounds.what, int: "a whole number", bool: "true or false", str: "text"}
+        kind = kinds.get(self.kind, self.kind.__name__)
         bounds = f" {self.bounds}" if self.kind in (int, float) else ""
         return f"{kind}{bounds}{', or None' if self.is_optional else ''}"
 
@@ -143,6 +146,8 @@ class Rule:
         """Whether a value is what the setting has to be."""
         if self.kind is object or (value is None and self.is_optional):
             return True
+        if self.kind not in _PLAIN:
+            return isinstance(value, self.kind)
         is_logical = isinstance(value, bool | np.bool_)
         if self.kind in (bool, str):
             return is_logical if self.kind is bool else isinstance(value, str)
@@ -232,4 +237,4 @@ def _rule(hint: Any) -> Rule:  # noqa: ANN401
         kinds = [each for each in get_args(hint) if each is not type(None)]
         rule = _rule(kinds[0]) if len(kinds) == 1 else Rule()
         return Rule(rule.kind, len(kinds) < len(get_args(hint)), rule.bounds, rule.inner)
-    return Rule(hint) if hint in (int, float, bool, str) else Rule()
+    return Rule(hint) if hint in _PLAIN or is_dataclass(hint) else Rule()

@@ -8,16 +8,22 @@ value. Log-odds are integers of ``LOG_ODDS_UNIT``; 0 is unknown.
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarium.mapping.geometry.bounds import check_settings, within
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.grids.scan_integration import WORD, integrate_one
 from lidarium.mapping.kernels.vectors import LEVELS
 
 LOG_ODDS_UNIT = 0.05
+
+Resolution = Annotated[float, within(1e-4, 1000.0)]
+"""Side of a cell [m]."""
+Gain = Annotated[float, within(LOG_ODDS_UNIT, 127 * LOG_ODDS_UNIT)]
+"""What a scan adds to a cell or takes [log-odds]."""
 
 
 OCCUPIED, UNKNOWN, FREE = LEVELS
@@ -40,17 +46,14 @@ class OccupancySettings:
         Bounds of a cell's value [log-odds].
     """
 
-    resolution: float = 0.05
-    hit: float = 0.85
-    miss: float = 0.4
-    minimum: float = -2.0
-    maximum: float = 3.5
+    resolution: Resolution = 0.05
+    hit: Gain = 0.85
+    miss: Gain = 0.4
+    minimum: Annotated[float, within(-127 * LOG_ODDS_UNIT, 0.0)] = -2.0
+    maximum: Annotated[float, within(0.0, 127 * LOG_ODDS_UNIT)] = 3.5
 
     def __post_init__(self) -> None:
-        if not (self.resolution > 0.0 and math.isfinite(self.resolution)):
-            raise ValueError(f"resolution of the map is {self.resolution} m/cell; want more than 0")
-        if not (self.hit >= LOG_ODDS_UNIT and self.miss >= LOG_ODDS_UNIT):
-            raise ValueError(f"hit is {self.hit} and miss is {self.miss}; want at least {LOG_ODDS_UNIT} each")
+        check_settings(self, "the map")
         largest = 127 * LOG_ODDS_UNIT
         if not (-largest <= self.minimum <= -self.miss and self.hit <= self.maximum <= largest):
             raise ValueError(

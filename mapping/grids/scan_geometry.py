@@ -2,15 +2,19 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.bounds import above, check_settings, within
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 MOST_BEAMS = 16_384
 """Kernels keep some 200 bytes a beam on the stack."""
+
+MOST_RANGE_M = 10_000.0
+"""Farthest that a laser may reach of which scans are read [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,17 +34,14 @@ class ScanGeometry:
         Shortest and longest measured range [m].
     """
 
-    beams: int = 727
-    field_of_view: float = math.radians(240.0)
-    range_min: float = 0.02
-    range_max: float = 5.6
+    beams: Annotated[int, within(1, MOST_BEAMS)] = 727
+    field_of_view: Annotated[float, above(0.0, 2.0 * math.pi + 1e-9)] = math.radians(240.0)
+    range_min: Annotated[float, within(0.0, MOST_RANGE_M)] = 0.02
+    range_max: Annotated[float, above(0.0, MOST_RANGE_M)] = 5.6
 
     def __post_init__(self) -> None:
-        if not 1 <= self.beams <= MOST_BEAMS:
-            raise ValueError(f"beams is {self.beams}; want 1 to {MOST_BEAMS}")
-        if not 0.0 < self.field_of_view <= 2.0 * math.pi + 1e-9:
-            raise ValueError(f"field_of_view is {self.field_of_view} rad; want more than 0 and at most 2 pi")
-        if not 0.0 <= self.range_min < self.range_max or not math.isfinite(self.range_max):
+        check_settings(self, "the scan")
+        if not self.range_min < self.range_max:
             raise ValueError(
                 f"range_min is {self.range_min} m and range_max is {self.range_max} m; want 0 <= range_min < "
                 "range_max"

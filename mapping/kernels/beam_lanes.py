@@ -5,8 +5,8 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 
-from lidarium.mapping.kernels import plain_forms
-from lidarium.mapping.kernels.interpreted import machine_code
+from lidarium.mapping.kernels.in_python import plain_forms
+from lidarium.mapping.kernels.in_python.interpreted import machine_code
 
 LANES = 8
 """Beams into which a face is drawn at once."""

@@ -10,9 +10,9 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.kernels.interpreted import machine_code
+from lidarium.mapping.kernels.in_python import plain_forms
+from lidarium.mapping.kernels.in_python.interpreted import machine_code
 from lidarium.mapping.kernels.processor import has_feature
 
 _WORD = ir.IntType(64)

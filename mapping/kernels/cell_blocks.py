@@ -15,9 +15,9 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.kernels.interpreted import machine_code
+from lidarium.mapping.kernels.in_python import plain_forms
+from lidarium.mapping.kernels.in_python.interpreted import machine_code
 from lidarium.mapping.kernels.vectors import (
     BLOCK,
     BYTES,

@@ -21,7 +21,7 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.cache_folders import cache_folder
-from lidarium.mapping.kernels.interpreted import IS_INTERPRETED, interpreted
+from lidarium.mapping.kernels.in_python.interpreted import IS_INTERPRETED, interpreted
 from lidarium.mapping.kernels.kept_code import keep
 
 Array = NDArray[Any]

@@ -14,9 +14,9 @@ from numba import types
 from numba.np import arrayobj
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.interpreted import machine_code, room_for
+from lidarium.mapping.kernels.in_python import plain_forms
+from lidarium.mapping.kernels.in_python.interpreted import machine_code, room_for
 
 _numba_arrays: Any = arrayobj
 _numba_types: Any = types

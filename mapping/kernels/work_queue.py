@@ -12,9 +12,9 @@ from llvmlite import ir
 from numba import types
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import plain_forms
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.interpreted import machine_code
+from lidarium.mapping.kernels.in_python import plain_forms
+from lidarium.mapping.kernels.in_python.interpreted import machine_code
 
 
 class Work(NamedTuple):

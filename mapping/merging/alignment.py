@@ -5,11 +5,12 @@ Each match proposes one, the others vote, and the walls refine it.
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.bounds import Count, Distance, check_settings, share, shown, within
 from lidarium.mapping.geometry.rigid import Transform, fit
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.correspondence import Matches
@@ -54,32 +55,25 @@ class AlignmentSettings:
     """
 
     inlier_rule: str = "distance"
-    tolerance_m: float = 0.12
-    angle_uncertainty: float = math.radians(3.0)
-    ratio: float = 0.92
-    least_inliers: int = 3
-    inlier_share: float = 0.0
-    candidates: int = 8
+    tolerance_m: Distance = 0.12
+    angle_uncertainty: Annotated[float, within(0.0, math.pi / 4.0)] = math.radians(3.0)
+    ratio: Annotated[float, share()] = 0.92
+    least_inliers: Count = 3
+    inlier_share: Annotated[float, share()] = 0.0
+    candidates: Count = 8
     refinements: tuple[str, ...] = ("least_squares", "walls")
-    refinement_reach_m: float = 0.4
-    wall_samples: int = 400
+    refinement_reach_m: Annotated[float, within(1e-3, 1000.0)] = 0.4
+    wall_samples: Count = 400
 
     def __post_init__(self) -> None:
+        check_settings(self, "alignment")
         if self.inlier_rule not in INLIER_RULES:
             raise ValueError(f"inlier_rule is {self.inlier_rule!r}; want one of {', '.join(INLIER_RULES)}")
-        if not set(self.refinements) <= set(REFINEMENTS):
-            raise ValueError(f"refinements are {self.refinements}; want some of {', '.join(REFINEMENTS)}")
-        for name, low, high in (
-            ("tolerance_m", 0.0, math.inf),
-            ("angle_uncertainty", 0.0, math.pi / 4.0),
-            ("ratio", 0.0, 1.0),
-            ("inlier_share", 0.0, 1.0),
-            ("refinement_reach_m", 1e-3, math.inf),
-        ):
-            if not low <= getattr(self, name) <= high:
-                raise ValueError(f"{name} of alignment is {getattr(self, name)}; want {low:g} to {high:.4g}")
-        if min(self.least_inliers, self.candidates, self.wall_samples) < 1:
-            raise ValueError("least_inliers, candidates and wall_samples of alignment want one or more each")
+        is_list = isinstance(self.refinements, tuple | list)
+        if not is_list or not all(each in REFINEMENTS for each in self.refinements):
+            raise ValueError(
+                f"refinements are {shown(self.refinements)}; want some of {', '.join(REFINEMENTS)}"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

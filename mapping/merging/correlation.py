@@ -9,12 +9,14 @@ spectra.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.bounds import FromZero, Length, check_settings, within
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE
 from lidarium.mapping.merging.description.described_map import DescribedMap
@@ -41,26 +43,15 @@ class CorrelationSettings:
         place.
     """
 
-    cell_m: float = 0.15
-    most_cells: int = 200
-    rotations: int = 72
-    peaks: int = 3
-    miss_weight: float = 1.0
-    free_weight: float = 0.03
+    cell_m: Length = 0.15
+    most_cells: Annotated[int, within(16, 2048)] = 200
+    rotations: Annotated[int, within(0, 3600)] = 72
+    peaks: Annotated[int, within(1, 1000)] = 3
+    miss_weight: FromZero = 1.0
+    free_weight: FromZero = 0.03
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.cell_m) and self.cell_m > 0.0):
-            raise ValueError(f"cell_m of correlation is {self.cell_m}; want a positive number")
-        if self.rotations < 0 or self.peaks < 1 or self.most_cells < 16:
-            found = f"{self.rotations}, {self.peaks} and {self.most_cells}"
-            raise ValueError(
-                f"rotations, peaks and most_cells of correlation are {found}; want at least 0, 1 and 16"
-            )
-        if not (0.0 <= self.miss_weight < math.inf and 0.0 <= self.free_weight < math.inf):
-            raise ValueError(
-                f"miss_weight and free_weight of correlation are {self.miss_weight} and {self.free_weight}; "
-                "want zero or more"
-            )
+        check_settings(self, "correlation")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

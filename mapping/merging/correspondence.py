@@ -5,11 +5,13 @@ Descriptors are compared under all rotations at once: a correlation along the an
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.bounds import Count, check_settings, share, within
 from lidarium.mapping.geometry.rigid import wrapped
 from lidarium.mapping.merging.description.corners import Corners
 from lidarium.mapping.merging.description.descriptors import Descriptors
@@ -47,32 +49,19 @@ class CorrespondenceSettings:
     """
 
     method: str = "descriptors"
-    threshold: float = 0.55
-    margin: float = 0.10
-    per_corner: int = 5
-    shift_window: float = math.radians(24.0)
+    threshold: Annotated[float, within(-1.0, 1.0)] = 0.55
+    margin: Annotated[float, within(0.0, 2.0)] = 0.10
+    per_corner: Count = 5
+    shift_window: Annotated[float, within(0.0, math.pi)] = math.radians(24.0)
     is_known_only: bool = True
-    least_known: float = 0.25
+    least_known: Annotated[float, share()] = 0.25
     use_shift: bool = True
-    length_tolerance: float = 0.08
+    length_tolerance: Annotated[float, share(has_least=False, has_most=False)] = 0.08
 
     def __post_init__(self) -> None:
+        check_settings(self, "correspondence")
         if self.method not in METHODS:
             raise ValueError(f"method of correspondence is {self.method!r}; want one of {', '.join(METHODS)}")
-        for name, low, high in (
-            ("threshold", -1.0, 1.0),
-            ("margin", 0.0, 2.0),
-            ("shift_window", 0.0, math.pi),
-            ("least_known", 0.0, 1.0),
-        ):
-            if not low <= getattr(self, name) <= high:
-                raise ValueError(
-                    f"{name} of correspondence is {getattr(self, name)}; want {low:g} to {high:.4g}"
-                )
-        if self.per_corner < 1:
-            raise ValueError(f"per_corner is {self.per_corner}; want one or more")
-        if not 0.0 < self.length_tolerance < 1.0:
-            raise ValueError(f"length_tolerance is {self.length_tolerance}; want more than 0 and less than 1")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

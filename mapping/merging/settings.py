@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+from lidarium.mapping.geometry.bounds import Angle, Length, check_settings
 from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.alignment import AlignmentSettings
 from lidarium.mapping.merging.correlation import CorrelationSettings
@@ -31,13 +32,11 @@ class MergeSettings:
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     validation: ValidationSettings = field(default_factory=ValidationSettings)
     correlation: CorrelationSettings = field(default_factory=CorrelationSettings)
-    cycle_distance_m: float = 0.15
-    cycle_angle: float = math.radians(3.0)
+    cycle_distance_m: Length = 0.15
+    cycle_angle: Angle = math.radians(3.0)
 
     def __post_init__(self) -> None:
-        for name in ("cycle_distance_m", "cycle_angle"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ValueError(f"{name} is {getattr(self, name)}; want a positive number")
+        check_settings(self, "merging")
 
 
 def merge_settings(mode: str = "default", resolution: float = 0.025) -> MergeSettings:

@@ -11,6 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
+from lidarium.evaluation.suites.processes import interrupts_held
 from lidarium.scripts.common import counted, notify
 
 LIST = Path(__file__).parents[1] / "data" / "kernels_of_run.json"
@@ -61,7 +62,8 @@ def _compiled(folder: Path, kernels: Sequence[Entry], processes: int) -> Iterato
     pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_begin_process)
     count, is_whole = count_compiled(folder), False
     try:
-        left: set[Future[None]] = {pool.submit(compile_kernel, each) for each in kernels}
+        with interrupts_held():
+            left: set[Future[None]] = {pool.submit(compile_kernel, each) for each in kernels}
         while left:
             left = wait(left, timeout=POLL_S).not_done
             before, count = count, count_compiled(folder)

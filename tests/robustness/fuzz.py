@@ -24,6 +24,9 @@ from pathlib import Path
 from robustness.samples import make_samples
 
 HANGS_S = 5.0
+MOST_S, MOST_MB = 1.0, 512.0
+"""What reading a file may take: time of the processor, and memory beyond what its process held."""
+
 WAITS = 6
 """A case that computes nothing is waited for so many times as long."""
 
@@ -43,24 +46,27 @@ class Tally:
         Cases by how they ended: fine, refused, wrong, signal, hang.
     faults : list of (int, str)
         Number and reason of each that is wrong.
-    slowest_s, peak_mb : float, float
-        Longest CPU time of a case, and most memory of a worker.
+    costly : list of (int, float, float)
+        Number, CPU time [s] and memory [MB] of each that took more than a file may.
+    slowest, largest : (float, int), (float, int)
+        Longest CPU time [s] and most memory [MB] of a case, and its number.
     """
 
     kinds: collections.Counter[str] = field(default_factory=collections.Counter)
     faults: list[tuple[int, str]] = field(default_factory=list)
-    slowest_s: float = 0.0
-    slowest: int = -1
-    peak_mb: float = 0.0
+    costly: list[tuple[int, float, float]] = field(default_factory=list)
+    slowest: tuple[float, int] = (0.0, -1)
+    largest: tuple[float, int] = (0.0, -1)
 
     def add(self, number: int, found: dict[str, object]) -> None:
         """Count a case."""
         self.kinds[str(found["kind"])] += 1
         if found["kind"] not in ("fine", "refused"):
             self.faults.append((number, f"{found['kind']} {found.get('error', '')} {found.get('at', '')}"))
-        if float(found.get("cpu_s", 0.0)) > self.slowest_s:
-            self.slowest_s, self.slowest = float(found["cpu_s"]), number
-        self.peak_mb = max(self.peak_mb, float(found.get("peak_mb", 0.0)))
+        took_s, took_mb = (float(str(found.get(name, 0.0))) for name in ("cpu_s", "mb"))
+        self.slowest, self.largest = max(self.slowest, (took_s, number)), max(self.largest, (took_mb, number))
+        if took_s > MOST_S or took_mb > MOST_MB:
+            self.costly.append((number, took_s, took_mb))
 
 
 def run_cases(kind: str, samples: Path, seed: int, first: int, count: int, tally: Tally) -> None:
@@ -162,9 +168,13 @@ def main() -> int:
     tally = fuzz(asked.kind, asked.count, asked.seed, asked.first, asked.samples)
     for number, fault in tally.faults[:200]:
         print(f"case {number}: {fault}")
+    for number, took_s, took_mb in tally.costly[:200]:
+        print(f"case {number}: {took_s:.2f} s of CPU, {took_mb:.0f} MB")
+    (slowest_s, slowest), (largest_mb, largest) = tally.slowest, tally.largest
     print(
         f"{sum(tally.kinds.values())} cases in {time.monotonic() - began:.0f} s: {dict(tally.kinds)}; "
-        f"slowest {tally.slowest_s:.2f} s of CPU (case {tally.slowest}), peak {tally.peak_mb:.0f} MB"
+        f"{len(tally.costly)} above {MOST_S:g} s or {MOST_MB:g} MB, slowest {slowest_s:.2f} s of CPU "
+        f"(case {slowest}), largest {largest_mb:.0f} MB (case {largest})"
     )
     return 1 if tally.faults else 0
 

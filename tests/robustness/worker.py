@@ -8,6 +8,7 @@ import json
 import os
 import random
 import resource
+import shutil
 import sys
 import tempfile
 import time
@@ -21,9 +22,16 @@ MEMORY = 6 << 30
 """What a worker may ask for: more is told as lack of memory [bytes]."""
 
 
+def memory_mb(kind: str) -> float:
+    """Return how much memory this process takes (``VmRSS``) or has taken at most (``VmHWM``) [MB]."""
+    told = Path("/proc/self/status").read_text()
+    return int(told.split(f"{kind}:")[1].split()[0]) / 1000
+
+
 def outcome_of(action: Callable[[], object]) -> dict[str, object]:
-    """Return how a case ended: ``fine``, ``refused`` by a clear error, or ``wrong``."""
-    began = time.process_time()
+    """Return how a case ended: ``fine``, ``refused`` by a clear error, or ``wrong``; and what it took."""
+    Path("/proc/self/clear_refs").write_text("5")  # the most memory is counted anew
+    held_mb, began = memory_mb("VmRSS"), time.process_time()
     try:
         action()
         found: dict[str, object] = {"kind": "fine"}
@@ -33,7 +41,8 @@ def outcome_of(action: Callable[[], object]) -> dict[str, object]:
         if not _is_clear(error, where):
             place = f"{Path(where.filename).name}:{where.lineno}"
             found = {"kind": "wrong", "error": f"{type(error).__name__}: {str(error)[:200]}", "at": place}
-    return {**found, "cpu_s": round(time.process_time() - began, 3)}
+    found["cpu_s"] = round(time.process_time() - began, 3)
+    return {**found, "mb": round(memory_mb("VmHWM") - held_mb)}
 
 
 def _is_clear(error: Exception, where: traceback.FrameSummary) -> bool:
@@ -61,6 +70,17 @@ def file_case(samples: list[Path], folder: Path, seed: int, number: int) -> Call
     return lambda: use(path.with_suffix(".yaml") if path.name == "map.pgm" else path)
 
 
+def read_all(samples: list[Path], folder: Path) -> None:
+    """Read and use all files undamaged: what is imported and loaded for it counts to no case."""
+    from robustness.uses import use
+
+    for sample in samples:
+        shutil.copy(sample, folder / sample.name)
+    for sample in samples:
+        if sample.name != "map.pgm":
+            use(folder / sample.name)
+
+
 def setting_case(seed: int, number: int) -> Callable[[], object]:
     """Return what makes and steps an environment of extreme settings."""
     from robustness.extremes import try_settings
@@ -75,15 +95,16 @@ def main(kind: str, samples_folder: str, seed: int, first: int, last: int) -> No
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     samples = sorted(path for path in Path(samples_folder).iterdir() if path.is_file())
     with tempfile.TemporaryDirectory() as folder:
+        print(f"begin {first}", flush=True)
+        if kind == "files":
+            read_all(samples, Path(folder))
         for number in range(first, last):
             print(f"begin {number}", flush=True)
             if kind == "files":
                 action = file_case(samples, Path(folder), seed, number)
             else:
                 action = setting_case(seed, number)
-            found = outcome_of(action)
-            found["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-            print(f"end {number} {json.dumps(found)}", flush=True)
+            print(f"end {number} {json.dumps(outcome_of(action))}", flush=True)
 
 
 if __name__ == "__main__":

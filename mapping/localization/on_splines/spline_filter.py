@@ -14,12 +14,12 @@ weight.
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.checks import check_from_zero
+from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_settings, share, within
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.kernels.compilation import Array, kernel
@@ -60,30 +60,19 @@ class SplineFilterSettings:
     """
 
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
-    particles: int = 200
-    start_distance: float = 0.0
-    start_turn: float = 0.0
-    distance_bias: float = 0.05
-    turn_bias: float = 0.05
-    bias_wander: float = 0.01
-    lost_likelihood: float = 0.3
-    recovered_share: float = 0.1
-    recovery_distance: float = 0.25
-    recovery_turn: float = math.radians(10.0)
+    particles: Annotated[int, within(1, 100_000)] = 200
+    start_distance: Distance = 0.0
+    start_turn: Turn = 0.0
+    distance_bias: FromZero = 0.05
+    turn_bias: FromZero = 0.05
+    bias_wander: FromZero = 0.01
+    lost_likelihood: FromZero = 0.3
+    recovered_share: Annotated[float, share()] = 0.1
+    recovery_distance: Distance = 0.25
+    recovery_turn: Turn = math.radians(10.0)
 
     def __post_init__(self) -> None:
-        if self.particles < 1:
-            raise ValueError(f"particles is {self.particles}; want at least 1")
-        spreads = ("start_distance", "start_turn", "distance_bias", "turn_bias", "bias_wander")
-        check_from_zero(
-            self,
-            "the filter",
-            (*spreads, "lost_likelihood", "recovered_share", "recovery_distance", "recovery_turn"),
-        )
-        if self.recovered_share > 1.0:
-            raise ValueError(
-                f"recovered_share of the filter is {self.recovered_share}; want a share from 0 to 1"
-            )
+        check_settings(self, "the filter")
 
 
 class SplineFilter(SplineTracker):

@@ -8,10 +8,11 @@ cells around the inliers only, unknown ones included.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from lidarium.mapping.geometry.checks import check_from_zero
+from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_settings, share, within
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.counts import WallField, count_overlap, count_walls, pose_numbers
 from lidarium.mapping.merging.description.described_map import DescribedMap
@@ -21,6 +22,7 @@ OCCUPIED_WEIGHT = 10.0
 
 
 TESTS = ("walls", "discs")
+Share = Annotated[float, share()]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,54 +76,31 @@ class ValidationSettings:
     """
 
     test: str = "walls"
-    hit_distance_m: float = 0.075
-    miss_distance_m: float = 0.175
-    least_overlap_m2: float = 5.0
-    least_wall_m: float = 3.0
-    least_evidence_m: float = 3.5
-    least_across_m: float = 0.4
-    least_across_share: float = 0.0
-    least_evidence_per_m2: float = 0.0
-    hit_rate: float = 0.7
-    score: float = 0.9
-    most_contradiction_m: float = 0.15
-    plenty_of_overlap_m2: float = 250.0
-    plenty_of_wall_m: float = 200.0
-    contradiction_share: float = 0.1
-    rival_distance_m: float = 0.5
-    rival_angle: float = math.radians(5.0)
-    rival_share: float = 0.6
-    rival_lead: float = 1.5
-    disc_radius_cells: int = 25
-    disc_agreement: float = 0.90
+    hit_distance_m: Distance = 0.075
+    miss_distance_m: Distance = 0.175
+    least_overlap_m2: FromZero = 5.0
+    least_wall_m: FromZero = 3.0
+    least_evidence_m: FromZero = 3.5
+    least_across_m: FromZero = 0.4
+    least_across_share: Share = 0.0
+    least_evidence_per_m2: FromZero = 0.0
+    hit_rate: Share = 0.7
+    score: Share = 0.9
+    most_contradiction_m: FromZero = 0.15
+    plenty_of_overlap_m2: FromZero = 250.0
+    plenty_of_wall_m: FromZero = 200.0
+    contradiction_share: Share = 0.1
+    rival_distance_m: Distance = 0.5
+    rival_angle: Turn = math.radians(5.0)
+    rival_share: Share = 0.6
+    rival_lead: FromZero = 1.5
+    disc_radius_cells: Annotated[int, within(1, 1000)] = 25
+    disc_agreement: Share = 0.90
 
     def __post_init__(self) -> None:
+        check_settings(self, "validation")
         if self.test not in TESTS:
             raise ValueError(f"test of validation is {self.test!r}; want one of {', '.join(TESTS)}")
-        for name in (
-            "least_across_share",
-            "hit_rate",
-            "score",
-            "contradiction_share",
-            "rival_share",
-            "disc_agreement",
-        ):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"{name} of validation is {getattr(self, name)}; want 0 to 1")
-        least = ("least_overlap_m2", "least_wall_m", "least_evidence_m", "least_across_m")
-        lengths = (
-            "hit_distance_m",
-            "miss_distance_m",
-            "most_contradiction_m",
-            "plenty_of_wall_m",
-            "rival_distance_m",
-            "rival_lead",
-        )
-        check_from_zero(
-            self, "validation", (*least, *lengths, "least_evidence_per_m2", "plenty_of_overlap_m2")
-        )
-        if self.disc_radius_cells < 1:
-            raise ValueError(f"disc_radius_cells is {self.disc_radius_cells}; want one or more")
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +132,7 @@ class Agreement:
     wall_m: float = 0.0
     across_m: float = 0.0
     contradicting_m: float = 0.0
-    score: float = 0.0
+    score: Share = 0.0
 
     @property
     def hit_rate(self) -> float:

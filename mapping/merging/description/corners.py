@@ -10,11 +10,13 @@ have too few occupied neighbours and do not fire.
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.bounds import Counted, Distance, check_settings, shown, within
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.description.corner_orientation import orientation_table
@@ -58,21 +60,21 @@ class CornerSettings:
 
     neighbours: tuple[int, ...] = (4, 5, 6)
     rule: str = "table"
-    separation_m: float = 0.1
-    limit: int = 96
-    free_above: int = 200
-    occupied_below: int = 55
+    separation_m: Distance = 0.1
+    limit: Counted = 96
+    free_above: Annotated[int, within(1, 254)] = 200
+    occupied_below: Annotated[int, within(1, 254)] = 55
 
     def __post_init__(self) -> None:
-        if not self.neighbours or not set(self.neighbours) <= {4, 5, 6, 7}:
-            raise ValueError(f"neighbours of corners are {self.neighbours}; want some of 4, 5, 6 and 7")
+        check_settings(self, "corners")
+        is_list = isinstance(self.neighbours, tuple | list) and len(self.neighbours) > 0
+        if not is_list or not all(each in (4, 5, 6, 7) for each in self.neighbours):
+            raise ValueError(
+                f"neighbours of corners are {shown(self.neighbours)}; want some of 4, 5, 6 and 7"
+            )
         if self.rule not in RULES:
             raise ValueError(f"rule of corners is {self.rule!r}; want one of {', '.join(RULES)}")
-        if not (math.isfinite(self.separation_m) and self.separation_m >= 0.0):
-            raise ValueError(f"separation of corners is {self.separation_m} m; want zero or more")
-        if self.limit < 0:
-            raise ValueError(f"limit of corners is {self.limit}; want zero (none) or more")
-        if not 0 < self.occupied_below <= self.free_above < 255:
+        if not self.occupied_below <= self.free_above:
             raise ValueError(
                 f"greys are {self.occupied_below} and {self.free_above}; want 0 < occupied_below <= "
                 "free_above < 255"

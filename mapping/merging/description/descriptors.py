@@ -8,17 +8,22 @@ of that angle alone.
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.bounds import Length, check_settings, within
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.description.corners import Corners
 
 VARIANTS = ("two_rings", "polar", "log_polar")
+MOST_RINGS = 1000
+"""Rings of a band at most."""
+
+Worth = Annotated[float, within(-1e6, 1e6)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,18 +48,19 @@ class DescriptorSettings:
     """
 
     variant: str = "two_rings"
-    radius_min: float = 0.1
-    radius_max: float = 0.6
-    radius_step: float = 0.1
-    far_min: float = 0.6
-    far_max: float = 2.6
-    far_step: float = 0.2
-    columns: int = 64
-    occupied: float = 1.0
-    unknown: float = 0.0
-    free: float = -0.25
+    radius_min: Length = 0.1
+    radius_max: Length = 0.6
+    radius_step: Length = 0.1
+    far_min: Length = 0.6
+    far_max: Length = 2.6
+    far_step: Length = 0.2
+    columns: Annotated[int, within(8, 4096)] = 64
+    occupied: Worth = 1.0
+    unknown: Worth = 0.0
+    free: Worth = -0.25
 
     def __post_init__(self) -> None:
+        check_settings(self, "descriptors")
         if self.variant not in VARIANTS:
             raise ValueError(f"variant of descriptors is {self.variant!r}; want one of {', '.join(VARIANTS)}")
         bands = [
@@ -62,15 +68,11 @@ class DescriptorSettings:
             ("far", self.far_min, self.far_max, self.far_step),
         ]
         for name, low, high, step in bands:
-            if not (0.0 < low < high < math.inf and 0.0 < step <= high - low):
+            if not (low < high and step <= high - low <= MOST_RINGS * step):
                 raise ValueError(
-                    f"{name}_min, _max and _step are {low}, {high} and {step} m; want 0 < min < max and 0 < "
-                    "step <= max - min"
+                    f"{name}_min, _max and _step are {low}, {high} and {step} m; want 0 < min < max, 0 < "
+                    f"step <= max - min and at most {MOST_RINGS} rings"
                 )
-        if self.columns < 8:
-            raise ValueError(f"columns of descriptors are {self.columns}; want 8 or more")
-        if not np.isfinite([self.occupied, self.unknown, self.free]).all():
-            raise ValueError("values of occupied, unknown and free cells in descriptors are not finite")
 
 
 class Descriptors(NamedTuple):

@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba.extending import intrinsic
 
-from lidarium.mapping.kernels import bit_words, plain
+from lidarium.mapping.kernels import bit_words
 from lidarium.mapping.kernels.bit_words import first_bit, running_xor
 from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.in_python import plain
 
 words = st.integers(0, 2**64 - 1)
 

@@ -5,8 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.kernels import cell_blocks, plain
+from lidarium.mapping.kernels import cell_blocks
 from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.in_python import plain
 
 words = st.integers(0, 2**64 - 1)
 blocks = arrays(np.int8, 64)

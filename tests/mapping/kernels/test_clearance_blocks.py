@@ -5,8 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.kernels import clearance_blocks, plain
+from lidarium.mapping.kernels import clearance_blocks
 from lidarium.mapping.kernels.compilation import kernel
+from lidarium.mapping.kernels.in_python import plain
 
 numbers = arrays(np.uint16, 64, elements=st.integers(0, 3))
 

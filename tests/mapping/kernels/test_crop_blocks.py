@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.kernels import crop_blocks, plain
+from lidarium.mapping.kernels import crop_blocks
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.kernels.crop_blocks import COLUMNS, PLACES, ROWS, SIDE
+from lidarium.mapping.kernels.in_python import plain
 
 pytestmark = pytest.mark.skipif(
     not crop_blocks.CAN_LOOK_UP_IN_REGISTERS, reason="this processor has no AVX-512 VBMI"

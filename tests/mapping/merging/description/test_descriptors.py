@@ -109,7 +109,7 @@ def test_all_shifts_are_compared_as_a_slow_loop_would(is_known_only):
         ({"radius_min": 0.0}, "radius_min"),
         ({"far_step": 9.0}, "far_min"),
         ({"columns": 4}, "columns"),
-        ({"free": math.nan}, "not finite"),
+        ({"free": math.nan}, "free of descriptors is nan; want a number"),
     ],
 )
 def test_bad_settings_are_named(options, message):

@@ -3,12 +3,14 @@
 Tests compare the operations with them. Blocks are arrays here, and addresses there.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels.compilation import Array
 from lidarium.mapping.kernels.vectors import LEVELS
 
+Array = NDArray[Any]
 Levels = NDArray[np.uint8]
 
 

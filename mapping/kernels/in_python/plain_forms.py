@@ -9,8 +9,8 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.kernels import plain
-from lidarium.mapping.kernels.interpreted import array_at
+from lidarium.mapping.kernels.in_python import plain
+from lidarium.mapping.kernels.in_python.interpreted import array_at
 
 BLOCK = 64
 HALF_BLOCK = 32

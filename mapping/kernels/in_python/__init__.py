@@ -1,0 +1,1 @@
+"""Kernels in plain Python, where numba compiles nothing."""

@@ -1,0 +1,20 @@
+"""An evaluation that is killed, or whose workers are, goes on with nothing lost or there twice.
+
+``LIDARIUM_KILLS=1000`` kills so many times; ``python -m robustness.kills`` does the same by hand.
+"""
+
+import os
+import sys
+
+import pytest
+from robustness.kills import run_kills
+
+COUNT = 3
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="children are found by the files of Linux")
+def test_nothing_is_lost_or_there_twice_after_kills():
+    count = int(os.environ.get("LIDARIUM_KILLS", COUNT))
+    tally = run_kills(count, seed=int(os.environ.get("LIDARIUM_FUZZ_SEED", "0")), episodes=12)
+    assert tally.kills.total() >= count
+    assert not tally.faults, tally.faults[:20]
