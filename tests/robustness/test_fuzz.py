@@ -17,6 +17,7 @@ def test_nothing_but_clear_errors_comes_out(kind):
     count = int(os.environ.get("LIDARIUM_FUZZ", COUNTS[kind]))
     tally = fuzz(kind, count, seed=int(os.environ.get("LIDARIUM_FUZZ_SEED", "0")))
     assert not tally.faults, tally.faults[:20]
+    assert kind == "settings" or not tally.costly, tally.costly[:20]
     assert sum(tally.kinds.values()) == count
     # Of the damaged some can still be read, and of the extreme some can be simulated.
     assert tally.kinds["fine"] > 0.05 * count

@@ -18,6 +18,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 MOST_MESSAGE = 500
+AGAIN_S = 0.5
+"""A file that takes longer is read again, and that is what counts: kernels may have been compiled for it."""
+
 MEMORY = 6 << 30
 """What a worker may ask for: more is told as lack of memory [bytes]."""
 
@@ -104,7 +107,10 @@ def main(kind: str, samples_folder: str, seed: int, first: int, last: int) -> No
                 action = file_case(samples, Path(folder), seed, number)
             else:
                 action = setting_case(seed, number)
-            print(f"end {number} {json.dumps(outcome_of(action))}", flush=True)
+            found = outcome_of(action)
+            if kind == "files" and float(str(found["cpu_s"])) > AGAIN_S:
+                found = outcome_of(file_case(samples, Path(folder), seed, number))
+            print(f"end {number} {json.dumps(found)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def is_dungeon(path: Path) -> bool:
     """
     pixels = read_image(path)
     mark = _mark(pixels)
-    levels = np.unique(_grey(pixels)[~mark])
+    levels = _levels(_grey(pixels), ~mark)
     walls, free = levels[levels <= _DUNGEON_FREE_ABOVE], levels[levels > _DUNGEON_FREE_ABOVE]
     return bool(mark.any() and walls.size and free.size and np.ptp(walls) <= 1 and np.ptp(free) <= 1)
 
@@ -57,7 +57,7 @@ def load_image(path: Path, resolution: float | None) -> Floor:
         raise ValueError(f"{path} is an image without a scale; pass --resolution with its metres per pixel")
     grey = _grey(read_image(path))
     free = grey > _FREE_ABOVE
-    if np.isin(grey, _MAP_SERVER_LEVELS).all():
+    if set(_levels(grey)) <= set(_MAP_SERVER_LEVELS):
         free = grey == max(_MAP_SERVER_LEVELS)
     return floor_of_cells(path, free[::-1], (0.0, 0.0), resolution)
 
@@ -71,14 +71,22 @@ def _grey(pixels: NDArray[Any]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(eight[..., :3]), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
+def _levels(grey: NDArray[np.uint8], where: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
+    """Return the greys that there are, in ascending order, without a copy of the picture."""
+    mask = None if where is None else where.view(np.uint8)
+    counts = cv2.calcHist([grey], [0], mask, [256], [0.0, 256.0])
+    return np.flatnonzero(counts).astype(np.int64)
+
+
 def _mark(pixels: NDArray[Any]) -> NDArray[np.bool_]:
     """Return the pixels of the start mark.
 
     The mark is yellow, or grey 208 in an image without colours.
     """
     if pixels.ndim == 3 and pixels.shape[2] >= 3:
-        blue, green, red = (pixels[..., channel] for channel in range(3))
-        yellow = (blue < 100) & (green > 150) & (red > 150)
+        most, rest = np.iinfo(pixels.dtype).max, [0] * (pixels.shape[2] - 3)
+        least, greatest = (0, 151, 151, *rest), (99, most, most, *(most for _ in rest))
+        yellow = cv2.inRange(pixels, np.array(least), np.array(greatest))
         if yellow.any():
-            return np.asarray(yellow)
+            return yellow > 0
     return np.asarray(_grey(pixels) == _MARK_GREY)

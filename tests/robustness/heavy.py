@@ -1,0 +1,159 @@
+"""Files of at most 1 MiB that ask for as much time and memory as they can.
+
+``python -m robustness.heavy [NAME ...]``
+
+Run it in the folder ``tests``. Each is read and used for the first time after valid files of all kinds were;
+its CPU time, and its memory beyond what was held, are printed.
+"""
+
+import gzip
+import io
+import json
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+from robustness.fuzz import MOST_MB, MOST_S
+from robustness.samples import make_samples
+from robustness.uses import use
+from robustness.worker import outcome_of, read_all
+
+from lidarium.mapping.files.images import MOST_COLOURED, MOST_PIXELS
+
+MOST_BYTES = 1 << 20
+MOST_SIDE, COLOURED_SIDE = math.isqrt(MOST_PIXELS), math.isqrt(MOST_COLOURED)
+TRIES = 2
+"""How often a file that took too much is read again."""
+
+_draws = np.random.default_rng(0)
+
+
+def _picture(rows: int, columns: int, suffix: str = ".png", share: float = 0.0, *colours: int) -> bytes:
+    """Return a picture of a room with some random cells occupied."""
+    pixels = np.full((rows, columns, *colours), 254, np.uint8)
+    pixels[[0, -1]] = pixels[:, [0, -1]] = 0
+    pixels[_draws.random((rows, columns)) < share] = 0
+    return bytes(cv2.imencode(suffix, pixels)[1])
+
+
+def _repeated(line: str, head: str = "", tail: str = "") -> bytes:
+    return (head + line * ((MOST_BYTES - len(head) - len(tail)) // len(line)) + tail).encode()
+
+
+def _packed(content: bytes) -> bytes:
+    return gzip.compress(content, 1)
+
+
+def _array(cells: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.save(file, cells)
+    return file.getvalue()
+
+
+def _arrays(**arrays: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays)
+    return file.getvalue()
+
+
+def _outline(corners: int, size: float) -> bytes:
+    turns = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+    radii = size * (1.0 + 0.3 * (np.arange(corners) % 2))
+    points = np.stack([radii * np.cos(turns), radii * np.sin(turns)], axis=1).round(2)
+    return json.dumps({"id": "h", "verts": points.tolist()}).encode()
+
+
+def _segments(line: str, count: int, size: int) -> bytes:
+    ends = _draws.integers(0, size, (count, 4))
+    return "".join(line.format(*row) for row in ends).encode()[:MOST_BYTES]
+
+
+def _plan(walls: int, size: float) -> bytes:
+    rows = _draws.uniform(0.5, size - 0.5, (walls, 4)).round(2).tolist()
+    return json.dumps(
+        {"name": "x", "about": "x", "bounds": [0, 0, size, size], "outer_wall": 0.2, "walls": rows}
+    ).encode()[:MOST_BYTES]
+
+
+def _carmen(beams: int, lines: int) -> bytes:
+    scan = f"FLASER {beams} {'3.00 ' * beams}"
+    rows = [f"{scan}{k / 10} 0 0 {k / 10} 0 0 {k} h {k}\n" for k in range(lines)]
+    return "".join(rows).encode()
+
+
+CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "a large room": ("image.png", lambda: _picture(MOST_SIDE, MOST_SIDE)),
+    "a large room in colour": ("image.png", lambda: _picture(COLOURED_SIDE, COLOURED_SIDE, ".png", 0.0, 4)),
+    "a room of 2,000 x 2,000": ("image.png", lambda: _picture(2000, 2000)),
+    "noise, 2,000 x 2,000": ("image.png", lambda: _picture(2000, 2000, share=0.05)),
+    "noise, 700 x 700": ("image.pgm", lambda: _picture(700, 700, ".pgm", 0.5)),
+    "noise, 1,000 x 1,000": ("image.pgm", lambda: _picture(1000, 1000, ".pgm", 0.3)),
+    "a large dungeon": ("dungeon.png", lambda: _picture(MOST_SIDE, MOST_SIDE)),
+    "noisy array": ("array.npy", lambda: _array((_draws.random((1000, 1000)) < 0.3).astype(np.uint8))),
+    "long array": ("array.npz", lambda: _arrays(solid=np.zeros((4000, 4000), bool), origin=np.zeros(2))),
+    "outline of many corners": ("houseexpo.json", lambda: _outline(60_000, 40.0)),
+    "outline of far corners": ("houseexpo.json", lambda: _outline(300, 900.0)),
+    "packed outline": ("houseexpo.json.gz", lambda: _packed(_outline(150_000, 40.0))),
+    "many lines": ("amrl.vectormap.txt", lambda: _segments("{}, {}, {}, {}\n", 60_000, 200)),
+    "few long lines": ("amrl.vectormap.txt", lambda: _segments("{}, {}, {}, {}\n", 500, 900)),
+    "many walls": ("lifull.txt", lambda: _segments("{} {} {} {} wall\n", 40_000, 2000)),
+    "few long walls": ("lifull.txt", lambda: _segments("{} {} {} {} wall\n", 500, 9000)),
+    "drawn walls": ("drawn.json", lambda: _plan(30_000, 100.0)),
+    "long drawn walls": ("drawn.json", lambda: _plan(200, 900.0)),
+    "log of many scans": ("carmen.log.gz", lambda: _packed(_carmen(8, 60_000))),
+    "log of many beams": ("carmen.log.gz", lambda: _packed(_carmen(16_000, 20))),
+    "many readings": ("carmen.log.gz", lambda: _packed(_repeated("ODOM 0 0 0 0 0 0 1 h 1\n") * 4)),
+    "trajectory": ("trajectory.tum", lambda: _repeated("0 0 0 0 0 0 0 1\n")),
+    "relations": ("relations.txt", lambda: _repeated("0 1 0 0 0 0 0 0\n")),
+    "many episodes": ("episodes.jsonl", lambda: _repeated('{"key":"a"}\n')),
+    "numbers of a suite": ("suite.toml", lambda: _repeated("1,", "robots = [", "1]\n")),
+    "tables of a suite": ("suite.toml", lambda: "".join(f"[a{k}]\n" for k in range(100_000)).encode()),
+    "nested file": ("drawn.json", lambda: _repeated('{"a":', "", "")),
+    "curves": ("splines.json", lambda: _repeated('{"knots":[0,1],"points":[[0,0]]},', '{"curves":[', "{}]}")),
+}
+"""By name: what the file is called, and how it is made."""
+
+
+def measured(names: Iterable[str] = tuple(CASES)) -> Iterator[tuple[str, dict[str, object]]]:
+    """Yield of each file how it ended, its CPU time [s] and memory [MB]."""
+    with tempfile.TemporaryDirectory() as folder:
+        samples, place = Path(folder, "samples"), Path(folder, "files")
+        make_samples(samples)
+        place.mkdir()
+        read_all(sorted(path for path in samples.iterdir() if path.is_file()), place)
+        for name in names:
+            called, make = CASES[name]
+            path, content = place / called, make()
+            if len(content) > MOST_BYTES:
+                raise ValueError(f"{name} has {len(content):,} bytes; want at most {MOST_BYTES:,}")
+            path.write_bytes(content)
+            found = outcome_of(partial(use, path))
+            for _ in range(TRIES):  # kernels may have been compiled for it, or the machine was busy
+                if is_costly(found):
+                    found = outcome_of(partial(use, path))
+            yield name, found
+
+
+def main(names: list[str]) -> int:
+    """Measure files and print what each took; the exit code is 1 where one took too much."""
+    above = count = 0
+    for name, found in measured(names or CASES):
+        count += 1
+        above += is_costly(found)
+        print(f"{name}: {json.dumps(found)[:200]}", flush=True)
+    print(f"{above} of {count} above {MOST_S:g} s or {MOST_MB:g} MB")
+    return int(above > 0)
+
+
+def is_costly(found: dict[str, object]) -> bool:
+    """Whether a file took more than one may."""
+    return float(str(found["cpu_s"])) > MOST_S or float(str(found["mb"])) > MOST_MB
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
