@@ -6,6 +6,7 @@ It has floors by name, generated floors by seed, and the sets for training and t
 import difflib
 import hashlib
 import json
+import os
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +19,7 @@ from lidarium.envs.floors.generation.buildings import KINDS, BuildingSettings, g
 from lidarium.envs.floors.generation.packing import packed_floor, unpacked_floor
 from lidarium.envs.floors.importers import FORMATS, load_file
 from lidarium.envs.floors.measures import measure_building
+from lidarium.mapping.geometry.bounds import shown
 
 SETS: dict[str, tuple[int, int]] = {
     "train": (1_000_000, 10_000),
@@ -103,7 +105,7 @@ def is_file_name(spec: str | Path) -> bool:
         "/" in spec
         or "\\" in spec
         or spec.lower().endswith(suffixes)
-        or (spec not in drawn_names() and Path(spec).is_file())
+        or (spec not in drawn_names() and os.path.isfile(spec))  # a name may be too long for one
     )
 
 
@@ -255,9 +257,9 @@ def _example(name: str) -> str:
 
 def _unknown(name: str) -> str:
     forms = [f"{generator}:SEED" for generator in GENERATORS]
-    nearest = difflib.get_close_matches(name, [*drawn_names(), *forms], n=1, cutoff=0.5)
+    nearest = difflib.get_close_matches(name[:100], [*drawn_names(), *forms], n=1, cutoff=0.5)
     guess = f", did you mean {nearest[0]!r}?" if nearest else ""
     return (
-        f"no floor called {name!r}{guess}; there are {', '.join([*drawn_names(), *forms])}, and paths to "
-        "files"
+        f"no floor called {shown(name)}{guess}; there are {', '.join([*drawn_names(), *forms])}, and paths "
+        "to files"
     )

@@ -177,3 +177,10 @@ def test_a_description_holds_the_figures_of_a_floor():
     assert described["rooms"] == 7
     assert described["loops"] == 2
     assert described["sha256"] == load_floor("apartment").sha256
+
+
+@pytest.mark.parametrize("name", ["apar" + "(" * 5000, "a/" + "(" * 5000, "(" * 5000 + ".png"])
+def test_a_name_too_long_for_a_file_is_told_in_a_line(name):
+    with pytest.raises((ValueError, FileNotFoundError), match=r"no floor called|no file") as caught:
+        load_floor(name)
+    assert len(str(caught.value)) <= 500
