@@ -9,14 +9,14 @@ from typing import Any
 from numba.core.caching import FunctionCache
 
 _caching: Any = FunctionCache
-_is_told = False
+_has_warned = False
 
 
 def warn_once(reason: Exception) -> None:
     """Warn that compiled code cannot be kept, once in a process."""
-    global _is_told  # one warning for hundreds of kernels
-    if not _is_told:
-        _is_told = True
+    global _has_warned  # one warning for hundreds of kernels
+    if not _has_warned:
+        _has_warned = True
         warnings.warn(
             f"compiled kernels cannot be kept and are compiled at each start: {str(reason)[:300]}; make room "
             "there, or name another folder in NUMBA_CACHE_DIR",

@@ -4,7 +4,7 @@ import numpy as np
 
 from lidarium.mapping.kernels.beam_lanes import PIXEL_LANES, raise_lanes
 from lidarium.mapping.kernels.compilation import kernel
-from lidarium.mapping.kernels.plain import raised_pixels
+from lidarium.mapping.kernels.in_python.plain import raised_pixels
 
 
 @kernel
