@@ -20,6 +20,7 @@ SMALL = {"lidar": Lidar(beams=24, range_max=3.0), "resolution": 0.1}
 
 CASES = {
     "velocity": team(drawn_floor, 3, robots=2, noise="datasheet", observe=SEEN, **SMALL),
+    "depth": team(drawn_floor, 2, robots=2, camera="depth_64x48", observe=("pose", "depth"), **SMALL),
     "frontier": team(drawn_floor, 2, "frontier", robots=2, radio="line_of_sight", **SMALL),
     "rows": rows("srt_l_room", 2, robots=1, threads=2, **SMALL),
     "waypoint": solo("WaypointExploration", "waypoint", 1, floor="srt_t_junction", **SMALL),
