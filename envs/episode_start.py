@@ -92,7 +92,7 @@ def _check_height(floor: Floor, height: float) -> None:
     if height >= floor.ceiling:
         raise ValueError(
             f"floor {floor.name!r} has its ceiling at {floor.ceiling:g} m, the robot is {height:g} m high; "
-            "choose a lower robot (robot.height) or a floor with a higher ceiling"
+            "want a lower robot (robot.height) or a floor with a higher ceiling"
         )
 
 

@@ -6,13 +6,16 @@ It is no part of the package: that is imported when the command begins, and take
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from types import FrameType
 
 INTERRUPTED = 130
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Import the command line and run it; return its exit code.
+
+    The arguments are those of the process where None is given.
 
     While it is imported nothing is under way that could be kept, so that Ctrl-C ends the process at once.
     """
@@ -24,7 +27,7 @@ def main() -> int:
     try:
         if is_usual:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        return run()
+        return run(arguments)
     except KeyboardInterrupt:  # before or after the command line hears it itself
         return INTERRUPTED
 

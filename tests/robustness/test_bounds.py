@@ -21,6 +21,13 @@ from lidarium.mapping.geometry.bounds import UNBOUNDED, Bounds, above, rules_of,
 NAMES = [row.name for row in settings_table() if row.bounds]
 
 
+def nested(name, value):
+    """Options that set one value: those of parts as mappings."""
+    for part in reversed(name.split(".")):
+        value = {part: value}
+    return value
+
+
 def test_every_number_of_the_table_has_bounds_of_its_own():
     for row in settings_table():
         is_number = isinstance(row.default, int | float) and not isinstance(row.default, bool)
@@ -44,22 +51,20 @@ def test_every_number_of_a_localizer_has_bounds_of_its_own(localization):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("value", [1e300, -1e300, math.nan, 10**400])
 def test_a_number_beyond_is_refused_alike_by_name_and_by_assignment(name, value):
-    first, _, rest = name.partition(".")
-    options = {first: {rest: value} if rest else value}
-    with pytest.raises(ValueError, match=rf"{rest or first}\b.*; want"):
+    last, options = name.rpartition(".")[2], nested(name, value)
+    with pytest.raises(ValueError, match=rf"{last}\b.*; want"):
         make_settings(**options)
-    with pytest.raises(ValueError, match=rf"{rest or first}\b.*; want"):
+    with pytest.raises(ValueError, match=rf"{last}\b.*; want"):
         make_settings(assigned=[f"{name}={value}"])
-    with pytest.raises(ValueError, match=rest or first):
+    with pytest.raises(ValueError, match=last):
         suite_of({"policies": ["random_walk"], "floors": ["apartment"], "settings": {**options, "x": 1}})
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("value", ["x", [1.0], {}, True, 1j])
 def test_a_value_of_another_type_is_refused_with_what_to_want(name, value):
-    first, _, rest = name.partition(".")
-    with pytest.raises(ValueError, match=rest or first) as caught:
-        make_settings(**{first: {rest: value} if rest else value})
+    with pytest.raises(ValueError, match=name.rpartition(".")[2]) as caught:
+        make_settings(**nested(name, value))
     assert len(str(caught.value)) < 300
 
 
@@ -99,9 +104,8 @@ def test_the_ends_of_each_bound_can_be_simulated_or_are_refused(row, end):
     """One at a time, all else usual; a step takes a moment, and what is observed are numbers."""
     value = getattr(row.bounds, end)
     value = round(value) if row.is_whole else value
-    first, _, rest = row.name.partition(".")
     try:
-        _step(make_settings(**{first: {rest: value} if rest else value}), random.Random(0))
+        _step(make_settings(**nested(row.name, value)), random.Random(0))
     except ValueError as error:
         assert re.search("want|do not fit", str(error))  # noqa: PT017
 

@@ -19,7 +19,7 @@ def one_more(number):
 def compiled(tmp_path, monkeypatch):
     """Return how to make a function anew whose compiled forms are kept in a folder of this test."""
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(kept_code, "_is_told", False)
+    monkeypatch.setattr(kept_code, "_has_warned", False)
 
     def make():
         made = numba.njit(one_more)
@@ -62,7 +62,7 @@ def test_a_damaged_file_is_made_anew(compiled, tmp_path, content, ending):
         assert hits(compiled()) == (2, 1)
 
 
-def test_a_damaged_file_that_cannot_be_replaced_is_told(compiled, tmp_path, monkeypatch):
+def test_a_damaged_file_that_cannot_be_replaced_has_warned(compiled, tmp_path, monkeypatch):
     compiled()(1)
     (damaged,) = tmp_path.rglob("*.nbi")
     damaged.write_bytes(b"?")
@@ -76,7 +76,7 @@ def test_a_damaged_file_that_cannot_be_replaced_is_told(compiled, tmp_path, monk
         assert hits(made) == (2, 0)
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path, compiled, monkeypatch):
+def test_a_folder_that_cannot_be_made_has_warned(tmp_path, compiled, monkeypatch):
     def fail(*_given):
         raise RuntimeError("no locator available for file")
 

@@ -266,15 +266,17 @@ def imported(path):
             continue
         found.add(path)
         froms = [
-            node.module or ""
+            node
             for node in ast.walk(ast.parse((ROOT / path).read_text()))
             if isinstance(node, ast.ImportFrom)
+            and (node.module or "").startswith("lidarium.")
+            and node.module != "lidarium.registry"
         ]
-        left += [
-            name.removeprefix("lidarium.").replace(".", "/") + ".py"
-            for name in froms
-            if name.startswith("lidarium.") and name != "lidarium.registry"
-        ]
+        for node in froms:
+            name = node.module.removeprefix("lidarium.").replace(".", "/")
+            # Of a package its modules are imported.
+            is_package = (ROOT / name).is_dir()
+            left += [f"{name}/{part.name}.py" for part in node.names] if is_package else [f"{name}.py"]
     return found
 
 
