@@ -5,6 +5,7 @@ What is kept is whole then.
 
 import signal
 import threading
+import time
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
@@ -37,10 +38,15 @@ class PatientInterrupt:
     Numba with a loader that has died for good, after which no kernel can be called. What is to be kept after
     an interrupt is therefore broken off where it is whole. Outside the main thread, and where an application
     handles a signal in its own way, nothing is changed.
+
+    Parameters
+    ----------
+    grace_s : float
+        For how long after the first signal further ones are taken for the same wish [s].
     """
 
-    def __init__(self) -> None:
-        self._is_asked = False
+    def __init__(self, grace_s: float = 0.0) -> None:
+        self._is_asked, self._grace_s, self._asked_at = False, grace_s, 0.0
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> "PatientInterrupt":
@@ -60,9 +66,11 @@ class PatientInterrupt:
 
     def _noting(self, before: Any) -> Callable[[int, FrameType | None], None]:  # noqa: ANN401
         def note(number: int, frame: FrameType | None) -> None:
-            if self._is_asked:
+            now = time.monotonic()
+            if self._is_asked and now - self._asked_at >= self._grace_s:
                 before(number, frame)
-            self._is_asked = True
+            if not self._is_asked:
+                self._is_asked, self._asked_at = True, now
             if isinstance(before, Termination):
                 before.is_asked = True
 

@@ -16,6 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import TypeVar
 
+from lidarium.evaluation.episodes.interrupts import PatientInterrupt
 from lidarium.evaluation.suites.processes import end_workers, interrupts_held, stopped_workers
 
 Task = TypeVar("Task")
@@ -26,6 +27,12 @@ _TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" el
 
 WAITING_PER_WORKER = 2
 """Tasks that are handed over before a worker is free, so that it never waits."""
+
+POLL_S = 0.2
+"""Wall time after which an interrupt is acted on at the latest [s]."""
+
+GRACE_S = 3.0
+"""Wall time in which further interrupts are the same wish as the first [s]."""
 
 CHECK_PERIOD_S = 10.0
 """Wall time between two checks whether a worker is stopped [s]."""
@@ -96,37 +103,41 @@ def _in_pool(
     # Linear algebra reads its number of threads when it is loaded.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
-    is_whole, watch = False, _Watch()
-    try:
-        for task in islice(tasks, WAITING_PER_WORKER * workers):
-            with interrupts_held():
-                running[pool.submit(_done, work, task)] = task
-        while running:
-            ready = wait(running, CHECK_PERIOD_S, FIRST_COMPLETED).done
-            watch.check()
-            for future in ready:
-                task = running.pop(future)
-                error = future.exception()
-                if isinstance(error, BrokenProcessPool):
-                    lost.append(task)
-                    continue
-                if error is not None and not isinstance(error, Exception):
-                    raise error
-                yield task, future.result() if error is None else error
-                if lost:
-                    continue
-                for following in islice(tasks, 1):
-                    try:
-                        with interrupts_held():
-                            running[pool.submit(_done, work, following)] = following
-                    except BrokenProcessPool:
-                        lost.append(following)
-        is_whole = True
-    finally:
-        # Not waited for without end: a worker that is stopped would never leave.
-        pool.shutdown(wait=False, cancel_futures=True)
-        end_workers(are_ending=is_whole)
+    # Raised where it comes, an interrupt may fall into a callback of the pool, and be lost there.
+    with PatientInterrupt(GRACE_S) as interrupt:
+        pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+        is_whole, watch = False, _Watch()
+        try:
+            for task in islice(tasks, WAITING_PER_WORKER * workers):
+                with interrupts_held():
+                    running[pool.submit(_done, work, task)] = task
+            while running:
+                ready = wait(running, POLL_S, FIRST_COMPLETED).done
+                if interrupt.is_asked:
+                    raise KeyboardInterrupt
+                watch.check()
+                for future in ready:
+                    task = running.pop(future)
+                    error = future.exception()
+                    if isinstance(error, BrokenProcessPool):
+                        lost.append(task)
+                        continue
+                    if error is not None and not isinstance(error, Exception):
+                        raise error
+                    yield task, future.result() if error is None else error
+                    if lost:
+                        continue
+                    for following in islice(tasks, 1):
+                        try:
+                            with interrupts_held():
+                                running[pool.submit(_done, work, following)] = following
+                        except BrokenProcessPool:
+                            lost.append(following)
+            is_whole = True
+        finally:
+            # Not waited for without end: a worker that is stopped would never leave.
+            pool.shutdown(wait=False, cancel_futures=True)
+            end_workers(are_ending=is_whole)
     return lost
 
 
