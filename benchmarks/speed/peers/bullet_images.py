@@ -4,6 +4,7 @@ import importlib
 import importlib.util
 import math
 from collections.abc import Callable
+from ctypes.util import find_library
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,11 @@ from lidarium.envs.settings.sensors.cameras import DepthCamera
 NEAR = 0.05
 
 
+def _has_egl() -> bool:
+    """Whether EGL can be used; its plug-in ends the process where the system has no EGL."""
+    return bool(_egl_library()) and find_library("EGL") is not None
+
+
 class BulletImages:
     """Depth images of a floor of upright boxes.
 
@@ -24,12 +30,18 @@ class BulletImages:
         Its solids have four corners each, at right angles.
     camera : DepthCamera
         The camera.
+    is_egl : bool
+        Whether EGL draws them, on a GPU where there is one; else TinyRenderer does.
     """
 
-    def __init__(self, floor: Floor, camera: DepthCamera) -> None:
+    def __init__(self, floor: Floor, camera: DepthCamera, is_egl: bool = False) -> None:
         self._bullet: Any = importlib.import_module("pybullet")
         self._camera, bullet = camera, self._bullet
         self.client = bullet.connect(bullet.DIRECT)
+        self._renderer = bullet.ER_BULLET_HARDWARE_OPENGL if is_egl else bullet.ER_TINY_RENDERER
+        if is_egl:
+            # It draws nothing that was made before it was loaded.
+            bullet.loadPlugin(_egl_library(), "_eglRendererPlugin", physicsClientId=self.client)
         x_min, y_min, x_max, y_max = floor.bounds
         middle, half = ((x_min + x_max) / 2, (y_min + y_max) / 2), ((x_max - x_min) / 2, (y_max - y_min) / 2)
         for height in (-0.05, floor.ceiling + 0.05):
@@ -70,7 +82,7 @@ class BulletImages:
             camera.rows,
             view,
             self._projection,
-            renderer=self._bullet.ER_TINY_RENDERER,
+            renderer=self._renderer,
             flags=self._bullet.ER_NO_SEGMENTATION_MASK,
             physicsClientId=self.client,
         )[3]
@@ -83,13 +95,19 @@ class BulletImages:
         self._bullet.disconnect(self.client)
 
 
+def _egl_library() -> str:
+    """Return the file of PyBullet's plug-in for EGL, empty where there is none."""
+    spec = importlib.util.find_spec("eglRenderer")
+    return "" if spec is None or spec.origin is None else spec.origin
+
+
 def bullet_images(
-    floor: Floor, camera: DepthCamera, poses: NDArray[np.float64]
+    floor: Floor, camera: DepthCamera, poses: NDArray[np.float64], is_egl: bool = False
 ) -> Callable[[], object] | None:
-    """Return a function that takes the image of the next pose; None where PyBullet is not installed."""
-    if importlib.util.find_spec("pybullet") is None:
+    """Return a function that takes the image of the next pose; None where its renderer is not there."""
+    if importlib.util.find_spec("pybullet") is None or (is_egl and not _has_egl()):
         return None
-    images, count = BulletImages(floor, camera), 0
+    images, count = BulletImages(floor, camera, is_egl), 0
 
     def take() -> None:
         nonlocal count
