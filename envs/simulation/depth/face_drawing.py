@@ -189,8 +189,9 @@ def cover(corners: Array, axes: Array, eye: Array, view: Array, span: Span) -> t
         ahead = a[0] * b[1] - a[1] * b[0]
         # The edge bounds columns u with along * (u - cx) + across * (v - cy) + ahead <= 0.
         if abs(along) > LEVEL * (abs(across) + abs(ahead)):
-            slope = -across / along
-            start = view[CENTRE_COLUMN] - ahead / along - slope * view[CENTRE_ROW]
+            inverse = 1.0 / along
+            slope = -across * inverse
+            start = view[CENTRE_COLUMN] - ahead * inverse - slope * view[CENTRE_ROW]
             if along > 0.0:
                 for row in range(first, last + 1):
                     high[row] = min(high[row], start + slope * row)
