@@ -1,1 +1,1 @@
-"""Sparse maps of point clouds, from codes to paths."""
+"""Maps of few boxes, made of point clouds by vector quantisation."""

@@ -1,0 +1,141 @@
+"""Codes that move from where they are of least use to where the error is greatest.
+
+To merge two codes costs what Ward's distance tells; to split one gains what its points' greatest variance
+tells. Exchanges that gain most are made, Lloyd's steps follow, and what is no better is not kept.
+Source: G. Patane, M. Russo, "The enhanced LBG algorithm", 2001, whose exchanges are made many at a time.
+"""
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from lidarium.mapping.sparse.quantisation.lloyd import Codes, improved, nearest_codes
+from lidarium.mapping.sparse.quantisation.seeding import Nearest
+from lidarium.mapping.sparse.quantisation.summary import Summary, summary_of
+from lidarium.mapping.sparse.quantisation.tiles import Tiles
+
+FIRST_SHARE, LEAST_SHARE = 0.1, 0.002
+"""Exchanges of a round over codes: at first, and when no more are tried."""
+
+STEPS = 3
+"""Lloyd's steps after exchanges."""
+
+GAIN = 0.7
+"""What splitting in two takes of the variance along the longest axis: 3/4 of even points."""
+
+
+def relocated(
+    tiles: Tiles, codes: Codes, deadline: float, keeps_empty: bool = False
+) -> tuple[Codes, Nearest]:
+    """Return better codes, found until a time, with the nearest of them of every point.
+
+    Parameters
+    ----------
+    tiles : Tiles
+        The points.
+    codes : (k, 3) float32
+        Codes to start from [m].
+    deadline : float
+        When to end, on the clock of ``time.perf_counter`` [s]; a round that takes longer is not begun.
+    keeps_empty : bool
+        Whether codes without points stay where they are.
+
+    Returns
+    -------
+    codes : (k, 3) float32
+        Codes whose mean squared distance is not above that of those given.
+    nearest : Nearest
+        The nearest of them of every point.
+    """
+    nearest, share, longest = nearest_codes(tiles, codes), FIRST_SHARE, 0.0
+    began = time.perf_counter()
+    while began + longest < deadline:
+        summary = summary_of(tiles, codes, nearest)
+        tried = codes
+        if share >= LEAST_SHARE:
+            tried = exchanged(codes, summary, max(1, int(share * len(codes))))
+        tried = improved(tiles, tried, STEPS, keeps_empty)
+        found = nearest_codes(tiles, tried)
+        if found.group_errors.sum() < nearest.group_errors.sum():
+            codes, nearest = tried, found
+        else:
+            share *= 0.5
+        now = time.perf_counter()
+        longest, began = max(longest, now - began), now
+    return codes, nearest
+
+
+def exchanged(codes: Codes, summary: Summary, most: int) -> Codes:
+    """Return codes of which some were merged into a neighbour, and as many split in two.
+
+    Parameters
+    ----------
+    codes : (k, 3) float32
+        The codes [m].
+    summary : Summary
+        Of their points.
+    most : int
+        Most exchanges.
+
+    Returns
+    -------
+    (k, 3) float32
+        The codes; no code takes part in two exchanges.
+    """
+    if len(codes) < 3:
+        return codes
+    costs, partners = merging_costs(codes, summary.masses)
+    variances, axes = np.linalg.eigh(summary.covariances())
+    gains = GAIN * summary.masses * variances[:, 2]
+    moved = codes.copy()
+    is_free = np.ones(len(codes), bool)
+    cheapest, richest = iter(np.argsort(costs, kind="stable")), iter(np.argsort(-gains, kind="stable"))
+    for _ in range(most):
+        merged = next((code for code in cheapest if is_free[code] and is_free[partners[code]]), None)
+        if merged is None:
+            break
+        other = partners[merged]
+        is_free[[merged, other]] = False
+        split = next((code for code in richest if is_free[code]), None)
+        if split is None or gains[split] <= costs[merged]:
+            break
+        is_free[split] = False
+        masses = summary.masses[[merged, other]]
+        moved[other] = (masses @ codes[[merged, other]]) / max(masses.sum(), np.finfo(np.float64).tiny)
+        # Halves of evenly spread points have their means so far from the middle.
+        shift = 0.5 * np.sqrt(3.0 * max(variances[split, 2], 0.0)) * axes[split, :, 2]
+        moved[split], moved[merged] = codes[split] + shift, codes[split] - shift
+    return moved
+
+
+def merging_costs(
+    codes: Codes, masses: NDArray[np.float64], neighbours: int = 8
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return what merging each code with the best of its neighbours adds to the error, and which that is.
+
+    Parameters
+    ----------
+    codes : (k, 3) float32
+        The codes, at least two [m].
+    masses : (k,) float64
+        Weights of their points.
+    neighbours : int
+        How many nearest codes are looked at.
+
+    Returns
+    -------
+    costs : (k,) float64
+        Ward's distances [m2].
+    partners : (k,) int
+        Numbers of the neighbours.
+    """
+    count = min(neighbours + 1, len(codes))
+    distances, near = cKDTree(codes).query(codes, count)
+    own, other = masses[:, None], masses[near]
+    ward = distances**2 * own * other / np.maximum(own + other, np.finfo(np.float64).tiny)
+    ward[near == np.arange(len(codes))[:, None]] = np.inf
+    best = ward.argmin(axis=1)
+    rows = np.arange(len(codes))
+    return ward[rows, best], near[rows, best]

@@ -1,0 +1,143 @@
+"""Tiles of 64 points and groups of 16 tiles, each with its box."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.sparse.quantisation.morton import CELLS, SPREAD, morton_order
+from lidarium.mapping.sparse.quantisation.point_lanes import TILE
+
+GROUP = 16
+"""Tiles of a group."""
+
+FARTHEST = 1e6
+"""Largest coordinate [m]."""
+
+_SPREADS = 4.0
+"""Standard deviations from the mean to the outermost cells: stray points do not make cells large."""
+
+
+class Tiles(NamedTuple):
+    """Points in Morton order, cut into tiles; the last one is filled up with its last point, weight 0.
+
+    Attributes
+    ----------
+    points : (tiles, 3, TILE) float32
+        Coordinates [m].
+    weights : (tiles, TILE) float32
+        Weights.
+    sums : (tiles, 4) float64
+        Sums of the weighted coordinates, and of the weights.
+    boxes : (tiles, 2, 3) float32
+        Least and greatest coordinates of a tile [m].
+    group_boxes : (groups, 2, 3) float32
+        Those of a group.
+    order : (N,) int32
+        Places of the points in the caller's order.
+    """
+
+    points: NDArray[np.float32]
+    weights: NDArray[np.float32]
+    sums: NDArray[np.float64]
+    boxes: NDArray[np.float32]
+    group_boxes: NDArray[np.float32]
+    order: NDArray[np.int32]
+
+
+def tiles_of(points: NDArray[np.float32], weights: NDArray[np.float32] | None = None) -> Tiles:
+    """Cut points into tiles.
+
+    Parameters
+    ----------
+    points : (N, 3) float32
+        The points [m].
+    weights : (N,) float32, optional
+        Their weights, all 1 by default.
+
+    Returns
+    -------
+    Tiles
+        The tiles.
+
+    Raises
+    ------
+    ValueError
+        Where coordinates are not finite, or so large that they can be no metres.
+    """
+    totals, ends = _extent_of(points)
+    if not (np.isfinite(totals).all() and np.abs(ends).max() <= FARTHEST):
+        raise ValueError(
+            f"points reach from {ends[0].tolist()} to {ends[1].tolist()}; want finite coordinates of at most "
+            f"{FARTHEST:,.0f} m"
+        )
+    mean = totals[0] / len(points)
+    reach = _SPREADS * np.sqrt(np.maximum(totals[1] / len(points) - mean * mean, 0.0))
+    low, high = np.maximum(ends[0], mean - reach), np.minimum(ends[1], mean + reach)
+    edge = max(float((high - low).max()), 1e-6)
+    order = morton_order(points, low, CELLS / edge, SPREAD)
+    given = np.empty(0, np.float32) if weights is None else weights
+    count = math.ceil(len(points) / TILE)
+    filled = _fill_tiles(points, given, order, count)
+    return Tiles(*filled, _group_boxes(filled[3]), order)
+
+
+@kernel
+def _extent_of(points: Array) -> tuple[Array, Array]:
+    """Return sums of coordinates and their squares (2, 3), and least and greatest ones (2, 3)."""
+    totals, ends = np.zeros((2, 3)), np.empty((2, 3))
+    for axis in range(3):
+        total, squares = 0.0, 0.0
+        low = high = points[0, axis]
+        for i in range(len(points)):
+            value = points[i, axis]
+            total += value
+            squares += float(value) * float(value)
+            low, high = min(low, value), max(high, value)
+        totals[0, axis], totals[1, axis], ends[0, axis], ends[1, axis] = total, squares, low, high
+    return totals, ends
+
+
+@kernel
+def _fill_tiles(
+    points: Array, weights: Array, order: Array, count: int
+) -> tuple[Array, Array, Array, Array]:
+    """Return points, weights, sums and boxes of tiles."""
+    sides, masses = np.empty((count, 3, TILE), np.float32), np.empty((count, TILE), np.float32)
+    sums, boxes = np.zeros((count, 4)), np.empty((count, 2, 3), np.float32)
+    for tile in range(count):
+        for lane in range(TILE):
+            place = tile * TILE + lane
+            i = order[min(place, len(order) - 1)]
+            mass = np.float32(1.0) if len(weights) == 0 else weights[i]
+            if place >= len(order):
+                mass = np.float32(0.0)
+            masses[tile, lane] = mass
+            for axis in range(3):
+                sides[tile, axis, lane] = points[i, axis]
+            sums[tile, 3] += mass
+        for axis in range(3):
+            low = high = sides[tile, axis, 0]
+            total = 0.0
+            for lane in range(TILE):
+                value = sides[tile, axis, lane]
+                low, high = min(low, value), max(high, value)
+                total += float(masses[tile, lane]) * float(value)
+            boxes[tile, 0, axis], boxes[tile, 1, axis], sums[tile, axis] = low, high, total
+    return sides, masses, sums, boxes
+
+
+@kernel
+def _group_boxes(boxes: Array) -> Array:
+    """Return the boxes of groups, (groups, 2, 3) float32."""
+    count = (len(boxes) + GROUP - 1) // GROUP
+    groups = np.empty((count, 2, 3), np.float32)
+    for group in range(count):
+        for axis in range(3):
+            low, high = boxes[group * GROUP, 0, axis], boxes[group * GROUP, 1, axis]
+            for tile in range(group * GROUP, min((group + 1) * GROUP, len(boxes))):
+                low, high = min(low, boxes[tile, 0, axis]), max(high, boxes[tile, 1, axis])
+            groups[group, 0, axis], groups[group, 1, axis] = low, high
+    return groups
