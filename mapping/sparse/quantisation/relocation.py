@@ -1,7 +1,7 @@
 """Codes that move from where they are of least use to where the error is greatest.
 
 To merge two codes costs what Ward's distance tells; to split one gains what its points' greatest variance
-tells. Exchanges that gain most are made, Lloyd's steps follow, and what is no better is not kept.
+tells. Exchanges that gain most are made, Lloyd's steps follow, and the best codes of all rounds are kept.
 Source: G. Patane, M. Russo, "The enhanced LBG algorithm", 2001, whose exchanges are made many at a time.
 """
 
@@ -16,14 +16,20 @@ from lidarium.mapping.sparse.quantisation.seeding import Nearest
 from lidarium.mapping.sparse.quantisation.summary import Summary, summary_of
 from lidarium.mapping.sparse.quantisation.tiles import Tiles
 
-FIRST_SHARE, LEAST_SHARE = 0.1, 0.002
-"""Exchanges of a round over codes: at first, and when no more are tried."""
+FIRST_SHARE = 0.1
+"""Exchanges of the first round over codes."""
 
-STEPS = 3
+FEWER = 0.6
+"""Exchanges of a round over those of the one before, where that was no better than the best so far."""
+
+STEPS = 4
 """Lloyd's steps after exchanges."""
 
-GAIN = 0.7
-"""What splitting in two takes of the variance along the longest axis: 3/4 of even points."""
+GAIN = 1.2
+"""What splitting takes over the variance along the longest axis: 3/4 of even points, the rest of neighbours.
+
+Of 0.5 to 1.7, this and above were best on a kitchen and a drawn room.
+"""
 
 
 def relocated(
@@ -49,22 +55,22 @@ def relocated(
     nearest : Nearest
         The nearest of them of every point.
     """
-    nearest, share, longest = nearest_codes(tiles, codes), FIRST_SHARE, 0.0
+    best = nearest = nearest_codes(tiles, codes)
+    best_codes, share, longest = codes, FIRST_SHARE, 0.0
     began = time.perf_counter()
     while began + longest < deadline:
-        summary = summary_of(tiles, codes, nearest)
-        tried = codes
-        if share >= LEAST_SHARE:
-            tried = exchanged(codes, summary, max(1, int(share * len(codes))))
-        tried = improved(tiles, tried, STEPS, keeps_empty)
-        found = nearest_codes(tiles, tried)
-        if found.group_errors.sum() < nearest.group_errors.sum():
-            codes, nearest = tried, found
+        most = int(share * len(codes))
+        if most > 0:
+            codes = exchanged(codes, summary_of(tiles, codes, nearest), most)
+        codes = improved(tiles, codes, STEPS, keeps_empty)
+        nearest = nearest_codes(tiles, codes)
+        if nearest.group_errors.sum() < best.group_errors.sum():
+            best_codes, best = codes, nearest
         else:
-            share *= 0.5
+            share *= FEWER
         now = time.perf_counter()
         longest, began = max(longest, now - began), now
-    return codes, nearest
+    return best_codes, best
 
 
 def exchanged(codes: Codes, summary: Summary, most: int) -> Codes:
