@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.sparse.quantisation.seeding import Nearest
 from lidarium.mapping.sparse.quantisation.summary import summary_of
 from lidarium.mapping.sparse.quantisation.tiles import Tiles
@@ -62,14 +63,12 @@ def quantisation_of(tiles: Tiles, codes: NDArray[np.float32], nearest: Nearest) 
         Codes, labels and what is known of each code.
     """
     summary = summary_of(tiles, codes, nearest)
-    labels = np.empty(len(tiles.order), np.int32)
-    labels[tiles.order] = nearest.labels.reshape(-1)[: len(labels)]
     is_empty = summary.counts == 0
     boxes = np.where(is_empty[:, None, None], codes[:, None], summary.boxes)
     phi1, phi2 = summary.errors.sum(axis=0) / summary.masses.sum()
     return Quantisation(
         codes.astype(np.float64),
-        labels,
+        _in_order(nearest.labels.reshape(-1), tiles.order),
         summary.counts,
         boxes,
         _normals(summary.covariances(), summary.counts),
@@ -77,6 +76,15 @@ def quantisation_of(tiles: Tiles, codes: NDArray[np.float32], nearest: Nearest) 
         float(phi2),
         summary.radii,
     )
+
+
+@kernel
+def _in_order(labels: Array, order: Array) -> Array:
+    """Return labels of points in the caller's order."""
+    placed = np.empty(len(order), np.int32)
+    for place in range(len(order)):
+        placed[order[place]] = labels[place]
+    return placed
 
 
 def _normals(covariances: NDArray[np.float64], counts: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from lidarium.mapping.sparse.quantisation.lloyd import Codes, at_far_points, imp
 from lidarium.mapping.sparse.quantisation.on_gpu import has_gpu, improved_on_gpu
 from lidarium.mapping.sparse.quantisation.quantisation import Quantisation, quantisation_of
 from lidarium.mapping.sparse.quantisation.relocation import relocated
-from lidarium.mapping.sparse.quantisation.seeding import Nearest, drawn_codes
+from lidarium.mapping.sparse.quantisation.seeding import drawn_codes
 from lidarium.mapping.sparse.quantisation.settings import QuantisationSettings
 from lidarium.mapping.sparse.quantisation.splitting import split_codes
 from lidarium.mapping.sparse.quantisation.tiles import Tiles, tiles_of
@@ -60,16 +60,20 @@ def quantise(
     places = _checked_points(points, count)
     masses = None if weights is None else _checked_weights(weights, len(places))
     tiles = tiles_of(places, masses)
-    low, high = tiles.boxes[:, 0].min(axis=0), tiles.boxes[:, 1].max(axis=0)
+    low, high = tiles.group_boxes[:, 0].min(axis=0), tiles.group_boxes[:, 1].max(axis=0)
     if len(places) > 1 and (low == high).all():
         raise ValueError(f"all {len(places):,} points are at {low.tolist()}; want different ones")
     codes = _codes_of(tiles, count, settings, start)
     nearest = nearest_codes(tiles, codes)
     if settings.budget_s is not None:
         codes, nearest = relocated(tiles, codes, began + settings.budget_s, settings.keeps_empty)
-    if not settings.keeps_empty:
-        codes, nearest = _without_empty(tiles, codes, nearest)
-    return quantisation_of(tiles, codes, nearest)
+    found = quantisation_of(tiles, codes, nearest)
+    for _ in range(0 if settings.keeps_empty else MOST_ROUNDS):
+        if found.counts.all():
+            break
+        codes = at_far_points(tiles, codes, found.counts == 0)
+        found = quantisation_of(tiles, codes, nearest_codes(tiles, codes))
+    return found
 
 
 def _codes_of(tiles: Tiles, count: int, settings: QuantisationSettings, start: ArrayLike | None) -> Codes:
@@ -97,17 +101,6 @@ def _even_draws(tiles: Tiles, count: int, generator: np.random.Generator) -> Cod
     is_even = bool((masses == masses[0]).all())
     chosen = generator.choice(total, count, replace=False, p=None if is_even else masses / masses.sum())
     return np.ascontiguousarray(tiles.points[chosen // tiles.points.shape[2], :, chosen % tiles.points.shape[2]])
-
-
-def _without_empty(tiles: Tiles, codes: Codes, nearest: Nearest) -> tuple[Codes, Nearest]:
-    """Move codes that no point is nearest to until there are none."""
-    for _ in range(MOST_ROUNDS):
-        is_empty = np.bincount(nearest.labels.reshape(-1), minlength=len(codes)) == 0
-        if not is_empty.any():
-            break
-        codes = at_far_points(tiles, codes, is_empty)
-        nearest = nearest_codes(tiles, codes)
-    return codes, nearest
 
 
 def _checked_points(points: ArrayLike, count: int) -> NDArray[np.float32]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import scratch_vector
 from lidarium.mapping.sparse.quantisation.point_lanes import TILE, nearest_in_tile
 from lidarium.mapping.sparse.quantisation.tiles import GROUP, Tiles
 
@@ -86,9 +87,10 @@ def drawn_codes(
     return codes, nearest
 
 
-@kernel
+@kernel(borrowing=True)
 def draw_codes(tiles: Tiles, draws: Array, codes: Array, nearest: Nearest) -> int:
     """Draw a code for each number in [0, 1), and return for how many there were places."""
+    shares = scratch_vector(TILE, np.float64)
     for number in range(len(draws)):
         total = 0.0
         for error in nearest.group_errors:
@@ -99,7 +101,6 @@ def draw_codes(tiles: Tiles, draws: Array, codes: Array, nearest: Nearest) -> in
         first = group * GROUP
         tile, rest = _reached(nearest.errors[first : first + GROUP], rest)
         tile += first
-        shares = np.empty(TILE)
         for lane in range(TILE):
             square = 1.0 if number == 0 else float(nearest.squares[tile, lane])
             shares[lane] = tiles.weights[tile, lane] * square
@@ -110,7 +111,7 @@ def draw_codes(tiles: Tiles, draws: Array, codes: Array, nearest: Nearest) -> in
     return len(draws)
 
 
-@kernel
+@kernel(inline=True, borrowing=True)
 def _reached(shares: Array, wanted: float) -> tuple[int, float]:
     """Return in which share a running sum passes a number, never an empty one, and what is left of it."""
     chosen, left = 0, 0.0
@@ -123,10 +124,11 @@ def _reached(shares: Array, wanted: float) -> tuple[int, float]:
     return chosen, left
 
 
-@kernel
+@kernel(borrowing=True)
 def come_nearer(tiles: Tiles, code: Array, number: int, nearest: Nearest) -> None:
     """Let the points that a new code is nearer to change to it."""
-    numbers = np.array([number], np.int32)
+    numbers = scratch_vector(1, np.int32)
+    numbers[0] = number
     for group in range(len(tiles.group_boxes)):
         if _least_square(tiles.group_boxes[group], code) >= nearest.group_worst[group]:
             continue
@@ -151,7 +153,7 @@ def come_nearer(tiles: Tiles, code: Array, number: int, nearest: Nearest) -> Non
             nearest.group_errors[group], nearest.group_worst[group] = error, worst
 
 
-@kernel
+@kernel(inline=True, borrowing=True)
 def _least_square(box: Array, code: Array) -> float:
     """Return a lower bound of the squared distances from a code to the points of a box [m2]."""
     zero = np.float32(0.0)
@@ -161,17 +163,24 @@ def _least_square(box: Array, code: Array) -> float:
     return x * x + y * y + z * z
 
 
-@kernel
+@kernel(inline=True, borrowing=True)
 def _error_of(weights: Array, squares: Array) -> tuple[float, float]:
-    """Return the sum of a tile's weighted squares, and the greatest square."""
-    total, worst = 0.0, np.float32(0.0)
-    for lane in range(TILE):
-        total += float(weights[lane]) * float(squares[lane])
-        worst = max(worst, squares[lane])
-    return total, worst
+    """Return the sum of a tile's weighted squares, and the greatest square.
+
+    In four parts, none of which waits for the others.
+    """
+    first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+    worst = np.float32(0.0)
+    for lane in range(0, TILE, 4):
+        first += float(weights[lane]) * float(squares[lane])
+        second += float(weights[lane + 1]) * float(squares[lane + 1])
+        third += float(weights[lane + 2]) * float(squares[lane + 2])
+        fourth += float(weights[lane + 3]) * float(squares[lane + 3])
+        worst = max(worst, max(max(squares[lane], squares[lane + 1]), max(squares[lane + 2], squares[lane + 3])))
+    return (first + second) + (third + fourth), worst
 
 
-@kernel
+@kernel(borrowing=True)
 def measure(tiles: Tiles, nearest: Nearest) -> None:
     """Make the sums and greatest ones of squares anew."""
     for group in range(len(tiles.group_boxes)):
