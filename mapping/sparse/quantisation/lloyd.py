@@ -1,7 +1,7 @@
 """Lloyd's steps: each point to its nearest code, each code to the mean of its points.
 
-Source: S. Lloyd, "Least squares quantization in PCM", 1982; the thesis's algorithm 2, whose mean belongs after
-the loop over points. Codes are rounded to float32, so that labels are exact.
+Source: S. Lloyd, "Least squares quantization in PCM", 1982; the thesis's algorithm 2, whose mean belongs
+after the loop over points. Codes are rounded to float32, so that labels are exact.
 """
 
 import numpy as np

@@ -100,7 +100,9 @@ def _even_draws(tiles: Tiles, count: int, generator: np.random.Generator) -> Cod
     masses = tiles.weights.reshape(-1)[:total].astype(np.float64)
     is_even = bool((masses == masses[0]).all())
     chosen = generator.choice(total, count, replace=False, p=None if is_even else masses / masses.sum())
-    return np.ascontiguousarray(tiles.points[chosen // tiles.points.shape[2], :, chosen % tiles.points.shape[2]])
+    return np.ascontiguousarray(
+        tiles.points[chosen // tiles.points.shape[2], :, chosen % tiles.points.shape[2]]
+    )
 
 
 def _checked_points(points: ArrayLike, count: int) -> NDArray[np.float32]:
@@ -109,7 +111,9 @@ def _checked_points(points: ArrayLike, count: int) -> NDArray[np.float32]:
     if given.ndim != 2 or given.shape[1] != 3 or len(given) == 0:
         raise ValueError(f"points have shape {given.shape}; want (N, 3) with at least one point")
     if not 1 <= count <= len(given):
-        raise ValueError(f"{count:,} codes are asked for of {len(given):,} points; want 1 to as many as points")
+        raise ValueError(
+            f"{count:,} codes are asked for of {len(given):,} points; want 1 to as many as points"
+        )
     return np.ascontiguousarray(given, np.float32)
 
 

@@ -6,6 +6,7 @@ Source: G. Patane, M. Russo, "The enhanced LBG algorithm", 2001, whose exchanges
 """
 
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,7 +139,8 @@ def merging_costs(
         Numbers of the neighbours.
     """
     count = min(neighbours + 1, len(codes))
-    distances, near = cKDTree(codes).query(codes, count)
+    found: Any = cKDTree(codes).query(codes, count)
+    distances, near = found
     own, other = masses[:, None], masses[near]
     ward = distances**2 * own * other / np.maximum(own + other, np.finfo(np.float64).tiny)
     ward[near == np.arange(len(codes))[:, None]] = np.inf

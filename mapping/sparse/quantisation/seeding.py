@@ -5,7 +5,7 @@ algorithm 4, whose printed norm lacks the square. Sums of a tile's squares are k
 that a new code may come nearer to are made anew, so that draws are exact.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +83,9 @@ def drawn_codes(
     nearest, codes = nearest_of_none(tiles), np.empty((count, 3), np.float32)
     found = draw_codes(tiles, generator.random(count), codes, nearest)
     if found < count:
-        raise ValueError(f"points are at {found:,} different places; want at least {count:,}, one for each code")
+        raise ValueError(
+            f"points are at {found:,} different places; want at least {count:,}, one for each code"
+        )
     return codes, nearest
 
 
@@ -154,7 +156,7 @@ def come_nearer(tiles: Tiles, code: Array, number: int, nearest: Nearest) -> Non
 
 
 @kernel(inline=True, borrowing=True)
-def _least_square(box: Array, code: Array) -> float:
+def _least_square(box: Array, code: Array) -> Any:  # noqa: ANN401
     """Return a lower bound of the squared distances from a code to the points of a box [m2]."""
     zero = np.float32(0.0)
     x = max(max(box[0, 0] - code[0], code[0] - box[1, 0]), zero)
@@ -164,7 +166,7 @@ def _least_square(box: Array, code: Array) -> float:
 
 
 @kernel(inline=True, borrowing=True)
-def _error_of(weights: Array, squares: Array) -> tuple[float, float]:
+def _error_of(weights: Array, squares: Array) -> tuple[float, Any]:
     """Return the sum of a tile's weighted squares, and the greatest square.
 
     In four parts, none of which waits for the others.
@@ -176,7 +178,9 @@ def _error_of(weights: Array, squares: Array) -> tuple[float, float]:
         second += float(weights[lane + 1]) * float(squares[lane + 1])
         third += float(weights[lane + 2]) * float(squares[lane + 2])
         fourth += float(weights[lane + 3]) * float(squares[lane + 3])
-        worst = max(worst, max(max(squares[lane], squares[lane + 1]), max(squares[lane + 2], squares[lane + 3])))
+        worst = max(
+            worst, max(max(squares[lane], squares[lane + 1]), max(squares[lane + 2], squares[lane + 3]))
+        )
     return (first + second) + (third + fourth), worst
 
 

@@ -1,8 +1,8 @@
 """Codes that split in two: LBG.
 
-Source: Y. Linde, A. Buzo, R. Gray, "An algorithm for vector quantizer design", 1980; the thesis's algorithm 3,
-in whose print the second copy is made of the moved first one. Nothing is drawn: the same points give the same
-codes.
+Source: Y. Linde, A. Buzo, R. Gray, "An algorithm for vector quantizer design", 1980; the thesis's
+algorithm 3, in whose print the second copy is made of the moved first one. Nothing is drawn: the same points
+give the same codes.
 """
 
 import numpy as np

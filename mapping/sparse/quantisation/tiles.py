@@ -80,8 +80,8 @@ def tiles_of(points: NDArray[np.float32], weights: NDArray[np.float32] | None = 
     order = morton_order(points, low, CELLS / edge, SPREAD)
     given = np.empty(0, np.float32) if weights is None else weights
     count = math.ceil(len(points) / TILE)
-    filled = _fill_tiles(points, given, order, count)
-    return Tiles(*filled, _group_boxes(filled[3]), order)
+    sides, masses, sums, boxes = _fill_tiles(points, given, order, count)
+    return Tiles(sides, masses, sums, boxes, _group_boxes(boxes), order)
 
 
 @kernel
@@ -101,9 +101,7 @@ def _extent_of(points: Array) -> tuple[Array, Array]:
 
 
 @kernel
-def _fill_tiles(
-    points: Array, weights: Array, order: Array, count: int
-) -> tuple[Array, Array, Array, Array]:
+def _fill_tiles(points: Array, weights: Array, order: Array, count: int) -> tuple[Array, Array, Array, Array]:
     """Return points, weights, sums and boxes of tiles."""
     sides, masses = np.empty((count, 3, TILE), np.float32), np.empty((count, TILE), np.float32)
     sums, boxes = np.zeros((count, 4)), np.empty((count, 2, 3), np.float32)
