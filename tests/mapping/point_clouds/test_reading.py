@@ -1,4 +1,4 @@
-"""Clouds of every kind of file are read as they were written; damaged ones are refused with file and cause."""
+"""Clouds of every kind of file are read as they were written; damaged ones are refused with the cause."""
 
 import struct
 import zlib
