@@ -25,7 +25,7 @@ from lidarium.benchmarks.speed.cases import (
     ray_casting,
     waypoint_decision,
 )
-from lidarium.benchmarks.speed.cases.three_dimensions import bullet_world, depth_image
+from lidarium.benchmarks.speed.cases.three_dimensions import bullet_world, depth_image, quantisation
 from lidarium.benchmarks.speed.harness.lines import Line, table
 from lidarium.benchmarks.speed.harness.report import speed_result, with_effort, write_speed
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, on_cores
@@ -44,6 +44,7 @@ _MODULES: tuple[ModuleType, ...] = (
     bullet_world,
     cached_start,
     depth_image,
+    quantisation,
 )
 
 QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}

@@ -1,4 +1,4 @@
-"""Which other simulators there are to be compared with, and how to get them."""
+"""Which other programs there are to be compared with, and how to get them."""
 
 import importlib.util
 from collections.abc import Callable
@@ -34,6 +34,8 @@ def _is_installed(module: str) -> bool:
 PEERS = (
     Peer("IR-SIM", partial(_is_installed, "irsim"), 'pip install "lidarium[bench]"'),
     Peer("PyBullet", partial(_is_installed, "pybullet"), 'pip install "lidarium[bench]" (Python 3.11)'),
+    Peer("scikit-learn", partial(_is_installed, "sklearn"), 'pip install "lidarium[bench]"'),
+    Peer("faiss", partial(_is_installed, "faiss"), 'pip install "lidarium[bench]"'),
     Peer(
         "VMAS",
         vmas_peer.is_there,

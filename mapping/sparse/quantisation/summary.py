@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
 from lidarium.mapping.sparse.quantisation.point_lanes import TILE
 from lidarium.mapping.sparse.quantisation.seeding import Nearest
 from lidarium.mapping.sparse.quantisation.tiles import Tiles
@@ -87,31 +88,71 @@ def summary_of(tiles: Tiles, codes: NDArray[np.float32], nearest: Nearest) -> Su
 
 @kernel(borrowing=True)
 def _sum_up(tiles: Tiles, count: int, codes: Array, nearest: Nearest, summary: Summary) -> None:
-    """Add every point to the sums of its code."""
+    """Add every point to the sums of its code; the points of a tile of one code are added at once."""
+    distances, offsets = scratch_vector(TILE, np.float32), scratch_grid(3, TILE, np.float64)
+    own = scratch_vector(_MOMENTS, np.float64)
     for tile in range(len(tiles.boxes)):
-        for lane in range(min(TILE, count - tile * TILE)):
-            number, mass = nearest.labels[tile, lane], float(tiles.weights[tile, lane])
-            own, box = summary.moments[number], summary.boxes[number]
+        labels, weights = nearest.labels[tile], tiles.weights[tile]
+        found = min(TILE, count - tile * TILE)
+        changes = 0
+        for lane in range(TILE):
+            changes |= labels[lane] ^ labels[0]
+            distances[lane] = np.sqrt(nearest.squares[tile, lane])
             for axis in range(3):
                 side = tiles.points[tile, axis, lane]
-                box[0, axis] = min(box[0, axis], side)
-                box[1, axis] = max(box[1, axis], side)
-            x = float(tiles.points[tile, 0, lane]) - float(codes[number, 0])
-            y = float(tiles.points[tile, 1, lane]) - float(codes[number, 1])
-            z = float(tiles.points[tile, 2, lane]) - float(codes[number, 2])
-            square = x * x + y * y + z * z
-            distance = np.sqrt(square)
+                offsets[axis, lane] = float(side) - float(codes[labels[lane], axis])
+        if changes == 0:
+            number = labels[0]
+            _stretch(summary.boxes[number], tiles.boxes[tile, 0], tiles.boxes[tile, 1])
+            summary.counts[number] += found
+            summary.masses[number] += tiles.sums[tile, 3]
+            summary.errors[number, 1] += nearest.errors[tile]
+            summary.radii[number] = max(summary.radii[number], np.sqrt(nearest.worst[tile]))
+            _add_all(weights, distances, offsets, summary.errors[number], summary.moments[number])
+            continue
+        for lane in range(found):
+            number, mass, reach = labels[lane], float(weights[lane]), distances[lane]
+            point = tiles.points[tile, :, lane]
+            _stretch(summary.boxes[number], point, point)
             summary.counts[number] += 1
             summary.masses[number] += mass
-            summary.errors[number, 0] += mass * distance
-            summary.errors[number, 1] += mass * square
-            own[0] += mass * x
-            own[1] += mass * y
-            own[2] += mass * z
-            own[3] += mass * x * x
-            own[4] += mass * y * y
-            own[5] += mass * z * z
-            own[6] += mass * x * y
-            own[7] += mass * x * z
-            own[8] += mass * y * z
-            summary.radii[number] = max(summary.radii[number], np.float32(distance))
+            summary.errors[number, 0] += mass * float(reach)
+            summary.errors[number, 1] += mass * float(nearest.squares[tile, lane])
+            summary.radii[number] = max(summary.radii[number], reach)
+            _set_moments(offsets, lane, mass, own)
+            for moment in range(_MOMENTS):
+                summary.moments[number, moment] += own[moment]
+
+
+@kernel(inline=True, borrowing=True)
+def _stretch(box: Array, low: Array, high: Array) -> None:
+    """Stretch a box so that it holds another one."""
+    for axis in range(3):
+        box[0, axis] = min(box[0, axis], low[axis])
+        box[1, axis] = max(box[1, axis], high[axis])
+
+
+@kernel(inline=True, borrowing=True)
+def _set_moments(offsets: Array, lane: int, mass: float, own: Array) -> None:
+    """Set the moments of a point."""
+    x, y, z = offsets[0, lane], offsets[1, lane], offsets[2, lane]
+    own[0], own[1], own[2] = mass * x, mass * y, mass * z
+    own[3], own[4], own[5] = own[0] * x, own[1] * y, own[2] * z
+    own[6], own[7], own[8] = own[0] * y, own[0] * z, own[1] * z
+
+
+@kernel(inline=True, borrowing=True)
+def _add_all(weights: Array, distances: Array, offsets: Array, errors: Array, moments: Array) -> None:
+    """Add the distances and moments of a tile's points to those of a code."""
+    far, a, b, c, aa, bb, cc, ab, ac, bc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for lane in range(TILE):
+        mass = float(weights[lane])
+        x, y, z = offsets[0, lane], offsets[1, lane], offsets[2, lane]
+        u, v, w = mass * x, mass * y, mass * z
+        far += mass * float(distances[lane])
+        a, b, c = a + u, b + v, c + w
+        aa, bb, cc = aa + u * x, bb + v * y, cc + w * z
+        ab, ac, bc = ab + u * y, ac + u * z, bc + v * z
+    errors[0] += far
+    for moment, value in enumerate((a, b, c, aa, bb, cc, ab, ac, bc)):
+        moments[moment] += value

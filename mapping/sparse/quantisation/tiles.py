@@ -115,16 +115,25 @@ def _fill_tiles(points: Array, weights: Array, order: Array, count: int) -> tupl
             masses[tile, lane] = mass
             for axis in range(3):
                 sides[tile, axis, lane] = points[i, axis]
-            sums[tile, 3] += mass
-        for axis in range(3):
-            low = high = sides[tile, axis, 0]
-            total = 0.0
-            for lane in range(TILE):
-                value = sides[tile, axis, lane]
-                low, high = min(low, value), max(high, value)
-                total += float(masses[tile, lane]) * float(value)
-            boxes[tile, 0, axis], boxes[tile, 1, axis], sums[tile, axis] = low, high, total
+        _sum_tile(sides[tile], masses[tile], sums[tile], boxes[tile])
     return sides, masses, sums, boxes
+
+
+@kernel(inline=True)
+def _sum_tile(sides: Array, masses: Array, sums: Array, box: Array) -> None:
+    """Set the sums and the box of a tile, three axes at a time: none waits for the others."""
+    x_low = x_high = sides[0, 0]
+    y_low = y_high = sides[1, 0]
+    z_low = z_high = sides[2, 0]
+    a, b, c, total = 0.0, 0.0, 0.0, 0.0
+    for lane in range(TILE):
+        x, y, z, mass = sides[0, lane], sides[1, lane], sides[2, lane], float(masses[lane])
+        x_low, y_low, z_low = min(x_low, x), min(y_low, y), min(z_low, z)
+        x_high, y_high, z_high = max(x_high, x), max(y_high, y), max(z_high, z)
+        a, b, c, total = a + mass * float(x), b + mass * float(y), c + mass * float(z), total + mass
+    box[0, 0], box[0, 1], box[0, 2] = x_low, y_low, z_low
+    box[1, 0], box[1, 1], box[1, 2] = x_high, y_high, z_high
+    sums[0], sums[1], sums[2], sums[3] = a, b, c, total
 
 
 @kernel

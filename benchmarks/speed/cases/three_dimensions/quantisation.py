@@ -1,0 +1,150 @@
+"""Codes of depth images and whole floors, beside the Lloyd's steps of scikit-learn and faiss."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from lidarium.benchmarks.speed.harness.lines import Line, faster, shown
+from lidarium.benchmarks.speed.harness.report import run_alone
+from lidarium.benchmarks.speed.harness.timing import Contender, Effort, interleaved, rate, repeated
+from lidarium.benchmarks.speed.peers.lloyd_peers import faiss_steps, scikit_learn_steps
+from lidarium.envs.floors.catalogue.names import load_floor
+from lidarium.envs.floors.faces import faces_of
+from lidarium.envs.floors.free_space import configuration_space
+from lidarium.envs.settings.robots import ROBOTS
+from lidarium.envs.settings.sensors.cameras import CAMERAS
+from lidarium.envs.simulation.depth.frames import image_of
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.point_clouds.frames import base_from_camera, map_from_base, moved
+from lidarium.mapping.point_clouds.intrinsics import points_of_depth
+from lidarium.mapping.point_clouds.point_cloud import PointCloud
+from lidarium.mapping.sparse.quantisation.lloyd import nearest_codes
+from lidarium.mapping.sparse.quantisation.quantiser import quantise
+from lidarium.mapping.sparse.quantisation.settings import QuantisationSettings
+from lidarium.mapping.sparse.quantisation.tiles import tiles_of
+
+CORES = 1
+FRAME, FLOOR, CODES, STEPS = 307_200, 2_570_000, 512, 7
+NOISE_M = 0.005
+BUDGET_S = 0.25
+
+LIMITS_S = {
+    f"K-means++, {CODES} codes, {FRAME:,} points": 0.030,
+    f"K-means++, 32 codes, {FRAME:,} points": 0.012,
+    f"K-means++, {CODES} codes, {FLOOR:,} points": 0.25,
+    f"LBG, {CODES} codes, {FRAME:,} points": 0.1,
+}
+"""Longest that a quantisation may take [s]."""
+
+LEAST_RATIOS = {"scikit-learn": 30.0, "faiss": 3.0}
+MOST_PHI = {"phi2": 0.94, "phi1": 0.975}
+
+NOTES = (
+    f"*Quantisation* is the whole call with {STEPS} of Lloyd's steps: points sorted, labelled, and all that "
+    "is known of each code. The points are of depth images of 640 x 480 in the furnished apartment, without "
+    "a limit of range and with 5 mm of noise. Peers start from the same codes, make as many steps on one "
+    "thread, and label every point at the end. *Error over theirs* compares the mean squared distances. "
+    f"*Budget* is the error after {BUDGET_S} s of the whole call over that of K-means++, the mean of three "
+    "seeds.",
+)
+
+
+def floor_points(count: int) -> np.ndarray:
+    """Return points that a robot's camera sees from places all over the apartment, (count, 3) float32."""
+    generator, floor = np.random.default_rng(0), load_floor("apartment")
+    camera = replace(CAMERAS["xtion_vga"], depth_min=0.05, depth_max=50.0, noise_floor=0.0, noise_share=0.0)
+    faces, robot = faces_of(floor), ROBOTS["kobuki"]
+    raster = floor.raster(0.05, 0.05, 0.52)
+    rows, columns = np.nonzero(configuration_space(raster, robot.radius))
+    mount = base_from_camera(camera.forward, camera.left, camera.height)
+    parts: list[np.ndarray] = []
+    while sum(map(len, parts)) < count:
+        chosen = generator.integers(0, len(rows))
+        x = raster.origin[0] + (columns[chosen] + 0.5) * raster.resolution
+        y = raster.origin[1] + (rows[chosen] + 0.5) * raster.resolution
+        pose = np.array([[x, y, generator.uniform(-np.pi, np.pi)]])
+        depth = image_of(faces, pose, np.zeros((1, 3)), robot.numbers[None], 0, camera)
+        cloud = PointCloud(points_of_depth(depth, camera.intrinsics))
+        parts.append(moved(cloud, map_from_base(Transform(*pose[0])) @ mount).points)
+    points = np.concatenate(parts)[:count]
+    return (points + generator.normal(0.0, NOISE_M, points.shape)).astype(np.float32)
+
+
+def quantised(points: np.ndarray, codes: int, settings: QuantisationSettings) -> Contender:
+    """Quantise points once a unit."""
+    return repeated(lambda: quantise(points, codes, settings), 1)
+
+
+def measure(effort: Effort) -> list[Line]:
+    """Time quantisations, compare Lloyd's steps with peers, and measure what a budget gains."""
+    frame, floor = floor_points(FRAME), floor_points(FLOOR)
+    plain, split = QuantisationSettings(steps=STEPS), QuantisationSettings("lbg", steps=STEPS)
+    asked = ((frame, CODES, plain), (frame, 32, plain), (floor, CODES, plain), (frame, CODES, split))
+    contenders = dict(zip(LIMITS_S, (quantised(*each) for each in asked), strict=True))
+    start = frame[np.random.default_rng(0).choice(len(frame), CODES, replace=False)]
+    contenders["ours"] = repeated(lambda: quantise(frame, CODES, plain, start=start), 1)
+    found = {
+        "scikit-learn": scikit_learn_steps(frame, start, STEPS),
+        "faiss": faiss_steps(frame, start, STEPS),
+    }
+    peers = {name: quietly(peer) for name, peer in found.items() if peer is not None}
+    contenders |= {name: repeated(peer, 1) for name, peer in peers.items()}
+    seconds = interleaved(contenders, effort)
+    lines = []
+    for name, limit in LIMITS_S.items():
+        taken = 1e3 / rate(seconds[name])
+        lines.append(Line(name, f"{shown(taken)} ms", "-", None, 1e3 * limit, taken, True, "ms"))
+    title = f"Lloyd's steps from the same {CODES} codes"
+    error = quantise(frame, CODES, plain, start=start).phi2
+    for name, wanted in LEAST_RATIOS.items():
+        lines.append(faster(title, seconds["ours"], name, seconds.get(name), wanted, "clouds/s"))
+        if name in peers:
+            ratio = error / error_of(frame, np.asarray(peers[name](), np.float32))
+            lines.append(Line(f"{title}, error over theirs", "-", name, None, 1.001, ratio, True))
+    return lines + budget_lines(frame)
+
+
+def quietly(peer: Callable[[], np.ndarray]) -> Callable[[], np.ndarray]:
+    """Return a peer that warns of nothing: steps that end before they converge are what is asked for."""
+
+    def quantising() -> np.ndarray:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return peer()
+
+    return quantising
+
+
+def error_of(points: np.ndarray, codes: np.ndarray) -> float:
+    """Return the mean squared distance of points to the nearest of codes [m2]."""
+    tiles = tiles_of(points)
+    nearest = nearest_codes(tiles, np.ascontiguousarray(codes))
+    return float(nearest.group_errors.sum()) / len(points)
+
+
+def budget_lines(points: np.ndarray) -> list[Line]:
+    """Compare errors after a budget with those of K-means++."""
+    ratios: dict[str, list[float]] = {name: [] for name in MOST_PHI}
+    for seed in range(3):
+        plain = quantise(points, CODES, QuantisationSettings(steps=STEPS, seed=seed))
+        better = quantise(points, CODES, QuantisationSettings(steps=STEPS, seed=seed, budget_s=BUDGET_S))
+        for name, found in ratios.items():
+            found.append(getattr(better, name) / getattr(plain, name))
+    return [
+        Line(
+            f"budget of {BUDGET_S} s, {name}",
+            "-",
+            "K-means++",
+            None,
+            most,
+            float(np.mean(ratios[name])),
+            True,
+        )
+        for name, most in MOST_PHI.items()
+    ]
+
+
+if __name__ == "__main__":
+    run_alone(measure, "Quantisation of depth images beside scikit-learn and faiss.")
