@@ -1,7 +1,9 @@
 """Codes that move from where they are of least use to where the error is greatest.
 
-To merge two codes costs what Ward's distance tells; to split one gains what its points' greatest variance
-tells. Exchanges that gain most are made, Lloyd's steps follow, and the best codes of all rounds are kept.
+What merging two codes costs, Ward's distance tells; what splitting one gains, the greatest variance of its
+points. The cheapest are merged and the richest split, whatever the balance: Lloyd's steps, which follow, gain
+more than either tells. There are fewer exchanges after rounds that were no better, and the best codes of all
+rounds are kept.
 Source: G. Patane, M. Russo, "The enhanced LBG algorithm", 2001, whose exchanges are made many at a time.
 """
 
@@ -25,12 +27,6 @@ FEWER = 0.6
 
 STEPS = 4
 """Lloyd's steps after exchanges."""
-
-GAIN = 1.2
-"""What splitting takes over the variance along the longest axis: 3/4 of even points, the rest of neighbours.
-
-Of 0.5 to 1.7, this and above were best on a kitchen and a drawn room.
-"""
 
 
 def relocated(
@@ -61,7 +57,7 @@ def relocated(
     began = time.perf_counter()
     while began + longest < deadline:
         most = int(share * len(codes))
-        if most > 0:
+        if most > 0 and len(codes) > 2:
             codes = exchanged(codes, summary_of(tiles, codes, nearest), most)
         codes = improved(tiles, codes, STEPS, keeps_empty)
         nearest = nearest_codes(tiles, codes)
@@ -75,12 +71,12 @@ def relocated(
 
 
 def exchanged(codes: Codes, summary: Summary, most: int) -> Codes:
-    """Return codes of which some were merged into a neighbour, and as many split in two.
+    """Return the means of codes' points, some merged with a neighbour's, and as many split in two.
 
     Parameters
     ----------
     codes : (k, 3) float32
-        The codes [m].
+        At least three codes [m].
     summary : Summary
         Of their points.
     most : int
@@ -89,14 +85,13 @@ def exchanged(codes: Codes, summary: Summary, most: int) -> Codes:
     Returns
     -------
     (k, 3) float32
-        The codes; no code takes part in two exchanges.
+        The new codes; no code takes part in two exchanges.
     """
-    if len(codes) < 3:
-        return codes
-    costs, partners = merging_costs(codes, summary.masses)
+    means = summary.means(codes)
+    costs, partners = merging_costs(means, summary.masses)
     variances, axes = np.linalg.eigh(summary.covariances())
-    gains = GAIN * summary.masses * variances[:, 2]
-    moved = codes.copy()
+    gains = summary.masses * variances[:, 2]
+    moved = means.copy()
     is_free = np.ones(len(codes), bool)
     cheapest, richest = iter(np.argsort(costs, kind="stable")), iter(np.argsort(-gains, kind="stable"))
     for _ in range(most):
@@ -106,14 +101,14 @@ def exchanged(codes: Codes, summary: Summary, most: int) -> Codes:
         other = partners[merged]
         is_free[[merged, other]] = False
         split = next((code for code in richest if is_free[code]), None)
-        if split is None or gains[split] <= costs[merged]:
+        if split is None:
             break
         is_free[split] = False
         masses = summary.masses[[merged, other]]
-        moved[other] = (masses @ codes[[merged, other]]) / max(masses.sum(), np.finfo(np.float64).tiny)
+        moved[other] = (masses @ means[[merged, other]]) / max(masses.sum(), np.finfo(np.float64).tiny)
         # Halves of evenly spread points have their means so far from the middle.
         shift = 0.5 * np.sqrt(3.0 * max(variances[split, 2], 0.0)) * axes[split, :, 2]
-        moved[split], moved[merged] = codes[split] + shift, codes[split] - shift
+        moved[split], moved[merged] = means[split] + shift, means[split] - shift
     return moved
 
 

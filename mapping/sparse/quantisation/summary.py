@@ -44,6 +44,11 @@ class Summary(NamedTuple):
     boxes: NDArray[np.float32]
     radii: NDArray[np.float32]
 
+    def means(self, codes: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the means of each code's points, (k, 3) [m]; of no points, the code itself."""
+        offsets = self.moments[:, :3] / np.maximum(self.masses, np.finfo(np.float64).tiny)[:, None]
+        return (codes + offsets).astype(np.float32)
+
     def covariances(self) -> NDArray[np.float64]:
         """Return the covariances of each code's points, (k, 3, 3) [m2]; zero of no points."""
         parts = self.moments / np.maximum(self.masses, np.finfo(np.float64).tiny)[:, None]
