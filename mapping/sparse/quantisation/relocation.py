@@ -19,7 +19,7 @@ from lidarium.mapping.sparse.quantisation.seeding import Nearest
 from lidarium.mapping.sparse.quantisation.summary import Summary, summary_of
 from lidarium.mapping.sparse.quantisation.tiles import Tiles
 
-FIRST_SHARE = 0.1
+FIRST_SHARE = 0.2
 """Exchanges of the first round over codes."""
 
 FEWER = 0.6
