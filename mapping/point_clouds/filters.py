@@ -12,7 +12,7 @@ from lidarium.mapping.point_clouds.point_cloud import PointCloud
 def within_range(
     cloud: PointCloud, farthest: float, nearest: float = 0.0, origin: ArrayLike = (0.0, 0.0, 0.0)
 ) -> PointCloud:
-    """Keep the points whose distance to the sensor is from ``nearest`` to ``farthest``.
+    """Keep the points that are from ``nearest`` to ``farthest`` away from the sensor.
 
     Parameters
     ----------

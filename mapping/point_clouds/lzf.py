@@ -46,7 +46,7 @@ def unpacked(packed: bytes, size: int) -> NDArray[np.uint8]:
 
 @kernel
 def _unpack(packed: Array, room: Array) -> int:
-    """Unpack bytes into room of their size, and return how many there are; -1 where they are damaged."""
+    """Unpack bytes and return how many there are; -1 where they are damaged."""
     place, written = 0, 0
     while place < len(packed):
         control = int(packed[place])

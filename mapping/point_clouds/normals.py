@@ -10,7 +10,7 @@ _AT_ONCE = 1 << 16
 
 
 def with_normals(cloud: PointCloud, neighbours: int = 12, origin: ArrayLike = (0.0, 0.0, 0.0)) -> PointCloud:
-    """Return a cloud with normals: the direction in which a point's nearest vary least.
+    """Return a cloud with normals, along which a point's nearest vary least.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def _checked_size(body: bytes, header: _Header) -> bytes:
 def _unpacked_columns(
     body: bytes, header: _Header, wanted: list[str], places: list[int]
 ) -> dict[str, NDArray[np.generic]]:
-    """Return columns of a compressed file, in which all numbers of a field lie side by side."""
+    """Return columns of a compressed file: numbers of a field lie side by side."""
     if len(body) < 8:
         raise ValueError("it ends before its packed points: truncated")
     packed, size = struct.unpack("<II", body[:8])

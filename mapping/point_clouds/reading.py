@@ -97,7 +97,7 @@ def read_cloud(
 
 
 def kind_of(path: Path) -> str:
-    """Return what kind a file is by its name and beginning, which have to agree where both tell.
+    """Return what kind a file is by its name and beginning, which have to agree.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def kind_of(path: Path) -> str:
 
 
 def checked_cloud(cloud: PointCloud) -> PointCloud:
-    """Return a cloud that has points, all of them finite and within the extent of a place in metres.
+    """Return a cloud that has points, all of them finite and near in metres.
 
     Raises
     ------

@@ -23,7 +23,7 @@ def parse_obj(content: bytes, source: str) -> PointCloud:
 
 
 def parse_xyz(content: bytes, source: str) -> PointCloud:
-    """Return the points of lines that begin with x, y and z, apart by blanks or commas.
+    """Return the points of lines of x, y and z, apart by blanks or commas.
 
     Raises
     ------

@@ -64,7 +64,7 @@ def _sums(values: Array, labels: Array, weights: Array, count: int) -> Array:
 
 @kernel
 def _numbered(keys: Array) -> tuple[Array, int]:
-    """Return numbers of keys, equal ones alike, from 0 in the order of their first, and how many."""
+    """Return numbers of keys in the order of their first, and how many there are."""
     size = 2
     while size < 2 * len(keys):
         size *= 2

@@ -33,6 +33,7 @@ from lidarium.mapping.files.map_files import read_ros_map
 from lidarium.mapping.files.npz_logs import read_npz_log
 from lidarium.mapping.files.spline_files import read_spline_map
 from lidarium.mapping.files.trajectories import read_tum
+from lidarium.mapping.point_clouds.reading import read_cloud
 from lidarium.scripts.common import BAD_INPUT
 from lidarium.scripts.main import main
 
@@ -56,6 +57,10 @@ READERS = {
     "suite.toml": read_suite,
     "record.npz": read_record,
     "episodes.jsonl": read_episodes,
+    "a.pcd": read_cloud,
+    "a.ply": read_cloud,
+    "a.obj": read_cloud,
+    "a.xyz": read_cloud,
 }
 
 

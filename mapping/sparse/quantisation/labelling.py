@@ -112,7 +112,7 @@ def _label(
 
 @kernel(inline=True, borrowing=True)
 def _narrow(box: Array, candidates: Candidates, count: int, kept: Candidates) -> int:
-    """Keep the first ``count`` candidates that may be nearest to a point of a box; return how many.
+    """Keep those of ``count`` candidates that may be nearest in a box; return how many.
 
     Each is written, and the next one over it where it is not kept: this takes no branch.
     """
@@ -132,7 +132,7 @@ def _narrow(box: Array, candidates: Candidates, count: int, kept: Candidates) ->
 
 @kernel(inline=True, borrowing=True)
 def _bound(box: Array, codes: Array, count: int, bounds: Array) -> None:
-    """Bound the squared distances from codes to the points of a box, from below and from above."""
+    """Bound the squared distances from codes to a box, from below and from above."""
     low, high = box[0], box[1]
     zero = np.float32(0.0)
     for j in range(count):

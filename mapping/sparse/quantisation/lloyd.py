@@ -4,6 +4,8 @@ Source: S. Lloyd, "Least squares quantization in PCM", 1982; the thesis's algori
 after the loop over points. Codes are rounded to float32, so that labels are exact.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,8 @@ from lidarium.mapping.sparse.quantisation.seeding import Nearest, come_nearer, m
 from lidarium.mapping.sparse.quantisation.tiles import Tiles
 
 Codes = NDArray[np.float32]
+Improve = Callable[[Tiles, Codes, int], Codes]
+"""Takes Lloyd's steps: tiles, codes, and how many."""
 
 
 def improved(tiles: Tiles, codes: Codes, steps: int, keeps_empty: bool = False) -> Codes:
@@ -49,7 +53,7 @@ def improved(tiles: Tiles, codes: Codes, steps: int, keeps_empty: bool = False) 
 
 
 def means_of(tiles: Tiles, codes: Codes, sums: NDArray[np.float64], keeps_empty: bool = False) -> Codes:
-    """Return the means of the codes' points by their sums; those of no points stay or go to far points."""
+    """Return the means of codes' points; codes of none stay or go to far points."""
     masses = sums[:, 3:]
     is_empty = masses[:, 0] == 0.0
     if not is_empty.any():
@@ -60,7 +64,7 @@ def means_of(tiles: Tiles, codes: Codes, sums: NDArray[np.float64], keeps_empty:
 
 
 def at_far_points(tiles: Tiles, codes: Codes, is_empty: NDArray[np.bool_]) -> Codes:
-    """Return codes of which some are moved, one after the other, to the point farthest from all others."""
+    """Move some codes, one by one, to the point that is farthest from all others."""
     nearest, moved = nearest_codes(tiles, codes[~is_empty]), codes.copy()
     for number in np.flatnonzero(is_empty):
         farthest = _farthest_point(tiles, nearest)
@@ -83,7 +87,7 @@ def nearest_codes(tiles: Tiles, codes: Codes) -> Nearest:
 
 @kernel
 def _farthest_point(tiles: Tiles, nearest: Nearest) -> Array:
-    """Return the point that is farthest from its code, (3,) float32; (0,) where all are at codes."""
+    """Return the point farthest from its code, (3,); (0,) where all are at codes."""
     tile = int(np.argmax(nearest.worst))
     if nearest.worst[tile] == np.float32(0.0):
         return np.empty(0, np.float32)

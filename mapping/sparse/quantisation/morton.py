@@ -26,7 +26,7 @@ SPREAD = _spread_bits()
 
 @kernel
 def morton_order(points: Array, low: Array, per_metre: float, spread: Array) -> Array:
-    """Return the places of points in Morton order; of equal cells the first comes first.
+    """Return the places of points in Morton order, of equal cells the first first.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ def improved_on_gpu(
 
 
 def nearest_on(torch: Any, points: Any, codes: Any) -> Any:  # noqa: ANN401
-    """Return the number of the nearest code of every point, both tensors (N, 3) and (k, 3) on a device."""
+    """Return the number of the nearest code of every point."""
     numbers = torch.arange(len(codes), device=points.device)
     found = []
     for some in points.split(max(1, MOST_DISTANCES // len(codes))):

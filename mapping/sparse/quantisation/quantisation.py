@@ -88,7 +88,7 @@ def _in_order(labels: Array, order: Array) -> Array:
 
 
 def _normals(covariances: NDArray[np.float64], counts: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the directions of least variance, those with z above zero first, then y, then x."""
+    """Return the directions of least variance, with z, else y, else x above zero."""
     normals: NDArray[np.float64] = np.linalg.eigh(covariances)[1][:, :, 0]
     signs = np.sign(normals)
     up = np.where(signs[:, 2] != 0, signs[:, 2], np.where(signs[:, 1] != 0, signs[:, 1], signs[:, 0]))

@@ -1,12 +1,13 @@
 """Quantisation of a cloud: checks, first codes, Lloyd's steps, exchanges in the time that is left."""
 
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.sparse.quantisation.lloyd import Codes, at_far_points, improved, nearest_codes
+from lidarium.mapping.sparse.quantisation.lloyd import Codes, Improve, at_far_points, improved, nearest_codes
 from lidarium.mapping.sparse.quantisation.on_gpu import has_gpu, improved_on_gpu
 from lidarium.mapping.sparse.quantisation.quantisation import Quantisation, quantisation_of
 from lidarium.mapping.sparse.quantisation.relocation import relocated
@@ -78,8 +79,9 @@ def quantise(
 
 def _codes_of(tiles: Tiles, count: int, settings: QuantisationSettings, start: ArrayLike | None) -> Codes:
     """Return codes after Lloyd's steps from given ones or those of the method."""
+    improve = _improvement(settings)
     if start is None and settings.method == "lbg":
-        return split_codes(tiles, count, settings.steps, settings.keeps_empty)
+        return split_codes(tiles, count, settings.steps, improve)
     generator = np.random.default_rng(settings.seed)
     if start is not None:
         codes = _checked_start(start, count)
@@ -87,11 +89,15 @@ def _codes_of(tiles: Tiles, count: int, settings: QuantisationSettings, start: A
         codes, _ = drawn_codes(tiles, count, generator)
     else:
         codes = _even_draws(tiles, count, generator)
+    return improve(tiles, codes, settings.steps)
+
+
+def _improvement(settings: QuantisationSettings) -> Improve:
+    """Return what takes Lloyd's steps on the device of the settings."""
     is_there = settings.device != "cpu" and has_gpu()
     if settings.device == "cuda" and not is_there:
         raise RuntimeError("device of quantisation is 'cuda', and torch finds no GPU; want 'cpu' or 'auto'")
-    improve = improved_on_gpu if is_there else improved
-    return improve(tiles, codes, settings.steps, settings.keeps_empty)
+    return partial(improved_on_gpu if is_there else improved, keeps_empty=settings.keeps_empty)
 
 
 def _even_draws(tiles: Tiles, count: int, generator: np.random.Generator) -> Codes:

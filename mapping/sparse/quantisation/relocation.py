@@ -32,7 +32,7 @@ STEPS = 4
 def relocated(
     tiles: Tiles, codes: Codes, deadline: float, keeps_empty: bool = False
 ) -> tuple[Codes, Nearest]:
-    """Return better codes, found until a time, with the nearest of them of every point.
+    """Return better codes, found until a time, and the nearest of every point.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def relocated(
 
 
 def exchanged(codes: Codes, summary: Summary, most: int) -> Codes:
-    """Return the means of codes' points, some merged with a neighbour's, and as many split in two.
+    """Return means of codes' points, some merged, and as many split in two.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def exchanged(codes: Codes, summary: Summary, most: int) -> Codes:
 def merging_costs(
     codes: Codes, masses: NDArray[np.float64], neighbours: int = 8
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return what merging each code with the best of its neighbours adds to the error, and which that is.
+    """Return what merging each code with a neighbour costs, and with which.
 
     Parameters
     ----------

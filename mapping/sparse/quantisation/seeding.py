@@ -91,7 +91,7 @@ def drawn_codes(
 
 @kernel(borrowing=True)
 def draw_codes(tiles: Tiles, draws: Array, codes: Array, nearest: Nearest) -> int:
-    """Draw a code for each number in [0, 1), and return for how many there were places."""
+    """Draw a code for each number in [0, 1); return for how many there were places."""
     shares = scratch_vector(TILE, np.float64)
     for number in range(len(draws)):
         total = 0.0
@@ -115,7 +115,7 @@ def draw_codes(tiles: Tiles, draws: Array, codes: Array, nearest: Nearest) -> in
 
 @kernel(inline=True, borrowing=True)
 def _reached(shares: Array, wanted: float) -> tuple[int, float]:
-    """Return in which share a running sum passes a number, never an empty one, and what is left of it."""
+    """Return in which share, never an empty one, a running sum is, and what is left."""
     chosen, left = 0, 0.0
     for place in range(len(shares)):
         if shares[place] > 0.0:
@@ -157,7 +157,7 @@ def come_nearer(tiles: Tiles, code: Array, number: int, nearest: Nearest) -> Non
 
 @kernel(inline=True, borrowing=True)
 def _least_square(box: Array, code: Array) -> Any:  # noqa: ANN401
-    """Return a lower bound of the squared distances from a code to the points of a box [m2]."""
+    """Return a lower bound of squared distances from a code to a box [m2]."""
     zero = np.float32(0.0)
     x = max(max(box[0, 0] - code[0], code[0] - box[1, 0]), zero)
     y = max(max(box[0, 1] - code[1], code[1] - box[1, 1]), zero)

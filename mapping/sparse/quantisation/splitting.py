@@ -7,7 +7,7 @@ give the same codes.
 
 import numpy as np
 
-from lidarium.mapping.sparse.quantisation.lloyd import Codes, improved
+from lidarium.mapping.sparse.quantisation.lloyd import Codes, Improve, improved
 from lidarium.mapping.sparse.quantisation.tiles import Tiles
 
 LEAST_SHIFT = 1e-3
@@ -17,8 +17,8 @@ SHIFT = 0.01
 """Shift of a copy along an axis over the standard deviation of the points."""
 
 
-def split_codes(tiles: Tiles, count: int, steps: int, keeps_empty: bool = False) -> Codes:
-    """Return codes by splitting each in two, from the mean on, with Lloyd's steps after each splitting.
+def split_codes(tiles: Tiles, count: int, steps: int, improve: Improve = improved) -> Codes:
+    """Return codes split in two, from the mean on, with Lloyd's steps in between.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ def split_codes(tiles: Tiles, count: int, steps: int, keeps_empty: bool = False)
         How many codes, a power of two.
     steps : int
         Lloyd's steps after each splitting.
-    keeps_empty : bool
-        Whether codes without points stay where they are.
+    improve : callable
+        Takes Lloyd's steps, as ``improved``.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def split_codes(tiles: Tiles, count: int, steps: int, keeps_empty: bool = False)
     codes = mean[None].astype(np.float32)
     while len(codes) < count:
         codes = np.concatenate([codes + shift, codes - shift]).astype(np.float32)
-        codes = improved(tiles, codes, steps, keeps_empty)
+        codes = improve(tiles, codes, steps)
     return codes
 
 

@@ -45,7 +45,7 @@ class Summary(NamedTuple):
     radii: NDArray[np.float32]
 
     def means(self, codes: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the means of each code's points, (k, 3) [m]; of no points, the code itself."""
+        """Return the means of codes' points, (k, 3) [m]; of no points, the code."""
         offsets = self.moments[:, :3] / np.maximum(self.masses, np.finfo(np.float64).tiny)[:, None]
         return (codes + offsets).astype(np.float32)
 
@@ -93,7 +93,7 @@ def summary_of(tiles: Tiles, codes: NDArray[np.float32], nearest: Nearest) -> Su
 
 @kernel(borrowing=True)
 def _sum_up(tiles: Tiles, count: int, codes: Array, nearest: Nearest, summary: Summary) -> None:
-    """Add every point to the sums of its code; the points of a tile of one code are added at once."""
+    """Add every point to the sums of its code, tiles of one code at once."""
     distances, offsets = scratch_vector(TILE, np.float32), scratch_grid(3, TILE, np.float64)
     own = scratch_vector(_MOMENTS, np.float64)
     for tile in range(len(tiles.boxes)):

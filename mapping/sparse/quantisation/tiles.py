@@ -86,7 +86,7 @@ def tiles_of(points: NDArray[np.float32], weights: NDArray[np.float32] | None = 
 
 @kernel
 def _extent_of(points: Array) -> tuple[Array, Array]:
-    """Return sums of coordinates and their squares (2, 3), and least and greatest ones (2, 3)."""
+    """Return sums of coordinates and of squares, least and greatest ones, (2, 3)."""
     totals, ends = np.zeros((2, 3)), np.empty((2, 3))
     for axis in range(3):
         total, squares = 0.0, 0.0
@@ -121,7 +121,7 @@ def _fill_tiles(points: Array, weights: Array, order: Array, count: int) -> tupl
 
 @kernel(inline=True)
 def _sum_tile(sides: Array, masses: Array, sums: Array, box: Array) -> None:
-    """Set the sums and the box of a tile, three axes at a time: none waits for the others."""
+    """Set the sums and the box of a tile, three axes side by side."""
     x_low = x_high = sides[0, 0]
     y_low = y_high = sides[1, 0]
     z_low = z_high = sides[2, 0]

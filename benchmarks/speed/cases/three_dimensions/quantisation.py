@@ -57,7 +57,7 @@ NOTES = (
 
 
 def floor_points(count: int) -> np.ndarray:
-    """Return points that a robot's camera sees from places all over the apartment, (count, 3) float32."""
+    """Return points that a robot's camera sees in the apartment, (count, 3) float32."""
     generator, floor = np.random.default_rng(0), load_floor("apartment")
     camera = replace(CAMERAS["xtion_vga"], depth_min=0.05, depth_max=50.0, noise_floor=0.0, noise_share=0.0)
     faces, robot = faces_of(floor), ROBOTS["kobuki"]
@@ -83,7 +83,7 @@ def quantised(points: np.ndarray, codes: int, settings: QuantisationSettings) ->
 
 
 def measure(effort: Effort) -> list[Line]:
-    """Time quantisations, compare Lloyd's steps with peers, and measure what a budget gains."""
+    """Time quantisation, compare Lloyd's steps, measure what a budget gains."""
     frame, floor = floor_points(FRAME), floor_points(FLOOR)
     plain, split = QuantisationSettings(steps=STEPS), QuantisationSettings("lbg", steps=STEPS)
     asked = ((frame, CODES, plain), (frame, 32, plain), (floor, CODES, plain), (frame, CODES, split))
@@ -113,7 +113,7 @@ def measure(effort: Effort) -> list[Line]:
 
 
 def quietly(peer: Callable[[], np.ndarray]) -> Callable[[], np.ndarray]:
-    """Return a peer that warns of nothing: steps that end before they converge are what is asked for."""
+    """Return a peer that warns of nothing: it is asked to end before it converges."""
 
     def quantising() -> np.ndarray:
         with warnings.catch_warnings():
@@ -131,7 +131,7 @@ def error_of(points: np.ndarray, codes: np.ndarray) -> float:
 
 
 def real_frames() -> dict[str, np.ndarray]:
-    """Return the points of real depth images of a kitchen, by name; none where there are no real data."""
+    """Return points of real depth images by name; none where there are no data."""
     beside = Path(__file__).resolve().parents[5] / "shared" / "data"
     folder = Path(os.environ.get("LIDARIUM_DATA", beside)) / "clouds" / "redkitchen"
     pinhole = Intrinsics(585.0, 585.0, 320.0, 240.0)
