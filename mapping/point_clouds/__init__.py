@@ -1,1 +1,1 @@
-"""Points in space."""
+"""Points in space: read from files or depth images, filtered, moved between frames."""

@@ -52,9 +52,11 @@ def relocated(
     nearest : Nearest
         The nearest of them of every point.
     """
-    best = nearest = nearest_codes(tiles, codes)
-    best_codes, share, longest = codes, FIRST_SHARE, 0.0
     began = time.perf_counter()
+    best = nearest = nearest_codes(tiles, codes)
+    now = time.perf_counter()
+    # A round labels the points so many times, and sums them up.
+    best_codes, share, longest, began = codes, FIRST_SHARE, (STEPS + 2) * (now - began), now
     while began + longest < deadline:
         most = int(share * len(codes))
         if most > 0 and len(codes) > 2:
