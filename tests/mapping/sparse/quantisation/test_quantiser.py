@@ -94,6 +94,15 @@ def test_a_budget_lowers_the_error_and_is_kept():
     assert quantise(POINTS, 64, QuantisationSettings(budget_s=1e-9)).phi2 == plain.phi2
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 50])
+def test_a_budget_is_no_harm_to_few_points(count):
+    points = np.repeat(POINTS[:50], 2, axis=0)
+    plain = quantise(points, count)
+    better = quantise(points, count, QuantisationSettings(budget_s=0.05))
+    assert better.phi2 <= plain.phi2
+    assert better.counts.all()
+
+
 def test_exchanges_take_from_where_codes_are_crowded():
     crowd = np.random.default_rng(0).normal(0.0, 0.01, (400, 3))
     spread = np.random.default_rng(1).uniform((5, 0, 0), (9, 4, 0), (400, 3))
