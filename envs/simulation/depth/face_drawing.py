@@ -14,8 +14,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from lidarium.mapping.kernels.beam_lanes import PIXEL_LANES, raise_lanes
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.beam_lanes import PIXEL_LANES, raise_lanes
 from lidarium.mapping.kernels.views import scratch_grid
 
 FOCAL, CENTRE_COLUMN, CENTRE_ROW, DEPTH_MIN, DEPTH_MAX, COLUMNS, ROWS = range(7)

@@ -20,8 +20,8 @@ from lidarium.envs.simulation.depth.face_drawing import (
 )
 from lidarium.envs.simulation.disturbances.noise import GAUSSIAN_TABLE, gaussian_at, mix, stream_key
 from lidarium.envs.simulation.disturbances.odometry import HEIGHT, RADIUS
-from lidarium.mapping.kernels.beam_lanes import PIXEL_LANES
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.beam_lanes import PIXEL_LANES
 from lidarium.mapping.kernels.views import grid_at, scratch_grid, vector_at
 
 DEPTH_STREAM = 0x64657074

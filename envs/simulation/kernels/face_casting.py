@@ -13,8 +13,8 @@ import numpy as np
 
 from lidarium.envs.simulation.kernels.ray_tables import TILE
 from lidarium.mapping.grids.scan_geometry import Beams, fast_angle
-from lidarium.mapping.kernels.beam_lanes import FLOAT, LANES, lower_lanes
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.beam_lanes import FLOAT, LANES, lower_lanes
 from lidarium.mapping.kernels.views import scratch_grid, vector_at
 
 CORNER_OVERLAP = 1e-9

@@ -111,3 +111,21 @@ def raised_pixels(pixels: Array, start: float, slope: float, first: int, last: i
     new = np.float32(start) + np.float32(slope) * places.astype(np.float32)
     is_within = (first <= places) & (places <= last)
     return np.where(is_within & (new > pixels), new, pixels).astype(np.float32)
+
+
+def nearest_codes(
+    points: Array, codes: Array, numbers: Array, before: tuple[Array, Array]
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Return squared distances (64,) and numbers of the nearest codes of points (3, 64).
+
+    Of equal codes the first counts.
+
+    ``before`` are those of codes that came earlier.
+    """
+    nearest, chosen = before[0].copy(), before[1].copy()
+    for code, number in zip(codes, numbers, strict=True):
+        x, y, z = (points - code[:, None]) ** 2
+        square = x + y + z
+        is_nearer = square < nearest
+        nearest, chosen = np.where(is_nearer, square, nearest), np.where(is_nearer, number, chosen)
+    return nearest.astype(np.float32), chosen.astype(np.int32)

@@ -157,6 +157,17 @@ def raise_lanes(address: int, start: float, slope: float, first: int, last: int)
     pixels[:] = plain.raised_pixels(pixels, start, slope, first, last)
 
 
+def nearest_in_tile(points: int, codes: int, numbers: int, count: int, squares: int, labels: int) -> None:
+    """Lower squared distances of a tile's points by codes, and note the nearest."""
+    nearest, chosen = array_at(squares, (BLOCK,), np.float32), array_at(labels, (BLOCK,), np.int32)
+    nearest[:], chosen[:] = plain.nearest_codes(
+        array_at(points, (3, BLOCK), np.float32),
+        array_at(codes, (count, 3), np.float32),
+        array_at(numbers, (count,), np.int32),
+        (nearest, chosen),
+    )
+
+
 def add_one(address: int) -> int:
     """Count on at an address; return the number before."""
     counter = array_at(address, (1,), np.int64)

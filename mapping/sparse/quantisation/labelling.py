@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.sparse.quantisation.point_lanes import TILE, nearest_in_tile
+from lidarium.mapping.kernels.lanes.point_lanes import TILE, nearest_in_tile
 from lidarium.mapping.sparse.quantisation.tiles import GROUP, Tiles
 
 NO_SQUARES = np.empty((0, TILE), np.float32)

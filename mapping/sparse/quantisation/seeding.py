@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.point_lanes import TILE, nearest_in_tile
 from lidarium.mapping.kernels.views import scratch_vector
-from lidarium.mapping.sparse.quantisation.point_lanes import TILE, nearest_in_tile
 from lidarium.mapping.sparse.quantisation.tiles import GROUP, Tiles
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.point_lanes import TILE
 from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
-from lidarium.mapping.sparse.quantisation.point_lanes import TILE
 from lidarium.mapping.sparse.quantisation.seeding import Nearest
 from lidarium.mapping.sparse.quantisation.tiles import Tiles
 

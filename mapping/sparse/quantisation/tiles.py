@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.point_lanes import TILE
 from lidarium.mapping.sparse.quantisation.morton import CELLS, SPREAD, morton_order
-from lidarium.mapping.sparse.quantisation.point_lanes import TILE
 
 GROUP = 16
 """Tiles of a group."""

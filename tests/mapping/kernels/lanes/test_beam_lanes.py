@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from lidarium.mapping.kernels.beam_lanes import LANES, lower_lanes
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.kernels.in_python import plain
+from lidarium.mapping.kernels.lanes.beam_lanes import LANES, lower_lanes
 
 numbers = st.floats(-20.0, 20.0)
 lanes = arrays(np.float64, LANES, elements=numbers)

@@ -5,7 +5,9 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
+
+from lidarium.mapping.kernels.in_python import plain_forms
+from lidarium.mapping.kernels.in_python.interpreted import machine_code
 
 LANES = 16
 """Points of a vector register."""
@@ -89,4 +91,4 @@ def _nearest_in_tile(
     return types.void(*(types.int64,) * 6), generate
 
 
-nearest_in_tile: Any = intrinsic(_nearest_in_tile)
+nearest_in_tile = machine_code(_nearest_in_tile, plain_forms.nearest_in_tile)

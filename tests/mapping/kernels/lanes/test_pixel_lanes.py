@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from lidarium.mapping.kernels.beam_lanes import PIXEL_LANES, raise_lanes
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.kernels.in_python.plain import raised_pixels
+from lidarium.mapping.kernels.lanes.beam_lanes import PIXEL_LANES, raise_lanes
 
 
 @kernel

@@ -1,0 +1,1 @@
+"""Operations on vectors of points, beams or pixels, in the code that LLVM compiles."""
