@@ -1,0 +1,125 @@
+"""Codes keep their frames: corrected poses move them."""
+
+import numpy as np
+import pytest
+from furnished_room import pose_at
+
+from lidarium.mapping.sparse.floor_plane import FloorPlane
+from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_boxes, moved_points
+from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
+from lidarium.mapping.sparse.sparse_map import SparseMap, free_codes, occupied_codes
+
+BOX = np.array([[[1.0, 0.0, 0.0], [2.0, 0.2, 1.0]]])
+
+
+def two_frames():
+    first = occupied_codes(BOX, 0)
+    second = occupied_codes(BOX + np.array([0.0, 3.0, 0.0]), 1)
+    poses = np.stack([np.eye(4), pose_at(0.0, 3.0)])
+    return SparseMap(
+        occupied=first.joined(second),
+        ground=free_codes(np.zeros((1, 3)), 1),
+        poses=poses,
+        recorded=poses,
+    )
+
+
+def test_a_corrected_pose_moves_the_codes_of_its_frame_alone():
+    known = two_frames()
+    poses = known.poses.copy()
+    poses[1, :3, 3] += [0.5, 0.0, 0.0]
+    moved = known.moved(poses)
+    np.testing.assert_array_equal(moved.boxes[0], BOX[0])
+    np.testing.assert_allclose(moved.boxes[1], BOX[0] + [0.5, 3.0, 0.0])
+    np.testing.assert_allclose(moved.free, [[0.5, 0.0, 0.0]], atol=1e-12)
+
+
+def test_a_turned_box_becomes_the_one_around_its_corners():
+    known = two_frames()
+    moved = known.moved(np.stack([pose_at(0.0, 0.0, 0.0, yaw=np.pi / 2.0), known.poses[1]]))
+    np.testing.assert_allclose(moved.boxes[0], [[-0.2, 1.0, 0.0], [0.0, 2.0, 1.0]], atol=1e-12)
+
+
+def test_corrections_do_not_add_up():
+    known = two_frames()
+    moved = known
+    for turn in np.linspace(0.0, 3.0, 20):
+        moved = moved.moved(np.stack([pose_at(turn, 0.0, 0.0, yaw=turn), known.poses[1]]))
+    back = moved.moved(known.poses)
+    np.testing.assert_array_equal(back.boxes, known.boxes)
+
+
+def test_normals_turn_with_their_frame():
+    known = two_frames()
+    known.occupied.normals[0] = [1.0, 0.0, 0.0]
+    moved = known.moved(np.stack([pose_at(0.0, 0.0, 0.0, yaw=np.pi / 2.0), known.poses[1]]))
+    np.testing.assert_allclose(moved.normals[0], [0.0, 1.0, 0.0], atol=1e-12)
+
+
+def test_motions_are_undone_by_their_inverse():
+    motions = np.stack([pose_at(1.0, 2.0, 3.0, 0.4, 0.2), pose_at(-1.0, 0.5, 0.0, 2.0)])
+    points = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    np.testing.assert_allclose(moved_points(moved_points(points, motions), inverse_of(motions)), points)
+    around = moved_boxes(np.stack([points, points + 1.0], axis=1), motions)
+    assert (around[:, 1] - around[:, 0] >= 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("pose", "message"),
+    [
+        (np.eye(3), "shape"),
+        (2.0 * np.eye(4), "rigid motion"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "rigid motion"),
+        (np.full((4, 4), np.nan), "rigid motion"),
+        (np.eye(4) + np.eye(4)[[3, 1, 2, 0]] * [[0], [0], [0], [1]], "last row"),
+    ],
+)
+def test_what_is_no_pose_is_refused(pose, message):
+    with pytest.raises(ValueError, match=message):
+        checked_poses(pose)
+
+
+def test_codes_of_unknown_frames_are_refused():
+    with pytest.raises(ValueError, match="frames up to 1"):
+        SparseMap(occupied=occupied_codes(BOX, 1), ground=free_codes(np.empty((0, 3))))
+    with pytest.raises(ValueError, match="poses have shape"):
+        two_frames().moved(np.eye(4)[None])
+
+
+def test_boxes_have_their_low_corner_first():
+    with pytest.raises(ValueError, match="low before high"):
+        occupied_codes(BOX[:, ::-1])
+
+
+@pytest.mark.parametrize("plane", [FloorPlane(0.6, 0.0, 0.8, 1.5), FloorPlane(0.0, -1.0, 0.0, 2.0)])
+def test_levelling_makes_the_floor_level(plane):
+    points = np.random.default_rng(0).uniform(-3.0, 3.0, (20, 3))
+    np.testing.assert_allclose(
+        moved_points(points, plane.levelling())[:, 2], plane.heights(points), atol=1e-12
+    )
+    checked_poses(plane.levelling())
+    checked_poses(FloorPlane(0.0, 0.0, -1.0, 0.0).levelling())
+
+
+def test_a_floor_has_a_unit_normal():
+    with pytest.raises(ValueError, match="unit normal"):
+        FloorPlane(0.0, 0.0, 2.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"mode": "printed"}, "mode of the mapper is 'printed'"),
+        ({"split": "colour"}, "split of the mapper is 'colour'"),
+        ({"voxel_m": -1.0}, "voxel_m of the mapper"),
+        ({"seed": 1.5}, "seed of the mapper"),
+    ],
+)
+def test_settings_out_of_bounds_are_named(settings, message):
+    with pytest.raises(ValueError, match=message):
+        MapperSettings(**settings)
+
+
+def test_up_is_a_direction():
+    with pytest.raises(ValueError, match="want a direction"):
+        FloorSettings(up_z=0.0)
