@@ -1,0 +1,1 @@
+"""Maps made of point clouds, whole or frame by frame."""
