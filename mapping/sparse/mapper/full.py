@@ -1,0 +1,81 @@
+"""Maps of whole clouds, coded once.
+
+References
+----------
+Sparse mapper, section 1, *full reconstruction*.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.sparse.floor_plane import FloorPlane
+from lidarium.mapping.sparse.mapper.code_merging import merged_codes
+from lidarium.mapping.sparse.mapper.floor_search import find_floor
+from lidarium.mapping.sparse.mapper.frame_coding import (
+    code_counts,
+    coded_as_points,
+    coded_floor,
+    coded_obstacles,
+    split_points,
+)
+from lidarium.mapping.sparse.mapper.preprocessing import usable_points, voxels_of
+from lidarium.mapping.sparse.rigid_motions import checked_poses, moved_points
+from lidarium.mapping.sparse.settings import MapperSettings
+from lidarium.mapping.sparse.sparse_map import SparseMap
+
+
+def map_cloud(
+    points: NDArray[np.floating],
+    k: int,
+    settings: MapperSettings | None = None,
+    *,
+    pose: NDArray[np.float64] | None = None,
+    floor: FloorPlane | None = None,
+) -> SparseMap:
+    """Make a map of one cloud.
+
+    Parameters
+    ----------
+    points : (N, 3) float
+        The cloud [m].
+    k : int
+        How many codes, of floor and obstacles together; merging leaves fewer.
+    settings : MapperSettings or None
+        How; the defaults where None.
+    pose : (4, 4) float64 or None
+        Pose of the cloud in the map, whose z axis points up; None where it is given in the map. For a cloud
+        that leans, ``find_floor(points).levelling()``.
+    floor : FloorPlane or None
+        The floor in the map; None to find it.
+
+    Returns
+    -------
+    SparseMap
+        The map, of one frame.
+
+    Raises
+    ------
+    ValueError
+        Where there are no points, they are not in metres, there is no floor, or k is too small.
+    """
+    settings = settings or MapperSettings()
+    pose = np.eye(4) if pose is None else checked_poses(pose)
+    on_obstacles, on_floor = code_counts(k, settings.floor_share)
+    cloud = moved_points(usable_points(points, settings.range_m), pose)
+    if floor is None:
+        floor = find_floor(voxels_of(cloud, max(settings.voxel_m, 0.02)).means, settings.floor, settings.seed)
+    if settings.mode == "thesis":
+        occupied, ground = coded_as_points(cloud, k, floor, settings)
+    else:
+        obstacles, ground_points = split_points(cloud, floor, settings)
+        ground = coded_floor(ground_points, on_floor, settings)
+        occupied = coded_obstacles(obstacles, on_obstacles, settings)
+        occupied, _ = merged_codes(occupied, ground.centres, settings)
+    return SparseMap(
+        occupied=occupied,
+        ground=ground,
+        poses=pose[None].copy(),
+        recorded=pose[None].copy(),
+        floor=floor,
+        settings=settings,
+    )

@@ -1,0 +1,156 @@
+"""Maps that grow frame by frame, where the poses of the frames are known.
+
+Only points that the map does not hold yet are coded: those outside its boxes, and floor away from its free
+codes. So a place that is seen again adds nothing, and the map stays as large as the place.
+
+References
+----------
+Sparse mapper, section 4, steps 1 and 2.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.sparse.floor_plane import FloorPlane
+from lidarium.mapping.sparse.mapper.code_merging import merged_codes
+from lidarium.mapping.sparse.mapper.explained_points import are_covered, are_near
+from lidarium.mapping.sparse.mapper.floor_search import find_floor
+from lidarium.mapping.sparse.mapper.frame_coding import (
+    code_counts,
+    coded_as_points,
+    coded_floor,
+    coded_obstacles,
+    split_points,
+)
+from lidarium.mapping.sparse.mapper.preprocessing import usable_points, voxels_of
+from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_points
+from lidarium.mapping.sparse.settings import MapperSettings
+from lidarium.mapping.sparse.sparse_map import FreeCodes, OccupiedCodes, SparseMap, free_codes, occupied_codes
+
+
+class IncrementalMapper:
+    """Makes a map of clouds with poses, one after the other.
+
+    Parameters
+    ----------
+    k : int
+        Codes of a frame, at most, of floor and obstacles together.
+    settings : MapperSettings or None
+        How; where None, the defaults with a range of 4 m.
+    floor : FloorPlane or None
+        The floor in the map; None to find it in the first frame.
+
+    Raises
+    ------
+    ValueError
+        Where k is too small.
+    """
+
+    def __init__(
+        self, k: int = 256, settings: MapperSettings | None = None, *, floor: FloorPlane | None = None
+    ) -> None:
+        self.settings = settings or MapperSettings(range_m=4.0)
+        self._counts = code_counts(k, self.settings.floor_share)
+        self._floor = floor
+        self._map: SparseMap | None = None
+
+    @property
+    def map(self) -> SparseMap:
+        """The map of all frames so far.
+
+        Raises
+        ------
+        ValueError
+            Where there is no frame yet.
+        """
+        if self._map is None:
+            raise ValueError("the map has no frame yet; want one to be added")
+        return self._map
+
+    def is_due(self, pose: NDArray[np.float64]) -> bool:
+        """Whether a frame with this pose (4, 4) is far enough from the last one that was taken."""
+        if self._map is None:
+            return True
+        motion = inverse_of(self._map.poses[-1]) @ checked_poses(pose)
+        turn = np.arccos(np.clip(0.5 * (np.trace(motion[:3, :3]) - 1.0), -1.0, 1.0))
+        moved = float(np.linalg.norm(motion[:3, 3]))
+        # Poses are given to so many digits.
+        return moved >= self.settings.least_motion_m - 1e-9 or float(turn) >= self.settings.least_turn - 1e-9
+
+    def add(self, points: NDArray[np.floating], pose: NDArray[np.float64]) -> bool:
+        """Add a frame, if the robot has moved or turned enough since the last one.
+
+        Parameters
+        ----------
+        points : (N, 3) float
+            Points in the frame [m].
+        pose : (4, 4) float64
+            Pose of the frame in the map, whose z axis points up.
+
+        Returns
+        -------
+        bool
+            Whether the frame was taken.
+
+        Raises
+        ------
+        ValueError
+            Where the frame has no points or they are not in metres, where the pose is no rigid motion, and
+            where the first frame has no floor and none was given. The map is left as it was.
+        """
+        pose = checked_poses(pose)
+        if not self.is_due(pose):
+            return False
+        settings = self.settings
+        cloud = moved_points(usable_points(points, settings.range_m), pose)
+        floor = self._floor
+        if floor is None:
+            floor = find_floor(
+                voxels_of(cloud, max(settings.voxel_m, 0.02)).means, settings.floor, settings.seed
+            )
+        known = self._map or _empty_map(floor, settings)
+        known = replace(
+            known,
+            poses=np.concatenate([known.poses, pose[None]]),
+            recorded=np.concatenate([known.recorded, pose[None]]),
+        )
+        if settings.mode == "thesis":
+            frame = len(known.poses) - 1
+            occupied, ground = coded_as_points(cloud, sum(self._counts), floor, settings, frame)
+            occupied, ground = known.occupied.joined(occupied), known.ground.joined(ground)
+        else:
+            occupied, ground = self._coded_frame(cloud, known, floor)
+        self._floor = floor
+        self._map = replace(known, occupied=occupied, ground=ground)
+        return True
+
+    def correct(self, poses: NDArray[np.float64]) -> None:
+        """Move the codes with corrected poses (F, 4, 4) of the frames that were taken."""
+        self._map = self.map.moved(poses)
+
+    def _coded_frame(
+        self, cloud: NDArray[np.float64], known: SparseMap, floor: FloorPlane
+    ) -> tuple[OccupiedCodes, FreeCodes]:
+        """Return the codes of a map, where they were recorded, with those of its last frame."""
+        settings, frame = self.settings, len(known.poses) - 1
+        obstacles, on_floor = split_points(cloud, floor, settings)
+        obstacles = obstacles[~are_covered(obstacles, known.boxes)]
+        on_floor = on_floor[~are_near(on_floor, known.free, settings.merge_radius_m)]
+        ground = known.ground.joined(coded_floor(on_floor, self._counts[1], settings, frame))
+        recorded = known.occupied.joined(coded_obstacles(obstacles, self._counts[0], settings, frame))
+        grown = replace(known, occupied=recorded, ground=ground)
+        occupied, sources = merged_codes(grown.current, grown.free, settings)
+        return grown.recorded_codes(occupied, sources), ground
+
+
+def _empty_map(floor: FloorPlane, settings: MapperSettings) -> SparseMap:
+    return SparseMap(
+        occupied=occupied_codes(np.empty((0, 2, 3))),
+        ground=free_codes(np.empty((0, 3))),
+        poses=np.empty((0, 4, 4)),
+        recorded=np.empty((0, 4, 4)),
+        floor=floor,
+        settings=settings,
+    )
