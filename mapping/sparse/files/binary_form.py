@@ -1,0 +1,224 @@
+"""Sparse maps as few bytes: boxes in whole centimetres, rounded outward so that no point leaves its box.
+
+A header (magic, version, counts, length, checksum) and one deflated body: the floor with the settings that
+are not defaults, as JSON; then low corners and sizes of boxes, free codes, nodes of the graph and its
+edges, each list in Morton order, as differences. Weights, normals and frames are not kept.
+"""
+
+import json
+import struct
+import zlib
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.files.guarded_reading import read_bytes, reading
+from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.sparse.files.integer_columns import (
+    BYTES,
+    differences,
+    morton_order,
+    pack_columns,
+    unpack_columns,
+)
+from lidarium.mapping.sparse.floor_plane import FloorPlane
+from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
+from lidarium.mapping.sparse.sparse_map import SparseMap, free_codes, occupied_codes
+
+MAGIC = b"LIDSPMAP"
+VERSION = 1
+STEPS_A_METRE = 100
+FARTHEST_M = 1e6
+"""Largest coordinate [m]."""
+
+MOST_FILE_BYTES = 256 << 20
+MOST_BODY_BYTES = 1 << 30
+_MOST_DEFLATED = 1032
+_HEADER = struct.Struct("<8sHHIIIIIII")
+_WIDTHS = (6, 3, 3, 2)
+
+
+class GraphEdges(NamedTuple):
+    """What a file keeps of a graph.
+
+    Attributes
+    ----------
+    nodes : (N, 3) float64
+        Nodes [m].
+    edges : (E, 2) int64
+        Numbers of the nodes at both ends of each edge.
+    """
+
+    nodes: NDArray[np.float64]
+    edges: NDArray[np.int64]
+
+
+def write_binary(path: Path, sparse_map: SparseMap, graph: GraphEdges | None = None) -> None:
+    """Write a map in binary form, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    sparse_map : SparseMap
+        The map.
+    graph : GraphEdges or None
+        A graph to keep with it.
+
+    Raises
+    ------
+    ValueError
+        Where coordinates are too large, or edges end at no node.
+    OSError
+        Where nothing can be written there.
+    """
+    write_whole(path, binary_content(sparse_map, graph))
+
+
+def binary_content(sparse_map: SparseMap, graph: GraphEdges | None = None) -> bytes:
+    """Return the bytes of a map's binary form."""
+    low, high = _outward(sparse_map.boxes)
+    order = morton_order(low)
+    boxes = np.concatenate([differences(low[order]), (high - low)[order]], axis=1)
+    free = _nearest(sparse_map.free)
+    graph = graph or GraphEdges(np.empty((0, 3)), np.empty((0, 2), np.int64))
+    nodes, edges = _ordered_graph(graph)
+    blocks = [boxes, differences(free[morton_order(free)]), differences(nodes), _coded_edges(edges)]
+    about = json.dumps(_about(sparse_map), separators=(",", ":")).encode()
+    body = b"".join([struct.pack("<I", len(about)), about, *map(pack_columns, blocks)])
+    packed = zlib.compress(body, 9)
+    counts = [len(block) for block in blocks]
+    return _HEADER.pack(MAGIC, VERSION, 0, *counts, len(body), len(packed), zlib.crc32(packed)) + packed
+
+
+def read_binary(path: Path) -> tuple[SparseMap, GraphEdges | None]:
+    """Read a map in binary form, with its graph where it has one.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is none.
+    ValueError
+        Where it is no such file, of another version, damaged, or claims more than it holds.
+    """
+    content = read_bytes(path, MOST_FILE_BYTES)
+    with reading(path, "a sparse map"):
+        return parsed_binary(content)
+
+
+def parsed_binary(content: bytes) -> tuple[SparseMap, GraphEdges | None]:
+    """Return the map, and the graph or None, of the bytes of a binary form."""
+    counts, body = _unpacked(content)
+    (length,) = struct.unpack_from("<I", body)
+    start = 4 + length
+    if start + BYTES * sum(count * width for count, width in zip(counts, _WIDTHS, strict=True)) != len(body):
+        raise ValueError("its counts do not fit its length")
+    floor, settings = _from_about(json.loads(body[4:start]))
+    blocks = []
+    for count, width in zip(counts, _WIDTHS, strict=True):
+        blocks.append(unpack_columns(body[start:], count, width))
+        start += BYTES * count * width
+    low = np.cumsum(blocks[0][:, :3], axis=0)
+    boxes = np.stack([low, low + blocks[0][:, 3:]], axis=1) / STEPS_A_METRE
+    sparse_map = SparseMap(
+        occupied=occupied_codes(boxes),
+        ground=free_codes(np.cumsum(blocks[1], axis=0) / STEPS_A_METRE),
+        floor=floor,
+        settings=settings,
+    )
+    if counts[2] == 0:
+        return sparse_map, None
+    edges = blocks[3].copy()
+    edges[:, 0] = np.cumsum(edges[:, 0])
+    edges[:, 1] += edges[:, 0]
+    _check_edges(edges, counts[2])
+    return sparse_map, GraphEdges(np.cumsum(blocks[2], axis=0) / STEPS_A_METRE, edges)
+
+
+def _unpacked(content: bytes) -> tuple[list[int], bytes]:
+    """Return the counts of the header and the body, where both are what they claim to be."""
+    if content[: len(MAGIC)] != MAGIC:
+        raise ValueError(f"it begins with {content[: len(MAGIC)]!r}; want {MAGIC!r}")
+    if len(content) < _HEADER.size:
+        raise ValueError(f"it has {len(content)} bytes; want a header of {_HEADER.size}")
+    _, version, flags, *counts, length, packed_length, checksum = _HEADER.unpack_from(content)
+    if (version, flags) != (VERSION, 0):
+        raise ValueError(f"it is of version {version}, flags {flags}; want version {VERSION}, flags 0")
+    packed = content[_HEADER.size :]
+    if len(packed) != packed_length:
+        raise ValueError(f"it claims {packed_length:,} bytes after the header; there are {len(packed):,}")
+    if zlib.crc32(packed) != checksum:
+        raise ValueError("its checksum is wrong: it is damaged")
+    if length > min(MOST_BODY_BYTES, _MOST_DEFLATED * (len(packed) + 1)):
+        raise ValueError(f"it claims {length:,} bytes when unpacked; so few bytes cannot hold them")
+    needed = BYTES * sum(count * width for count, width in zip(counts, _WIDTHS, strict=True))
+    if needed > length:
+        raise ValueError(
+            f"it claims {sum(counts):,} codes, nodes and edges; {length:,} bytes cannot hold them"
+        )
+    unpacking = zlib.decompressobj()
+    body = unpacking.decompress(packed, length + 1)
+    if len(body) != length or not unpacking.eof:
+        raise ValueError(f"it does not unpack to the {length:,} bytes that it claims")
+    return counts, body
+
+
+def _checked(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not (np.abs(places) <= FARTHEST_M).all():
+        raise ValueError(f"a coordinate of the map is not within {FARTHEST_M:,.0f} m; want metres")
+    return places
+
+
+def _nearest(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    return np.rint(_checked(points) * STEPS_A_METRE).astype(np.int64)
+
+
+def _outward(boxes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return low and high corners in steps: never inside the box, as a reader computes them."""
+    low, high = _nearest(boxes[:, 0]), _nearest(boxes[:, 1])
+    low -= low / STEPS_A_METRE > boxes[:, 0]
+    high += high / STEPS_A_METRE < boxes[:, 1]
+    return low, high
+
+
+def _ordered_graph(graph: GraphEdges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return nodes in Morton order, in steps, with the edges between their new numbers in order."""
+    _check_edges(graph.edges, len(graph.nodes))
+    nodes = _nearest(graph.nodes)
+    order = morton_order(nodes)
+    numbers = np.empty(len(order), np.int64)
+    numbers[order] = np.arange(len(order))
+    edges = np.sort(numbers[graph.edges], axis=1)
+    return nodes[order], edges[np.lexsort((edges[:, 1], edges[:, 0]))]
+
+
+def _coded_edges(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return edges, each as the difference of its first node and how far on its second is."""
+    return np.stack([np.diff(edges[:, 0], prepend=0), edges[:, 1] - edges[:, 0]], axis=1)
+
+
+def _check_edges(edges: NDArray[np.int64], count: int) -> None:
+    if len(edges) and not (edges.min() >= 0 and edges.max() < count):
+        raise ValueError(f"edges end at nodes {edges.min()} to {edges.max()}; want some of {count}")
+
+
+def _about(sparse_map: SparseMap) -> dict[str, Any]:
+    """Return the floor, and the settings that are not defaults."""
+    floor, settings = sparse_map.floor, asdict(sparse_map.settings)
+    plain = asdict(MapperSettings())
+    about: dict[str, Any] = {"floor": [floor.x, floor.y, floor.z, floor.offset]}
+    about["settings"] = {name: value for name, value in settings.items() if value != plain[name]}
+    return about
+
+
+def _from_about(about: dict[str, Any]) -> tuple[FloorPlane, MapperSettings]:
+    given = dict(about["settings"])
+    names = {each.name for each in fields(MapperSettings)}
+    if not set(given) <= names:
+        raise ValueError(f"it has settings {sorted(set(given) - names)}; want some of {sorted(names)}")
+    if "floor" in given:
+        given["floor"] = FloorSettings(**given["floor"])
+    return FloorPlane(*map(float, about["floor"])), MapperSettings(**given)

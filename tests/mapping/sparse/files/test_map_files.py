@@ -1,0 +1,242 @@
+"""Maps come back from their files to the stated precision, damaged files are refused."""
+
+import os
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from lidarium.mapping.sparse.files.binary_form import (
+    _HEADER,
+    GraphEdges,
+    binary_content,
+    parsed_binary,
+    read_binary,
+)
+from lidarium.mapping.sparse.files.integer_columns import morton_order, pack_columns, unpack_columns
+from lidarium.mapping.sparse.files.map_files import read_sparse_map, write_sparse_map
+from lidarium.mapping.sparse.files.text_form import parsed_text, read_text_map, text_content
+from lidarium.mapping.sparse.floor_plane import FloorPlane
+from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
+from lidarium.mapping.sparse.sparse_map import SparseMap, free_codes, occupied_codes
+
+COORDINATES = st.floats(-1e4, 1e4, allow_nan=False)
+TRIPLES = arrays(np.float64, st.tuples(st.integers(0, 20), st.just(3)), elements=COORDINATES)
+SETTINGS = MapperSettings(split="both", seed=7, floor=FloorSettings(up_y=-1.0, up_z=0.0))
+
+
+def some_map(count=60, seed=0):
+    rng = np.random.default_rng(seed)
+    low = rng.uniform(-4.0, 4.0, (count, 3))
+    return SparseMap(
+        occupied=occupied_codes(np.stack([low, low + rng.uniform(0.0, 0.6, (count, 3))], axis=1)),
+        ground=free_codes(rng.uniform(-4.0, 4.0, (count // 2, 3)) * [1, 1, 0.01]),
+        floor=FloorPlane(0.6, 0.0, 0.8, 0.3),
+        settings=SETTINGS,
+    )
+
+
+def sorted_rows(values):
+    return values[np.lexsort(values.T)]
+
+
+def outward_steps(box):
+    """Whole centimetres of the smallest box that holds another one, low corner first."""
+    low = [
+        max(step for step in range(round(100 * x) - 2, round(100 * x) + 3) if step / 100 <= x) for x in box[0]
+    ]
+    high = [
+        min(step for step in range(round(100 * x) - 2, round(100 * x) + 3) if step / 100 >= x) for x in box[1]
+    ]
+    return low + high
+
+
+@given(TRIPLES, TRIPLES, TRIPLES)
+def test_binary_boxes_hold_what_they_held_to_a_centimetre(corners, others, free):
+    count = min(len(corners), len(others))
+    boxes = np.sort(np.stack([corners[:count], others[:count]], axis=1), axis=1)
+    before = SparseMap(occupied=occupied_codes(boxes), ground=free_codes(free))
+    after, graph = parsed_binary(binary_content(before))
+    assert graph is None
+    expected = sorted(outward_steps(box) for box in boxes)
+    assert sorted(np.rint(100.0 * box).astype(int).ravel().tolist() for box in after.boxes) == expected
+    np.testing.assert_array_equal(
+        sorted_rows(np.rint(after.free * 100.0)), sorted_rows(np.rint(np.rint(free * 100.0)))
+    )
+    # What was read is written to the same bytes.
+    assert binary_content(after) == binary_content(before)
+
+
+@given(TRIPLES)
+def test_no_point_leaves_its_box(corners):
+    for corner in corners:
+        box = np.stack([corner, corner])[None]
+        after, _ = parsed_binary(
+            binary_content(SparseMap(occupied=occupied_codes(box), ground=free_codes([])))
+        )
+        assert (after.boxes[0, 0] <= corner).all()
+        assert (after.boxes[0, 1] >= corner).all()
+
+
+def test_floor_and_settings_come_back():
+    after, _ = parsed_binary(binary_content(some_map()))
+    assert after.floor == FloorPlane(0.6, 0.0, 0.8, 0.3)
+    assert after.settings == SETTINGS
+
+
+def test_a_graph_comes_back_with_its_edges(tmp_path):
+    rng = np.random.default_rng(1)
+    nodes = np.rint(rng.uniform(0.0, 900.0, (50, 3))) / 100.0
+    edges = np.array([(i, j) for i in range(50) for j in range(i + 1, 50) if rng.random() < 0.1])
+    path = tmp_path / "room.smap"
+    write_sparse_map(path, some_map(), GraphEdges(nodes, edges))
+    _, graph = read_sparse_map(path)
+    assert graph is not None
+
+    def ends(nodes, edges):
+        return {frozenset([tuple(nodes[a].tolist()), tuple(nodes[b].tolist())]) for a, b in edges.tolist()}
+
+    assert ends(graph.nodes, graph.edges) == ends(nodes, edges)
+    with pytest.raises(ValueError, match="edges end at nodes"):
+        write_sparse_map(path, some_map(), GraphEdges(nodes[:10], edges))
+
+
+def test_text_is_as_the_thesis_has_it():
+    boxes = np.array([[[3.0, 0, 0], [3, 0, 0]], [[1.0, 2, 2], [1, 2, 2]], [[0, 0, -3.0], [0, 0, -3]]])
+    found = text_content(SparseMap(occupied=occupied_codes(boxes), ground=free_codes([[0.5, -0.25, 0.0]])))
+    assert found.splitlines() == [
+        "# sparse-map v1 3 1",
+        "3.000000 0.000000 0.000000",
+        "1.000000 2.000000 2.000000",
+        "0.000000 0.000000 -3.000000",
+        "0.500000 -0.250000 0.000000",
+    ]
+
+
+@given(TRIPLES, TRIPLES)
+def test_text_comes_back_to_six_decimals(occupied, free):
+    codes = occupied_codes(np.stack([occupied, occupied], axis=1))
+    after = parsed_text(text_content(SparseMap(occupied=codes, ground=free_codes(free))))
+    for found, expected in ((after.centres, occupied), (after.free, free)):
+        order = np.argsort(np.linalg.norm(expected, axis=1), kind="stable")
+        np.testing.assert_allclose(found, expected[order], atol=5.1e-7, rtol=0.0)
+    np.testing.assert_array_equal(after.boxes[:, 0], after.boxes[:, 1])
+
+
+def test_binary_is_a_third_of_the_thesis_form():
+    known = some_map(400)
+    assert 3 * len(binary_content(known)) < len(text_content(known))
+
+
+def test_names_say_the_form(tmp_path):
+    known = some_map()
+    for name in ("room.txt", "room.smap"):
+        write_sparse_map(tmp_path / name, known)
+        assert len(read_sparse_map(tmp_path / name)[0].occupied) == 60
+    with pytest.raises(ValueError, match=r"want one that ends in \.smap or \.txt"):
+        write_sparse_map(tmp_path / "room.map", known)
+    with pytest.raises(ValueError, match="keeps no graph"):
+        write_sparse_map(tmp_path / "g.txt", known, GraphEdges(np.zeros((1, 3)), np.empty((0, 2), int)))
+    assert sorted(os.listdir(tmp_path)) == ["room.smap", "room.txt"]
+    with pytest.raises(FileNotFoundError, match="there is no file"):
+        read_sparse_map(tmp_path / "none.smap")
+
+
+def test_a_map_that_cannot_be_written_leaves_nothing(tmp_path):
+    far = SparseMap(occupied=occupied_codes(np.full((1, 2, 3), 1e7)), ground=free_codes([]))
+    for name in ("far.smap", "far.txt"):
+        with pytest.raises(ValueError, match="1,000,000 m"):
+            write_sparse_map(tmp_path / name, far)
+    assert os.listdir(tmp_path) == []
+
+
+@given(st.data())
+def test_a_damaged_binary_file_is_refused(data):
+    content = bytearray(binary_content(some_map(10)))
+    if data.draw(st.booleans()):
+        content = content[: data.draw(st.integers(0, len(content) - 1))]
+    else:
+        place = data.draw(st.integers(0, len(content) - 1))
+        content[place] ^= data.draw(st.integers(1, 255))
+    with pytest.raises((ValueError, struct.error)):
+        parsed_binary(bytes(content))
+
+
+def rewritten(content, **changes):
+    """Return a binary form with other fields in its header, the checksum put right."""
+    names = ("magic", "version", "flags", "boxes", "free", "nodes", "edges", "length", "packed", "checksum")
+    fields = dict(zip(names, _HEADER.unpack_from(content), strict=True))
+    body = changes.pop("body", content[_HEADER.size :])
+    fields |= {"packed": len(body), "checksum": zlib.crc32(body)} | changes
+    return _HEADER.pack(*fields.values()) + body
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"version": 2}, "version 2"),
+        ({"boxes": 2**32 - 1}, "cannot hold them"),
+        ({"length": 2**32 - 1, "boxes": 10**8}, "so few bytes cannot hold them"),
+        ({"boxes": 59}, "do not fit its length"),
+        ({"checksum": 1}, "checksum"),
+        ({"packed": 5}, "claims 5 bytes"),
+        ({"length": 5000}, "does not unpack"),
+        ({"body": b"no zlib", "length": 2000}, "header check"),
+    ],
+)
+def test_a_binary_file_that_lies_is_refused_by_its_name(tmp_path, changes, message):
+    path = tmp_path / "lie.smap"
+    path.write_bytes(rewritten(binary_content(some_map()), **changes))
+    with pytest.raises(ValueError, match=message) as caught:
+        read_binary(path)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "it begins with ''"),
+        ("# map v1 0 0\n", "want '# sparse-map v1"),
+        ("# sparse-map v2 0 0\n", "version 'v2'"),
+        ("# sparse-map v1 -1 0\n", "two whole numbers"),
+        ("# sparse-map v1 999999999 1\n1 2 3\n", "cannot hold them"),
+        ("# sparse-map v1 2 0\n1.000000 2.000000 3.000000\n", "claims 2 codes"),
+        ("# sparse-map v1 1 0\n1 2 3\n4 5 6\n", "there are 2 lines"),
+        ("# sparse-map v1 1 0\n1.0 2.0\n", "line 2 is '1.0 2.0'"),
+        ("# sparse-map v1 1 0\n1.0 2.0 x\n", "want three numbers"),
+        ("# sparse-map v1 1 0\n1.0 2.0 nan\n", "within 1,000,000 m"),
+    ],
+)
+def test_a_text_that_is_no_map_is_refused_by_its_name(tmp_path, text, message):
+    path = tmp_path / "map.txt"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message) as caught:
+        read_text_map(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_text_with_the_name_of_a_binary_file_is_refused(tmp_path):
+    path = tmp_path / "map.smap"
+    path.write_text(text_content(some_map()))
+    with pytest.raises(ValueError, match="it begins with"):
+        read_sparse_map(path)
+
+
+@given(
+    arrays(np.int64, st.tuples(st.integers(0, 9), st.integers(1, 6)), elements=st.integers(-(2**30), 2**30))
+)
+def test_columns_come_back(columns):
+    content = pack_columns(columns)
+    assert len(content) == 4 * columns.size
+    np.testing.assert_array_equal(unpack_columns(content, *columns.shape), columns)
+
+
+def test_neighbours_are_near_in_morton_order():
+    places = np.stack(np.meshgrid(*[np.arange(8)] * 3), axis=-1).reshape(-1, 3)
+    ordered = places[morton_order(places)]
+    assert np.abs(np.diff(ordered, axis=0)).sum(axis=1).mean() < 3.0
+    assert sorted(morton_order(places * 10**7).tolist()) == list(range(512))
