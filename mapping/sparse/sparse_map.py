@@ -84,6 +84,10 @@ class FreeCodes:
     def __len__(self) -> int:
         return len(self.centres)
 
+    def taken(self, places: NDArray[np.int64] | NDArray[np.bool_]) -> "FreeCodes":
+        """Return some of the codes."""
+        return FreeCodes(centres=self.centres[places], frames=self.frames[places])
+
     def joined(self, other: "FreeCodes") -> "FreeCodes":
         """Return these codes, then others."""
         return FreeCodes(

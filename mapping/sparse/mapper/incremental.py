@@ -138,7 +138,10 @@ class IncrementalMapper:
         obstacles, on_floor = split_points(cloud, floor, settings)
         obstacles = obstacles[~are_covered(obstacles, known.boxes)]
         on_floor = on_floor[~are_near(on_floor, known.free, settings.merge_radius_m)]
-        ground = known.ground.joined(coded_floor(on_floor, self._counts[1], settings, frame))
+        found = coded_floor(on_floor, self._counts[1], settings, frame)
+        # Of points around a free code the mean may lie on it.
+        found = found.taken(~are_near(found.centres, known.free, settings.merge_radius_m))
+        ground = known.ground.joined(found)
         recorded = known.occupied.joined(coded_obstacles(obstacles, self._counts[0], settings, frame))
         grown = replace(known, occupied=recorded, ground=ground)
         occupied, sources = merged_codes(grown.current, grown.free, settings)

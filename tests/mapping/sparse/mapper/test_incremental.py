@@ -122,3 +122,10 @@ def test_a_frame_that_cannot_be_added_leaves_the_map_as_it_was(points, pose, mes
         mapper.add(points, pose)
     with pytest.raises(ValueError, match="no frame yet"):
         _ = mapper.map
+
+
+def test_free_codes_of_different_frames_keep_apart(grown):
+    found, _, _ = grown
+    gaps = np.linalg.norm(found.free[:, None] - found.free[None], axis=2)
+    of_others = found.ground.frames[:, None] != found.ground.frames[None]
+    assert gaps[of_others].min() > found.settings.merge_radius_m
