@@ -95,7 +95,7 @@ def _checked_boxes(boxes: NDArray[np.float64] | None, whose: str) -> NDArray[np.
 
 
 def _without(codes: OccupiedCodes, box: NDArray[np.float64]) -> OccupiedCodes:
-    """Return codes without what lies in a box (2, 3); a code that reaches out of it becomes up to six."""
+    """Cut a box (2, 3) out of codes; one that reaches out of it becomes up to six."""
     inside = ((codes.boxes[:, 0] < box[1]) & (codes.boxes[:, 1] > box[0])).all(axis=1)
     # A box of no size lies inside where it is not outside.
     flat = (codes.boxes[:, 0] >= box[0]).all(axis=1) & (codes.boxes[:, 1] <= box[1]).all(axis=1)

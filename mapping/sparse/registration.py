@@ -193,7 +193,7 @@ def _pairs(
 
 
 def _solved(pairs: _Pairs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the motion that brings places onto their planes, and how much each direction resists, (6, 6)."""
+    """Return the motion that brings places onto their planes, and its matrix (6, 6)."""
     middle = pairs.weights @ pairs.places
     arms = pairs.places - middle
     size = max(math.sqrt(float(pairs.weights @ np.einsum("ij,ij->i", arms, arms))), 1e-9)

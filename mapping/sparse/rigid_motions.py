@@ -43,7 +43,7 @@ def moved_points(points: NDArray[np.float64], motions: NDArray[np.float64]) -> N
 
 
 def turned(directions: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return directions (N, 3) turned by one motion (4, 4), or each by its own (N, 4, 4)."""
+    """Return directions (N, 3) turned by one motion (4, 4), or by one each."""
     return np.asarray(np.einsum("...ij,...j->...i", motions[..., :3, :3], directions))
 
 

@@ -1,4 +1,4 @@
-"""A sparse map: codes of what is occupied with their boxes, codes of free floor, poses of their frames.
+"""A sparse map: occupied codes with their boxes, free codes, poses of frames.
 
 Codes are kept where they were when their frame was coded. What is asked for is moved by how the pose of the
 frame has been corrected since, so that corrections never add up.

@@ -62,7 +62,7 @@ def codes_of(sparse_map: SparseMap, spacing: float = SPACING_M) -> Codes:
 
 
 def _spread(sparse_map: SparseMap, spacing: float) -> Codes:
-    """Return points on the planes of the occupied codes, within their boxes; a code's weight is shared."""
+    """Spread the occupied codes over their planes, and their weights with them."""
     boxes, centres, normals = sparse_map.boxes, sparse_map.centres, sparse_map.normals
     sizes = boxes[:, 1] - boxes[:, 0]
     facing = np.abs(normals).argmax(axis=1)

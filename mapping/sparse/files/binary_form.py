@@ -1,4 +1,6 @@
-"""Sparse maps as few bytes: boxes in whole centimetres, rounded outward so that no point leaves its box.
+"""Sparse maps as few bytes: boxes in whole centimetres.
+
+They are rounded outward, so that no point leaves its box.
 
 A header (magic, version, counts, length, checksum) and one deflated body: the floor with the settings that
 are not defaults, as JSON; then low corners and sizes of boxes, free codes, nodes of the graph and its
@@ -139,7 +141,7 @@ def parsed_binary(content: bytes) -> tuple[SparseMap, GraphEdges | None]:
 
 
 def _unpacked(content: bytes) -> tuple[list[int], bytes]:
-    """Return the counts of the header and the body, where both are what they claim to be."""
+    """Return the counts of the header, and the body that it claims."""
     if content[: len(MAGIC)] != MAGIC:
         raise ValueError(f"it begins with {content[: len(MAGIC)]!r}; want {MAGIC!r}")
     if len(content) < _HEADER.size:
@@ -177,7 +179,7 @@ def _nearest(points: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _outward(boxes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return low and high corners in steps: never inside the box, as a reader computes them."""
+    """Return low and high corners in steps, as read never inside the box."""
     low, high = _nearest(boxes[:, 0]), _nearest(boxes[:, 1])
     low -= low / STEPS_A_METRE > boxes[:, 0]
     high += high / STEPS_A_METRE < boxes[:, 1]
@@ -185,7 +187,7 @@ def _outward(boxes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.
 
 
 def _ordered_graph(graph: GraphEdges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return nodes in Morton order, in steps, with the edges between their new numbers in order."""
+    """Return nodes in steps in Morton order, with the edges between them."""
     _check_edges(graph.edges, len(graph.nodes))
     nodes = _nearest(graph.nodes)
     order = morton_order(nodes)
@@ -196,7 +198,7 @@ def _ordered_graph(graph: GraphEdges) -> tuple[NDArray[np.int64], NDArray[np.int
 
 
 def _coded_edges(edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return edges, each as the difference of its first node and how far on its second is."""
+    """Return edges as differences of first nodes and distances to second ones."""
     return np.stack([np.diff(edges[:, 0], prepend=0), edges[:, 1] - edges[:, 0]], axis=1)
 
 

@@ -1,6 +1,7 @@
-"""Columns of whole numbers as few bytes: signs in the lowest bit, then byte by byte of a column.
+"""Columns of whole numbers as few bytes.
 
-Small numbers leave their upper bytes zero; those stand together and cost nothing once deflated.
+Signs are in the lowest bit, then comes byte by byte of a column. Small numbers leave their upper bytes
+zero; those stand together and cost nothing once deflated.
 """
 
 import numpy as np

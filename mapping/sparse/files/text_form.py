@@ -109,7 +109,7 @@ def _point(line: str, number: int) -> tuple[float, float, float]:
 
 
 def _by_distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points (N, 3) in order of their distance to the origin; equal ones stay in their order."""
+    """Sort points (N, 3) by their distance to the origin; equal ones stay in order."""
     if not (np.abs(points) <= FARTHEST_M).all():
         raise ValueError(f"a coordinate of the map is not within {FARTHEST_M:,.0f} m; want metres")
     return points[np.argsort(np.linalg.norm(points, axis=1), kind="stable")]

@@ -1,4 +1,4 @@
-"""What is kept of each code's points: the box that holds them, their weight, the normal of their surface."""
+"""What is kept of each code's points: box, weight, normal."""
 
 import numpy as np
 from numpy.typing import NDArray

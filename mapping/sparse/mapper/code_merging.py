@@ -63,7 +63,7 @@ def merged_codes(
 def _common_normals(
     codes: OccupiedCodes, labels: NDArray[np.int64], centres: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the normals of merged codes, zero of those whose codes lie on no common plane."""
+    """Return the normals of merged codes, zero where they share no plane."""
     count = len(centres)
     products = np.einsum("n,ni,nj->nij", codes.weights, codes.normals, codes.normals).reshape(-1, 9)
     sums = np.stack([np.bincount(labels, part, count) for part in products.T], axis=1).reshape(-1, 3, 3)

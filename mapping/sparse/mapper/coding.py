@@ -1,4 +1,4 @@
-"""Codes of weighted points: the one place that says which quantiser the mapper uses.
+"""Codes of weighted points: the one place that says how they are made.
 
 References
 ----------
@@ -51,7 +51,7 @@ def coded(
 def _seeds(
     points: NDArray[np.float64], weights: NDArray[np.float64], count: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Return points drawn one after the other by their squared distance to those drawn before."""
+    """Draw points, each by its squared distance to those drawn before."""
     codes = np.empty((count, 3))
     squares = np.full(len(points), 1.0)
     for place in range(count):

@@ -1,4 +1,4 @@
-"""How much of a box is in no other box, exactly: what one covers is cut off, the rest goes to the next."""
+"""How much of a box is in no other box: what one leaves of it goes to the next."""
 
 from lidarium.mapping.kernels.compilation import Array, kernel
 
@@ -60,7 +60,7 @@ def _share_space(piece: Array, box: Array, slack: float) -> bool:
 
 @kernel(borrowing=True)
 def _cut(pieces: Array, nexts: Array, place: int, box: Array, slack: float, following: int) -> int:
-    """Put what a box leaves of the piece at a place there and behind; return the place behind these."""
+    """Put what a box leaves of a piece in its place and behind; return the next place."""
     low_x, low_y, low_z = pieces[place, 0], pieces[place, 1], pieces[place, 2]
     high_x, high_y, high_z = pieces[place, 3], pieces[place, 4], pieces[place, 5]
     for axis in range(3):

@@ -38,7 +38,7 @@ def _are_covered(index: BoxIndex, points: Array) -> Array:
 
 
 def are_near(points: NDArray[np.float64], nodes: NDArray[np.float64], distance: float) -> NDArray[np.bool_]:
-    """Return which points (N, 3) are within a distance [m] of one of the nodes (M, 3), (N,) bool."""
+    """Return which points (N, 3) are near [m] to one of nodes (M, 3), (N,) bool."""
     if len(nodes) == 0 or len(points) == 0:
         return np.zeros(len(points), np.bool_)
     gaps = cKDTree(nodes).query(points, distance_upper_bound=distance)[0]

@@ -89,7 +89,7 @@ def _best_plane(
 
 
 def _drawn(heights: NDArray[np.float64], trials: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return three points for each trial, (trials, 3): any, or for every other trial of about one height.
+    """Draw three points a trial, (trials, 3), for every other one of about one height.
 
     Where little of a cloud is floor, three points of any height are hardly ever all on it.
     """

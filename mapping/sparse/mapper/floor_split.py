@@ -31,7 +31,7 @@ def is_floor(points: NDArray[np.float64], floor: FloorPlane, settings: MapperSet
 def _hangs_over(
     points: NDArray[np.float64], floor: FloorPlane, settings: MapperSettings
 ) -> NDArray[np.bool_]:
-    """Return which points are too high above the floor to be driven up to: table tops, seats."""
+    """Return which points are too high to be driven up to: table tops, seats."""
     reach = floor.heights(points) - settings.floor_height_m
     aside = points @ floor.levelling()[:2, :3].T
     low = aside[reach <= 0.0]
@@ -43,7 +43,7 @@ def _hangs_over(
 
 
 def surface_normals(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit normals of the surface around each point (N, 3), either way round, (N, 3)."""
+    """Return unit normals around points (N, 3), either way round, (N, 3)."""
     count = min(_NEIGHBOURS, len(points))
     if count < 3:
         return np.zeros(points.shape)

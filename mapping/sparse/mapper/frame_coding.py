@@ -1,4 +1,4 @@
-"""Codes of one cloud: floor and obstacles apart, each code with the box of its points.
+"""Codes of one cloud: floor and obstacles apart, each with its points' box.
 
 References
 ----------
@@ -35,7 +35,7 @@ def code_counts(count: int, floor_share: float) -> tuple[int, int]:
 def between_cuts(
     points: NDArray[np.float64], floor: FloorPlane, settings: MapperSettings
 ) -> NDArray[np.bool_]:
-    """Return which points (N, 3) lie neither below the floor nor above what the robot reaches, (N,) bool."""
+    """Return which points (N, 3) are neither too deep nor too high, (N,) bool."""
     heights = floor.heights(points)
     return np.asarray((heights >= -settings.noise_depth_m) & (heights <= settings.ceiling_m))
 
@@ -85,7 +85,7 @@ def coded_obstacles(
 def coded_floor(
     points: NDArray[np.float64], count: int, settings: MapperSettings, frame: int = 0
 ) -> FreeCodes:
-    """Return at most ``count`` codes of floor points (N, 3) in the map [m], close ones merged."""
+    """Return at most so many codes of floor points (N, 3) [m], close ones merged."""
     if len(points) == 0 or count < 1:
         return free_codes(np.empty((0, 3)), frame)
     voxels = voxels_of(points, settings.voxel_m)
@@ -96,7 +96,7 @@ def coded_floor(
 def coded_as_points(
     points: NDArray[np.float64], count: int, floor: FloorPlane, settings: MapperSettings, frame: int = 0
 ) -> tuple[OccupiedCodes, FreeCodes]:
-    """Return the codes of a cloud as the thesis has them: points, split by their own height.
+    """Return codes as the thesis has them: points, split by their own height.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ class IncrementalMapper:
         return self._map
 
     def is_due(self, pose: NDArray[np.float64]) -> bool:
-        """Whether a frame with this pose (4, 4) is far enough from the last one that was taken."""
+        """Whether a frame with this pose (4, 4) is far from the last one taken."""
         if self._map is None:
             return True
         motion = inverse_of(self._map.poses[-1]) @ checked_poses(pose)
@@ -133,7 +133,7 @@ class IncrementalMapper:
     def _coded_frame(
         self, cloud: NDArray[np.float64], known: SparseMap, floor: FloorPlane
     ) -> tuple[OccupiedCodes, FreeCodes]:
-        """Return the codes of a map, where they were recorded, with those of its last frame."""
+        """Return a map's codes, as recorded, with those of its last frame."""
         settings, frame = self.settings, len(known.poses) - 1
         obstacles, on_floor = split_points(cloud, floor, settings)
         obstacles = obstacles[~are_covered(obstacles, known.boxes)]

@@ -154,7 +154,7 @@ def _last_owners(owners: Array) -> Array:
 
 @kernel(borrowing=True)
 def _may_merge(one: Array, other: Array, slack: float, around: Array) -> bool:
-    """Whether two boxes touch and make up enough of the box around them, which is written to ``around``."""
+    """Write the box around two; return whether they touch and make up enough of it."""
     both = 1.0
     for axis in range(3):
         shared = min(one[axis + 3], other[axis + 3]) - max(one[axis], other[axis]) + 2.0 * slack
@@ -192,9 +192,9 @@ def _gather(
     around: Array,
     beside: Array,
 ) -> int:
-    """Write the boxes that share space with the one around two into ``beside``, these first; return how many.
+    """Write the boxes in the one around two into ``beside``, these two first.
 
-    0 where all of them together are too little to fill it.
+    Return how many there are; 0 where all of them together are too little to fill it.
     """
     _copy(boxes[first], beside[0])
     _copy(boxes[second], beside[1])
@@ -223,7 +223,7 @@ def _gather(
 
 @kernel(borrowing=True)
 def _covers_free(one: Array, other: Array, nodes: Array, around: Array) -> bool:
-    """Whether the box around two boxes lies over a free code over which neither of them lies."""
+    """Whether the box around two lies over a free code over which neither lies."""
     place = _first_from(nodes, around[0])
     while place < nodes.shape[0] and nodes[place, 0] <= around[3]:
         x, y = nodes[place, 0], nodes[place, 1]

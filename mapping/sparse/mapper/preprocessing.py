@@ -1,4 +1,4 @@
-"""Clouds made ready to be coded: what cannot be points goes, the others are gathered in voxels.
+"""Clouds made ready to be coded: points that can be, gathered in voxels.
 
 References
 ----------
