@@ -45,10 +45,10 @@ def split_points(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the points of obstacles and those of the floor, without what is cut off."""
     points = points[between_cuts(points, floor, settings)]
-    voxels = voxels_of(points, settings.voxel_m)
     if settings.split == "height":
         on_floor = is_floor(points, floor, settings)
     else:
+        voxels = voxels_of(points, settings.voxel_m)
         on_floor = is_floor(voxels.means, floor, settings)[voxels.labels]
     return points[~on_floor], points[on_floor]
 

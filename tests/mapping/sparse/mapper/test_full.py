@@ -74,6 +74,12 @@ def test_the_same_seed_gives_the_same_map():
     assert not np.array_equal(first.free, other.free)
 
 
+def test_codes_that_are_not_merged_all_stay(room_map):
+    found = map_cloud(ROOM, 256, MapperSettings(merges=False))
+    assert len(found.occupied) == 179
+    assert len(room_map.occupied) < 60
+
+
 def test_the_thesis_has_codes_as_points_split_by_their_own_height():
     settings = MapperSettings(mode="thesis")
     found = map_cloud(ROOM, 128, settings)
