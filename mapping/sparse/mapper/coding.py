@@ -7,9 +7,9 @@ Sparse mapper, section 3.3: seeds drawn by squared distance, then Lloyd's steps.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-STEPS = 7
+from lidarium.mapping.sparse.quantisation.quantiser import quantise
+from lidarium.mapping.sparse.quantisation.settings import QuantisationSettings
 
 
 def coded(
@@ -35,30 +35,6 @@ def coded(
     (N,) int64
         The code of each point.
     """
-    count = min(count, len(points))
-    codes = _seeds(points, weights, count, np.random.default_rng(seed))
-    for _ in range(STEPS):
-        labels = cKDTree(codes).query(points)[1]
-        masses = np.bincount(labels, weights, count)
-        sums = np.stack([np.bincount(labels, weights * points[:, axis], count) for axis in range(3)], axis=1)
-        held = masses > 0.0
-        codes[held] = sums[held] / masses[held, None]
-    labels = cKDTree(codes).query(points)[1]
-    held, labels = np.unique(labels, return_inverse=True)
-    return codes[held], labels
-
-
-def _seeds(
-    points: NDArray[np.float64], weights: NDArray[np.float64], count: int, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """Draw points, each by its squared distance to those drawn before."""
-    codes = np.empty((count, 3))
-    squares = np.full(len(points), 1.0)
-    for place in range(count):
-        totals = np.cumsum(squares * weights)
-        drawn = np.searchsorted(totals, rng.random() * totals[-1], side="right")
-        codes[place] = points[min(int(drawn), len(points) - 1)]
-        gaps = points - codes[place]
-        own = np.einsum("ij,ij->i", gaps, gaps)
-        squares = own if place == 0 else np.minimum(squares, own)
-    return codes
+    found = quantise(points, min(count, len(points)), QuantisationSettings(seed=seed), weights)
+    held, labels = np.unique(found.labels, return_inverse=True)
+    return found.codes[held], labels
