@@ -51,6 +51,7 @@ from lidarium.scripts.reproduce import Reproduce
 from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
 from lidarium.scripts.slam import Slam
+from lidarium.scripts.sparse import plan, sparse_map
 
 Choice = (
     Annotated[Run, subcommand("run")]
@@ -61,6 +62,8 @@ Choice = (
     | Annotated[Animate, subcommand("animate")]
     | Annotated[Merge, subcommand("merge")]
     | Annotated[Slam, subcommand("slam")]
+    | Annotated[sparse_map.SparseMapping, subcommand("sparse-map")]
+    | Annotated[plan.Plan, subcommand("plan")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -75,6 +78,8 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Animate: animate.execute,
     Merge: merge.execute,
     Slam: slam.execute,
+    sparse_map.SparseMapping: sparse_map.execute,
+    plan.Plan: plan.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,
@@ -85,7 +90,18 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
 }
 
 
-_WITH_KERNELS = (Run, Evaluate, Reproduce, Animate, Merge, Slam, floors.Prepare, Bench)
+_WITH_KERNELS = (
+    Run,
+    Evaluate,
+    Reproduce,
+    Animate,
+    Merge,
+    Slam,
+    sparse_map.SparseMapping,
+    plan.Plan,
+    floors.Prepare,
+    Bench,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -141,7 +141,7 @@ def shade(
     size: tuple[int, int],
     bodies: NDArray[np.float64],
     colours: list[Colour],
-    walls: NDArray[np.bool_],
+    walls: NDArray[np.bool_] | NDArray[np.float64],
 ) -> Frame:
     """Draw faces and bodies in flat colours.
 
@@ -157,8 +157,8 @@ def shade(
         x, y, height of the base, radius and height of upright cylinders [m].
     colours : list of Colour
         Of the bodies.
-    walls : (solids,) bool
-        Which solids are walls; the others are furniture.
+    walls : (solids,) bool or (solids, 3) float64
+        Which solids are walls, the others being furniture; or the colour of each.
 
     Returns
     -------
@@ -189,9 +189,11 @@ def shade(
     return np.asarray(_with_edges(palette[numbers], numbers), np.uint8)
 
 
-def _face_colours(faces: Faces, walls: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _face_colours(faces: Faces, walls: NDArray[np.bool_] | NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the colour of each face (faces, 3): what it belongs to, lit from above on one side."""
-    furniture = np.where(walls[:, None], _WALL, _FURNITURE[np.arange(len(walls)) % len(_FURNITURE)])
+    furniture: NDArray[np.float64] = np.asarray(walls, np.float64)
+    if walls.ndim == 1:
+        furniture = np.where(walls[:, None], _WALL, _FURNITURE[np.arange(len(walls)) % len(_FURNITURE)])
     special = np.array([_COLOURS[owner] for owner in sorted(_COLOURS)])
     # Owners below 0 count from the end.
     base = np.concatenate([furniture, special])[faces.owners]

@@ -65,6 +65,8 @@ def read_depth_image(
 def read_pose(path: Path | str) -> Matrix:
     """Read a rigid motion: a text file of 4 x 4 numbers.
 
+    Files round their numbers: the nearest rotation is taken.
+
     Raises
     ------
     FileNotFoundError, ValueError
@@ -73,6 +75,9 @@ def read_pose(path: Path | str) -> Matrix:
     path = Path(path)
     text = read_text(path, _MOST_POSE_BYTES)
     with reading(path, "a pose of 4 x 4 numbers"):
-        return checked_motion(
+        motion = checked_motion(
             [[float(word) for word in line.split()] for line in text.splitlines() if line.strip()]
         )
+    left, _, right = np.linalg.svd(motion[:3, :3])
+    motion[:3, :3] = left @ right
+    return motion
