@@ -162,7 +162,7 @@ def test_a_policy_explores():
 @pytest.mark.parametrize("backend", ["kinematic", "bullet"])
 def test_a_robot_as_high_as_the_ceiling_is_refused(backend):
     settings = make_settings(robot={"height": 2.6}, backend=backend)
-    with pytest.raises(ValueError, match=r"ceiling at 2\.5 m, the robot is 2\.6 m high; choose a lower"):
+    with pytest.raises(ValueError, match=r"ceiling at 2\.5 m, the robot is 2\.6 m high; want a lower"):
         ExplorationEnv("apartment", settings).reset(seed=0)
 
 
