@@ -136,7 +136,8 @@ class ObservationWriter:
             write_parallel(chosen, sources, observed)
         else:
             write_serial(chosen, sources, observed)
-        self._copy_sensors(arrays, active)
+        if self._sensed:
+            self._copy_sensors(arrays, active)
         return dict(zip(self.keys, arrays, strict=True)) if out is None else out
 
     def copy_sensors(self, out: Mapping[str, NDArray[Any]], active: NDArray[np.bool_]) -> None:
