@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import lidarium
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.generation.furniture import place
 from lidarium.envs.floors.solid import Solid
@@ -181,3 +182,18 @@ def test_a_copy_is_refused():
 
     with pytest.raises(TypeError, match="cannot be copied"):
         copy.deepcopy(placed(hall(), [(4.0, 3.0, 0.0)]))
+
+
+def test_a_robot_that_loses_the_ground_has_fallen():
+    env = lidarium.parallel_env("apartment", backend="bullet", robots=1)
+    env.reset(seed=0)
+    bodies = env.world.bodies_of(0)
+    bodies.client.call("removeBody", bodies._ground)
+    reasons = set()
+    for _ in range(5):
+        if env.agents:
+            *_, infos = env.step({"robot_0": np.zeros(2, np.float32)})
+            reasons |= {info["ended_because"] for info in infos.values() if "ended_because" in info}
+    assert env.world.attitudes[0, 0] < -0.05
+    assert reasons == {"failed"}
+    env.close()
