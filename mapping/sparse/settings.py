@@ -76,8 +76,8 @@ class MapperSettings:
     floor_share : float
         Share of the codes that goes to the floor.
     merges : bool
-        Whether boxes are merged. Codes that are to be registered are not: a merged one says less of its
-        surface.
+        Whether boxes that are mostly empty are cut, and boxes merged. Codes that are to be registered are
+        not: a merged one says less of its surface.
     slack_m : float
         Boxes merge where their union adds nothing that is farther from them than this [m].
     most_boxes : int

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import above, check_settings, within
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.sparse.graph.node_grid import NodeGrid, grid_of_nodes, nearest_nodes
-from lidarium.mapping.sparse.graph.nodes import reduced_nodes, standing_nodes
+from lidarium.mapping.sparse.graph.nodes import reduced_nodes
+from lidarium.mapping.sparse.graph.retraction import nodes_with_room
 from lidarium.mapping.sparse.swept_body import BoxIndex, SweptBody, are_free, index_boxes
 
 
@@ -116,9 +117,7 @@ def build_graph(
         raise ValueError("the map has no free nodes; want a cloud with floor in it, or another floor height")
     index = index_boxes(occupied)
     nodes = reduced_nodes(free, settings.merge_radius)
-    standing = standing_nodes(nodes, index, body)
-    # A mean of nodes may stand in the way where one of its nodes does not.
-    nodes = nodes[standing]
+    nodes = nodes_with_room(nodes, index, body, settings.merge_radius)
     if len(nodes) == 0:
         raise ValueError(
             f"a body of radius {body.radius} m and height {body.height} m can stand at none of {len(free)} "

@@ -37,6 +37,15 @@ def masses_of(labels: NDArray[np.int64], weights: NDArray[np.float64], count: in
     return np.asarray(np.bincount(labels, weights, count), np.float64)
 
 
+def means_of(
+    points: NDArray[np.float64], weights: NDArray[np.float64], labels: NDArray[np.int64], count: int
+) -> NDArray[np.float64]:
+    """Return the weighted means of each code's points (N, 3), (count, 3)."""
+    masses = np.maximum(np.bincount(labels, weights, count), 1e-12)
+    sums = np.stack([np.bincount(labels, weights * points[:, axis], count) for axis in range(3)], axis=1)
+    return np.asarray(sums / masses[:, None])
+
+
 def normals_of(
     points: NDArray[np.float64], weights: NDArray[np.float64], labels: NDArray[np.int64], count: int
 ) -> NDArray[np.float64]:
@@ -59,8 +68,7 @@ def normals_of(
         Unit normals, their largest part above zero; zero where the points are no surface.
     """
     masses = np.maximum(np.bincount(labels, weights, count), 1e-12)
-    means = np.stack([np.bincount(labels, weights * points[:, axis], count) for axis in range(3)], axis=1)
-    gaps = points - (means / masses[:, None])[labels]
+    gaps = points - means_of(points, weights, labels, count)[labels]
     spreads = np.empty((count, 3, 3))
     for row in range(3):
         for column in range(3):

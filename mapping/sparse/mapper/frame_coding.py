@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.sparse.floor_plane import FloorPlane
 from lidarium.mapping.sparse.graph.nodes import reduced_nodes
-from lidarium.mapping.sparse.mapper.code_boxes import boxes_of, masses_of, normals_of
+from lidarium.mapping.sparse.mapper.code_boxes import boxes_of, masses_of, means_of, normals_of
+from lidarium.mapping.sparse.mapper.code_cutting import cut_labels
 from lidarium.mapping.sparse.mapper.coding import coded
 from lidarium.mapping.sparse.mapper.floor_split import is_floor
-from lidarium.mapping.sparse.mapper.preprocessing import voxels_of
+from lidarium.mapping.sparse.mapper.preprocessing import Voxels, voxels_of
 from lidarium.mapping.sparse.settings import MapperSettings
 from lidarium.mapping.sparse.sparse_map import FreeCodes, OccupiedCodes, free_codes, occupied_codes
 
@@ -63,7 +64,7 @@ def coded_obstacles(
     points : (N, 3) float64
         Points in the map [m].
     count : int
-        How many codes, at most.
+        How many codes, at most, before those whose boxes are mostly empty are cut.
     settings : MapperSettings
         How.
     frame : int
@@ -71,14 +72,31 @@ def coded_obstacles(
     """
     if len(points) == 0 or count < 1:
         return occupied_codes(np.empty((0, 2, 3)), frame)
+    voxels, labels = labelled_voxels(points, count, settings, frame)
+    if settings.merges:
+        labels = cut_labels(voxels.means, labels, settings.voxel_m)
+    return codes_of_labels(points, voxels, labels, frame)
+
+
+def labelled_voxels(
+    points: NDArray[np.float64], count: int, settings: MapperSettings, frame: int
+) -> tuple[Voxels, NDArray[np.int64]]:
+    """Return the voxels of points (N, 3) and the code of each, of at most ``count`` codes."""
     voxels = voxels_of(points, settings.voxel_m)
-    centres, labels = coded(voxels.means, voxels.weights, count, settings.seed + frame)
+    return voxels, coded(voxels.means, voxels.weights, count, settings.seed + frame)[1]
+
+
+def codes_of_labels(
+    points: NDArray[np.float64], voxels: Voxels, labels: NDArray[np.int64], frame: int
+) -> OccupiedCodes:
+    """Return the codes of points (N, 3) whose voxels have labels (V,) from 0."""
+    number = int(labels.max()) + 1
     return OccupiedCodes(
-        boxes=boxes_of(points, labels[voxels.labels], len(centres)),
-        centres=centres,
-        weights=masses_of(labels, voxels.weights, len(centres)),
-        normals=normals_of(voxels.means, voxels.weights, labels, len(centres)),
-        frames=np.full(len(centres), frame, np.int64),
+        boxes=boxes_of(points, labels[voxels.labels], number),
+        centres=means_of(voxels.means, voxels.weights, labels, number),
+        weights=masses_of(labels, voxels.weights, number),
+        normals=normals_of(voxels.means, voxels.weights, labels, number),
+        frames=np.full(number, frame, np.int64),
     )
 
 

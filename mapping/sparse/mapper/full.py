@@ -9,19 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.sparse.floor_plane import FloorPlane
+from lidarium.mapping.sparse.mapper.code_cutting import cut_labels
 from lidarium.mapping.sparse.mapper.code_merging import merged_codes
 from lidarium.mapping.sparse.mapper.floor_search import find_floor
 from lidarium.mapping.sparse.mapper.frame_coding import (
     code_counts,
     coded_as_points,
     coded_floor,
-    coded_obstacles,
+    codes_of_labels,
+    labelled_voxels,
     split_points,
 )
 from lidarium.mapping.sparse.mapper.preprocessing import usable_points, voxels_of
 from lidarium.mapping.sparse.rigid_motions import checked_poses, moved_points
 from lidarium.mapping.sparse.settings import MapperSettings
-from lidarium.mapping.sparse.sparse_map import SparseMap
+from lidarium.mapping.sparse.sparse_map import OccupiedCodes, SparseMap, occupied_codes
 
 
 def map_cloud(
@@ -69,8 +71,7 @@ def map_cloud(
     else:
         obstacles, ground_points = split_points(cloud, floor, settings)
         ground = coded_floor(ground_points, on_floor, settings)
-        occupied = coded_obstacles(obstacles, on_obstacles, settings)
-        occupied, _ = merged_codes(occupied, ground.centres, settings)
+        occupied = _merged_obstacles(obstacles, on_obstacles, ground.centres, settings)
     return SparseMap(
         occupied=occupied,
         ground=ground,
@@ -79,3 +80,21 @@ def map_cloud(
         floor=floor,
         settings=settings,
     )
+
+
+def _merged_obstacles(
+    points: NDArray[np.float64], count: int, free: NDArray[np.float64], settings: MapperSettings
+) -> OccupiedCodes:
+    """Return at most so many codes of obstacles: those that merging saves go to boxes that are cut."""
+    if len(points) == 0:
+        return occupied_codes(np.empty((0, 2, 3)))
+    voxels, labels = labelled_voxels(points, count, settings, 0)
+    merged, _ = merged_codes(codes_of_labels(points, voxels, labels, 0), free, settings)
+    cuts = count - len(merged)
+    while settings.merges and cuts > 0:
+        pieces = cut_labels(voxels.means, labels, settings.voxel_m, cuts)
+        cut, _ = merged_codes(codes_of_labels(points, voxels, pieces, 0), free, settings)
+        if len(cut) <= count:
+            return cut
+        cuts //= 2
+    return merged

@@ -39,10 +39,11 @@ TREE_WORLDS = (
     "srt_cluttered",
     "srt_cluttered_reachable",
 )
-TEAM_FLOORS = ("apartment", "clinic", "open_apartment", *SCENES)
+LABORATORIES = ("robotics_laboratory", "signal_laboratory")
+TEAM_FLOORS = ("apartment", "clinic", "home_arena", "open_apartment", *LABORATORIES, *SCENES)
 
 
-def test_the_catalogue_holds_two_apartments_the_clinic_six_scenes_and_six_worlds_with_goals():
+def test_the_catalogue_holds_six_furnished_floors_six_scenes_and_six_worlds_with_goals():
     assert set(floor_names()) == {*TEAM_FLOORS, *TREE_WORLDS}
     assert all(about_floor(name).endswith(".") for name in floor_names())
 
