@@ -63,6 +63,11 @@ STUDIES.register(
     "SLAM on recorded laser logs and on a simulated robot: errors and times",
 )
 STUDIES.register(
+    "sparse",
+    f"{_PACKAGE}.sparse.study:STUDY",
+    "sparse 3D maps of furnished places: quantisation, paths beside grids, memory",
+)
+STUDIES.register(
     "splines",
     f"{_PACKAGE}.splines:STUDY",
     "maps of walls as B-splines and localization on them",

@@ -8,6 +8,7 @@ from scipy import ndimage
 
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
+from lidarium.evaluation.metrics.paths import points_along
 from lidarium.mapping.sparse.swept_body import SweptBody
 
 PLACES = ("robotics_laboratory", "signal_laboratory", "home_arena", "apartment")
@@ -79,11 +80,3 @@ def load_place(name: str) -> Place:
 def requests_of(place: Place) -> NDArray[np.float64]:
     """Return starts and goals, (REQUESTS, 2, 2) [m]."""
     return place.drawn_points(BODY.radius + CLEAR_M, 2 * REQUESTS, seed=0).reshape(-1, 2, 2)
-
-
-def points_along(path: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    """Return points of a path (P, D) at equal arc lengths of at most ``step``, its ends among them [m]."""
-    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    count = max(int(np.ceil(lengths[-1] / step)), 1)
-    places = np.linspace(0.0, lengths[-1], count + 1)
-    return np.stack([np.interp(places, lengths, column) for column in path.T], axis=1)

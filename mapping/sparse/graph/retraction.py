@@ -71,7 +71,7 @@ def nodes_with_room(
         return found
     pairs = cKDTree(found).query_pairs(merge_radius, output_type="ndarray")
     pairs = pairs[np.argsort(pairs[:, 1], kind="stable")]
-    return found[_are_kept(len(found), own, pairs)]
+    return np.asarray(found[_are_kept(len(found), own, pairs)])
 
 
 @kernel

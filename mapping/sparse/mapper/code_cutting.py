@@ -9,6 +9,8 @@ I. Wald, "On fast construction of SAH-based bounding volume hierarchies", Sympos
 2007: planes between bins of points.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -115,7 +117,7 @@ def _best_plane(points: Array, members: Array, pad: float, bounds: Array) -> tup
 
 
 @kernel(borrowing=True)
-def _room_of(bounds: Array, pad: float, around: Array) -> float:
+def _room_of(bounds: Array, pad: float, around: Array) -> Any:  # noqa: ANN401
     """Return the volume of the box around boxes (B, 6) [m3]; that box is written as well."""
     _begin(around)
     for slot in range(bounds.shape[0]):
@@ -139,10 +141,10 @@ def _widen(box: Array, low: Array, high: Array) -> None:
 
 
 @kernel(borrowing=True)
-def _room(box: Array, pad: float) -> float:
+def _room(box: Array, pad: float) -> Any:  # noqa: ANN401
     if box[0] > box[3]:
         return 0.0
-    return float((box[3] - box[0] + pad) * (box[4] - box[1] + pad) * (box[5] - box[2] + pad))
+    return (box[3] - box[0] + pad) * (box[4] - box[1] + pad) * (box[5] - box[2] + pad)
 
 
 @kernel(borrowing=True)

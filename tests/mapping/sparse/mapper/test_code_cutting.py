@@ -88,6 +88,7 @@ def test_pieces_lie_within_codes_and_take_less_room(cells, codes, random):
 def test_a_whole_cloud_has_no_more_boxes_than_codes(codes):
     floor = np.stack(np.meshgrid(np.arange(0.0, 4.0, 0.05), np.arange(0.0, 4.0, 0.05)), axis=-1)
     ground = np.concatenate([floor.reshape(-1, 2), np.zeros((floor.size // 2, 1))], axis=1)
-    walls = np.concatenate([corner(x) + [0.0, y, 0.15] for x in (0.2, 1.6, 3.0) for y in (0.3, 2.0)])
+    places = [np.array([0.0, y, 0.15]) for y in (0.3, 2.0)]
+    walls = np.concatenate([corner(x) + place for x in (0.2, 1.6, 3.0) for place in places])
     found = map_cloud(np.concatenate([ground, walls]), codes, MapperSettings())
     assert len(found.occupied) + len(found.ground) <= codes

@@ -1,0 +1,148 @@
+"""Sparse maps as in the thesis's three experiments: quantisation, paths, memory."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lidarium.benchmarks.speed.harness.report import about, heading
+from lidarium.benchmarks.studies.shared.kept import Progress, kept_lines
+from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.sparse import paths, quantisation
+from lidarium.benchmarks.studies.sparse.figures import figure_table
+from lidarium.benchmarks.studies.sparse.pictures import draw_errors, draw_paths
+from lidarium.benchmarks.studies.sparse.places import CELL_M, CLEAR_M, REQUESTS
+from lidarium.benchmarks.studies.sparse.survey import SPACING_M, TURNS
+from lidarium.benchmarks.studies.sparse.tables import (
+    MEASURES,
+    error_table,
+    failure_table,
+    measure_table,
+    memory_table,
+    node_table,
+    thesis_error_table,
+    thesis_failure_table,
+)
+
+ERRORS_PICTURE, PATHS_PICTURE = "sparse_errors.png", "sparse_paths.png"
+
+PAGE = """{heading}
+
+Four furnished places: two laboratories, an arena and a flat, each with furniture on legs. A robot of
+0.30 m and 1.2 m stops every {spacing} m and takes {turns} frames of 320 x 240 round about, with its
+camera 1 m above the floor, looking down by 26 degrees, and exact poses. *Incremental*: at most 256 codes
+a frame. *Full*: 2,048 codes of a sixteenth of all pixels. *Thesis's form*: codes as points, 32 a frame
+and as many frames as the thesis has, edges as cylinders, no shortcuts, its parameters of each place.
+*Grid*: an OctoMap of 5 cm made by the octomap library of the same frames, projected and inflated by 0.30
+m, with A* that keeps off obstacles. *Laser*: the grid of a planar laser at 0.30 m that knows every cell
+of its plane.
+
+{requests} requests a place, both ends {clear:.0f} cm clear of what they could touch. A path collides
+where the robot's circle reaches more than one cell of a raster of {cell:.0f} cm into what stands there.
+The optimum is the shortest path of a circle among the solids themselves, by a graph of corners.
+
+## Figures
+
+{figures}
+
+With the noise of an Xtion in its frames, of {requests} requests each: {noisy}. Noise of 2 cm at 3 m widens the
+boxes, so narrow places close; what is answered still does not collide.
+
+Table tops and seats: of places that only they take up, and no laser's plane shows, the inflated grid of the
+laser lets a robot stand at {laser}.
+
+## Paths
+
+Means and standard deviations over the requests that both the grid and the sparse map answer. Turning and
+dispersion are taken at points of 5 cm along the path; in the thesis's form at its own points, as the thesis
+does. The printed figures are of other places: their relations can be compared, their sizes cannot.
+
+{measures}
+
+![Paths over the straight distance of their ends]({paths_picture})
+
+### Requests without a path, and paths that collide
+
+{failures}
+
+{thesis_failures}
+
+## Codes and graphs
+
+{nodes}
+
+## Memory
+
+Kilobytes on disk, *deflated* by zlib. Sparse maps are deflated in themselves, without their graphs.
+
+{memory}
+
+## Quantisation
+
+Mean distance of points to their codes [m], then median times [ms] on one core; 7 of Lloyd's steps, 10 seeds,
+LBG once. {clouds} clouds: frames of a kitchen (7-Scenes), an office and table tops (Point Cloud Library),
+whole places (kitchen, Open3D's living room, two laser scans of a room, OctoMap's building and stairs), and
+simulated frames of the apartment.
+
+{errors}
+
+What the thesis prints, with other clouds and another unit of depth, so that only ratios compare; K-means++
+there labels on a GPU:
+
+{thesis_errors}
+
+![Errors and times over the number of codes]({errors_picture})
+"""
+
+
+def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress:
+    """Measure every N-th place and cloud in this process, as times are taken."""
+    yield from paths.work(folder, every)
+    yield from quantisation.work(folder, data, every)
+
+
+def page(folder: Path, command: str) -> str:
+    """Return the results as markdown."""
+    lines = kept_lines(folder / paths.PATHS_FILE)
+    clouds = kept_lines(folder / quantisation.QUANTISATION_FILE)
+    measures = (
+        f"### {title}\n\n{measure_table(lines, name, column, digits, unit)}"
+        for name, title, column, digits, unit in MEASURES
+    )
+    return PAGE.format(
+        heading="\n".join(heading("Sparse maps", about(command))).rstrip(),
+        spacing=SPACING_M,
+        turns=TURNS,
+        requests=f"{REQUESTS:,}",
+        clear=100.0 * CLEAR_M,
+        cell=100.0 * CELL_M,
+        figures=figure_table(lines),
+        noisy=_noisy(lines),
+        laser=", ".join(f"{100.0 * (1.0 - line['tops']['laser']):.1f} % ({line['place']})" for line in lines),
+        measures="\n\n".join(measures),
+        failures=failure_table(lines),
+        thesis_failures=thesis_failure_table(lines),
+        nodes=node_table(lines),
+        memory=memory_table(lines),
+        clouds=len(clouds),
+        errors=error_table(clouds),
+        thesis_errors=thesis_error_table(),
+        paths_picture=PATHS_PICTURE,
+        errors_picture=ERRORS_PICTURE,
+    )
+
+
+def _noisy(lines: Sequence[Mapping[str, Any]]) -> str:
+    answered = [line["noisy"]["answered"] for line in lines]
+    collide = int(np.sum([line["noisy"]["collide"] for line in lines]))
+    return f"{', '.join(map(str, answered))} are answered, and {collide} paths collide"
+
+
+def pictures(folder: Path, images: Path) -> None:
+    """Draw the page's pictures."""
+    draw_paths(images / PATHS_PICTURE, kept_lines(folder / paths.PATHS_FILE))
+    draw_errors(images / ERRORS_PICTURE, kept_lines(folder / quantisation.QUANTISATION_FILE))
+
+
+STUDY = Study(page, work=work, pictures=pictures)
