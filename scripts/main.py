@@ -51,7 +51,7 @@ from lidarium.scripts.reproduce import Reproduce
 from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
 from lidarium.scripts.slam import Slam
-from lidarium.scripts.sparse import plan, sparse_map
+from lidarium.scripts.sparse import edit_map, plan, sparse_map
 
 Choice = (
     Annotated[Run, subcommand("run")]
@@ -63,6 +63,7 @@ Choice = (
     | Annotated[Merge, subcommand("merge")]
     | Annotated[Slam, subcommand("slam")]
     | Annotated[sparse_map.SparseMapping, subcommand("sparse-map")]
+    | Annotated[edit_map.EditSparseMap, subcommand("sparse-map-edit")]
     | Annotated[plan.Plan, subcommand("plan")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
@@ -79,6 +80,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Merge: merge.execute,
     Slam: slam.execute,
     sparse_map.SparseMapping: sparse_map.execute,
+    edit_map.EditSparseMap: edit_map.execute,
     plan.Plan: plan.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
@@ -89,6 +91,8 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     Show: show.execute,
 }
 
+_IN_TWO_WORDS = {("sparse-map", "edit"): "sparse-map-edit"}
+"""Commands in two words, the first of which is a command of its own that takes files."""
 
 _WITH_KERNELS = (
     Run,
@@ -98,6 +102,7 @@ _WITH_KERNELS = (
     Merge,
     Slam,
     sparse_map.SparseMapping,
+    edit_map.EditSparseMap,
     plan.Plan,
     floors.Prepare,
     Bench,
@@ -164,12 +169,13 @@ def _ended(arguments: Sequence[str] | None) -> int:
 def _command(arguments: Sequence[str] | None) -> Command:
     import tyro
 
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if tuple(words[:2]) in _IN_TWO_WORDS:
+        words[:2] = [_IN_TWO_WORDS[words[0], words[1]]]
     config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
     description = "Teams of lidar robots explore unknown floors. Begin with `lidarium run`."
     try:
-        chosen: Any = tyro.cli(
-            Choice, prog="lidarium", description=description, args=arguments, config=config
-        )
+        chosen: Any = tyro.cli(Choice, prog="lidarium", description=description, args=words, config=config)
     except BrokenPipeError as error:  # nobody reads the help to its end
         silence(sys.stdout)
         raise SystemExit(DONE) from error

@@ -25,7 +25,12 @@ from lidarium.benchmarks.speed.cases import (
     ray_casting,
     waypoint_decision,
 )
-from lidarium.benchmarks.speed.cases.three_dimensions import bullet_world, depth_image, quantisation
+from lidarium.benchmarks.speed.cases.three_dimensions import (
+    bullet_world,
+    depth_image,
+    quantisation,
+    sparse_planning,
+)
 from lidarium.benchmarks.speed.harness.lines import Line, table
 from lidarium.benchmarks.speed.harness.report import speed_result, with_effort, write_speed
 from lidarium.benchmarks.speed.harness.timing import EFFORTS, Effort, on_cores
@@ -45,6 +50,7 @@ _MODULES: tuple[ModuleType, ...] = (
     cached_start,
     depth_image,
     quantisation,
+    sparse_planning,
 )
 
 QUESTIONS: dict[str, Any] = {module.__name__.split(".")[-1]: module for module in _MODULES}

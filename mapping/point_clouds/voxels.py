@@ -45,7 +45,7 @@ def thinned(cloud: PointCloud, edge: float) -> PointCloud:
         )
     cells = places.astype(np.int64) + MOST_CELLS
     keys = cells[:, 0] | cells[:, 1] << 21 | cells[:, 2] << 42
-    labels, count = _numbered(keys)
+    labels, count = numbered(keys)
     weights = np.ones(len(cloud)) if cloud.weights is None else cloud.weights.astype(np.float64)
     masses = np.bincount(labels, weights, count)
     points = _sums(cloud.points, labels, weights, count) / masses[:, None]
@@ -63,8 +63,8 @@ def _sums(values: Array, labels: Array, weights: Array, count: int) -> Array:
 
 
 @kernel
-def _numbered(keys: Array) -> tuple[Array, int]:
-    """Return numbers of keys in the order of their first, and how many there are."""
+def numbered(keys: Array) -> tuple[Array, int]:
+    """Return numbers of keys (N,) int64 in the order of their first, (N,), and how many there are."""
     size = 2
     while size < 2 * len(keys):
         size *= 2

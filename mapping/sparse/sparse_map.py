@@ -18,6 +18,13 @@ from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, mov
 from lidarium.mapping.sparse.settings import MapperSettings
 
 
+FLAT_SHARE = 0.25
+"""Shortest side of a box over the next one, below which it is a surface."""
+
+SQUARE_M2 = 0.05**2
+"""Part of a face for which a box of which no points are known has a weight of one [m2]."""
+
+
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class OccupiedCodes:
     """Codes of what stands there.
@@ -97,16 +104,23 @@ class FreeCodes:
 
 
 def occupied_codes(boxes: NDArray[np.float64], frame: int = 0) -> OccupiedCodes:
-    """Return codes of which nothing but the boxes (M, 2, 3) [m] is known."""
+    """Return codes of which nothing but the boxes (M, 2, 3) [m] is known.
+
+    Flat boxes are surfaces that face along their shortest side; the weight of a box is its largest face in
+    squares of 5 cm, so that maps from files can be registered.
+    """
     flat = np.ascontiguousarray(boxes, np.float64).reshape(-1, 2, 3)
     if not (np.isfinite(flat).all() and (flat[:, 0] <= flat[:, 1]).all()):
         raise ValueError("boxes are not low and high corners; want finite ones, low before high")
     count = len(flat)
+    sizes = flat[:, 1] - flat[:, 0]
+    ranked = np.sort(sizes, axis=1)
+    normals = np.eye(3)[sizes.argmin(axis=1)] * (ranked[:, 0] < FLAT_SHARE * ranked[:, 1])[:, None]
     return OccupiedCodes(
         boxes=flat,
         centres=flat.mean(axis=1),
-        weights=np.ones(count),
-        normals=np.zeros((count, 3)),
+        weights=np.maximum(ranked[:, 1] * ranked[:, 2] / SQUARE_M2, 1.0),
+        normals=normals,
         frames=np.full(count, frame, np.int64),
     )
 

@@ -4,6 +4,8 @@ The thesis's baseline, section 8: an OctoMap without floor and ceiling, projecte
 the robot's radius, on which A* finds paths that keep off obstacles.
 """
 
+import importlib
+import importlib.util
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,12 +94,19 @@ class TreeSizes:
 
 
 class OctoMap:
-    """An OctoMap of frames, made by the octomap library."""
+    """An OctoMap of frames, made by the octomap library.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        Where that library is not installed.
+    """
 
     def __init__(self) -> None:
-        import octomap
-
-        self._tree: Any = octomap.OcTree(RESOLUTION_M)
+        if importlib.util.find_spec("octomap") is None:
+            raise ModuleNotFoundError("the library octomap is missing; want pip install 'lidarium[bench]'")
+        library: Any = importlib.import_module("octomap")
+        self._tree: Any = library.OcTree(RESOLUTION_M)
 
     def add(self, frame: Frame) -> None:
         """Insert the rays of a frame, one for each voxel that it meets."""

@@ -4,6 +4,8 @@ Solids at the body's heights are grown by its radius. The shortest path between 
 of what has grown alone (Lozano-Perez and Wesley, CACM 22, 1979).
 """
 
+from typing import Any
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -76,6 +78,8 @@ class ShortestPaths:
             columns = np.concatenate([self._second, nodes[seen]])
             gaps = np.linalg.norm(np.repeat(ends, count, axis=0) - np.tile(corners, (2, 1)), axis=1)[seen]
             weights = np.concatenate([self._gaps, np.maximum(gaps, 1e-12)])
+            shortest: Any = dijkstra
             graph = csr_array((weights, (rows, columns)), shape=(count + 2, count + 2))
-            found[k] = min(direct, dijkstra(graph, directed=False, indices=count)[count + 1])
+            gone = shortest(graph, directed=False, indices=count)
+            found[k] = min(direct, gone[count + 1])
         return found

@@ -46,8 +46,8 @@ The optimum is the shortest path of a circle among the solids themselves, by a g
 
 {figures}
 
-With the noise of an Xtion in its frames, of {requests} requests each: {noisy}. Noise of 2 cm at 3 m widens the
-boxes, so narrow places close; what is answered still does not collide.
+With the noise of an Xtion in its frames, of {requests} requests each: {noisy}. Noise of 2 cm at 3 m
+widens the boxes, so narrow places close; what is answered still does not collide.
 
 Table tops and seats: of places that only they take up, and no laser's plane shows, the inflated grid of the
 laser lets a robot stand at {laser}.

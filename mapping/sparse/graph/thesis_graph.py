@@ -23,7 +23,15 @@ from lidarium.mapping.sparse.graph.topological_graph import (
     candidate_pairs,
     edge_weights,
 )
+from lidarium.mapping.sparse.graph.voxel_index import KdTreeIndex, VoxelIndex
 from lidarium.mapping.sparse.swept_body import SweptBody, cylinder_holds, index_boxes
+
+SUPPORTS: dict[str, type[VoxelIndex] | type[KdTreeIndex] | None] = {
+    "voxels": VoxelIndex,
+    "kd_tree": KdTreeIndex,
+    "none": None,
+}
+"""What finds the points beside an edge, by name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +50,9 @@ class ThesisGraphSettings:
         Nearest nodes to which edges are tried.
     longest_edge : float or None
         Longest edge [m]; None for three times the median distance of nearest nodes, at least 1 m.
+    support : str
+        What finds the points beside an edge: ``voxels``, a ``kd_tree``, or ``none`` to test all. The graph is
+        the same.
     """
 
     merge_radius: Annotated[float, within(0.0, 10.0)] = 0.15
@@ -50,9 +61,14 @@ class ThesisGraphSettings:
     connection_radius: Annotated[float, above(0.0, 10.0)] = 0.3
     neighbours: Annotated[int, within(1, 64)] = 6
     longest_edge: Annotated[float, above(0.0, 1000.0)] | None = None
+    support: str = "voxels"
 
     def __post_init__(self) -> None:
         check_settings(self, "the thesis's graph")
+        if self.support not in SUPPORTS:
+            raise ValueError(
+                f"support of the thesis's graph is {self.support!r}; want one of {', '.join(SUPPORTS)}"
+            )
 
 
 def build_thesis_graph(
@@ -86,10 +102,29 @@ def build_thesis_graph(
     grid = grid_of_nodes(nodes)
     pairs = candidate_pairs(grid, settings.neighbours, settings.longest_edge)
     starts, ends = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
-    open_pairs = pairs[_free_cylinders(starts, ends, points, settings.connection_radius)]
+    open_pairs = pairs[_are_open(starts, ends, points, settings)]
     weights = edge_weights(nodes, open_pairs, index, body, GraphSettings())
     starts, ends, listed = adjacency(len(nodes), open_pairs, weights)
     return TopologicalGraph(grid, starts, ends, listed, index, body)
+
+
+def _are_open(
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    points: NDArray[np.float64],
+    settings: ThesisGraphSettings,
+) -> NDArray[np.bool_]:
+    """Return which edges (P, 3) to (P, 3) have a cylinder without points (M, 3), (P,) bool."""
+    make, radius = SUPPORTS[settings.support], settings.connection_radius
+    if make is None or len(points) == 0:
+        return np.asarray(_free_cylinders(starts, ends, points, radius))
+    index, found = make(points), np.ones(len(starts), np.bool_)
+    for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        # A ball around the cylinder holds all that can be in it.
+        reach = float(np.hypot(0.5 * np.linalg.norm(end - start), radius)) + 1e-9
+        near = index.within(0.5 * (start + end), reach)
+        found[k] = len(near) == 0 or not cylinder_holds(start, end, points[near], radius).any()
+    return found
 
 
 @kernel

@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from lidarium.mapping.geometry.bounds import shown
 
@@ -55,6 +56,13 @@ class VoxelIndex:
     def _places(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.asarray(cells @ np.array([1, self.shape[0], self.shape[0] * self.shape[1]]))
 
+    def _members(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the points in cells (C, 3), in their order."""
+        places = self._places(cells)
+        firsts, lasts = (np.searchsorted(self._sorted, places, side) for side in ("left", "right"))
+        found = [self._order[first:last] for first, last in zip(firsts, lasts, strict=True)]
+        return np.sort(np.concatenate(found)) if found else np.zeros(0, np.int64)
+
     def voxel(self, point: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the voxel (3,) in which a point lies; it may lie beyond all of them."""
         place = (np.asarray(point, np.float64) - self._low) / self.size
@@ -83,7 +91,33 @@ class VoxelIndex:
         if neighbours not in NEIGHBOURHOODS:
             raise ValueError(f"neighbours is {neighbours}; want one of {', '.join(map(str, NEIGHBOURHOODS))}")
         cells = np.unique(np.vstack([NEIGHBOURHOODS[neighbours], (0, 0, 0)]), axis=0) + self.voxel(point)
-        places = self._places(cells[((cells >= 0) & (cells < self.shape)).all(axis=1)])
-        firsts, lasts = (np.searchsorted(self._sorted, places, side) for side in ("left", "right"))
-        found = [self._order[first:last] for first, last in zip(firsts, lasts, strict=True)]
-        return np.sort(np.concatenate(found)) if found else np.zeros(0, np.int64)
+        return self._members(cells[((cells >= 0) & (cells < self.shape)).all(axis=1)])
+
+    def within(self, point: NDArray[np.float64], radius: float) -> NDArray[np.int64]:
+        """Return the points at most so far [m] from a place (3,), in their order, (M,) int64."""
+        low = np.maximum(self.voxel(point - radius), 0)
+        high = np.minimum(self.voxel(point + radius), self.shape - 1)
+        if (low > high).any():
+            return np.zeros(0, np.int64)
+        spans = [np.arange(first, last + 1) for first, last in zip(low, high, strict=True)]
+        found = self._members(np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, 3))
+        gaps = self.points[found] - point
+        return np.asarray(found[np.einsum("ij,ij->i", gaps, gaps) <= radius * radius])
+
+
+class KdTreeIndex:
+    """Points in a k-d tree, which the thesis names as an alternative to voxels.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        The points [m].
+    """
+
+    def __init__(self, points: NDArray[np.float64]) -> None:
+        self.points = np.ascontiguousarray(points, np.float64).reshape(-1, 3)
+        self._tree = cKDTree(self.points)
+
+    def within(self, point: NDArray[np.float64], radius: float) -> NDArray[np.int64]:
+        """Return the points at most so far [m] from a place (3,), in their order, (M,) int64."""
+        return np.asarray(self._tree.query_ball_point(point, radius, return_sorted=True), np.int64)

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.point_clouds.voxels import numbered
+
 WIDEST_M = 2000.0
 """Widest cloud [m]; millimetres are wider."""
 
@@ -100,11 +102,7 @@ def voxels_of(points: NDArray[np.float64], side: float) -> Voxels:
     cells = np.floor((points - points.min(axis=0)) / side).astype(np.int64)
     cells = np.minimum(cells, (1 << _CELL_BITS) - 1)
     keys = (cells[:, 2] << 2 * _CELL_BITS) | (cells[:, 1] << _CELL_BITS) | cells[:, 0]
-    _, firsts, sorted_labels = np.unique(keys, return_index=True, return_inverse=True)
-    order = np.argsort(firsts)
-    places = np.empty(len(order), np.int64)
-    places[order] = np.arange(len(order))
-    labels = places[sorted_labels]
-    weights = np.bincount(labels).astype(np.float64)
+    labels, count = numbered(keys)
+    weights = np.bincount(labels, minlength=count).astype(np.float64)
     sums = np.stack([np.bincount(labels, points[:, axis]) for axis in range(3)], axis=1)
     return Voxels(sums / weights[:, None], weights, labels)

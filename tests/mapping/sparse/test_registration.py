@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from furnished_room import box_points, pose_at, room_points, seen_from
 
+from lidarium.mapping.sparse.files.map_files import read_sparse_map, write_sparse_map
 from lidarium.mapping.sparse.floor_plane import FloorPlane
 from lidarium.mapping.sparse.mapper.full import map_cloud
 from lidarium.mapping.sparse.registration import RegistrationSettings, register
@@ -79,3 +80,16 @@ def test_settings_and_guesses_are_checked(room_map):
         RegistrationSettings(kept_share=0.0)
     with pytest.raises(ValueError, match="rigid motion"):
         register(codes_of(room_map), codes_of(room_map), np.zeros((4, 4)))
+
+
+def test_maps_read_from_files_are_registered(room_map, tmp_path):
+    motion = pose_at(0.15, -0.1, 0.0, yaw=0.05)
+    points = moved_points(room_points(0.04, 0.004, seed=1), inverse_of(motion))
+    second = map_cloud(points, 512, MapperSettings(merges=False, seed=1))
+    read = []
+    for name, made in (("first", room_map), ("second", second)):
+        write_sparse_map(tmp_path / f"{name}.smap", made)
+        read.append(read_sparse_map(tmp_path / f"{name}.smap")[0])
+    found = register(codes_of(read[0]), codes_of(read[1]))
+    assert found.is_accepted, found.refusal
+    np.testing.assert_allclose(found.transform, motion, atol=0.05)

@@ -6,7 +6,7 @@ import pytest
 from lidarium.mapping.sparse.graph.obstacles import ChangingGraph
 from lidarium.mapping.sparse.graph.thesis_graph import ThesisGraphSettings, build_thesis_graph
 from lidarium.mapping.sparse.graph.topological_graph import GraphSettings, build_graph, components_of
-from lidarium.mapping.sparse.graph.voxel_index import NEIGHBOURHOODS, VoxelIndex
+from lidarium.mapping.sparse.graph.voxel_index import NEIGHBOURHOODS, KdTreeIndex, VoxelIndex
 from lidarium.mapping.sparse.swept_body import SweptBody, are_free, index_boxes
 
 WALL = [[2.9, -1.0, 0.0], [3.1, 2.0, 2.5]]
@@ -125,3 +125,27 @@ def test_neighbourhoods_that_are_none_are_refused():
         VoxelIndex(np.zeros((1, 3))).beside(np.zeros(3), 5)
     with pytest.raises(ValueError, match="size of voxels"):
         VoxelIndex(np.zeros((1, 3)), 0.0)
+
+
+@pytest.mark.parametrize("make", [VoxelIndex, KdTreeIndex])
+def test_points_within_a_ball_are_those_of_a_plain_search(make):
+    generator = np.random.default_rng(3)
+    points = generator.uniform(-1.0, 2.0, (400, 3))
+    index = make(points)
+    for query in generator.uniform(-2.5, 3.5, (40, 3)):
+        for radius in (0.1, 0.6, 2.0):
+            wanted = np.flatnonzero(np.linalg.norm(points - query, axis=1) <= radius)
+            assert index.within(query, radius).tolist() == wanted.tolist()
+
+
+def test_the_thesis_graph_is_the_same_with_every_support():
+    generator = np.random.default_rng(4)
+    free = np.column_stack([generator.uniform(0.0, 4.0, (300, 2)), generator.uniform(0.0, 0.05, 300)])
+    occupied = generator.uniform([0.0, 0.0, 0.1], [4.0, 4.0, 1.0], (60, 3))
+    plain = build_thesis_graph(free, occupied, ThesisGraphSettings(support="none", height=0.5))
+    assert len(plain.edges) > 20
+    for support in ("voxels", "kd_tree"):
+        found = build_thesis_graph(free, occupied, ThesisGraphSettings(support=support, height=0.5))
+        assert np.array_equal(found.edges, plain.edges)
+    with pytest.raises(ValueError, match="support of the thesis's graph is 'octree'"):
+        ThesisGraphSettings(support="octree")
