@@ -17,7 +17,6 @@ from lidarium.mapping.sparse.floor_plane import FloorPlane
 from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_boxes, moved_points, turned
 from lidarium.mapping.sparse.settings import MapperSettings
 
-
 FLAT_SHARE = 0.25
 """Shortest side of a box over the next one, below which it is a surface."""
 
