@@ -28,6 +28,5 @@ def test_what_frames_show_is_free_or_occupied_and_the_rest_unknown():
     # What is occupied is a solid or a cell beside one; free cells lie in none.
     assert ndimage.binary_dilation(truth, np.ones((3, 3)))[grid.log_odds == 1].mean() > 0.97
     assert (truth[grid.log_odds == -1].mean()) < 0.1
-    base = frames[0].base[:2]
-    near = (np.floor((base - np.array(grid.origin)) / 0.05)).astype(int)
-    assert grid.log_odds[near[1] - 20 : near[1] + 20, near[0] - 20 : near[0] + 20].any()
+    column, row = np.floor((frames[0].base[:2] - np.array(grid.origin)) / 0.05).astype(int)
+    assert grid.log_odds[max(row - 20, 0) : row + 20, max(column - 20, 0) : column + 20].any()
