@@ -5,6 +5,7 @@ References
 Sparse mapper, section 12: the thesis names obstacles that move as what is left to do.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -67,13 +68,32 @@ class ChangingGraph:
         ValueError
             Where the box has a corner that is not finite, or no size.
         """
-        corners = np.asarray(box, np.float64)
-        if corners.shape != (2, 3) or not np.isfinite(corners).all() or not (corners[0] <= corners[1]).all():
-            raise ValueError(f"box is {box}; want its low corner x, y, z and its high corner [m]")
-        number, self._next = self._next, self._next + 1
-        self._obstacles[number] = corners
+        return self.insert_all([box])[0]
+
+    def insert_all(self, boxes: Sequence[NDArray[np.float64]] | NDArray[np.float64]) -> list[int]:
+        """Put obstacles there, all or, where one is no box, none.
+
+        Parameters
+        ----------
+        boxes : (M, 2, 3) float64
+            Their low and high corners [m].
+
+        Returns
+        -------
+        list of int
+            Their numbers, for ``remove``.
+
+        Raises
+        ------
+        ValueError
+            Where a box has a corner that is not finite, or no size.
+        """
+        corners = [_checked(box) for box in boxes]
+        numbers = list(range(self._next, self._next + len(corners)))
+        self._next += len(corners)
+        self._obstacles.update(zip(numbers, corners, strict=True))
         self._repair(corners, 1)
-        return number
+        return numbers
 
     def remove(self, number: int) -> None:
         """Take an obstacle away.
@@ -83,22 +103,40 @@ class ChangingGraph:
         ValueError
             Where there is none of that number.
         """
-        if number not in self._obstacles:
-            raise ValueError(f"there is no obstacle {number}; there are {sorted(self._obstacles)}")
-        self._repair(self._obstacles.pop(number), -1)
+        self.remove_all([number])
 
-    def _repair(self, box: NDArray[np.float64], change: int) -> None:
-        """Count an obstacle in or out at the edges that it blocks."""
-        base = self._base
-        edges = _edges_blocked(
-            base.grid, base.starts, base.ends, box.ravel(), base.body.numbers, self._longest
-        )
-        self._blocks[edges] += change
-        weights = self.graph.weights
-        weights[edges] = np.where(self._blocks[edges] > 0, np.inf, base.weights[edges])
+    def remove_all(self, numbers: Sequence[int]) -> None:
+        """Take obstacles away, all or, where there is none of a number, none.
+
+        Raises
+        ------
+        ValueError
+            Where there is none of a number.
+        """
+        for number in numbers:
+            if number not in self._obstacles:
+                raise ValueError(f"there is no obstacle {number}; there are {sorted(self._obstacles)}")
+        self._repair([self._obstacles.pop(number) for number in dict.fromkeys(numbers)], -1)
+
+    def _repair(self, boxes: Sequence[NDArray[np.float64]], change: int) -> None:
+        """Count obstacles in or out at the edges that they block."""
+        base, weights = self._base, self.graph.weights
+        for box in boxes:
+            edges = _edges_blocked(
+                base.grid, base.starts, base.ends, box.ravel(), base.body.numbers, self._longest
+            )
+            self._blocks[edges] += change
+            weights[edges] = np.where(self._blocks[edges] > 0, np.inf, base.weights[edges])
         moving = np.array(list(self._obstacles.values())).reshape(-1, 6)
         index = index_boxes(np.concatenate([base.index.boxes, moving])) if len(moving) else base.index
         self.graph = replace(self.graph, index=index)
+
+
+def _checked(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    corners = np.asarray(box, np.float64)
+    if corners.shape != (2, 3) or not np.isfinite(corners).all() or not (corners[0] <= corners[1]).all():
+        raise ValueError(f"box is {box}; want its low corner x, y, z and its high corner [m]")
+    return corners
 
 
 @kernel

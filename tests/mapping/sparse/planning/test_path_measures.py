@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lidarium.evaluation.metrics.paths import measure_path, points_along
+from lidarium.mapping.sparse.planning.path_measures import measure_path, points_along
 
 
 def test_a_straight_line_does_not_turn():
