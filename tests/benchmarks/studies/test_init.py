@@ -8,7 +8,7 @@ from lidarium.scripts.main import main
 
 NAMES = (
     *("evaluation", "floor_cache", "floors", "interval_coverage", "leaderboard", "merging", "merging_tuning"),
-    *("parity", "policies", "realism", "slam", "splines", "srt", "supervisor"),
+    *("parity", "policies", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
 )
 
 
