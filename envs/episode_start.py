@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.areas import around
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.starts import check_goal, check_starts, draw_starts
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -66,6 +67,8 @@ def begin(
     """
     choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
     floor = choice_here.load(generator)
+    if chosen.starts is not None:
+        floor = around(floor, chosen.starts)
     radius = settings.robot.radius
     _check_height(floor, settings.robot.height)
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)

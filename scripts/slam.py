@@ -45,6 +45,11 @@ class Slam(Command):
     """or after so much of a turn [degrees]"""
     beam_interval: float = 0.0
     """time from beam to beam where the log does not say [s]; 0 for scans taken at once"""
+    field_of_view: float | None = None
+    """angle between the first and the last beam of FLASER lines [degrees].
+
+    These lines have no angles; without it the log's parameters count, else those of a SICK
+    """
     ignore_odometry: bool = False
     """do without the log's odometry: scans are matched around the last motion"""
     clear_without_return: bool = False
@@ -78,6 +83,8 @@ class Slam(Command):
         ):
             if not (math.isfinite(value) and value >= least):
                 raise ValueError(f"{name} is {value}; want at least {least}")
+        if self.field_of_view is not None and not 0.0 < self.field_of_view <= 360.0:
+            raise ValueError(f"field-of-view is {self.field_of_view} degrees; want more than 0, at most 360")
         if not math.isfinite(self.clock_shift):
             raise ValueError(f"clock-shift is {self.clock_shift} s; want a number")
 
@@ -139,9 +146,12 @@ def _log(command: Slam) -> "LaserLog":
     from lidarium.mapping.files.carmen_logs import read_carmen_log
     from lidarium.mapping.files.npz_logs import read_npz_log
 
-    log = read_npz_log(command.log) if command.log.suffix == ".npz" else read_carmen_log(command.log)
+    view = None if command.field_of_view is None else math.radians(command.field_of_view)
+    log = read_npz_log(command.log) if command.log.suffix == ".npz" else read_carmen_log(command.log, view)
     for reason, count in log.skipped.items():
         notify(f"{command.log}: left out: {count} {reason}")
+    for remark in log.remarks:
+        notify(f"{command.log}: {remark}")
     if log.odometry is None:
         notify(f"{command.log}: there is no odometry; scans are matched around the last motion")
     return log.limited(command.range, command.clear_without_return)
@@ -163,6 +173,7 @@ def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, A
         "log": command.log.name,
         "scans": len(log.stamps),
         "skipped": log.skipped,
+        "remarks": list(log.remarks),
         "odometry": not command.ignore_odometry and log.odometry is not None,
         "data_s": round(data_s, 3),
         "cpu_s": round(cpu_s, 3),

@@ -27,3 +27,12 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real data at {folder}; set LIDARIUM_DATA")
     return folder
+
+
+@pytest.fixture(scope="session")
+def shared_cases() -> Path:
+    """Folder of small files of other programs; the test is skipped where it is absent."""
+    folder = _data_folder().parent / "cases"
+    if not folder.is_dir():
+        pytest.skip(f"no files of other programs at {folder}; set LIDARIUM_DATA to a folder beside it")
+    return folder

@@ -44,6 +44,10 @@ class Floor:
         Where robots with a goal should go [m].
     ceiling : float
         Height of the ceiling, to which solids without a height reach [m].
+    areas : Raster or None
+        Solid cells of a picture with several free areas, of which one is the floor; see ``areas.around``.
+    remark : str
+        What was assumed of a picture that does not say it.
     """
 
     name: str
@@ -53,6 +57,8 @@ class Floor:
     starts: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
     goal: tuple[float, float] | None = None
     ceiling: float = CEILING
+    areas: Raster | None = None
+    remark: str = ""
 
     def __post_init__(self) -> None:
         x_min, y_min, x_max, y_max = self.bounds

@@ -13,6 +13,7 @@ import numpy as np
 import lidarium
 from lidarium.envs.episode_start import EpisodeStart
 from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.areas import around
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -163,6 +164,8 @@ def find_floor(header: dict[str, Any], floor: str | Path | Floor | None = None) 
         is_file = not isinstance(name, Floor) and is_file_name(name)
         try:
             found = load_floor(name, header["image_resolution"] if is_file else None)
+            if found.sha256 != header["floor_sha256"]:
+                found = around(found, np.array(header["starts"], np.float64))
         except (ValueError, OSError) as error:
             tried.append(str(error))
             continue

@@ -36,14 +36,15 @@ def read_image(path: Path) -> NDArray[Any]:
     Returns
     -------
     (rows, columns) or (rows, columns, channels) uint8 or uint16
-        The pixels, row 0 at the top, channels in OpenCV's order (blue first).
+        The pixels, row 0 at the top, channels in OpenCV's order (blue first). White is the greatest number of
+        the type, whatever the file calls white.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        If it is a folder or not an image.
+        If it is a folder, not an image, or of float pixels that are neither shares nor greys.
     """
     path = Path(path)
     content = read_bytes(path, MOST_IMAGE_BYTES)
@@ -54,15 +55,44 @@ def read_image(path: Path) -> NDArray[Any]:
         pixels = _decoded(content)
     except cv2.error:
         pixels = None
+    if pixels is not None and pixels.dtype in (np.float32, np.float64):
+        return _greys_of_floats(path, pixels)
     if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"{path} is not an image that can be read; want png, pgm, bmp, jpg or tif")
-    return pixels
+    white, most = _unscaled_white(content), np.iinfo(pixels.dtype).max
+    if white is None or white == most:
+        return pixels
+    return np.minimum(np.rint(pixels * (most / max(white, 1))), most).astype(pixels.dtype)
+
+
+def _greys_of_floats(path: Path, pixels: NDArray[Any]) -> NDArray[np.uint16]:
+    """Return the greys of float pixels, which are shares of white or greys to 255."""
+    low, high = float(pixels.min()), float(pixels.max())
+    if not (np.isfinite(pixels).all() and low >= 0.0 and high <= 255.0):
+        raise ValueError(
+            f"{path} has float pixels from {low:g} to {high:g}; want 0 to 1 or 0 to 255, or greys of 8 bits"
+        )
+    white = 1.0 if high <= 1.0 else 255.0
+    # Of whole greys of 8 bits, thresholds at a grey hold as in such an image.
+    return (np.rint(pixels * (255.0 / white)) * 257.0).astype(np.uint16)
+
+
+def _unscaled_white(content: bytes) -> int | None:
+    """Return what is white in the pixels of a PGM or PPM that OpenCV leaves as they are; None in others."""
+    if content[:2] not in (b"P2", b"P3", b"P5", b"P6"):
+        return None
+    white = _pnm_numbers(content, 3)[2]
+    is_scaled = content[:2] in (b"P2", b"P3") and white <= 255
+    return None if is_scaled else white
 
 
 def _decoded(content: bytes) -> NDArray[Any] | None:
     """Return the pixels of a picture whose header is known; None where it is not or cannot be read."""
     if picture_size(content) is None:
         return None
+    if content[:2] in (b"P1", b"P2", b"P3"):
+        # OpenCV reads no last number that the file ends with.
+        content += b"\n"
     return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
 
 
@@ -131,12 +161,18 @@ def _bmp(content: bytes) -> tuple[int, int]:
 
 
 def _pnm(content: bytes) -> tuple[int, int]:
-    """Return the size of a PBM, PGM or PPM: two numbers among remarks."""
+    """Return the size of a PBM, PGM or PPM."""
+    width, height = _pnm_numbers(content, 2)
+    return width, height
+
+
+def _pnm_numbers(content: bytes, count: int) -> list[int]:
+    """Return the first numbers of a PBM, PGM or PPM among remarks: width, height, and what is white."""
     numbers: list[int] = []
     for line in content[2:65536].splitlines():
-        numbers += [int(word) for word in line.split(b"#")[0].split()[: 2 - len(numbers)]]
-        if len(numbers) == 2:
-            return numbers[0], numbers[1]
+        numbers += [int(word) for word in line.split(b"#")[0].split()[: count - len(numbers)]]
+        if len(numbers) == count:
+            return numbers
     raise ValueError("no size")
 
 

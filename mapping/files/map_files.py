@@ -5,10 +5,12 @@ References
 The interpretation of pixels follows ROS map_server (trinary, scale, raw), http://wiki.ros.org/map_server.
 """
 
+import logging
 import math
+import os
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,7 @@ from lidarium.mapping.files.map_levels import (
     levels_of,
     raw_levels,
 )
+from lidarium.mapping.files.mending.unknown_greys import MAP_SERVER_GREYS, MIDDLE_GREYS, unknown_grey
 from lidarium.mapping.files.output import write_whole
 from lidarium.mapping.geometry.bounds import Rule, shown, within
 
@@ -36,6 +39,7 @@ RESOLUTION = Rule(float, bounds=within(1e-4, 100.0, "a positive number"))
 MOST_COORDINATE_M = 1e8
 """Farthest that a map may lie from the origin of its frame [m]."""
 
+_LOG = logging.getLogger(__name__)
 _MODES = ("trinary", "scale", "raw")
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _PGM_LEVELS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
@@ -71,7 +75,8 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     Returns
     -------
     MapImage
-        The map. In scale and raw mode too, what is between the thresholds is unknown.
+        The map. In scale and raw mode too, what is between the thresholds is unknown. In trinary mode the
+        grey that map_saver writes for unknown is unknown whatever the thresholds.
 
     Raises
     ------
@@ -82,8 +87,7 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     """
     yaml_path = Path(yaml_path)
     header = _read_header(yaml_path)
-    image_path = yaml_path.parent / str(header["image"])
-    pixels = read_image(image_path)
+    pixels = read_image(_image_path(yaml_path, str(header["image"])))
     low, high = _number(yaml_path, header, "free_thresh"), _number(yaml_path, header, "occupied_thresh")
     if not 0.0 <= low < high <= 1.0:
         raise ValueError(
@@ -94,7 +98,10 @@ def read_ros_map(yaml_path: Path) -> MapImage:
     if mode not in _MODES:
         raise ValueError(f"{yaml_path}: mode is {shown(mode)}; want one of {', '.join(_MODES)}")
     negate = bool(_number(yaml_path, header, "negate"))
-    rule = raw_levels if mode == "raw" else partial(levels_of, negate=negate)
+    # map_saver of nav2 writes unknown as 205, which its free_thresh of 0.25 calls free.
+    may_mistake = mode == "trinary" and not negate
+    unknown = unknown_grey(pixels, (MAP_SERVER_GREYS,)) if may_mistake else None
+    rule = raw_levels if mode == "raw" else partial(levels_of, negate=negate, unknown=unknown)
     levels = levels_by_blocks(pixels, lambda shades: rule(shades, low=low, high=high), mode == "scale")
     return MapImage(
         np.ascontiguousarray(levels[::-1]), _origin(yaml_path, header), _resolution(yaml_path, header)
@@ -104,7 +111,8 @@ def read_ros_map(yaml_path: Path) -> MapImage:
 def read_grey_map(path: Path, resolution: float) -> MapImage:
     """Read a plain image as a map.
 
-    Black is occupied, white is free, and values between are unknown.
+    Black is occupied, white is free, and values between are unknown, as is the grey that mappers write for
+    unknown.
 
     Parameters
     ----------
@@ -127,8 +135,10 @@ def read_grey_map(path: Path, resolution: float) -> MapImage:
     """
     if not RESOLUTION.hold(resolution):
         raise ValueError(f"{path}: resolution is {resolution} m; want {RESOLUTION.wanted}")
-    rule = partial(levels_of, negate=False, low=0.196, high=0.65)
-    levels = levels_by_blocks(read_image(Path(path)), rule, True)
+    pixels = read_image(Path(path))
+    unknown = unknown_grey(pixels, (MAP_SERVER_GREYS, MIDDLE_GREYS))
+    rule = partial(levels_of, negate=False, low=0.196, high=0.65, unknown=unknown)
+    levels = levels_by_blocks(pixels, rule, True)
     return MapImage(np.ascontiguousarray(levels[::-1]), (0.0, 0.0, 0.0), resolution)
 
 
@@ -229,6 +239,24 @@ def _read_header(path: Path) -> dict[str, Any]:
     if missing:
         raise ValueError(f"{path} has no key {', '.join(missing)}; a ROS map has {', '.join(_REQUIRED)}")
     return header
+
+
+def _image_path(yaml_path: Path, name: str) -> Path:
+    """Return where the image of a map is.
+
+    Where the header names a place that is none on this machine, the file of that name beside the header is
+    used, with a warning to the log.
+    """
+    named = yaml_path.parent / name
+    beside = yaml_path.parent / PureWindowsPath(name).name
+    if named != beside and not os.path.isfile(named) and os.path.isfile(beside):
+        _LOG.warning("%s: there is no image %s; %s beside it is used", yaml_path, name, beside.name)
+        return beside
+    if not os.path.lexists(named):
+        raise FileNotFoundError(
+            f"there is no file {named}; {yaml_path} names it as its image: put the image beside it"
+        )
+    return named
 
 
 def _number(path: Path, header: dict[str, Any], key: str) -> float:

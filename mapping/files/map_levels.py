@@ -37,12 +37,19 @@ def levels_by_blocks(
     return levels
 
 
-def levels_of(shades: NDArray[np.float64], *, negate: bool, low: float, high: float) -> NDArray[np.uint8]:
-    """Return the levels of shades in trinary mode: below and above the thresholds."""
+def levels_of(
+    shades: NDArray[np.float64], *, negate: bool, low: float, high: float, unknown: int | None = None
+) -> NDArray[np.uint8]:
+    """Return the levels of shades in trinary mode: below and above the thresholds.
+
+    ``unknown`` is a grey that stands for it whatever the thresholds.
+    """
     occupancy = (shades if negate else 255.0 - shades) / 255.0
     levels = np.full(shades.shape, UNKNOWN, dtype=np.uint8)
     levels[occupancy > high] = OCCUPIED
     levels[occupancy < low] = FREE
+    if unknown is not None:
+        levels[np.abs(shades - unknown) < 0.5] = UNKNOWN
     return levels
 
 

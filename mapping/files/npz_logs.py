@@ -69,7 +69,7 @@ def _from_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> LaserLog:
         _number(path, arrays, "angle_increment", math.nan),
     )
     try:
-        wide, geometry = symmetric_scans(
+        wide, geometry, axis = symmetric_scans(
             ranges, first, increment, (_number(path, arrays, "min_range", 0.0), highest)
         )
     except ValueError as error:
@@ -83,7 +83,7 @@ def _from_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> LaserLog:
         ranges=wide,
         geometry=geometry,
         odometry=_table(path, arrays, "pose_odom", (scans, 3)),
-        laser_pose=np.zeros(3) if laser_pose is None else laser_pose,
+        laser_pose=(np.zeros(3) if laser_pose is None else laser_pose) + np.array([0.0, 0.0, axis]),
         beam_interval_s=_number(path, arrays, "beam_interval", 0.0),
         corrected=_table(path, arrays, "pose_corrected", (scans, 3)),
         readings_stamps=readings_stamps if readings is not None else np.zeros(0),

@@ -87,6 +87,8 @@ def floor_description(result: dict[str, Any], folder: Path | None, files: list[s
         ("solids", f"{result['solids'] or 'none, cells of an image'}"),
         ("sha256", result["sha256"]),
     ]
+    if result["remark"]:
+        facts.append(("note", result["remark"]))
     if folder is not None:
         facts.append(("files", f"{folder}: {', '.join(files)}"))
     return f"{result['name']}{f': {about}' if about else ''}\n{table(facts)}"

@@ -188,7 +188,7 @@ def describe_floor(floor: Floor) -> dict[str, Any]:
     -------
     dict
         ``name``, ``size_m`` [width, height], ``area_m2`` (free), ``loops``, ``clutter``, ``rooms``,
-        ``solids``, ``sha256``; what the four measures mean says `BuildingMeasures`.
+        ``solids``, ``sha256``, ``remark``; what the four measures mean says `BuildingMeasures`.
 
     Raises
     ------
@@ -206,6 +206,7 @@ def describe_floor(floor: Floor) -> dict[str, Any]:
         "rooms": measures.rooms,
         "solids": len(floor.solids),
         "sha256": floor.sha256,
+        "remark": floor.remark,
     }
 
 

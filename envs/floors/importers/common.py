@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.areas import floor_of_area
 from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip
 from lidarium.envs.floors.extent import check_extent
-from lidarium.envs.floors.floor import Floor, Raster, Solid
+from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.mapping.files.guarded_reading import read_text as read_guarded
 from lidarium.mapping.files.images import MOST_PIXELS
 from lidarium.mapping.files.names import printable
@@ -77,7 +78,7 @@ def floor_of_cells(
     origin, resolution : (float, float), float
         Lower left corner of cell (0, 0) and side of a cell [m].
     seed_cell : (row, column) or None
-        A cell of the area that stays free; None for the largest.
+        A cell of the area that stays free; None for the largest that is not outside.
     starts : (K, 3) float64 or None
         Starts that the file proposes [m, rad].
 
@@ -92,24 +93,7 @@ def floor_of_cells(
         raise ValueError(
             f"{path} is {'all free' if free.any() else 'all solid'}; want a floor with free space and walls"
         )
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(
-        free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
-    )
-    label = (
-        int(labels[seed_cell])
-        if seed_cell is not None
-        else 1 + int(np.argmax(statistics[1:count, cv2.CC_STAT_AREA]))
-    )
-    if label == 0:
-        raise ValueError(f"{path} has its start in a wall; want it in free space")
-    left, bottom, width, height = (int(value) for value in statistics[label, :4])
-    solid = (labels[bottom : bottom + height, left : left + width] != label).astype(np.uint8)
-    corner = (origin[0] + left * resolution, origin[1] + bottom * resolution)
-    bounds = (*corner, corner[0] + width * resolution, corner[1] + height * resolution)
-    cells = Raster(
-        np.pad(solid, 1, constant_values=1), (corner[0] - resolution, corner[1] - resolution), resolution
-    )
-    return Floor(floor_name(path), bounds, cells=cells, starts=np.zeros((0, 3)) if starts is None else starts)
+    return floor_of_area(floor_name(path), free, origin, resolution, seed_cell, starts)
 
 
 def floor_of_lines(path: Path, walls: NDArray[np.float64], openings: NDArray[np.float64]) -> Floor:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import floor_of_cells
 from lidarium.mapping.files.images import read_image
+from lidarium.mapping.files.mending.unknown_greys import MAP_SERVER_GREYS, MIDDLE_GREYS, unknown_grey
 
 SUFFIXES = (".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff")
 
@@ -22,7 +23,6 @@ DUNGEON_RESOLUTION = 0.1
 _DUNGEON_FREE_ABOVE = 150
 _MARK_GREY = 208
 _FREE_ABOVE = 127
-_MAP_SERVER_LEVELS = (0, 205, 254)
 
 
 def is_dungeon(path: Path) -> bool:
@@ -51,14 +51,15 @@ def load_dungeon(path: Path, resolution: float | None) -> Floor:
 def load_image(path: Path, resolution: float | None) -> Floor:
     """Read a picture: grey above 127 is free.
 
-    In the greys of map_server (0, 205, 254 alone) 205 is unknown, so solid.
+    The grey that mappers write for unknown is solid.
     """
     if resolution is None:
         raise ValueError(f"{path} is an image without a scale; pass --resolution with its metres per pixel")
     grey = _grey(read_image(path))
     free = grey > _FREE_ABOVE
-    if set(_levels(grey)) <= set(_MAP_SERVER_LEVELS):
-        free = grey == max(_MAP_SERVER_LEVELS)
+    unknown = unknown_grey(grey, (MAP_SERVER_GREYS, MIDDLE_GREYS))
+    if unknown is not None:
+        free &= grey != unknown
     return floor_of_cells(path, free[::-1], (0.0, 0.0), resolution)
 
 

@@ -1,0 +1,1 @@
+"""What the lines of CARMEN logs say."""

@@ -1,0 +1,1 @@
+"""Mends what files of other programs say wrongly."""
