@@ -184,6 +184,7 @@ def _result(command: Slam, log: "LaserLog", followed: "Followed") -> dict[str, A
         },
         "path_m": round(float(np.hypot(steps[:, 0], steps[:, 1]).sum()), 3),
         **asdict(followed.slam.counts),
+        "doubtful": [asdict(doubt) for doubt in followed.slam.doubts.stretches],
         "settings": settings,
         "version": __version__,
     }
@@ -275,6 +276,9 @@ def _summary(result: dict[str, Any], out: Path) -> str:
         ("closures", f"{result['closures']} in {result['corrections']} corrections"),
         ("failed matches", f"{result['failures']} of {result['failures'] + result['matches']}"),
     ]
+    if result["doubtful"]:
+        scans = sum(doubt["scans"] for doubt in result["doubtful"])
+        rows.append(("doubtful", f"{scans} scans in {len(result['doubtful'])} stretches, see slam.json"))
     if "ate_m" in result:
         rows.append(("ATE", f"{result['ate_m']:.3f} m"))
     if "relations" in result:

@@ -21,7 +21,13 @@ from lidarium.mapping.files.carmen.directions import give_directions, on_one_gri
 from lidarium.mapping.files.carmen.lines import Content, Scan, parameter, read_line
 from lidarium.mapping.files.guarded_reading import read_lines, reading
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
+from lidarium.mapping.files.trajectories import interpolated
 from lidarium.mapping.geometry.rigid import composed, relative
+
+REPEATED_M = 1e-4
+"""By how much a pose and its copy in another line may differ, in metres and radians."""
+
+SAME_STAMP_S = 1e-6
 
 MOST_LINE_BYTES = 1 << 20
 """Longest line of a log; one of 16,384 ranges has some 150,000 bytes."""
@@ -95,7 +101,7 @@ def _log(path: Path, content: Content) -> LaserLog:
             skipped=dict(content.skipped),
             remarks=remarks,
         )
-    chained, is_own = _chained(readings, np.array([before for _, before in content.scans], np.int64))
+    chained, is_own = _chained(readings, content.scans)
     if not _has_odometry(before, is_own):
         return LaserLog(
             stamps,
@@ -111,7 +117,7 @@ def _log(path: Path, content: Content) -> LaserLog:
         stamps,
         wide,
         geometry,
-        chained[np.maximum(before - 1, 0)],
+        _at_scans(stamps, before, readings_stamps, chained, is_own),
         laser_pose,
         corrected=robot_poses,
         readings_stamps=readings_stamps[is_own],
@@ -132,20 +138,48 @@ def _has_odometry(before: NDArray[np.int64], is_own: NDArray[np.bool_]) -> bool:
 
 
 def _chained(
-    readings: NDArray[np.float64], scans_before: NDArray[np.int64]
+    readings: NDArray[np.float64], scans: list[tuple[Scan, int]]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return the sum of the motions between readings, and which are odometry.
 
-    The first reading after a scan is the scan's pose.
+    The first reading after a scan is the scan's pose, from which odometry goes on; where that line is
+    missing, the scan's own stands for it.
     """
-    is_own = np.ones(len(readings), np.bool_)
-    is_own[scans_before[scans_before < len(readings)]] = False
+    is_own, previous = np.ones(len(readings), np.bool_), readings[np.maximum(np.arange(len(readings)) - 1, 0)]
+    for scan, before in scans:
+        if before < len(readings):
+            is_own[before] = np.abs(readings[before] - scan.robot_pose).max() >= REPEATED_M
+            previous[before] = scan.robot_pose
     chained = np.zeros_like(readings)
     for k in range(1, len(readings)):
         chained[k] = (
-            composed(chained[k - 1], relative(readings[k - 1], readings[k])) if is_own[k] else chained[k - 1]
+            composed(chained[k - 1], relative(previous[k], readings[k])) if is_own[k] else chained[k - 1]
         )
     return chained, is_own
+
+
+def _at_scans(
+    stamps: NDArray[np.float64],
+    before: NDArray[np.int64],
+    readings_stamps: NDArray[np.float64],
+    chained: NDArray[np.float64],
+    is_own: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """Return the odometry of scans (n,), of which ``before`` readings came before each, (n, 3) [m, rad].
+
+    A scan has the stamp of the reading before it. Where that line is missing, odometry is interpolated.
+    """
+    odometry = chained[np.maximum(before - 1, 0)]
+    own = np.flatnonzero(is_own)
+    late = np.flatnonzero(stamps > readings_stamps[np.maximum(before - 1, 0)] + SAME_STAMP_S)
+    for scan in late:
+        after = int(np.searchsorted(own, before[scan]))
+        if not 0 < after < len(own):
+            continue
+        ends = own[after - 1 : after + 1]
+        if readings_stamps[ends[0]] <= stamps[scan] <= readings_stamps[ends[1]]:
+            odometry[scan] = interpolated(readings_stamps[ends], chained[ends], stamps[scan : scan + 1])[0]
+    return odometry
 
 
 def _mounting(content: Content, first: Scan) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ import numpy as np
 from lidarium.benchmarks.speed.harness.report import about, heading
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.slam import lies
 from lidarium.benchmarks.studies.slam.logs import OTHERS, RELATIONS, log_row, read, relation_cells
 from lidarium.benchmarks.studies.slam.robot import Robot, measured_robot, robot_lines
 from lidarium.mapping.localization.slam.following import LOG_SETTINGS, follow
@@ -23,6 +24,7 @@ FLOOR, HORIZON_S = "apartment", 900.0
 """Floor of the simulated robot, and how long it explores at most [s]."""
 
 LOGS_FOLDER, LOGS_FILE, ROBOT_FILE = "laser_logs", "logs.jsonl", "robot.jsonl"
+LIES_FILE = "lies.jsonl"
 WARMED_BY = "aces"
 """The log that is followed before any is measured, so that kernels are compiled."""
 
@@ -91,6 +93,15 @@ truth. Where scans are a metre apart nearly every one sets a node and looks for 
 take longer than the dense log of Freiburg. Infinite-corridor, belgioioso and orebro have stamps without
 use, so closures act after one scan; orebro has no odometry, and scans up to a metre and 40 degrees apart.
 
+## Logs that lie
+
+Every tenth line of odometry is removed; or scans during one turn of 60 to 90 degrees are left out, and
+odometry does not know of it ({turns} turns of each log, one at a time). Of {count} such logs {honest} end
+within 1.5 x the error of the whole log, or name the lie as doubtful. *Recovered* are scans that were found in
+another direction than odometry said; *doubtful* those that no map says anything of.
+
+{lies}
+
 ## A robot
 
 {robot}
@@ -117,6 +128,8 @@ def work(folder: Path, data: Path | None, every: int, _workers: int) -> Progress
     logs = None if data is None else Path(data) / LOGS_FOLDER
     tasks = [] if logs is None else [Task(name) for name in (*RELATIONS, *OTHERS)][::every]
     yield from do_missing(folder / LOGS_FILE, "logs", tasks, partial(_follow_log, logs), 1)
+    lying = [] if logs is None else lies.lies()[::every]
+    yield from do_missing(folder / LIES_FILE, "logs that lie", lying, partial(lies.measure, logs), 1)
     yield from do_missing(folder / ROBOT_FILE, "robot", [Task(FLOOR)], partial(_follow_robot, logs), 1)
 
 
@@ -160,6 +173,7 @@ def page(folder: Path, command: str) -> str:
     """Return the results as markdown."""
     logs = kept_lines(folder / LOGS_FILE)
     [line] = kept_lines(folder / ROBOT_FILE)
+    lying = [each for each in kept_lines(folder / LIES_FILE) if each["ate_m"] is not None]
     match, closure, correction = (
         np.array(line[name], np.float64) for name in ("match_ms", "closure_ms", "correction_ms")
     )
@@ -171,6 +185,10 @@ def page(folder: Path, command: str) -> str:
         relations="\n".join(relations),
         logs_header=header_rows(LOGS_HEADER),
         logs="\n".join(log["row"] for log in logs),
+        turns=lies.TURNS,
+        count=len(lying),
+        honest=sum(map(lies.is_honest, lying)),
+        lies=lies.table(lying),
         robot="\n".join(robot_lines(robot, FLOOR)),
     )
 

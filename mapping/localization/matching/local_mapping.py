@@ -107,6 +107,11 @@ class LocalMapper:
         """How much the last scan contradicted the local map, see ``LocalMatcher``."""
         return self._matcher.contradiction
 
+    @property
+    def recoveries(self) -> int:
+        """How many scans were found elsewhere than odometry said, see ``LocalMatcher``."""
+        return self._matcher.recoveries
+
     def match(
         self,
         points: NDArray[np.float64],

@@ -31,6 +31,8 @@ class LocalMatcher:
     contradiction : float
         Share of the last scan's returns that lay, from where odometry led, in what the local map knows to be
         free.
+    recoveries : int
+        Scans that were found in another direction or place than odometry said, as nothing there agreed.
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
@@ -39,7 +41,7 @@ class LocalMatcher:
             settings.uses_odometry,
             geometry,
         )
-        self.usual_score, self.contradiction = 0.0, 0.0
+        self.usual_score, self.contradiction, self.recoveries = 0.0, 0.0, 0
 
     def match(
         self,
@@ -76,10 +78,12 @@ class LocalMatcher:
         is_blind = not self._uses_odometry or failed >= settings.wide_after
         near = self._match_near(submap, points, predicted, uncertainty) if self._uses_odometry else None
         self.contradiction = 1.0 if near is None else near.contradiction
+        is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
         if near is not None and self._is_new_ground(near, len(points)):
-            return Match(
-                predicted, near.score, near.overlap, near.contradiction, np.zeros((3, 3)), near.prior
-            )
+            nothing = np.zeros((3, 3))
+            unmatched = Match(predicted, near.score, near.overlap, near.contradiction, nothing, near.prior)
+            known = None if is_sparse else self._beyond_odometry(submap, points, predicted)
+            return unmatched if known is None else self._noted(known)
         if (
             near is not None
             and self._is_good(near)
@@ -87,7 +91,6 @@ class LocalMatcher:
         ):
             return self._noted(near)
         reach = (settings.blind_m, settings.blind_angle) if is_blind else self._reach(moved)
-        is_sparse = near is not None and len(points) < settings.wide_share * self._geometry.beams
         far = None if is_sparse else self._match_far(submap, points, predicted, reach)
         if self._uses_odometry and is_blind and far is not None:
             # So far from odometry something a little similar, or in part, is soon found.
@@ -97,9 +100,47 @@ class LocalMatcher:
             )
             far = far if is_alike else None
         good = [match for match in (near, far) if match is not None and self._is_good(match)]
-        if len(good) == 2:
-            return self._noted(good[1] if outweighs(good[1], good[0], settings.better_by) else good[0])
-        return self._noted(good[0]) if good else None
+        found = good[0] if good else None
+        if len(good) == 2 and outweighs(good[1], good[0], settings.better_by):
+            found = good[1]
+        if self._uses_odometry and not is_sparse and found is None:
+            found = self._beyond_odometry(submap, points, predicted)
+        return None if found is None else self._noted(found)
+
+    def _beyond_odometry(
+        self, submap: Submap, points: NDArray[np.float64], predicted: NDArray[np.float64]
+    ) -> Match | None:
+        """Return the match in any direction that alone explains most of a scan, or None.
+
+        Odometry may not know of a motion at all: a robot was turned by hand, or scans are missing.
+        """
+        settings = self._matching
+        reach, alike = (settings.blind_m, math.pi), settings.convincing_share * self.usual_score
+        coarse, least = pyramid(submap.finished()), 0.6 * settings.blind_overlap * alike
+        best, is_over = place(coarse, points, predicted, reach, least, settings.lost_evaluations)
+        if best is None or not is_over:
+            return None
+        match = self._refined(submap, points, best.pose)
+        if (
+            match.score < max(alike, settings.least_score)
+            or match.overlap < settings.blind_overlap
+            or match.contradiction > settings.most_contradiction
+        ):
+            return None
+        apart = (best.pose, settings.apart_m, settings.apart_angle)
+        second, is_over = place(
+            coarse,
+            points,
+            predicted,
+            reach,
+            settings.ambiguity * best.score,
+            settings.lost_evaluations,
+            apart,
+        )
+        if second is not None or not is_over:
+            return None
+        self.recoveries += 1
+        return match
 
     def _reach(self, moved: NDArray[np.float64]) -> tuple[float, float]:
         """Return how far to search without odometry, [m] and [rad]."""
@@ -168,19 +209,13 @@ class LocalMatcher:
         settings = self._matching
         least = 0.5 * settings.least_score * settings.least_overlap
         found, _ = place(pyramid(submap.finished()), points, predicted, reach, least, settings.evaluations)
-        if found is None:
-            return None
+        return None if found is None else self._refined(submap, points, found.pose)
+
+    def _refined(self, submap: Submap, points: NDArray[np.float64], pose: NDArray[np.float64]) -> Match:
+        """Return the match near a pose (3,), without odometry."""
+        settings, nothing = self._matching, np.zeros((3, 3))
         weight = settings.weight(len(points))
-        return refine(
-            submap.grid,
-            points,
-            found.pose,
-            found.pose,
-            np.zeros((3, 3)),
-            weight,
-            settings.unseen,
-            settings.surface_m,
-        )
+        return refine(submap.grid, points, pose, pose, nothing, weight, settings.unseen, settings.surface_m)
 
     def match_first(self, submap: Submap, points: NDArray[np.float64]) -> Match | None:
         """Return where the first scan of a local map now lies on that map.

@@ -21,9 +21,11 @@ from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sen
 from lidarium.mapping.localization.dead_reckoning.odometry import compounded
 from lidarium.mapping.localization.graph.node_graph import NodeGraph
 from lidarium.mapping.localization.matching.local_mapping import LocalMapper, way
+from lidarium.mapping.localization.matching.scan_matching import Match
 from lidarium.mapping.localization.matching.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.matching.wall_compass import WallCompass
+from lidarium.mapping.localization.slam.doubts import ELSEWHERE, NO_MATCH, ODOMETRY_ALONE, Doubts
 from lidarium.mapping.localization.slam.loop_closing import LoopClosing
 from lidarium.mapping.localization.slam.odometry_motion import OdometryMotion
 from lidarium.mapping.localization.slam.scan_history import ScanHistory
@@ -39,6 +41,7 @@ class SlamCounts:
     closures: int = 0
     corrections: int = 0
     restarts: int = 0
+    recoveries: int = 0
 
 
 class Slam:
@@ -55,6 +58,8 @@ class Slam:
     ----------
     counts : SlamCounts
         What was done so far.
+    doubts : Doubts
+        Stretches in which it is not sure where the robot went.
     """
 
     Settings = SlamSettings
@@ -69,7 +74,7 @@ class Slam:
         settings = self._settings
         self._mapper = LocalMapper(settings, self._geometry)
         self._loops = LoopClosing(settings)
-        self.counts = SlamCounts()
+        self.counts, self.doubts = SlamCounts(), Doubts()
         self._compass = WallCompass(settings.compass) if settings.uses_walls else None
         self._graph = NodeGraph(settings.graph, self._compass, pose)
         self._history = ScanHistory(self._geometry, settings.submaps.resolution)
@@ -210,6 +215,8 @@ class Slam:
             self._begin(ranges)
             return
         match = self._mapper.match(points, self._local, moved, self._motion.growth(), self._failed)
+        self.doubts.note(time_s, self._doubt(match, len(points)))
+        self.counts.recoveries = self._mapper.recoveries
         if match is None:
             self._fail(ranges)
             return
@@ -247,6 +254,15 @@ class Slam:
         poses, ended = self._mapper.hand_over(np.stack([self._local, self._matched, self._at_node]))
         self._local, self._matched, self._at_node = poses[0], poses[1], poses[2]
         self._loops.remember(ended, self._path)
+
+    def _doubt(self, match: Match | None, points: int) -> str | None:
+        """Return why a scan of so many points is not sure to be where it was placed; None where it is."""
+        if match is None:
+            return NO_MATCH
+        if self._mapper.recoveries > self.counts.recoveries:
+            return ELSEWHERE
+        is_sparse = points < self._settings.matching.wide_share * self._geometry.beams
+        return None if is_sparse or match.information.any() else ODOMETRY_ALONE
 
     def _begin(self, ranges: NDArray[np.float32]) -> None:
         """Begin the first map, at a node of its own.

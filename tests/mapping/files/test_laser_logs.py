@@ -277,3 +277,32 @@ def test_a_real_log_has_the_odometry_that_others_found_in_it(shared_data):
     assert len(text.stamps) == 906
     assert np.abs(text.odometry - parsed.odometry)[:, :2].max() < 1e-6
     np.testing.assert_array_equal(text.ranges[0, :-1] < 9.0, parsed.ranges[0, :-1] < 9.0)
+
+
+def corrected_lines(missing=(), without_own=None):
+    """A GridFastSLAM log: a reading every 0.5 s and 0.2 m; they go on from each scan's own pose."""
+    lines, x, y = [], 0.0, 0.0
+    for k in range(12):
+        x += 0.2 if k else 0.0
+        if k not in missing:
+            lines.append(odom(0.5 * k, x, y))
+        if k % 2 == 1:
+            y += 0.3
+            lines.append(flaser(0.5 * k, SCAN, (x, y, 0)))
+            if k != without_own:
+                lines.append(odom(0.5 * k, x, y))
+    return [*lines, "NEFF 1\n"]
+
+
+def test_odometry_of_a_scan_without_a_line_of_its_stamp_is_interpolated(tmp_path):
+    whole, gaps = read(tmp_path, *corrected_lines()), read(tmp_path, *corrected_lines(missing=(5, 8)))
+    assert whole.odometry[:, 0] == pytest.approx(0.2 + 0.4 * np.arange(6))
+    assert whole.odometry[:, 1] == pytest.approx(np.zeros(6), abs=1e-9)
+    assert gaps.stamps.tolist() == whole.stamps.tolist()
+    # The third scan's reading is missing; the last one before it is not repeated.
+    assert np.diff(gaps.odometry[:, 0]).min() > 0.1
+
+
+def test_a_pose_of_the_program_that_is_missing_costs_nothing(tmp_path):
+    whole, without = (read(tmp_path, *corrected_lines(without_own=own)) for own in (None, 5))
+    assert without.odometry == pytest.approx(whole.odometry, abs=1e-9)

@@ -52,6 +52,12 @@ class MatchingSettings:
         odometry led nowhere.
     evaluations : int
         At most so many placements, and blocks of them, are examined in such a search.
+    lost_evaluations : int
+        The same of a search in all directions, where odometry explains too little of a scan.
+    ambiguity : float
+        A second place that agrees as well as this share of the best refutes what such a search finds.
+    apart_m, apart_angle : float
+        By how much two such places differ [m, rad].
     independent_points, independent_share : float
         As how many independent measurements the returns of a scan count, all of them at most and each:
         neighbouring ones err together.
@@ -98,6 +104,10 @@ class MatchingSettings:
     wide_share: Positive = 0.08
     blind_overlap: Positive = 0.7
     evaluations: Count = 100_000
+    lost_evaluations: Count = 400_000
+    ambiguity: Positive = 0.9
+    apart_m: Length = 0.5
+    apart_angle: Angle = math.radians(15.0)
     independent_points: Positive = 50.0
     independent_share: Positive = 0.15
     deviation: Positive = 0.2
