@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.agent_actions import check_agents, missing_action, numbers_of
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.shares import scale_shares
 from lidarium.envs.station.operating import Operating
+from lidarium.mapping.geometry.bounds import shown
 
 
 class AgentCommands:
@@ -39,21 +41,23 @@ class AgentCommands:
         Raises
         ------
         ValueError
-            Where an agent has neither an action nor an order, or an action is not two finite numbers.
+            Where an agent has neither an action nor an order or is unknown, or an action is not two finite
+            numbers.
         """
         commands, rows = self.values, self._rows
+        check_agents(actions, rows)
         for agent in agents:
             row, action = rows[agent], actions.get(agent)
             if action is None:
                 if agent in self._operating.stopping or self._operating.is_addressed(row):
                     commands[row] = 0.0
                     continue
-                raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-            shares = action if isinstance(action, np.ndarray) else np.asarray(action, np.float64)
-            if shares.shape != (2,):
+                raise missing_action(agent)
+            shares = action if isinstance(action, np.ndarray) else numbers_of(action)
+            if shares.shape != (2,) or shares.dtype.kind not in "iuf":
                 raise ValueError(
-                    f"action of {agent} is {action!r}; want two numbers within [-1, 1]: shares of speed and "
-                    "turn rate"
+                    f"action of {agent} is {shown(action)}; want two numbers within [-1, 1]: shares of speed "
+                    "and turn rate"
                 )
             commands[row] = shares
         if not scale_shares(commands, self._limits):

@@ -26,7 +26,7 @@ from lidarium.envs.onboard.software import Software
 from lidarium.envs.outcome.scorer import Scorer
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.reset_options import FloorChoice, read_options
+from lidarium.envs.settings.reset_options import FloorChoice, checked_seed, read_options
 from lidarium.envs.station.reports import Station
 
 if TYPE_CHECKING:
@@ -160,9 +160,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             last seed.
         options : dict or None
             ``floor``, ``starts`` (robots, 3) in the floor's frame [m, rad], ``goal`` (2,) [m]; others are
-            ignored.
+            ignored, but for known names misspelt.
         """
-        chosen = read_options(options, self.settings.robots)
+        chosen, seed = read_options(options, self.settings.robots), checked_seed(seed)
         if seed is not None or self._generator is None:
             self._generator = np.random.default_rng(seed)
         return self.start(begin(self._generator, self._choice, chosen, self.settings))

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.reset_options import ResetOptions, read_options
+from lidarium.envs.settings.reset_options import (
+    OPTIONS,
+    ResetOptions,
+    check_options,
+    checked_seed,
+    read_options,
+)
 from lidarium.mapping.kernels.compilation import available_threads
 
 
@@ -45,19 +51,14 @@ def seeds_of(
     if seed is None:
         return [None] * episodes
     if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
-        first = _checked_seed(seed)
+        first = checked_seed(seed)
+        assert first is not None
         return [first + episode for episode in range(episodes)]
     if len(seed) != episodes:
         raise ValueError(
             f"seed has {len(seed)} entries; want one number, or one entry for each of the {episodes} episodes"
         )
-    return [None if one is None else _checked_seed(one) for one in seed]
-
-
-def _checked_seed(seed: Any) -> int:  # noqa: ANN401
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ValueError(f"seed is {seed!r}; want a whole number of zero or more")
-    return int(seed)
+    return [checked_seed(one) for one in seed]
 
 
 def episodes_of(options: dict[str, Any] | None, episodes: int) -> NDArray[np.int64]:
@@ -68,6 +69,7 @@ def episodes_of(options: dict[str, Any] | None, episodes: int) -> NDArray[np.int
     ValueError
         Where the mask is not (episodes,) bool with at least one True.
     """
+    check_options(options, (*OPTIONS, "episodes"))
     mask = (options or {}).get("episodes")
     if mask is None:
         return np.arange(episodes)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
@@ -25,10 +26,15 @@ class DecisionWrapper(ParallelEnv[str, Observation, Any]):
         The environment to drive in.
     name : str
         Name of the wrapped environment.
+
+    Raises
+    ------
+    ValueError
+        Where ``env`` is another environment.
     """
 
     def __init__(self, env: ExplorationEnv, name: str) -> None:
-        self.env = env
+        self.env = exploration_below(env, type(self).__name__)
         self.metadata = {**env.metadata, "name": name, "render_fps": 1.0 / env.settings.decision_period_s}
         self.possible_agents = env.possible_agents
         self.agents: list[str] = env.agents
@@ -59,6 +65,23 @@ class DecisionWrapper(ParallelEnv[str, Observation, Any]):
     def close(self) -> None:
         """Close the window, if there is one."""
         self.env.close()
+
+
+def exploration_below(env: Any, wrapper: str) -> ExplorationEnv:  # noqa: ANN401
+    """Return the environment below a wrapper.
+
+    Raises
+    ------
+    ValueError
+        Where it is not one of a single team.
+    """
+    if not isinstance(env, ExplorationEnv):
+        what = "a batch of many episodes" if isinstance(env, VectorEnv) else "no team's environment"
+        raise ValueError(
+            f"{wrapper} is put around {type(env).__name__}, {what}; want an environment of "
+            "lidarium.parallel_env"
+        )
+    return env
 
 
 def boxes_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:

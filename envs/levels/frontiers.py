@@ -9,11 +9,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from lidarium.envs.agent_actions import check_agents, missing_action, whole_number
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.decisions import DecisionWrapper, boxes_of
 from lidarium.envs.levels.frontier_choices import CANDIDATES, FARTHEST
 from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
 from lidarium.envs.levels.waypoints import WaypointExploration
+from lidarium.mapping.geometry.bounds import shown
 
 
 class FrontierExploration(DecisionWrapper):
@@ -71,17 +73,18 @@ class FrontierExploration(DecisionWrapper):
     ]:
         """Drive to the chosen frontiers for one decision."""
         env, offers = self.env, self._offers
+        check_agents(actions, self.possible_agents)
         numbers, choosing = np.full(env.settings.robots, CANDIDATES), []
         for agent in env.agents:
             if agent not in actions:
                 if agent in env.stopping or env.operating.is_addressed(self.possible_agents.index(agent)):
                     continue
-                raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
-            number = int(actions[agent])
-            if not 0 <= number <= CANDIDATES:
+                raise missing_action(agent)
+            number = whole_number(actions[agent], CANDIDATES)
+            if number is None:
                 raise ValueError(
-                    f"action of {agent} is {number}; want a frontier from 0 to {CANDIDATES - 1}, or "
-                    f"{CANDIDATES} to stay"
+                    f"action of {agent} is {shown(actions[agent])}; want a frontier from 0 to "
+                    f"{CANDIDATES - 1}, or {CANDIDATES} to stay"
                 )
             numbers[self.possible_agents.index(agent)] = number
             choosing.append(agent)

@@ -12,6 +12,7 @@ from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.making import make_settings
+from lidarium.envs.settings.reset_options import checked_seed
 
 AGENT = "robot_0"
 
@@ -64,7 +65,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode; options are those of ``ExplorationEnv.reset``."""
-        super().reset(seed=seed)
+        super().reset(seed=checked_seed(seed))
         observations, infos = self.parallel.reset(seed=seed, options=options)
         return observations[AGENT], infos[AGENT]
 

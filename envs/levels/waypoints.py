@@ -10,10 +10,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from lidarium.envs.agent_actions import check_agents, missing_action, numbers_of
 from lidarium.envs.driving.team_driver import TeamDriver
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.decisions import DecisionWrapper
 from lidarium.envs.radio.messages import DriveState, Orders, Target
+from lidarium.mapping.geometry.bounds import shown
 
 Waypoint = Target | NDArray[np.float32] | None
 
@@ -76,15 +78,16 @@ class WaypointExploration(DecisionWrapper):
         Rewards are summed over its steps, ``infos[agent]["drive"]`` is a ``DriveState``.
         """
         env = self.env
+        check_agents(actions, env.possible_agents)
         targets: list[Target | None] = [None] * env.settings.robots
         is_chosen = np.zeros(env.settings.robots, np.bool_)
         for agent in env.agents:
             row = env.possible_agents.index(agent)
             is_chosen[row] = agent in actions or agent in env.stopping
             if agent in actions:
-                targets[row] = self._target(row, actions[agent])
+                targets[row] = self._target(agent, actions[agent])
             elif agent not in env.stopping and not env.operating.is_addressed(row):
-                raise ValueError(f"no action for {agent}; step() needs one for every agent in env.agents")
+                raise missing_action(agent)
         return self.carry_out(Orders.of(targets), is_chosen)
 
     def carry_out(
@@ -127,14 +130,16 @@ class WaypointExploration(DecisionWrapper):
             one = np.arange(self.env.settings.robots) == row
             driver.assign(one, Orders.of([target] * self.env.settings.robots))
 
-    def _target(self, row: int, waypoint: Waypoint) -> Target | None:
+    def _target(self, agent: str, waypoint: Waypoint) -> Target | None:
         if waypoint is None or isinstance(waypoint, Target):
             return waypoint
-        share = np.asarray(waypoint, np.float64)
+        share = numbers_of(waypoint)
         if share.shape != (2,) or not np.isfinite(share).all():
             raise ValueError(
-                f"waypoint is {waypoint}; want two finite numbers within [-1, 1], a Target or None"
+                f"waypoint of {agent} is {shown(waypoint)}; want two finite numbers within [-1, 1], a Target "
+                "or None"
             )
+        row = self.env.possible_agents.index(agent)
         x, y = (
             self.env.perception.poses.pose_in_frame(row, row)[:2]
             + np.clip(share, -1.0, 1.0) * self._half_side

@@ -71,13 +71,8 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         occupancy = options.get("occupancy", base.occupancy)
         if isinstance(occupancy, OccupancySettings):
             options["occupancy"] = replace(occupancy, resolution=resolution)
-    max_cycles = options.pop("max_cycles", None)
-    if max_cycles is not None:
-        time_step = options.get("time_step", base.time_step)
-        for name, value, rule in (("max_cycles", max_cycles, CYCLES), ("time_step", time_step, TIME_STEP)):
-            if not rule.hold(value):
-                raise ValueError(f"{name} is {shown(value)}; want {rule.wanted}")
-        options["horizon_s"] = max_cycles * time_step
+    if (max_cycles := options.pop("max_cycles", None)) is not None:
+        options["horizon_s"] = _horizon(max_cycles, options, base)
     known = ExplorationSettings.__dataclass_fields__
     for name in options:
         if name not in known:
@@ -86,6 +81,20 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
         chosen = options.get("localization", base.localization)
         options["localizer"] = localizer_settings(chosen, options["localizer"])
     return assign(replace(base, **options), assigned)
+
+
+def _horizon(max_cycles: Any, options: Mapping[str, Any], base: ExplorationSettings) -> float:  # noqa: ANN401
+    """Return the horizon [s] of so many steps."""
+    if "horizon_s" in options:
+        raise ValueError(
+            f"max_cycles is {shown(max_cycles)} and horizon_s is {shown(options['horizon_s'])}; want one of "
+            "them: both set the horizon"
+        )
+    time_step = options.get("time_step", base.time_step)
+    for name, value, rule in (("max_cycles", max_cycles, CYCLES), ("time_step", time_step, TIME_STEP)):
+        if not rule.hold(value):
+            raise ValueError(f"{name} is {shown(value)}; want {rule.wanted}")
+    return float(max_cycles * time_step)
 
 
 def _part(name: str, value: Any) -> Any:  # noqa: ANN401

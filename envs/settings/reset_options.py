@@ -1,6 +1,8 @@
 """The options of ``reset``, and which floor an episode takes."""
 
-from dataclasses import dataclass
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.catalogue.names import is_file_name, load_floor, set_floors
 from lidarium.envs.floors.floor import Floor
+from lidarium.mapping.geometry.bounds import shown
 
 SET_PREFIX = "set:"
 
@@ -66,14 +69,57 @@ class ResetOptions:
     goal: tuple[float, float] | None = None
 
 
-def read_options(options: dict[str, Any] | None, robots: int) -> ResetOptions:
+OPTIONS = tuple(each.name for each in fields(ResetOptions))
+"""Names of the options of ``reset``."""
+
+SIMILARITY = 0.8
+"""How alike an unknown option's name is to a known one where it is taken for a slip of the pen."""
+
+
+def check_options(options: Any, known: Iterable[str] = OPTIONS) -> None:  # noqa: ANN401
+    """Check that options are a mapping, and that no name is a known one misspelt.
+
+    Other unknown names are no error: wrappers and trainers pass options of their own.
+
+    Raises
+    ------
+    ValueError
+        Where they are no mapping, or a name is nearly a known one.
+    """
+    if options is not None and not isinstance(options, Mapping):
+        raise ValueError(
+            f"options of reset are {shown(options)}; want a dict of any of {', '.join(known)}, or None"
+        )
+    for name in options or ():
+        near = difflib.get_close_matches(str(name)[:100], known, n=1, cutoff=SIMILARITY)
+        if near and near[0] != name:
+            raise ValueError(f"unknown reset option {shown(name)}; did you mean {near[0]!r}?")
+
+
+def checked_seed(seed: Any) -> int | None:  # noqa: ANN401
+    """Return a seed as a number; None stays None.
+
+    Raises
+    ------
+    ValueError
+        Where it is not a whole number of zero or more.
+    """
+    if seed is None:
+        return None
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"seed is {shown(seed)}; want a whole number of zero or more, or None")
+    return int(seed)
+
+
+def read_options(options: Mapping[str, Any] | None, robots: int) -> ResetOptions:
     """Check the options that are known and ignore the others.
 
     Raises
     ------
     ValueError
-        Where a known option has a bad value.
+        Where these are no options, or a known one has a bad value.
     """
+    check_options(options)
     if not options:
         return ResetOptions()
     starts = options.get("starts")

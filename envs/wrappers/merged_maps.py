@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from lidarium.envs.exploration import ExplorationEnv, Observation, Outcome
-from lidarium.envs.levels.decisions import boxes_of
+from lidarium.envs.levels.decisions import boxes_of, exploration_below
 from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.observation_spaces import FARTHEST
@@ -124,8 +124,7 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
         settings: MergingSettings | None = None,
         can_talk: NDArray[np.bool_] | CanTalk | None = None,
     ) -> None:
-        base = env.unwrapped
-        assert isinstance(base, ExplorationEnv)
+        base = exploration_below(getattr(env, "unwrapped", env), "MergedMaps")
         robots = base.settings.robots
         if robots < 2:
             raise ValueError(f"robots is {robots}; merging maps wants two or more")

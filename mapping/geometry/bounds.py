@@ -220,7 +220,7 @@ def check_anything(settings: Any, whose: str) -> None:  # noqa: ANN401
 def shown(value: Any) -> str:  # noqa: ANN401
     """Return a value for a message, never longer than a line."""
     try:
-        text = str(value) if isinstance(value, Real) else reprlib.repr(value)
+        text = str(value) if isinstance(value, Real) else " ".join(reprlib.repr(value).split())
     except (ValueError, RecursionError):
         return f"a {type(value).__name__} too long to be shown"
     return text if len(text) <= _MOST_LETTERS else f"{text[:_MOST_LETTERS]}..."

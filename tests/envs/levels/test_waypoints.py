@@ -134,7 +134,7 @@ def test_a_robot_that_is_stopped_ends_while_the_others_wait_one_step():
 def test_an_order_that_is_no_waypoint_is_refused(order):
     env = make()
     env.reset(seed=0)
-    with pytest.raises(ValueError, match="waypoint is"):
+    with pytest.raises(ValueError, match=r"waypoint of robot_\d is"):
         env.step({"robot_0": order})
 
 
