@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from lidarium.envs.floors.areas import around
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import FloorChoice
 from lidarium.envs.floors.starts import check_goal, check_starts, draw_starts
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
+from lidarium.envs.settings.reset_options import ResetOptions
 from lidarium.envs.simulation.backends import BACKENDS
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
@@ -72,11 +73,13 @@ def begin(
     radius = settings.robot.radius
     _check_height(floor, settings.robot.height)
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
-    if chosen.starts is not None:
-        check_starts(tables.body, radius, chosen.starts)
-        starts = chosen.starts
+    starts = chosen.starts
+    if isinstance(starts, np.ndarray):
+        check_starts(tables.body, radius, starts)
     else:
-        starts = draw_starts(tables.body, radius, settings.robots, generator, floor.starts)
+        how = starts or settings.starts or ("drawn" if choice_here.is_set else "fixed")
+        proposed = floor.starts[:0] if how == "drawn" else floor.starts
+        starts = draw_starts(tables.body, radius, settings.robots, generator, proposed)
     goal = (chosen.goal or floor.goal) if choice.has_goal else None
     if goal is not None:
         check_goal(tables.body, goal)

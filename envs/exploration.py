@@ -4,7 +4,6 @@ The team explores a floor.
 """
 
 import copy
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from lidarium.envs.agent_infos import AgentInfos
 from lidarium.envs.agent_observations import AgentObservations, Observation
 from lidarium.envs.episode_start import EpisodeStart, begin, make_simulation
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import FloorChoice, Floors
 from lidarium.envs.observation_spaces import action_space, observation_space
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.meters import Meters
@@ -26,7 +26,7 @@ from lidarium.envs.onboard.software import Software
 from lidarium.envs.outcome.scorer import Scorer
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.reset_options import FloorChoice, checked_seed, read_options
+from lidarium.envs.settings.reset_options import checked_seed, read_options
 from lidarium.envs.station.reports import Station
 
 if TYPE_CHECKING:
@@ -44,9 +44,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     Parameters
     ----------
-    floor : str, Path or Floor
-        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor. Of a
-        set, each reset draws one.
+    floor : Floors
+        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor; or
+        many, as `FloorChoice` takes them. Of many, each reset draws one.
     settings : ExplorationSettings
         Every knob.
     render_mode : str or None
@@ -79,7 +79,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def __init__(
         self,
-        floor: str | Path | Floor = "apartment",
+        floor: Floors = "apartment",
         settings: ExplorationSettings | None = None,
         render_mode: str | None = None,
         image_resolution: float | None = None,
@@ -159,7 +159,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             Where all draws of this and the later episodes come from; None goes on with the generator of the
             last seed.
         options : dict or None
-            ``floor``, ``starts`` (robots, 3) in the floor's frame [m, rad], ``goal`` (2,) [m]; others are
+            ``floor``, ``starts`` (robots, 3) in the floor's frame [m, rad], or ``fixed`` or ``drawn``,
+            ``goal`` (2,) [m]; others are
             ignored, but for known names misspelt.
         """
         chosen, seed = read_options(options, self.settings.robots), checked_seed(seed)

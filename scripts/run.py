@@ -68,9 +68,10 @@ class Run(TeamCommand):
     0.99 where left out, and none on a floor with a goal
     """
     starts: str | None = None
-    """where the robots start: x,y,theta of each.
+    """where the robots start: fixed, drawn, or x,y,theta of each.
 
-    In metres and radians, separated by semicolons.
+    In metres and radians, separated by semicolons. Fixed starts are those of the floor, and the default but
+    for sets of floors
     """
     record: bool = False
     """write a record of the run, episode.npz.
@@ -125,7 +126,7 @@ def _completed(command: Run) -> Run:
 
     The policy, and for supervised robots a world in which they need each other's maps.
     """
-    from lidarium.envs.settings.reset_options import FloorChoice
+    from lidarium.envs.floors.floor_choice import FloorChoice
 
     if command.policy is not None:
         return command
@@ -139,8 +140,8 @@ def _completed(command: Run) -> Run:
 
 
 def _settings(command: Run) -> "ExplorationSettings":
+    from lidarium.envs.floors.floor_choice import FloorChoice
     from lidarium.envs.settings.making import make_settings
-    from lidarium.envs.settings.reset_options import FloorChoice
 
     stop = command.stop_coverage
     if stop is None and not FloorChoice(command.floor, command.resolution).has_goal:
@@ -169,9 +170,13 @@ def _environment(command: Run, recorder: "Recorder | None") -> "tuple[WatchedExp
     ), history
 
 
-def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
+def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64] | str":
     import numpy as np
 
+    from lidarium.envs.settings.exploration import STARTS
+
+    if text in STARTS:
+        return text
     try:
         starts = np.array(
             [[float(value) for value in start.split(",")] for start in text.strip("; ").split(";")]
@@ -180,8 +185,8 @@ def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64]":
         starts = np.zeros((0, 0))
     if starts.ndim != 2 or starts.shape[1] != 3 or not np.isfinite(starts).all():
         raise ValueError(
-            f"--starts is {text!r}; want x,y,theta of each robot, separated by semicolons, as in "
-            "'1.0,2.5,0;4,2,1.57'"
+            f"--starts is {text!r}; want {', '.join(STARTS)}, or x,y,theta of each robot, separated by "
+            "semicolons, as in '1.0,2.5,0;4,2,1.57'"
         )
     if len(starts) != robots:
         raise ValueError(f"--starts has {len(starts)} starts for {robots} robots; want one for each")

@@ -55,7 +55,7 @@ CASES: dict[str, Case] = {
         egocentric_scales=(1, 4, 16),
     ),
     "velocity_drawn_floor": team(drawn_floor, 300, robots=2, resolution=0.1),
-    "velocity_set": team("set:train", 300, robots=2, max_cycles=100),
+    "velocity_set": team("set:train", 300, robots=2, max_cycles=100, starts="fixed"),
     "velocity_pioneer": team("office:3", 200, robots=2, robot="pioneer", lidar="lidar_360_20m"),
     "velocity_service": team("corridors:2", 200, robots=2, robot="service", raster_resolution=0.05),
     "velocity_point": team("srt_lab", 200, robots=1, robot="point", time_step=0.05),
@@ -115,7 +115,9 @@ CASES: dict[str, Case] = {
     "solo_waypoint": solo("WaypointExploration", "waypoint", 30, floor="srt_t_junction"),
     "solo_frontier": solo("FrontierExploration", "frontier", 40, floor="scene_loop_corridor"),
     "turns": turns("clinic", 300, robots=2, max_cycles=100),
-    "rows_velocity": rows("set:train", 200, robots=2, max_cycles=90, observe=ALL_SEEN, threads=THREADS),
+    "rows_velocity": rows(
+        "set:train", 200, robots=2, max_cycles=90, observe=ALL_SEEN, threads=THREADS, starts="fixed"
+    ),
     "rows_waypoint": rows("apartment", 30, "waypoint", robots=2, noise="datasheet", copy=False),
     "rows_frontier": rows(
         "building:5", 30, "frontier", robots=3, threads=THREADS, max_cycles=400, known_starts=False

@@ -11,18 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 import lidarium
 from lidarium.agents import make_policy
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.floors.catalogue.names import load_floor
-from lidarium.envs.floors.starts import draw_starts
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.evaluation.episodes.runner import run_episode
 
 POLICIES = ("random_walk", "nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite")
@@ -63,28 +57,17 @@ class Entry:
         return f"{self.floor} | {self.policy} | {self.robots}"
 
 
-def drawn_starts(env: ExplorationEnv, floor: str, seed: int) -> NDArray[np.float64]:
-    """Draw where the robots start, (robots, 3) [m, rad].
-
-    The starts that come with the floor would be the same for every seed.
-    """
-    settings = env.settings
-    tables = floor_tables(
-        load_floor(floor), settings.raster_resolution, settings.lidar.height, settings.robot.height
-    )
-    return draw_starts(tables.body, settings.robot.radius, settings.robots, np.random.default_rng(seed))
-
-
 def measure(entry: Entry) -> dict[str, Any]:
     """Run a policy on a floor once per seed; return times, coverages and contacts."""
     env = ExplorationEnv(
         entry.floor,
-        make_settings(robots=entry.robots, resolution=0.025, stop_coverage=GOAL, horizon_s=HORIZON_S),
+        make_settings(
+            robots=entry.robots, starts="drawn", resolution=0.025, stop_coverage=GOAL, horizon_s=HORIZON_S
+        ),
     )
     times, coverages, collisions = [], [], 0
     for seed in SEEDS:
-        starts = drawn_starts(env, entry.floor, seed)
-        episode = run_episode(make_policy(entry.policy), env, seed, {"starts": starts})
+        episode = run_episode(make_policy(entry.policy), env, seed)
         scorer = episode.env.scorer
         times.append(scorer.times.get(GOAL))
         coverages.append(scorer.coverage)

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.episode_start import EpisodeStart, begin
+from lidarium.envs.floors.floor_choice import FloorChoice
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
+from lidarium.envs.settings.reset_options import ResetOptions
 
 
 class Beginnings:

@@ -6,7 +6,6 @@ What each row sees, earns and why it ends is what ``ExplorationEnv`` gives for t
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from lidarium.envs.batch.row_infos import RowInfos
 from lidarium.envs.batch.running import SENSES, STEPS, WAITS
 from lidarium.envs.episode_start import EpisodeStart, goal_of_robots, make_simulation, map_frames
 from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import FloorChoice, Floors
 from lidarium.envs.observation_spaces import observation_space
 from lidarium.envs.observations import ObservationWriter
 from lidarium.envs.onboard.perception import Perception
@@ -29,7 +29,7 @@ from lidarium.envs.outcome.endings import HORIZON, make_rules, note_endings
 from lidarium.envs.outcome.reward_terms import ExtraTerms
 from lidarium.envs.scoring.rewards import TERMS
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.reset_options import FloorChoice, ResetOptions
+from lidarium.envs.settings.reset_options import ResetOptions
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.mapping.kernels.views import table_of
 
@@ -41,7 +41,7 @@ class EpisodeBatch:
     ----------
     episodes : int
         How many.
-    floor : str, Path or Floor
+    floor : Floors
         As for ``ExplorationEnv``.
     settings : ExplorationSettings
         Of every episode.
@@ -84,7 +84,7 @@ class EpisodeBatch:
     def __init__(
         self,
         episodes: int,
-        floor: str | Path | Floor,
+        floor: Floors,
         settings: ExplorationSettings,
         level: str = "velocity",
         image_resolution: float | None = None,

@@ -4,7 +4,6 @@ It has the rows of ``ExplorationVectorEnv``, reset in the step that ends.
 """
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.batch.episodes import Arrays, EpisodeBatch
 from lidarium.envs.batch.requests import options_of, seeds_of, settings_of
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.settings.reset_options import ResetOptions, read_options
 
 try:
@@ -56,7 +55,7 @@ class ExplorationVecEnv(VecEnv):
     def __init__(
         self,
         episodes: int,
-        floor: str | Path | Floor = "apartment",
+        floor: Floors = "apartment",
         level: str = "velocity",
         image_resolution: float | None = None,
         **options: Any,  # noqa: ANN401

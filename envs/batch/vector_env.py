@@ -4,7 +4,6 @@ It has a row for every robot of every episode.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.batch.episodes import Arrays, EpisodeBatch
 from lidarium.envs.batch.requests import episodes_of, options_of, seeds_of, settings_of
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import Floors
 
 _NO_EPISODES = np.zeros(0, np.int64)
 
@@ -36,7 +35,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
     ----------
     episodes : int
         How many episodes.
-    floor : str, Path or Floor
+    floor : Floors
         As for ``lidarium.parallel_env``; of a set, each beginning draws one.
     level : str
         What an action is: ``velocity``, ``waypoint`` or ``frontier``.
@@ -61,7 +60,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
     def __init__(
         self,
         episodes: int,
-        floor: str | Path | Floor = "apartment",
+        floor: Floors = "apartment",
         level: str = "velocity",
         image_resolution: float | None = None,
         copy: bool = True,

@@ -1,13 +1,12 @@
 """One robot alone: the Gymnasium form of the environment."""
 
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 from numpy.typing import NDArray
 
 from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.radio.messages import Order
@@ -22,7 +21,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
 
     Parameters
     ----------
-    floor : str, Path or Floor
+    floor : Floors
         As for ``lidarium.parallel_env``.
     level : str
         What an action is: ``velocity``, ``waypoint`` or ``frontier``.
@@ -43,7 +42,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
 
     def __init__(
         self,
-        floor: str | Path | Floor = "apartment",
+        floor: Floors = "apartment",
         level: str = "velocity",
         render_mode: str | None = None,
         image_resolution: float | None = None,

@@ -46,6 +46,9 @@ OCCUPANCY = inner(
 TRUE_POSE = "truth"
 """The localization that is none: the robot is given its true pose."""
 
+STARTS = ("fixed", "drawn")
+"""Where robots start: where the floor says, or anywhere in its largest free area."""
+
 KERNEL_LOCALIZATIONS = (TRUE_POSE, "odometry")
 """Localizations that can run within the kernels of a step.
 
@@ -73,6 +76,9 @@ class ExplorationSettings:
         Weights of the reward.
     known_starts : bool
         Whether the robots know where they start; otherwise each believes to start at (0, 0, 0).
+    starts : str or None
+        Where robots start: ``fixed``, at the starts of the floor as far as it has some; ``drawn``, anywhere;
+        None for drawn ones where each episode draws its floor, else fixed ones.
     reveals_starts : bool
         Whether reports hold where robots with unknown starts truly started, as a bound for what merging maps
         can reach.
@@ -128,6 +134,7 @@ class ExplorationSettings:
     occupancy: Annotated[OccupancySettings, OCCUPANCY] = field(default_factory=OccupancySettings)
     reward: RewardSettings = field(default_factory=RewardSettings)
     known_starts: bool = True
+    starts: str | None = None
     reveals_starts: bool = False
     localization: str = TRUE_POSE
     localizer: Annotated[Any, inner(particles=within(1, 20_000))] = None
@@ -164,6 +171,8 @@ class ExplorationSettings:
             raise ValueError(
                 f"localization is {self.localization!r}; want one of {', '.join(localizations())}"
             )
+        if self.starts is not None and self.starts not in STARTS:
+            raise ValueError(f"starts is {shown(self.starts)}; want {', '.join(STARTS)} or None")
         if self.localizer is not None:
             self._check_localizer()
         if self.backend != "kinematic" and self.backend not in registry("backend"):

@@ -1,71 +1,24 @@
-"""The options of ``reset``, and which floor an episode takes."""
+"""Options of ``reset``."""
 
 import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.catalogue.names import is_file_name, load_floor, set_floors
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import Floors
+from lidarium.envs.settings.exploration import STARTS
 from lidarium.mapping.geometry.bounds import shown
-
-SET_PREFIX = "set:"
-
-
-class FloorChoice:
-    """A floor, or a set of which each episode draws one.
-
-    Parameters
-    ----------
-    floor : str, Path or Floor
-        What the user named.
-    image_resolution : float or None
-        Side of a pixel [m] where the floor is a plain image.
-    """
-
-    def __init__(self, floor: str | Path | Floor, image_resolution: float | None = None) -> None:
-        if not isinstance(floor, str | Path | Floor):
-            raise ValueError(
-                f"floor is {floor!r}; want a name such as apartment, building:17 or set:train, a path, or a "
-                "Floor"
-            )
-        self._image_resolution = image_resolution
-        if isinstance(floor, str) and floor.startswith(SET_PREFIX):
-            self._specs: tuple[str | Path | Floor, ...] = set_floors(floor.removeprefix(SET_PREFIX))
-            self.has_goal = False
-        else:
-            self._specs = (floor,)
-            self.has_goal = load_floor(floor, image_resolution).goal is not None
-
-    def instead(self, floor: str | Path | Floor) -> "FloorChoice":
-        """Return the choice of another floor or set.
-
-        The side of a pixel concerns files only.
-        """
-        return FloorChoice(
-            floor, self._image_resolution if isinstance(floor, str | Path) and is_file_name(floor) else None
-        )
-
-    def load(self, generator: np.random.Generator) -> Floor:
-        """Return the floor of the next episode."""
-        spec = (
-            self._specs[0]
-            if len(self._specs) == 1
-            else self._specs[int(generator.integers(len(self._specs)))]
-        )
-        return load_floor(spec, self._image_resolution)
 
 
 @dataclass(frozen=True, slots=True)
 class ResetOptions:
     """Options of ``reset``, checked; None where not given."""
 
-    floor: str | Path | Floor | None = None
-    starts: NDArray[np.float64] | None = None
+    floor: Floors | None = None
+    starts: NDArray[np.float64] | str | None = None
     goal: tuple[float, float] | None = None
 
 
@@ -123,13 +76,13 @@ def read_options(options: Mapping[str, Any] | None, robots: int) -> ResetOptions
     if not options:
         return ResetOptions()
     starts = options.get("starts")
-    if starts is not None:
+    if starts is not None and not (isinstance(starts, str) and starts in STARTS):
         poses = _numbers(starts)
         if poses is None or poses.shape != (robots, 3):
             what = f"is {starts!r}" if poses is None else f"has shape {poses.shape}"
             raise ValueError(
-                f"option starts {what}; want ({robots}, 3) finite numbers: x, y [m] and theta [rad] of each "
-                "robot"
+                f"option starts {what}; want ({robots}, 3) finite numbers: x, y [m] and theta [rad] "
+                f"of each robot; or one of {', '.join(STARTS)}"
             )
         starts = poses
     goal = options.get("goal")

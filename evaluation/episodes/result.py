@@ -253,16 +253,21 @@ def realism_of(settings: ExplorationSettings) -> str:
     return "custom"
 
 
+LATER = ("localizer", "camera", "starts")
+"""Settings that older records do not have."""
+
+
 def settings_sha256(settings: ExplorationSettings) -> str:
     """Return a hash of all settings that can change a result.
 
     It is of their JSON with sorted keys, without ``threads``, and without what older records do not have
-    where it is not used: a localizer's own settings, more rewards, the build of robots without forces.
+    where it is not used: `LATER` settings at their defaults, more rewards, the build of robots without
+    forces.
     """
-    values = asdict(settings)
+    values, plain = asdict(settings), ExplorationSettings()
     del values["threads"]
-    for name in ("localizer", "camera"):
-        if values[name] is None:
+    for name in LATER:
+        if getattr(settings, name) == getattr(plain, name):
             del values[name]
     if not values["reward"]["more"]:
         del values["reward"]["more"]

@@ -4,7 +4,6 @@ Watchers are cameras, histories and records.
 """
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from lidarium.agents.report import GivenUp
 from lidarium.envs.episode_start import EpisodeStart
 from lidarium.envs.exploration import ExplorationEnv, Observation
-from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.radio.messages import Orders
 from lidarium.envs.settings.exploration import ExplorationSettings
 
@@ -75,7 +74,7 @@ class WatchedExploration(ExplorationEnv):
 
     def __init__(
         self,
-        floor: str | Path | Floor,
+        floor: Floors,
         settings: ExplorationSettings,
         image_resolution: float | None = None,
         watchers: Iterable[Watcher] = (),

@@ -14,14 +14,13 @@ import pettingzoo
 
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
-    from pathlib import Path
 
     from pettingzoo import AECEnv, ParallelEnv
 
     from lidarium.agents.policy import Policy
     from lidarium.envs.batch.stable_baselines import ExplorationVecEnv
     from lidarium.envs.batch.vector_env import ExplorationVectorEnv
-    from lidarium.envs.floors.floor import Floor
+    from lidarium.envs.floors.floor_choice import Floors
     from lidarium.envs.settings.exploration import ExplorationSettings
 
 __version__ = "0.2.0"
@@ -70,7 +69,7 @@ for _name, _options in _IDS.items():
 
 
 def parallel_env(
-    floor: "str | Path | Floor" = "apartment",
+    floor: "Floors" = "apartment",
     *,
     level: str = "velocity",
     settings: "ExplorationSettings | None" = None,
@@ -82,8 +81,9 @@ def parallel_env(
 
     Parameters
     ----------
-    floor : str, Path or Floor
-        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor.
+    floor : str, Path, Floor, sequence, mapping or callable
+        A catalogue name, ``building:SEED``, ``set:NAME``, a file that the importers know, or a floor; many
+        of them as a list, a folder, a mapping to weights, or a callable of a generator.
     level : str
         What an action is: ``velocity`` (shares of the greatest speed and turn rate), ``waypoint`` (a point of
         the observed map) or ``frontier`` (one of the frontiers in reach).
@@ -117,7 +117,7 @@ def parallel_env(
     )
 
 
-def env(floor: "str | Path | Floor" = "apartment", **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401
+def env(floor: "Floors" = "apartment", **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401
     """Make a team's environment in PettingZoo's turn-based form.
 
     Options as for ``parallel_env``.
@@ -130,7 +130,7 @@ def env(floor: "str | Path | Floor" = "apartment", **options: Any) -> "AECEnv[st
 
 def vector_env(
     episodes: int,
-    floor: "str | Path | Floor" = "apartment",
+    floor: "Floors" = "apartment",
     **options: Any,  # noqa: ANN401
 ) -> "ExplorationVectorEnv":
     """Make many episodes as one Gymnasium vector environment.
@@ -141,7 +141,7 @@ def vector_env(
     ----------
     episodes : int
         How many; ``num_envs`` is episodes x robots.
-    floor : str, Path or Floor
+    floor : Floors
         As for ``parallel_env``; of a set such as ``set:train``, each beginning draws one.
     **options
         ``level``, ``image_resolution`` and the options of ``parallel_env``; ``copy=False`` for observations
@@ -159,7 +159,7 @@ def vector_env(
 
 def sb3_vec_env(
     episodes: int,
-    floor: "str | Path | Floor" = "apartment",
+    floor: "Floors" = "apartment",
     **options: Any,  # noqa: ANN401
 ) -> "ExplorationVecEnv":
     """Make the same rows as ``vector_env`` for stable-baselines3.

@@ -58,7 +58,7 @@ MOVED: dict[str, tuple[str, ...]] = {
     "envs.onboard.team_driver": ("envs.driving.team_driver",),
     "envs.onboard.team_mapping": ("envs.station.team_mapping",),
     "envs.onboard.traffic": ("envs.driving.traffic",),
-    "envs.options": ("envs.settings.reset_options",),
+    "envs.options": ("envs.settings.reset_options", "envs.floors.floor_choice"),
     "envs.rendering": ("envs.drawing.rendering",),
     "envs.scorer": (
         "envs.outcome.scorer",

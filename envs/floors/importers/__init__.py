@@ -24,11 +24,14 @@ class Format:
         Whether a file with such a name is of this format, by its content.
     load : callable
         Reads the file; gets the path and the resolution asked for, or None.
+    has_scale : callable
+        Whether a file says itself how large it is, by its name.
     """
 
     suffixes: tuple[str, ...]
     matches: Callable[[Path], bool]
     load: Callable[[Path, float | None], Floor]
+    has_scale: Callable[[Path], bool] = lambda path: True
 
 
 def _always(path: Path) -> bool:
@@ -39,7 +42,7 @@ FORMATS: Registry[Format] = Registry("floor format")
 """Formats of floors by name; the first that matches reads a file."""
 
 FORMATS.register(
-    "ros_map", Format((".yaml", ".yml"), _always, ros_map.load), "ROS map: a picture with its yaml"
+    "ros_map", Format(ros_map.SUFFIXES, _always, ros_map.load), "ROS map: a picture with its yaml"
 )
 FORMATS.register(
     "houseexpo", Format((".json", ".json.gz"), _always, houseexpo.load), "HouseExpo, a plan as JSON"
@@ -47,11 +50,15 @@ FORMATS.register(
 FORMATS.register("kth", Format((".xml", ".xml.gz"), _always, kth.load), "KTH floor plan as XML")
 FORMATS.register("amrl", Format((".txt", ".txt.gz"), amrl.matches, amrl.load), "AMRL vector map")
 FORMATS.register("lifull", Format((".txt", ".txt.gz"), _always, lifull.load), "LIFULL vector annotation")
-FORMATS.register("array", Format((".npy", ".npz"), _always, arrays.load), "numpy array")
+FORMATS.register("array", Format((".npy", ".npz"), _always, arrays.load, arrays.has_scale), "numpy array")
 FORMATS.register(
     "dungeon", Format(images.SUFFIXES, images.is_dungeon, images.load_dungeon), "picture of a dungeon"
 )
-FORMATS.register("image", Format(images.SUFFIXES, _always, images.load_image), "plain picture")
+FORMATS.register(
+    "image",
+    Format(images.SUFFIXES, _always, images.load_image, has_scale=lambda path: False),
+    "plain picture",
+)
 
 
 def load_file(path: Path, resolution: float | None = None) -> Floor:
@@ -85,10 +92,24 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     check_file(path)
     if resolution is not None and not RESOLUTION.hold(resolution):
         raise ValueError(f"resolution is {shown(resolution)} m; want {RESOLUTION.wanted} of metres per pixel")
-    lower = path.name.lower()
     with reading(path, "a floor"):
-        for known in FORMATS.values():
-            if lower.endswith(known.suffixes) and known.matches(path):
-                return known.load(path, resolution)
+        known = _format_of(path)
+        if known is not None:
+            return known.load(path, resolution)
     suffixes = sorted({suffix for known in FORMATS.values() for suffix in known.suffixes})
     raise ValueError(f"{path} is of no known floor format; want a file that ends in {', '.join(suffixes)}")
+
+
+def takes_resolution(path: Path) -> bool:
+    """Whether a file needs a resolution beside it, because it does not say its scale itself."""
+    with reading(path, "a floor"):
+        known = _format_of(path)
+        return known is not None and not known.has_scale(path)
+
+
+def _format_of(path: Path) -> Format | None:
+    """Return the first format that a file's name and content match."""
+    lower = path.name.lower()
+    return next(
+        (known for known in FORMATS.values() if lower.endswith(known.suffixes) and known.matches(path)), None
+    )

@@ -14,6 +14,11 @@ from lidarium.mapping.geometry.bounds import shown
 _FREE_ABOVE = 127
 
 
+def has_scale(path: Path) -> bool:
+    """Whether an array says its scale itself: archives do, single arrays do not."""
+    return path.suffix.lower() == ".npz"
+
+
 def load(path: Path, resolution: float | None) -> Floor:
     """Read an array.
 

@@ -11,6 +11,9 @@ from lidarium.envs.floors.importers.common import floor_of_cells, refuse_resolut
 from lidarium.mapping.files.images import MOST_PIXELS
 from lidarium.mapping.files.map_files import FREE, MapImage, read_ros_map
 
+SUFFIXES = (".yaml", ".yml")
+"""How the names of descriptions end; a picture of the same name belongs to each."""
+
 # Indices of a whole map would take sixteen times its memory.
 _BLOCK_ROWS = 256
 

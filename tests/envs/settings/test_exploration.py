@@ -11,7 +11,7 @@ import pytest
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.lidar import LIDARS, NOISE, Lidar
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.reset_options import FloorChoice, read_options
+from lidarium.envs.settings.reset_options import read_options
 from lidarium.envs.settings.rewards import RewardSettings
 from lidarium.envs.settings.robots import ROBOTS
 from lidarium.mapping.grids.occupancy import OccupancySettings
@@ -199,19 +199,3 @@ def test_reset_options_that_are_unknown_are_ignored_and_known_ones_checked():
 def test_reset_options_with_bad_values_are_refused(options, words):
     with pytest.raises(ValueError, match=words):
         read_options(options, 2)
-
-
-def test_a_set_draws_its_floors_from_the_generator_and_one_floor_draws_nothing():
-    choice = FloorChoice("set:test")
-    first = [choice.load(np.random.default_rng(1)) for _ in range(3)]
-    assert first[0] is first[1] is first[2]
-    generator = np.random.default_rng(1)
-    assert len({choice.load(generator).sha256 for _ in range(20)}) > 10
-    generator, untouched = np.random.default_rng(1), np.random.default_rng(1)
-    assert FloorChoice("apartment").load(generator).name == "apartment"
-    assert generator.random() == untouched.random()
-
-
-def test_an_unknown_set_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="validation"):
-        FloorChoice("set:training")

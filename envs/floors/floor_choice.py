@@ -1,0 +1,173 @@
+"""Which floor an episode takes: a named one, or one drawn from many."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lidarium.envs.floors.catalogue.names import is_file_name, load_floor, set_floors
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.importers import FORMATS, ros_map, takes_resolution
+from lidarium.mapping.geometry.bounds import shown
+
+SET_PREFIX = "set:"
+
+FloorName = str | Path | Floor
+"""A name of the catalogue, a set, a folder, a file, or a floor."""
+
+Floors = FloorName | Sequence[Any] | Mapping[Any, float] | Callable[[np.random.Generator], Any]
+"""What an environment takes as its floor; see `FloorChoice`."""
+
+
+class FloorChoice:
+    """A floor, or many of which each episode draws one.
+
+    Parameters
+    ----------
+    floor : str, Path, Floor, sequence, mapping or callable
+        A name of the catalogue, a path, or a floor; or many: ``set:NAME``, a folder of files that the
+        importers know, a list, a mapping from floors to their weights, or a callable that takes the episode's
+        generator and returns a floor. Those of a list or mapping may be sets and folders themselves.
+    image_resolution : float or None
+        Side of a pixel [m] of floors that are plain images.
+
+    Attributes
+    ----------
+    is_set : bool
+        Whether there are many.
+    has_goal : bool
+        Whether the floor has a goal; of many, whether the first one has. That of a callable has none.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        Where there is no such floor, none at all, or a weight is not a positive number.
+    """
+
+    def __init__(self, floor: Floors, image_resolution: float | None = None) -> None:
+        self._image_resolution = image_resolution
+        self._source: Callable[[np.random.Generator], Any] | None = None
+        self._weights: np.ndarray[Any, np.dtype[np.float64]] | None = None
+        self._specs: tuple[Any, ...] = ()
+        if isinstance(floor, str | Path | Floor):
+            self._specs = _expanded(floor)
+            self.is_set = self._specs != (floor,)
+        elif callable(floor):
+            self._source, self.is_set = floor, True
+        elif isinstance(floor, Mapping | Sequence) and len(floor):
+            self._specs, self.is_set = tuple(floor), True
+            self._weights = _shares(floor) if isinstance(floor, Mapping) else None
+        else:
+            raise ValueError(
+                f"floor is {shown(floor)}; want a name such as apartment, building:17 or set:train, a path, "
+                "a Floor, or many of them: a list, a folder, a mapping to weights, a callable"
+            )
+        self.has_goal = self._first_has_goal(floor)
+
+    def _first_has_goal(self, floor: Floors) -> bool:
+        """Whether the first floor has a goal.
+
+        Generated floors have none, and are not generated to be asked.
+        """
+        if self._source is not None or (isinstance(floor, str) and floor.startswith(SET_PREFIX)):
+            return False
+        if isinstance(floor, str | Path | Floor):
+            return self._load(self._specs[0]).goal is not None
+        return FloorChoice(self._specs[0], self._resolution_of(self._specs[0])).has_goal
+
+    def instead(self, floor: Floors) -> "FloorChoice":
+        """Return the choice of another floor or of others.
+
+        The side of a pixel concerns files only.
+        """
+        return FloorChoice(floor, self._resolution_of(floor))
+
+    def load(self, generator: np.random.Generator) -> Floor:
+        """Return the floor of the next episode.
+
+        Raises
+        ------
+        ValueError, FileNotFoundError
+            Where the floor that was drawn cannot be used.
+        """
+        if self._source is not None:
+            return self.instead(self._source(generator)).load(generator)
+        spec = self._specs[self._draw(generator)]
+        if self._holds_choices(spec):
+            return self.instead(spec).load(generator)
+        return self._load(spec)
+
+    def _draw(self, generator: np.random.Generator) -> int:
+        count = len(self._specs)
+        if count == 1:
+            return 0
+        if self._weights is None:
+            return int(generator.integers(count))
+        return int(generator.choice(count, p=self._weights))
+
+    def _load(self, spec: FloorName) -> Floor:
+        # One floor alone is refused with a resolution that it cannot have; of many some are plain images.
+        resolution = self._image_resolution
+        if self.is_set and resolution is not None and not isinstance(spec, Floor):
+            is_plain = is_file_name(spec) and takes_resolution(Path(spec))
+            return load_floor(spec, resolution if is_plain else None)
+        return load_floor(spec, resolution)
+
+    def _resolution_of(self, spec: Any) -> float | None:  # noqa: ANN401
+        """Return the side of a pixel for files, folders and choices; None for floors by name."""
+        is_named = isinstance(spec, Floor) or (isinstance(spec, str) and not is_file_name(spec))
+        return None if is_named else self._image_resolution
+
+    @staticmethod
+    def _holds_choices(spec: Any) -> bool:  # noqa: ANN401
+        if isinstance(spec, Floor):
+            return False
+        return not isinstance(spec, str | Path) or str(spec).startswith(SET_PREFIX) or _is_folder(spec)
+
+
+def _expanded(floor: FloorName) -> tuple[FloorName, ...]:
+    """Return the floors of a set or of a folder; any other floor alone."""
+    if isinstance(floor, str) and floor.startswith(SET_PREFIX):
+        return set_floors(floor.removeprefix(SET_PREFIX))
+    return folder_floors(Path(floor)) if not isinstance(floor, Floor) and _is_folder(floor) else (floor,)
+
+
+def _is_folder(floor: Any) -> bool:  # noqa: ANN401
+    """Whether a floor is named by a folder; names of the catalogue go before folders."""
+    if isinstance(floor, Path):
+        return floor.is_dir()
+    return isinstance(floor, str) and ("/" in floor or "\\" in floor) and Path(floor).is_dir()
+
+
+def folder_floors(folder: Path) -> tuple[Path, ...]:
+    """Return the files of a folder that have the name of a floor, in the order of their names.
+
+    Pictures beside the description of a ROS map of the same name belong to it.
+
+    Raises
+    ------
+    ValueError
+        Where the folder has none.
+    """
+    suffixes = tuple(suffix for known in FORMATS.values() for suffix in known.suffixes)
+    files = sorted(path for path in folder.iterdir() if path.name.lower().endswith(suffixes))
+    described = {path.stem for path in files if path.suffix.lower() in ros_map.SUFFIXES}
+    is_own = (path.stem not in described or path.suffix.lower() in ros_map.SUFFIXES for path in files)
+    floors = tuple(path for path, keeps in zip(files, is_own, strict=True) if keeps)
+    if not floors:
+        raise ValueError(
+            f"folder {str(folder)!r} has no floors; want files that end in {', '.join(sorted(set(suffixes)))}"
+        )
+    return floors
+
+
+def _shares(weights: Mapping[Any, float]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return weights as shares of their sum."""
+    for floor, weight in weights.items():
+        is_number = isinstance(weight, int | float | np.number) and not isinstance(weight, bool)
+        if not (is_number and math.isfinite(weight) and weight > 0):
+            raise ValueError(f"the weight of floor {shown(floor)} is {shown(weight)}; want a positive number")
+    numbers = np.array([float(weight) for weight in weights.values()])
+    return np.asarray(numbers / numbers.sum())

@@ -1,0 +1,57 @@
+"""Where robots start: at the floor's starts, or anywhere; alone, in batches, and by options of a reset."""
+
+import numpy as np
+import pytest
+
+import lidarium
+
+SMALL = {"robots": 2, "map_cells": 64, "lidar": "lidar_360_6m"}
+
+
+def begun(env, seed, **options):
+    env.reset(seed=seed, options=options)
+    return env.unwrapped.world.starts.copy()
+
+
+def test_one_floor_has_fixed_starts_unless_drawn_ones_are_asked_for():
+    fixed = lidarium.parallel_env("apartment", **SMALL)
+    drawn = lidarium.parallel_env("apartment", starts="drawn", **SMALL)
+    assert np.array_equal(begun(fixed, 0), begun(fixed, 1))
+    assert not np.array_equal(begun(drawn, 0), begun(drawn, 1))
+    assert np.array_equal(begun(drawn, 0), begun(drawn, 0))
+
+
+@pytest.mark.parametrize("floor", ["set:test:1", ["apartment"]])
+def test_floors_that_are_drawn_have_drawn_starts_unless_fixed_ones_are_asked_for(floor):
+    drawn = lidarium.parallel_env(floor, **SMALL)
+    fixed = lidarium.parallel_env(floor, starts="fixed", **SMALL)
+    assert not np.array_equal(begun(drawn, 0), begun(drawn, 1))
+    assert np.array_equal(begun(fixed, 0)[0], begun(fixed, 1)[0])
+
+
+def test_an_option_of_a_reset_goes_before_the_setting():
+    env = lidarium.parallel_env("apartment", **SMALL)
+    fixed = begun(env, 0)
+    drawn = begun(env, 0, starts="drawn")
+    assert not np.array_equal(fixed, drawn)
+    assert np.array_equal(begun(env, 1, starts="fixed"), fixed)
+    assert np.array_equal(begun(lidarium.parallel_env("apartment", starts="drawn", **SMALL), 0), drawn)
+
+
+def test_rows_of_a_batch_start_where_single_episodes_do():
+    batch = lidarium.vector_env(3, ["apartment", "clinic"], **SMALL)
+    batch.reset(seed=4)
+    alone = lidarium.parallel_env(["apartment", "clinic"], **SMALL)
+    starts = np.concatenate([begun(alone, 4 + episode) for episode in range(3)])
+    assert np.array_equal(batch.batch.world.starts, starts)
+    batch.reset(seed=4, options={"starts": "fixed"})
+    again = np.concatenate([begun(alone, 4 + episode, starts="fixed") for episode in range(3)])
+    assert np.array_equal(batch.batch.world.starts, again)
+
+
+@pytest.mark.parametrize("starts", ["random", "fixd"])
+def test_unknown_kinds_of_starts_are_refused(starts):
+    with pytest.raises(ValueError, match=r"starts is .*; want fixed, drawn or None"):
+        lidarium.parallel_env("apartment", starts=starts)
+    with pytest.raises(ValueError, match=r"option starts is .*; want \(3, 3\) .*one of fixed, drawn"):
+        lidarium.parallel_env("apartment").reset(options={"starts": starts})
