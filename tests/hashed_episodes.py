@@ -25,6 +25,9 @@ from lidarium.evaluation.episodes.watching import Watcher
 SEED = 11
 SMALL: dict[str, Any] = {"map_cells": 64, "stop_coverage": None}
 
+OLD_OFFERS: dict[str, Any] = {"frontiers": 16, "least_frontier": 0.1, "frontiers_by_size": 0.0}
+"""What the level of frontiers offered when the hashes were made, and version 0 of the ids still does."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Case:
@@ -54,9 +57,14 @@ def drawn_floor() -> Any:
     )
 
 
-def built(options: Mapping[str, Any]) -> dict[str, Any]:
+def built(options: Mapping[str, Any], level: str = "velocity") -> dict[str, Any]:
     """Return options in which values that need a documented name have been made."""
-    return {**SMALL, **{key: value() if callable(value) else value for key, value in options.items()}}
+    offers = OLD_OFFERS if level == "frontier" else {}
+    return {
+        **SMALL,
+        **offers,
+        **{key: value() if callable(value) else value for key, value in options.items()},
+    }
 
 
 def part(name: str, **values: Any) -> Callable[[], Any]:
@@ -103,7 +111,9 @@ def team(
     """Return an episode of ``lidarium.parallel_env`` with drawn actions."""
 
     def run(ledger: Ledger) -> None:
-        env = lidarium.parallel_env(floor() if callable(floor) else floor, level=level, **built(options))
+        env = lidarium.parallel_env(
+            floor() if callable(floor) else floor, level=level, **built(options, level)
+        )
         if merged is not None:
             env = named("MergedMaps")(env, named("MergingSettings")(period_s=2.0, known_starts=merged))
         draws, actions = np.random.default_rng(SEED), {}
@@ -173,7 +183,7 @@ def rows(
     """Return episodes of ``lidarium.vector_env``, some of which end and begin anew."""
 
     def run(ledger: Ledger) -> None:
-        env = (make or lidarium.vector_env)(3, floor=floor, level=level, **built(options))
+        env = (make or lidarium.vector_env)(3, floor=floor, level=level, **built(options, level))
         draws, before = np.random.default_rng(SEED), [np.zeros(2)] * env.num_envs
         outcome = env.reset(seed=SEED)
         ledger.told(outcome)

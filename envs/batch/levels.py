@@ -14,7 +14,6 @@ from lidarium.envs.batch.running import DECIDES, STEPS
 from lidarium.envs.driving.drives import DRIVE_STATES, Drives, Following, no_drives
 from lidarium.envs.driving.safety_stop import FORESIGHT_TIMES
 from lidarium.envs.driving.team_driver import TeamDriver
-from lidarium.envs.levels.frontier_choices import CANDIDATES
 from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
 from lidarium.envs.levels.frontiers import frontier_boxes
 from lidarium.envs.observation_spaces import action_space
@@ -195,8 +194,9 @@ class FrontierLevel:
     """An action is the number of a frontier, as for ``FrontierExploration``."""
 
     def __init__(self, perception: Perception, settings: ExplorationSettings) -> None:
-        self.action_space: spaces.Space[Any] = spaces.Discrete(CANDIDATES + 1)
-        self.boxes = frontier_boxes()
+        self._most = settings.frontiers
+        self.action_space: spaces.Space[Any] = spaces.Discrete(self._most + 1)
+        self.boxes = frontier_boxes(settings)
         self._waypoints = WaypointLevel(perception, settings)
         self._offers = FrontierOffers(perception, settings, self._waypoints.driver)
         self._robots = settings.robots
@@ -211,15 +211,14 @@ class FrontierLevel:
         self, actions: NDArray[Any], live: Rows, commands: NDArray[np.float64], modes: NDArray[np.int8]
     ) -> NDArray[np.int8]:
         """Take the choices; where no robot of an episode is offered any frontier, all end."""
-        wanted = f"a whole number from 0 to {CANDIDATES}"
+        most = self._most
+        wanted = f"a whole number from 0 to {most}"
         numbers = check_actions(actions, (len(live),), live, wanted)
-        is_bad = live & ((numbers < 0) | (numbers > CANDIDATES) | (numbers != np.floor(numbers)))
+        is_bad = live & ((numbers < 0) | (numbers > most) | (numbers != np.floor(numbers)))
         if is_bad.any():
             bad = int(np.flatnonzero(is_bad)[0])
-            raise ValueError(
-                f"the action of row {bad} is {numbers[bad]}; want {wanted}, {CANDIDATES} to stay"
-            )
-        orders = self._offers.choose(live, np.where(live, numbers, CANDIDATES).astype(np.int64))
+            raise ValueError(f"the action of row {bad} is {numbers[bad]}; want {wanted}, {most} to stay")
+        orders = self._offers.choose(live, np.where(live, numbers, most).astype(np.int64))
         has_work = (live & (self._offers.offers.counts > 0)).reshape(-1, self._robots).any(axis=1)
         is_idle = (modes == STEPS) & ~has_work
         stopping = np.zeros(len(live), np.int8)

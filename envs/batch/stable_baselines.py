@@ -183,7 +183,7 @@ class ExplorationVecEnv(VecEnv):
 
     @property
     def action_masks(self) -> NDArray[np.bool_]:
-        """Which actions each row may choose now, (rows, 17).
+        """Which actions each row may choose now, (rows, frontiers + 1).
 
         At the level of frontiers only.
         """

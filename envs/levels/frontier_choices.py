@@ -25,14 +25,6 @@ from lidarium.mapping.planning.frontiers import frontier_clusters, ignore_fronti
 from lidarium.mapping.planning.search.path_search import clear_memory, search_all
 from lidarium.mapping.planning.search.search_state import LARGEST_BUDGET, STRAIGHT
 
-CANDIDATES = 16
-"""Most frontiers that a robot chooses among."""
-
-
-MINIMUM_SIZE = 0.1
-"""Shorter frontiers are offered only where there is no longer one [m]."""
-
-
 FARTHEST = 1000.0
 """Largest number in a table of offers [m]."""
 
@@ -49,20 +41,20 @@ UNSEEN, BLOCKED, NO_PROGRESS = 1, 2, 3
 
 
 class Offers(NamedTuple):
-    """What each robot is offered; row = episode * robots + robot.
+    """What each robot is offered; row = episode * robots + robot, offers: ``settings.frontiers``.
 
     Attributes
     ----------
-    tables : (rows, 16, 4) float32
+    tables : (rows, offers, 4) float32
         Position along the axes of the map frame from where the robot believes to be, cost of the path and
         size [m] of each frontier, cheapest path first, zeros behind the last.
-    masks : (rows, 17) int8
+    masks : (rows, offers + 1) int8
         1 for what may be chosen; the last is to stay.
     counts : (rows,) int64
         Number of frontiers.
-    targets, headings : (rows, 16, 2), (rows, 16) float64
+    targets, headings : (rows, offers, 2), (rows, offers) float64
         Where to stand in the map frame [m] and how to turn there [rad], nan for any.
-    cells : (rows, 16, 2) int64
+    cells : (rows, offers, 2) int64
         The frontier cell (row, column) to observe.
     """
 
@@ -99,7 +91,7 @@ class Choices(NamedTuple):
 
 
 class ViewReach(NamedTuple):
-    """From where robots observe frontiers.
+    """From where robots observe frontiers, and which they are offered.
 
     Attributes
     ----------
@@ -109,11 +101,17 @@ class ViewReach(NamedTuple):
         Its radius [cells].
     time_step : float
         Length of a step [s].
+    least_size : float
+        Shorter frontiers are offered only where there is no longer one [m].
+    by_size : int
+        How many of the offers are the longest ones, the others are the cheapest.
     """
 
     spans: NDArray[np.int64]
     reach: float
     time_step: float
+    least_size: float
+    by_size: int
 
 
 class Renewal(NamedTuple):
@@ -158,36 +156,64 @@ def _why_in_vain(planning: Planning, drives: Drives, choices: Choices, row: int,
 
 
 @kernel
-def _cheapest(left: Array, is_wanted: Array, ranked: Array) -> int:
-    """Rank the wanted clusters by what is left of the budget; return their number.
+def _rank(values: Array, is_wanted: Array, ranked: Array, first: int, last: int) -> int:
+    """Write wanted clusters to ``ranked[first:last]``, the highest value first; return where they end.
 
-    The budget is what is left at the cluster; the first of equals comes first.
+    The first of equals comes first. What is ranked is wanted no more.
     """
-    count = 0
-    while count < len(ranked):
+    while first < last:
         best = -1
-        for k in range(len(left)):
-            if is_wanted[k] and (best < 0 or left[k] > left[best]):
+        for k in range(len(values)):
+            if is_wanted[k] and (best < 0 or values[k] > values[best]):
                 best = k
         if best < 0:
             break
         is_wanted[best] = False
-        ranked[count] = best
-        count += 1
-    return count
+        ranked[first] = best
+        first += 1
+    return first
+
+
+@kernel
+def choose_offers(left: Array, sizes: Array, is_wanted: Array, by_size: int, ranked: Array) -> int:
+    """Choose which clusters are offered, and return how many.
+
+    They are the cheapest, and of the others the longest; offered in the order of their cost.
+
+    Parameters
+    ----------
+    left : (clusters,) array
+        What is left of the budget at each cluster: more is cheaper.
+    sizes : (clusters,) array
+        How long each is.
+    is_wanted : (clusters,) bool
+        Which may be offered; overwritten.
+    by_size : int
+        How many of the offers are for the longest.
+    ranked : (offers,) int64
+        Where the numbers of the chosen clusters are written.
+    """
+    count = int(_rank(left, is_wanted, ranked, 0, len(ranked) - by_size))
+    if by_size == 0:
+        return count
+    count = _rank(sizes, is_wanted, ranked, count, len(ranked))
+    is_wanted[:] = False
+    for i in range(count):
+        is_wanted[ranked[i]] = True
+    return int(_rank(left, is_wanted, ranked, 0, count))
 
 
 @kernel
 def _offer(
     planning: Planning, view: ViewReach, offers: Offers, row: int, cells: Array, starts: Array, piece: int
 ) -> None:
-    """Offer a robot the frontier clusters that it can approach and see.
+    """Offer a robot frontier clusters that it can approach and see, see `choose_offers`.
 
     The cheapest path comes first.
     """
     table, mask = offers.tables[row], offers.masks[row]
     table[:], mask[:], offers.counts[row] = 0.0, 0, 0
-    mask[CANDIDATES] = 1
+    mask[len(table)] = 1
     if len(starts) < 2:
         return
     record, resolution = planning.records[row // planning.sharing], planning.resolution
@@ -202,11 +228,11 @@ def _offer(
     )
     places, left, is_near = approach_places(cells, starts, log_odds, remaining, parent, least, view.spans)
     clear_memory(memory, record[ROWS], record[COLUMNS], touched)
-    is_long = is_near.copy()
+    sizes, is_long = np.diff(starts), is_near.copy()
     for k in range(len(is_long)):
-        is_long[k] &= (starts[k + 1] - starts[k]) * resolution >= MINIMUM_SIZE
-    ranked = np.empty(CANDIDATES, np.int64)
-    count = _cheapest(left, is_long if is_long.any() else is_near, ranked)
+        is_long[k] &= sizes[k] * resolution >= view.least_size
+    ranked = np.empty(len(table), np.int64)
+    count = choose_offers(left, sizes, is_long if is_long.any() else is_near, view.by_size, ranked)
     offset_x, offset_y = planning.offsets[row, 0], planning.offsets[row, 1]
     x, y = planning.believed[row, 0] - offset_x, planning.believed[row, 1] - offset_y
     for i in range(count):
@@ -224,7 +250,7 @@ def _offer(
         )
         table[i, 2], table[i, 3] = (
             min(cost, FARTHEST),
-            min((starts[k + 1] - starts[k]) * resolution, FARTHEST),
+            min(sizes[k] * resolution, FARTHEST),
         )
         mask[i] = 1
     offers.counts[row] = count

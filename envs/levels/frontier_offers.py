@@ -13,14 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.driving.team_driver import TeamDriver, footprint_of
-from lidarium.envs.levels.frontier_choices import (
-    CANDIDATES,
-    Choices,
-    Offers,
-    Renewal,
-    ViewReach,
-    renew_teams,
-)
+from lidarium.envs.levels.frontier_choices import Choices, Offers, Renewal, ViewReach, renew_teams
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import Orders, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -62,15 +55,22 @@ class FrontierOffers:
     def __init__(self, perception: Perception, settings: ExplorationSettings, driver: TeamDriver) -> None:
         self._perception, self._driver, self._robots = perception, driver, settings.robots
         rows, resolution = settings.robots * perception.world.episodes, settings.occupancy.resolution
-        self._reach = default_reach(footprint_of(settings.robot.radius), resolution) / resolution
-        self._time_step = settings.time_step
+        reach = default_reach(footprint_of(settings.robot.radius), resolution) / resolution
+        offers = settings.frontiers
+        self._view = ViewReach(
+            disc_spans(reach),
+            reach,
+            settings.time_step,
+            settings.least_frontier,
+            round(offers * settings.frontiers_by_size),
+        )
         self.offers = Offers(
-            np.zeros((rows, CANDIDATES, 4), np.float32),
-            np.zeros((rows, CANDIDATES + 1), np.int8),
+            np.zeros((rows, offers, 4), np.float32),
+            np.zeros((rows, offers + 1), np.int8),
             np.zeros(rows, np.int64),
-            np.zeros((rows, CANDIDATES, 2)),
-            np.full((rows, CANDIDATES), np.nan),
-            np.zeros((rows, CANDIDATES, 2), np.int64),
+            np.zeros((rows, offers, 2)),
+            np.full((rows, offers), np.nan),
+            np.zeros((rows, offers, 2), np.int64),
         )
         self.choices = Choices(
             np.zeros(rows, np.bool_),
@@ -132,13 +132,12 @@ class FrontierOffers:
         episodes = np.unique(rows // self._robots)
         if len(episodes):
             threads = self._perception.threads_for(len(episodes))
-            view = ViewReach(disc_spans(self._reach), self._reach, self._time_step)
             renew = _renew_teams_parallel if threads > 1 else _renew_teams_serial
             renew(
                 self._driver.planning(rows, with_frontiers=True),
                 self._perception.maps,
                 self._driver.drives,
-                view,
+                self._view,
                 self.offers,
                 self.choices,
                 Renewal(is_live, is_offered, reasons),

@@ -12,20 +12,23 @@ from numpy.typing import NDArray
 from lidarium.envs.agent_actions import check_agents, missing_action, whole_number
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.decisions import DecisionWrapper, boxes_of
-from lidarium.envs.levels.frontier_choices import CANDIDATES, FARTHEST
+from lidarium.envs.levels.frontier_choices import FARTHEST
 from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
 from lidarium.envs.levels.waypoints import WaypointExploration
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.mapping.geometry.bounds import shown
 
 
 class FrontierExploration(DecisionWrapper):
     """Turns the choice of a frontier into driving.
 
-    The observation has, beside that of the environment below, ``frontiers`` float32 (16, 4): position along
+    The observation has, beside that of the environment below, ``frontiers`` float32 (F, 4): position along
     the axes of the map frame from where the robot believes to be [m], cost of the way [m] and size [m] of
-    each frontier in reach, cheapest way first, zeros behind the last; and ``action_mask`` int8 (17,). Action
-    k < 16 drives to frontier k, action 16 stays and gives way; an action that the mask rules out stays as
-    well. A frontier to which a robot has driven and turned, and which is still there, is offered no more, and
+    each frontier on offer, cheapest way first, zeros behind the last; and ``action_mask`` int8 (F + 1,). F is
+    ``settings.frontiers``. Action k < F drives to frontier k, action F stays and gives way; an action that
+    the mask rules out stays as well.
+
+    A frontier to which a robot has driven and turned, and which is still there, is offered no more, and
     ``infos[agent]["given_up"]`` names it with the reason. A decision lasts ``decision_period_s`` or until any
     robot is done. Robots that have no frontier in reach stay idle; when none has, all end with
     ``no_frontier`` or ``frontier_unreachable``.
@@ -43,10 +46,12 @@ class FrontierExploration(DecisionWrapper):
         self.waypoints = WaypointExploration(env, shares_map)
         self._offers = FrontierOffers(env.perception, env.settings, self.waypoints.driver)
         self._observation_spaces = {
-            agent: spaces.Dict({**boxes_of(env.observation_space(agent)), **frontier_boxes()})
+            agent: spaces.Dict({**boxes_of(env.observation_space(agent)), **frontier_boxes(env.settings)})
             for agent in self.possible_agents
         }
-        self._action_spaces = {agent: spaces.Discrete(CANDIDATES + 1) for agent in self.possible_agents}
+        self._action_spaces = {
+            agent: spaces.Discrete(env.settings.frontiers + 1) for agent in self.possible_agents
+        }
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations."""
@@ -72,19 +77,19 @@ class FrontierExploration(DecisionWrapper):
         dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
         """Drive to the chosen frontiers for one decision."""
-        env, offers = self.env, self._offers
+        env, offers, most = self.env, self._offers, self.settings.frontiers
         check_agents(actions, self.possible_agents)
-        numbers, choosing = np.full(env.settings.robots, CANDIDATES), []
+        numbers, choosing = np.full(env.settings.robots, most), []
         for agent in env.agents:
             if agent not in actions:
                 if agent in env.stopping or env.operating.is_addressed(self.possible_agents.index(agent)):
                     continue
                 raise missing_action(agent)
-            number = whole_number(actions[agent], CANDIDATES)
+            number = whole_number(actions[agent], most)
             if number is None:
                 raise ValueError(
                     f"action of {agent} is {shown(actions[agent])}; want a frontier from 0 to "
-                    f"{CANDIDATES - 1}, or {CANDIDATES} to stay"
+                    f"{most - 1}, or {most} to stay"
                 )
             numbers[self.possible_agents.index(agent)] = number
             choosing.append(agent)
@@ -92,7 +97,7 @@ class FrontierExploration(DecisionWrapper):
         is_sent = np.isin(np.arange(env.settings.robots), list(env.operating.sent))
         # Who is sent elsewhere by an order has no choice among frontiers any more, who is paused keeps its
         # own.
-        numbers[is_sent] = CANDIDATES
+        numbers[is_sent] = most
         orders = offers.choose(self._rows(choosing) & ~env.operating.held | is_sent, numbers)
         is_left_alone = bool(is_chosen[self._rows(env.agents)].all()) and not is_sent.any()
         if is_left_alone and not offers.offers.counts[self._rows(env.agents)].any():
@@ -119,11 +124,12 @@ class FrontierExploration(DecisionWrapper):
         return observations
 
 
-def frontier_boxes() -> dict[str, spaces.Space[Any]]:
+def frontier_boxes(settings: ExplorationSettings) -> dict[str, spaces.Space[Any]]:
     """Return the spaces of what the choice among frontiers adds to an observation."""
-    high = np.full((CANDIDATES, 4), FARTHEST, np.float32)
-    low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (CANDIDATES, 1))
+    most = settings.frontiers
+    high = np.full((most, 4), FARTHEST, np.float32)
+    low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (most, 1))
     return {
         "frontiers": spaces.Box(low, high, dtype=np.float32),
-        "action_mask": spaces.Box(0, 1, (CANDIDATES + 1,), np.int8),
+        "action_mask": spaces.Box(0, 1, (most + 1,), np.int8),
     }

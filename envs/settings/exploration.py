@@ -31,6 +31,7 @@ from lidarium.mapping.localization.registry import LOCALIZERS
 from lidarium.registry import REGISTRIES, registry
 
 MAX_ROBOTS = 64
+MAX_FRONTIERS = 1024
 MAX_MAP_CELLS = 4096
 MAX_EGOCENTRIC_CELLS = 1024
 
@@ -119,6 +120,13 @@ class ExplorationSettings:
         Side of each crop of the ``egocentric_map`` [cells of the crop], a multiple of 2.
     egocentric_scales : tuple of int
         Side of a cell of each crop of the ``egocentric_map`` [cells of the map].
+    frontiers : int
+        How many frontiers the level of frontiers offers at most.
+    least_frontier : float
+        Length of a frontier that is offered [m]; shorter ones are where there is no longer one.
+    frontiers_by_size : float
+        Share of the frontiers that are offered because they are the longest; the others are those with the
+        cheapest way.
     raster_resolution : float
         Side of a cell of the world's raster [m]; the maps' cell is a whole multiple of it.
     decision_period_s : float
@@ -153,6 +161,9 @@ class ExplorationSettings:
     map_cells: Annotated[int, within(2, MAX_MAP_CELLS)] = 256
     egocentric_cells: Annotated[int, within(2, MAX_EGOCENTRIC_CELLS)] = 64
     egocentric_scales: tuple[int, ...] = (1, 4)
+    frontiers: Annotated[int, within(1, MAX_FRONTIERS)] = 32
+    least_frontier: Annotated[float, within(0.0, 1e4)] = 0.5
+    frontiers_by_size: Annotated[float, share()] = 0.5
     raster_resolution: Annotated[float, within(0.005, 10.0)] = 0.025
     decision_period_s: Annotated[float, above(0.0, 1e6)] = 2.0
     threads: Annotated[int, within(1, 1024)] = 1

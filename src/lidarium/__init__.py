@@ -2,8 +2,8 @@
 
 ``parallel_env`` makes the PettingZoo environment, ``env`` its turn-based form, ``vector_env`` and
 ``sb3_vec_env`` many episodes at once, and after ``import lidarium`` Gymnasium knows
-``lidarium/Exploration-v0``, ``lidarium/WaypointExploration-v0``, ``lidarium/FrontierExploration-v0`` and
-``lidarium/Exploration3D-v0``.
+``lidarium/Exploration-v1``, ``lidarium/WaypointExploration-v1``, ``lidarium/FrontierExploration-v1`` and
+``lidarium/Exploration3D-v1``.
 """
 
 import sys
@@ -54,18 +54,31 @@ _IDS: dict[str, dict[str, Any]] = {
 }
 """What each id means; options of the maker go before."""
 
+_VERSIONS: dict[int, dict[str, Any]] = {
+    0: {"starts": "fixed", "frontiers": 16, "least_frontier": 0.1, "frontiers_by_size": 0.0},
+    1: {"starts": "drawn"},
+}
+"""Options of each version of the ids: those whose defaults have changed since, or that a seed needs."""
+
+
+def _register(name: str, version: int, options: dict[str, Any]) -> None:
+    """Make an environment known to Gymnasium and to PettingZoo, once."""
+    registered = f"lidarium/{name}-v{version}"
+    if registered in gymnasium.registry:
+        return
+    gymnasium.register(
+        id=registered,
+        entry_point="lidarium.envs.levels.gymnasium_env:SoloExploration",
+        vector_entry_point="lidarium.envs.batch.vector_env:make_vector_env",
+        kwargs=options,
+    )
+    pettingzoo.register("parallel", registered, entry_point="lidarium:parallel_env", kwargs=options)
+    pettingzoo.register("aec", registered, entry_point="lidarium:env", kwargs=options)
+
+
 for _name, _options in _IDS.items():
-    if f"lidarium/{_name}-v0" not in gymnasium.registry:
-        gymnasium.register(
-            id=f"lidarium/{_name}-v0",
-            entry_point="lidarium.envs.levels.gymnasium_env:SoloExploration",
-            vector_entry_point="lidarium.envs.batch.vector_env:make_vector_env",
-            kwargs=_options,
-        )
-        pettingzoo.register(
-            "parallel", f"lidarium/{_name}-v0", entry_point="lidarium:parallel_env", kwargs=_options
-        )
-        pettingzoo.register("aec", f"lidarium/{_name}-v0", entry_point="lidarium:env", kwargs=_options)
+    for _version, _more in _VERSIONS.items():
+        _register(_name, _version, {**_options, **_more})
 
 
 def parallel_env(

@@ -28,7 +28,7 @@ with warnings.catch_warnings():
 
 LEVELS = {"Exploration": "velocity", "WaypointExploration": "waypoint", "FrontierExploration": "frontier"}
 CHOICES = (["egocentric_map"], ["egocentric_map", "velocity", "bumper"], ["scan", "pose"])
-IDS = [f"lidarium/{name}-v0" for name in LEVELS]
+IDS = [f"lidarium/{name}-v1" for name in LEVELS]
 BULLET = {"backend": "bullet", "map_cells": 64, "lidar": "lidar_360_6m", "resolution": 0.1}
 needs_bullet = pytest.mark.skipif(find_spec("pybullet") is None, reason="the extra bullet is not installed")
 
@@ -207,11 +207,13 @@ def test_no_mode_renders_nothing_and_rendering_needs_a_reset():
 
 @pytest.mark.parametrize("name", IDS)
 def test_the_solo_form_is_the_parallel_one_with_one_robot(name):
-    level = LEVELS[name.split("/")[1].removesuffix("-v0")]
+    level = LEVELS[name.split("/")[1].removesuffix("-v1")]
     solo = gymnasium.make(
         name, floor="building:5", noise="datasheet", map_cells=64, disable_env_checker=True
     ).unwrapped
-    team = lidarium.parallel_env("building:5", level=level, robots=1, noise="datasheet", map_cells=64)
+    team = lidarium.parallel_env(
+        "building:5", level=level, robots=1, starts="drawn", noise="datasheet", map_cells=64
+    )
     ours, _ = solo.reset(seed=3)
     theirs, _ = team.reset(seed=3)
     for _ in range(5):
@@ -230,8 +232,8 @@ def test_the_solo_form_is_the_parallel_one_with_one_robot(name):
 
 def test_the_solo_form_has_one_robot_and_says_what_to_use_for_more():
     with pytest.raises(ValueError, match=r"lidarium\.parallel_env"):
-        gymnasium.make("lidarium/Exploration-v0", robots=2)
-    env = gymnasium.make("lidarium/Exploration-v0", horizon_s=0.1).unwrapped
+        gymnasium.make("lidarium/Exploration-v1", robots=2)
+    env = gymnasium.make("lidarium/Exploration-v1", horizon_s=0.1).unwrapped
     with pytest.raises(RuntimeError, match="reset"):
         env.step(np.zeros(2, np.float32))
     env.reset(seed=0)

@@ -250,7 +250,7 @@ def test_frames_that_cannot_be_read_are_refused(offsets, words):
 
 def test_the_gymnasium_form_takes_the_choice():
     env = gymnasium.make(
-        "lidarium/Exploration-v0", observe=["egocentric_map"], egocentric_cells=32, egocentric_scales=[2]
+        "lidarium/Exploration-v1", observe=["egocentric_map"], egocentric_cells=32, egocentric_scales=[2]
     )
     observation, _ = env.reset(seed=0)
     assert {name: array.shape for name, array in observation.items()} == {"egocentric_map": (1, 32, 32)}

@@ -71,7 +71,7 @@ def test_bad_seeds_are_refused_alike_by_every_environment(seed):
     with pytest.raises(ValueError, match=wanted):
         lidarium.parallel_env(floor).reset(seed=seed)
     with pytest.raises(ValueError, match=wanted):
-        gymnasium.make("lidarium/Exploration-v0", floor=floor).unwrapped.reset(seed=seed)
+        gymnasium.make("lidarium/Exploration-v1", floor=floor).unwrapped.reset(seed=seed)
     with pytest.raises(ValueError, match=wanted):
         lidarium.vector_env(1, floor).reset(seed=seed)
 

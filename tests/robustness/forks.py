@@ -27,7 +27,7 @@ def make_episodes():
 
 def make_environment():
     """Return an environment of one robot; its id is there once the package is imported."""
-    return gym.make("lidarium/Exploration-v0")
+    return gym.make("lidarium/Exploration-v1")
 
 
 def steps_of(env, steps=5):

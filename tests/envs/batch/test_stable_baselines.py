@@ -253,7 +253,7 @@ def test_the_level_of_frontiers_has_masks_of_actions():
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.parametrize("observe", [["scan", "pose"], OBSERVABLES])
 def test_stable_baselines_checker_passes_on_the_gymnasium_ids(name, observe):
-    env = gymnasium.make(f"lidarium/{name}-v0", floor=ROOM, **{**FEW, "observe": observe, "map_cells": 64})
+    env = gymnasium.make(f"lidarium/{name}-v1", floor=ROOM, **{**FEW, "observe": observe, "map_cells": 64})
     check_env(env)
     env.close()
 
@@ -276,7 +276,7 @@ def test_stable_baselines_algorithms_train(algorithm, options, is_batch):
     env = (
         VecMonitor(lidarium.sb3_vec_env(4, ROOM, **FEW))
         if is_batch
-        else gymnasium.make("lidarium/Exploration-v0", floor=ROOM, **FEW)
+        else gymnasium.make("lidarium/Exploration-v1", floor=ROOM, **FEW)
     )
     assert_trains(getattr(stable_baselines3, algorithm), env, **options)
 

@@ -1,11 +1,15 @@
 """Decisions by frontiers: what is offered, what a choice does, and how it ends."""
 
+import gymnasium
 import numpy as np
 import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.levels.frontiers import CANDIDATES
+from lidarium.envs.levels.frontier_choices import choose_offers
+from lidarium.envs.settings.exploration import ExplorationSettings
+
+MOST = ExplorationSettings().frontiers
 
 
 def wall(x, y, width, height):
@@ -62,8 +66,8 @@ def test_frontiers_are_offered_cheapest_first_with_zeros_behind_the_last():
     for _ in range(4):
         for observation in observations.values():
             table, mask = observation["frontiers"], observation["action_mask"]
-            count = int(mask[:CANDIDATES].sum())
-            assert mask[CANDIDATES] == 1
+            count = int(mask[:MOST].sum())
+            assert mask[MOST] == 1
             assert mask[:count].all()
             assert (np.diff(table[:count, 2]) >= 0.0).all()
             assert (table[:count, 3] > 0.0).all()
@@ -91,17 +95,17 @@ def test_staying_and_what_the_mask_rules_out_stay():
     observations, _ = env.reset(seed=0)
     place = env.unwrapped.world.poses.copy()
     ruled_out = int(np.flatnonzero(observations["robot_0"]["action_mask"] == 0)[0])
-    for action in (CANDIDATES, ruled_out):
+    for action in (MOST, ruled_out):
         env.step({"robot_0": action})
         assert np.array_equal(env.unwrapped.world.poses, place)
 
 
-@pytest.mark.parametrize("action", [-1, CANDIDATES + 1, 99])
+@pytest.mark.parametrize("action", [-1, MOST + 1, 99])
 def test_a_number_that_is_no_candidate_is_refused(action):
     env = make(robots=1)
     env.reset(seed=0)
     with pytest.raises(
-        ValueError, match=f"action of robot_0 is {action}; want a frontier from 0 to 15, or 16 to stay"
+        ValueError, match=f"action of robot_0 is {action}; want a frontier from 0 to 31, or 32 to stay"
     ):
         env.step({"robot_0": action})
 
@@ -132,9 +136,9 @@ def test_random_choices_end_as_well():
 
     def choose(observations):
         return {
-            agent: int(generator.choice(np.flatnonzero(observation["action_mask"][:CANDIDATES])))
-            if observation["action_mask"][:CANDIDATES].any()
-            else CANDIDATES
+            agent: int(generator.choice(np.flatnonzero(observation["action_mask"][:MOST])))
+            if observation["action_mask"][:MOST].any()
+            else MOST
             for agent, observation in observations.items()
         }
 
@@ -169,3 +173,72 @@ def test_on_their_own_maps_robots_explore_twice():
         shares.append(float((base.score.seen / base.score.counted[0]).min()))
     assert shares[1] >= 0.97
     assert shares[0] <= shares[1]
+
+
+def plain_offers(left, sizes, is_wanted, by_size, most):
+    """Choose as the kernel does, by sorting."""
+    wanted = np.flatnonzero(is_wanted)
+    by_cost = wanted[np.argsort(-left[wanted], kind="stable")]
+    cheapest = by_cost[: most - by_size]
+    others = np.setdiff1d(wanted, cheapest)
+    longest = others[np.argsort(-sizes[others], kind="stable")][:by_size]
+    return [k for k in by_cost if k in cheapest or k in longest]
+
+
+@pytest.mark.parametrize("by_size", [0, 1, 4, 8])
+@pytest.mark.parametrize("clusters", [0, 3, 8, 9, 40])
+def test_offers_are_the_cheapest_and_the_longest_of_the_others(clusters, by_size):
+    generator = np.random.default_rng(clusters + by_size)
+    for _ in range(20):
+        left, sizes = generator.integers(0, 50, clusters), generator.integers(1, 20, clusters)
+        is_wanted, ranked = generator.random(clusters) < 0.8, np.empty(8, np.int64)
+        wanted = plain_offers(left, sizes, is_wanted, by_size, 8)
+        count = choose_offers(left, sizes, is_wanted.copy(), by_size, ranked)
+        assert ranked[:count].tolist() == wanted
+
+
+def table_of(observations):
+    """What a lone robot is offered, a row for each."""
+    seen = observations["robot_0"]
+    return seen["frontiers"][: seen["action_mask"][:-1].sum()]
+
+
+def offered(seed=0, decisions=12, **options):
+    """The tables of a robot that takes the first offer of 256, whatever is offered beside."""
+    env = make("building:17", robots=1, frontiers=256, frontiers_by_size=0.0, least_frontier=0.0)
+    other = make("building:17", robots=1, **options)
+    tables = []
+    observations, own = env.reset(seed=seed)[0], other.reset(seed=seed)[0]
+    for _ in range(decisions):
+        tables.append((table_of(observations), table_of(own)))
+        place = tables[-1][0][0, :2]
+        is_same = (tables[-1][1][:, :2] == place).all(axis=1)
+        if not is_same.any():
+            break
+        observations = env.step({"robot_0": 0})[0]
+        own = other.step({"robot_0": int(np.flatnonzero(is_same)[0])})[0]
+    return tables
+
+
+def test_the_longest_frontier_is_always_on_offer():
+    for every, own in offered(frontiers=2, least_frontier=0.0):
+        assert every[:, 3].max() == own[:, 3].max()
+        assert own[0].tolist() == every[0].tolist()
+
+
+def test_short_frontiers_are_offered_only_where_there_is_no_longer_one():
+    for every, own in offered(frontiers=256):
+        is_long = every[:, 3] >= 0.5 - 1e-6
+        wanted = every[is_long] if is_long.any() else every
+        assert own.tolist() == wanted.tolist()
+    least = 1000.0
+    for every, own in offered(frontiers=256, least_frontier=least, decisions=4):
+        assert own.tolist() == every.tolist()
+
+
+@pytest.mark.filterwarnings("ignore:.*is out of date:DeprecationWarning")
+def test_version_0_of_the_id_offers_what_it_did():
+    env = gymnasium.make("lidarium/FrontierExploration-v0")
+    assert env.action_space.n == 17
+    assert env.unwrapped.parallel.settings.least_frontier == 0.1
+    assert gymnasium.make("lidarium/FrontierExploration-v1").action_space.n == MOST + 1
