@@ -24,6 +24,7 @@ from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
 from lidarium.envs.outcome.scorer import Scorer
+from lidarium.envs.outcome.team_state import state_space, team_state
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.reset_options import checked_seed, read_options
@@ -308,12 +309,16 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             raise ValueError(f"{agent!r} is not among the agents {self.possible_agents}")
         self.operating.order(self._rows[agent], order)
 
-    def state(self) -> NDArray[np.float64]:
-        """Return the true state of the team, shape (robots * 5,).
+    @property
+    def state_space(self) -> spaces.Box:
+        """The space of ``state``."""
+        return state_space(self.settings)
 
-        For each robot it is x, y, theta, speed and turn rate.
-        """
-        return np.concatenate([self.world.poses, self.world.velocities], axis=1).ravel()
+    def state(self) -> NDArray[np.float32]:
+        """Return the true state of the team with what it has seen; see `team_state`."""
+        if self.floor is None:
+            raise RuntimeError("the environment was not reset; call reset() before state()")
+        return team_state(self.simulation, self.settings)
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the floor, what is explored, the robots and their scans.

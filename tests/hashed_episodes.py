@@ -221,6 +221,11 @@ def learner_rows(floor: str, steps: int, **options: Any) -> Case:
     return Case(run, 50, False)
 
 
+def true_motion(env: Any) -> np.ndarray:
+    """Return x, y, theta, speed and turn rate of each robot, (robots * 5,)."""
+    return np.concatenate([env.world.poses, env.world.velocities], axis=1).ravel()
+
+
 class Overseen(Watcher):
     """Hashes the commands and true states of all steps, and who is live."""
 
@@ -231,7 +236,7 @@ class Overseen(Watcher):
         self.outcome(env)
 
     def step(self, env: Any, commands: Any) -> None:
-        self._ledger.add("motion", {"commands": commands, "state": env.state()})
+        self._ledger.add("motion", {"commands": commands, "state": true_motion(env)})
         self._ledger.tick()
 
     def outcome(self, env: Any) -> None:

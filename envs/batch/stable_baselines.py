@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.batch.episodes import Arrays, EpisodeBatch
+from lidarium.envs.batch.episodes import EpisodeBatch
 from lidarium.envs.batch.requests import options_of, seeds_of, settings_of
+from lidarium.envs.conventions.conventions import split_options
+from lidarium.envs.conventions.row_conventions import RowConventions
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.settings.reset_options import ResetOptions, read_options
 
@@ -60,15 +62,17 @@ class ExplorationVecEnv(VecEnv):
         image_resolution: float | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
+        conventions, options = split_options(options)
         self.settings = settings_of(options)
-        self.batch = EpisodeBatch(episodes, floor, self.settings, level, image_resolution, copy=False)
+        self.batch = batch = EpisodeBatch(episodes, floor, self.settings, level, image_resolution, copy=False)
+        self.conventions = RowConventions(batch.observation_space, conventions, batch.robots, batch.rows)
         self.render_mode = None
         self._actions: NDArray[Any] | None = None
         self._chosen: dict[int, ResetOptions] = {}
         self._is_closed = False
-        super().__init__(self.batch.rows, self.batch.observation_space, self.batch.action_space)
+        super().__init__(batch.rows, self.conventions.space, batch.action_space)
 
-    def reset(self) -> Arrays:
+    def reset(self) -> Any:  # noqa: ANN401
         """Begin all episodes.
 
         It uses the seeds of ``seed`` and the options of ``set_options`` where they were called.
@@ -79,8 +83,8 @@ class ExplorationVecEnv(VecEnv):
         self._actions = None
         self._reset_seeds()
         self._reset_options()
-        self.reset_infos = self._infos_of(np.arange(batch.rows))
-        return batch.observations
+        self.reset_infos = self._infos_of(batch.infos, np.arange(batch.rows))
+        return self.conventions.observations(batch.observations)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Give episode e the seed ``seed`` + e at the next reset; None draws one."""
@@ -125,7 +129,7 @@ class ExplorationVecEnv(VecEnv):
             raise RuntimeError("the environment was not reset; call reset() before step()")
         self._actions = actions
 
-    def step_wait(self) -> tuple[Arrays, NDArray[np.float32], NDArray[np.bool_], Infos]:
+    def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], Infos]:
         """Run all episodes for one step (velocity) or decision.
 
         Episodes that are over begin again.
@@ -136,19 +140,20 @@ class ExplorationVecEnv(VecEnv):
         batch = self.batch
         masked = ~batch.live
         batch.run(actions, np.zeros(0, np.int64))
-        rewards = batch.rewards.astype(np.float32)
+        rewards, told = self.conventions.rewards(batch.rewards, batch.acted, batch.infos)
         ends_masked = masked & np.repeat(batch.is_over, batch.robots)
         truncated = batch.truncated | ends_masked
         dones = batch.terminated | truncated
-        infos = self._infos_of(np.arange(batch.rows))
+        infos = self._infos_of(told, np.arange(batch.rows))
         for row, info in enumerate(infos):
             info["TimeLimit.truncated"], info["active"] = bool(truncated[row]), not masked[row]
             if dones[row]:
-                info["terminal_observation"] = {
-                    name: array[row].copy() for name, array in batch.observations.items()
-                }
+                info["terminal_observation"] = self.conventions.observation(
+                    {name: array[row].copy() for name, array in batch.observations.items()}
+                )
         self._begin_again(np.flatnonzero(batch.is_over))
-        return batch.observations, rewards, dones, infos
+        observations = self.conventions.observations(batch.observations)
+        return observations, rewards.astype(np.float32), dones, infos
 
     def _begin_again(self, over: NDArray[np.int64]) -> None:
         """Begin episodes in the step that ended them; the other rows keep what they see."""
@@ -157,12 +162,12 @@ class ExplorationVecEnv(VecEnv):
         batch = self.batch
         batch.run(None, over, is_same_step=True)
         rows = (over[:, None] * batch.robots + np.arange(batch.robots)).ravel()
-        for row, info in zip(rows, self._infos_of(rows), strict=True):
+        for row, info in zip(rows, self._infos_of(batch.infos, rows), strict=True):
             self.reset_infos[row] = info
 
-    def _infos_of(self, rows: NDArray[np.int64]) -> Infos:
-        """Return the batch's infos as a dict for each of some rows."""
-        infos = self.batch.infos
+    def _infos_of(self, batch_infos: dict[str, Any], rows: NDArray[np.int64]) -> Infos:
+        """Return a batch's infos as a dict for each of some rows."""
+        infos = self.conventions.infos(batch_infos)
         names = [name for name in infos if not name.startswith("_")]
         return [
             {

@@ -7,20 +7,24 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from lidarium.envs.batch.episodes import Arrays, EpisodeBatch
+from lidarium.envs.batch.episodes import EpisodeBatch
 from lidarium.envs.batch.requests import episodes_of, options_of, seeds_of, settings_of
+from lidarium.envs.conventions.conventions import split_options
+from lidarium.envs.conventions.row_conventions import RowConventions
 from lidarium.envs.floors.floor_choice import Floors
+from lidarium.envs.outcome.team_state import state_space, team_state
 
 _NO_EPISODES = np.zeros(0, np.int64)
 
-Step = tuple[Arrays, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
-class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
+class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     """Teams of lidar robots that explore floors (Gymnasium).
 
     Many episodes run in one kernel call.
@@ -72,12 +76,16 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
                 f"render_mode is {render_mode!r}; a batch is not drawn, use lidarium.parallel_env to look at "
                 "an episode"
             )
+        conventions, options = split_options(options)
         settings = settings_of(options)
         self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy)
+        self.conventions = RowConventions(
+            self.batch.observation_space, conventions, self.batch.robots, self.batch.rows
+        )
         self.settings, self.render_mode = settings, None
         self.num_envs = self.batch.rows
         self.single_observation_space, self.single_action_space = (
-            self.batch.observation_space,
+            self.conventions.space,
             self.batch.action_space,
         )
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -86,7 +94,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Arrays, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes.
 
         Parameters
@@ -109,7 +117,7 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
             [seeds[episode] for episode in chosen],
             options_of(options, chosen, batch.episodes, batch.robots),
         )
-        return batch.observations, self._infos(batch.live.copy())
+        return self.conventions.observations(batch.observations), self._infos(batch.infos, batch.live.copy())
 
     def step(self, actions: NDArray[Any]) -> Step:
         """Run all episodes for one step (velocity) or decision.
@@ -129,23 +137,34 @@ class ExplorationVectorEnv(VectorEnv[Arrays, NDArray[Any], NDArray[Any]]):
             raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
         if batch.is_whole:
             batch.run(actions, _NO_EPISODES)
-            return (
-                batch.observations,
-                batch.rewards.copy(),
-                batch.terminated,
-                batch.truncated,
-                self._infos(batch.everyone),
-            )
+            return self._outcome(batch.truncated, batch.everyone)
         over = batch.is_over
         masked = ~batch.live & ~np.repeat(over, batch.robots)
         batch.run(actions, np.flatnonzero(over))
         truncated = batch.truncated
         if masked.any():
             truncated |= masked & np.repeat(batch.is_over, batch.robots)
-        return batch.observations, batch.rewards.copy(), batch.terminated, truncated, self._infos(~masked)
+        return self._outcome(truncated, ~masked)
 
-    def _infos(self, active: NDArray[np.bool_]) -> dict[str, Any]:
-        return {**self.batch.infos, "active": active, "_active": self.batch.everyone}
+    def _outcome(self, truncated: NDArray[np.bool_], active: NDArray[np.bool_]) -> Step:
+        """Return what a step of the batch has brought, in the forms of the conventions."""
+        batch = self.batch
+        rewards, infos = self.conventions.rewards(batch.rewards, batch.acted, batch.infos)
+        observations = self.conventions.observations(batch.observations)
+        return observations, rewards, batch.terminated, truncated, self._infos(infos, active)
+
+    def _infos(self, infos: dict[str, Any], active: NDArray[np.bool_]) -> dict[str, Any]:
+        return {**self.conventions.infos(infos), "active": active, "_active": self.batch.everyone}
+
+    @property
+    def state_space(self) -> Box:
+        """The space of the true state of each team."""
+        return state_space(self.settings)
+
+    def state(self) -> NDArray[np.float32]:
+        """Return the true state of each team, (episodes, numbers); see `team_state`."""
+        simulation = self.batch.simulation
+        return np.stack([team_state(simulation, self.settings, k) for k in range(self.batch.episodes)])
 
     def _check_open(self) -> None:
         if self.closed:

@@ -111,6 +111,10 @@ class FrontierExploration(DecisionWrapper):
             infos[self.possible_agents[row]]["given_up"] = (offers.target(row), REASONS[reasons[row]])
         return self._with_offers(observations), rewards, terminations, truncations, infos
 
+    def action_masks(self, agent: str) -> NDArray[np.bool_]:
+        """Return which actions an agent may choose now, (frontiers + 1,)."""
+        return np.asarray(self._offers.offers.masks[self.possible_agents.index(agent)] != 0)
+
     def _rows(self, agents: list[str]) -> NDArray[np.bool_]:
         """Return which rows are those of agents, (robots,)."""
         return np.array([agent in agents for agent in self.possible_agents])

@@ -3,8 +3,11 @@
 from typing import Any
 
 import gymnasium
+import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.conventions.conventional_env import ConventionalEnv, conventional
+from lidarium.envs.conventions.conventions import split_options
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.levels.frontiers import FrontierExploration
@@ -53,8 +56,9 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
                 f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.parallel_env "
                 "for a team"
             )
+        conventions, options = split_options(options)
         base = ExplorationEnv(floor, make_settings(**options), render_mode, image_resolution)
-        self.parallel = at_level(base, level)
+        self.parallel = conventional(at_level(base, level), conventions)
         self.metadata = {**type(self).metadata, "render_fps": self.parallel.metadata["render_fps"]}
         self.render_mode = render_mode
         self.observation_space = self.parallel.observation_space(AGENT)
@@ -75,6 +79,21 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         observations, rewards, terminations, truncations, infos = self.parallel.step({AGENT: action})
         return observations[AGENT], rewards[AGENT], terminations[AGENT], truncations[AGENT], infos[AGENT]
 
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions may be chosen now, (frontiers + 1,), as sb3-contrib's MaskablePPO asks for.
+
+        Raises
+        ------
+        AttributeError
+            At other levels than that of frontiers.
+        """
+        level = self.parallel.env if isinstance(self.parallel, ConventionalEnv) else self.parallel
+        if not isinstance(level, FrontierExploration):
+            raise AttributeError(
+                "action_masks are there at the level of frontiers only; use level='frontier'"
+            )
+        return level.action_masks(AGENT)
+
     def stop(self, reason: str) -> None:
         """End the episode at the next step, with a reason."""
         self.parallel.stop(AGENT, reason)
@@ -85,7 +104,8 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
 
     def render(self) -> NDArray[Any] | None:
         """Draw the environment."""
-        return self.parallel.render()
+        frame: NDArray[Any] | None = self.parallel.render()
+        return frame
 
     def close(self) -> None:
         """Close the window, if there is one."""

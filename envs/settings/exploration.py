@@ -127,6 +127,8 @@ class ExplorationSettings:
     frontiers_by_size : float
         Share of the frontiers that are offered because they are the longest; the others are those with the
         cheapest way.
+    state_cells : int
+        Side of the pictures in the true ``state`` of the team [cells].
     raster_resolution : float
         Side of a cell of the world's raster [m]; the maps' cell is a whole multiple of it.
     decision_period_s : float
@@ -164,6 +166,7 @@ class ExplorationSettings:
     frontiers: Annotated[int, within(1, MAX_FRONTIERS)] = 32
     least_frontier: Annotated[float, within(0.0, 1e4)] = 0.5
     frontiers_by_size: Annotated[float, share()] = 0.5
+    state_cells: Annotated[int, within(1, MAX_EGOCENTRIC_CELLS)] = 32
     raster_resolution: Annotated[float, within(0.005, 10.0)] = 0.025
     decision_period_s: Annotated[float, above(0.0, 1e6)] = 2.0
     threads: Annotated[int, within(1, 1024)] = 1

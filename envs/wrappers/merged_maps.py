@@ -10,15 +10,14 @@ from typing import Annotated, Any
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from pettingzoo import ParallelEnv
 
 from lidarium.envs.exploration import ExplorationEnv, Observation, Outcome
 from lidarium.envs.levels.decisions import boxes_of, exploration_below
 from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.observation_spaces import FARTHEST
-from lidarium.envs.radio.messages import Order
 from lidarium.envs.station.team_mapping import Frames, TeamMapping, crop_around
+from lidarium.envs.team_wrapper import TeamWrapper
 from lidarium.envs.wrappers.contacts import CanTalk, check_links, clusters_of
 from lidarium.mapping.geometry.bounds import above, check_settings
 from lidarium.mapping.geometry.rigid import Transform
@@ -86,7 +85,7 @@ class MergeEvent:
     is_direct: bool = True
 
 
-class MergedMaps(ParallelEnv[str, Observation, Any]):
+class MergedMaps(TeamWrapper):
     """Gives each robot the map made by all it is joined with, and their poses.
 
     The robot's own map is part of it.
@@ -130,12 +129,11 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
             raise ValueError(f"robots is {robots}; merging maps wants two or more")
         if can_talk is not None and not callable(can_talk):
             check_links(np.asarray(can_talk), robots)
-        self.env, self._base = env, base
+        super().__init__(env)
+        self._base = base
         self.merging = settings or MergingSettings()
         self._can_talk = can_talk
         self.metadata = {**env.metadata, "name": f"{str(env.metadata['name']).removesuffix('_v0')}_merged_v0"}
-        self.possible_agents, self.agents = env.possible_agents, env.agents
-        self.render_mode, self.settings = env.render_mode, base.settings
         self.team = TeamMapping(base.perception, self.merging.merge)
         self.events: list[MergeEvent] = []
         self._joined: set[tuple[str, str]] = set()
@@ -148,25 +146,15 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
             for agent in self.possible_agents
         }
 
-    @property
-    def unwrapped(self) -> ExplorationEnv:
-        """The environment that keeps the episode."""
-        return self._base
-
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations, the same object at each call."""
         return self._observation_spaces[agent]
-
-    def action_space(self, agent: str) -> spaces.Space[Any]:
-        """Return the space of an agent's actions, that of the environment below."""
-        return self.env.action_space(agent)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode; see ``ExplorationEnv.reset``."""
-        observations, infos = self.env.reset(seed, options)
-        self.agents = self.env.agents
+        observations, infos = super().reset(seed, options)
         self.team.start()
         self.events, self._joined, self._due = [], set(), 0
         self._exchange(infos)
@@ -174,30 +162,9 @@ class MergedMaps(ParallelEnv[str, Observation, Any]):
 
     def step(self, actions: Any) -> Outcome:  # noqa: ANN401
         """Take a step or a decision, and exchange maps where the period is over."""
-        observations, rewards, terminations, truncations, infos = self.env.step(actions)
-        self.agents = self.env.agents
+        observations, rewards, terminations, truncations, infos = super().step(actions)
         self._exchange(infos)
         return self._with_team(observations), rewards, terminations, truncations, infos
-
-    def stop(self, agent: str, reason: str) -> None:
-        """End an agent at its next step, with a reason."""
-        self.env.stop(agent, reason)
-
-    def order(self, agent: str, order: Order) -> None:
-        """Send an agent an order, as ``ExplorationEnv.order``."""
-        self.env.order(agent, order)
-
-    def state(self) -> NDArray[np.float64]:
-        """Return the true state of the team."""
-        return self.env.state()
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Draw the environment."""
-        return self.env.render()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self.env.close()
 
     def _exchange(self, infos: dict[str, dict[str, Any]]) -> None:
         """Let the robots exchange maps if it is time, and note who has come to know whom."""

@@ -253,7 +253,7 @@ def realism_of(settings: ExplorationSettings) -> str:
     return "custom"
 
 
-LATER = ("localizer", "camera", "starts", "frontiers", "least_frontier", "frontiers_by_size")
+LATER = ("localizer", "camera", "starts", "frontiers", "least_frontier", "frontiers_by_size", "state_cells")
 """Settings that older records do not have."""
 
 

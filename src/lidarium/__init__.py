@@ -109,7 +109,8 @@ def parallel_env(
     **options
         Any attribute of ``ExplorationSettings``, such as ``robots=3`` or ``horizon_s=None``; ``robot`` and
         ``lidar`` by name; ``noise`` (none, datasheet, thesis), ``resolution`` of the maps [m], ``max_cycles``
-        [steps].
+        [steps]; and ``Conventions``: ``observation``, ``action_mask``, ``infos``, ``ended_agents``,
+        ``team_reward``.
 
     Returns
     -------
@@ -121,13 +122,16 @@ def parallel_env(
     ValueError, TypeError, FileNotFoundError
         Where an option or the floor cannot be used.
     """
+    from lidarium.envs.conventions.conventional_env import conventional
+    from lidarium.envs.conventions.conventions import split_options
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.envs.levels.gymnasium_env import at_level
     from lidarium.envs.settings.making import make_settings
 
-    return at_level(
-        ExplorationEnv(floor, make_settings(settings, **options), render_mode, image_resolution), level
-    )
+    conventions, options = split_options(options)
+    base = ExplorationEnv(floor, make_settings(settings, **options), render_mode, image_resolution)
+    made: ParallelEnv[str, Any, Any] = conventional(at_level(base, level), conventions)
+    return made
 
 
 def env(floor: "Floors" = "apartment", **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401

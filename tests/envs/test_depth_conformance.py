@@ -45,7 +45,7 @@ def test_equal_seeds_give_equal_images(backend):
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_gymnasiums_checker_finds_nothing_in_the_id(backend):
-    env = gymnasium.make("lidarium/Exploration3D-v0", backend=backend, horizon_s=1.0, **SMALL)
+    env = gymnasium.make("lidarium/Exploration3D-v1", backend=backend, horizon_s=1.0, **SMALL)
     check_env(env.unwrapped, skip_render_check=True)
     env.close()
 

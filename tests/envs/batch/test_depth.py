@@ -47,7 +47,7 @@ def test_a_copy_goes_on_seeing(duplicate):
 
 
 def test_the_id_observes_depth():
-    env = gymnasium.make("lidarium/Exploration3D-v0", camera="depth_64x48", floor="apartment", horizon_s=5.0)
+    env = gymnasium.make("lidarium/Exploration3D-v1", camera="depth_64x48", floor="apartment", horizon_s=5.0)
     assert env.observation_space["depth"].shape == (1, 48, 64)
     check_env(env.unwrapped, skip_render_check=True)
     env.close()

@@ -1,0 +1,1 @@
+"""The forms in which trainers take observations, rewards, infos, ends of agents."""

@@ -1,0 +1,229 @@
+"""Observations, rewards, infos and ends in the forms that trainers want, alone and in batches."""
+
+import math
+import re
+
+import gymnasium
+import numpy as np
+import pytest
+from pettingzoo.test import parallel_api_test
+
+import lidarium
+from lidarium.envs.conventions.conventional_env import ConventionalEnv
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.floor import Floor
+
+OPTIONS = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m", "observe": ["scan", "pose", "map"]}
+CLOSET = Floor("closet", (0.0, 0.0, 2.0, 1.6))
+AHEAD = np.array([1.0, 0.2], np.float32)
+ENDING = {**OPTIONS, "stop_on_contact": True}
+
+
+def make(floor="scene_room", **options):
+    return lidarium.parallel_env(floor, **{**OPTIONS, **options})
+
+
+def step(env, action=AHEAD):
+    return env.step(dict.fromkeys(env.agents, action))
+
+
+def test_without_conventions_nothing_is_wrapped():
+    assert type(make()) is ExplorationEnv
+    assert type(make(infos="full", observation="dict", team_reward=0.0)) is ExplorationEnv
+    assert type(make(infos="flat")) is ConventionalEnv
+
+
+@pytest.mark.parametrize("level", ["velocity", "frontier"])
+def test_the_flat_form_holds_the_numbers_of_the_dict_form(level):
+    plain, flat = make(level=level), make(level=level, observation="flat")
+    space = flat.observation_space("robot_0")
+    wanted, own = plain.reset(seed=1)[0], flat.reset(seed=1)[0]
+    for _ in range(3):
+        for agent, vector in own.items():
+            assert space.contains(vector)
+            for name, first, last in flat.columns(agent):
+                assert np.array_equal(vector[first:last], wanted[agent][name].ravel().astype(np.float32))
+            assert flat.columns(agent)[-1][2] == len(vector)
+        action = 0 if level == "frontier" else AHEAD
+        wanted, own = step(plain, action)[0], step(flat, action)[0]
+
+
+@pytest.mark.parametrize("form", ["dict", "flat"])
+def test_the_mask_may_be_beside_the_observation(form):
+    env = make(level="frontier", observation=form, action_mask="beside")
+    observations, _ = env.reset(seed=1)
+    for agent, observation in observations.items():
+        assert set(observation) == {"observation", "action_mask"}
+        assert env.observation_space(agent).contains(observation)
+        assert observation["action_mask"].shape == (33,)
+
+
+def test_the_level_of_frontiers_alone_has_masks():
+    with pytest.raises(ValueError, match="action_mask is 'beside', but observations have none"):
+        make(action_mask="beside")
+    solo = gymnasium.make("lidarium/FrontierExploration-v1", floor="scene_room", observation="flat").unwrapped
+    observation, _ = solo.reset(seed=0)
+    assert solo.action_masks().dtype == np.bool_
+    assert np.array_equal(solo.action_masks(), observation[:33] == 1.0)
+    with pytest.raises(AttributeError, match="level of frontiers only"):
+        gymnasium.make("lidarium/Exploration-v1", floor="scene_room").unwrapped.action_masks()
+
+
+@pytest.mark.parametrize("level", ["velocity", "waypoint", "frontier"])
+def test_flat_infos_are_numbers_under_the_same_names(level):
+    env, full = (
+        make(CLOSET, level=level, infos="flat", horizon_s=8.0),
+        make(CLOSET, level=level, horizon_s=8.0),
+    )
+    infos, wanted = env.reset(seed=1)[1], full.reset(seed=1)[1]
+    names = set(infos["robot_0"])
+    while True:
+        for agent, info in infos.items():
+            assert set(info) == names
+            assert all(type(value) is float for value in info.values())
+            assert info["truth.coverage"] == wanted[agent]["truth"]["coverage"]
+            assert info["truth.pose.2"] == wanted[agent]["truth"]["pose"][2]
+            assert info["reward_terms.area"] == wanted[agent]["reward_terms"]["area"]
+            assert (info["ended"] > 0) == ("ended_because" in wanted[agent])
+        if not env.agents:
+            break
+        action = 32 if level == "frontier" else AHEAD
+        infos, wanted = step(env, action)[4], step(full, action)[4]
+
+
+def test_no_infos_are_empty_infos():
+    env = make(infos="none")
+    assert env.reset(seed=0)[1] == {"robot_0": {}, "robot_1": {}}
+    assert step(env)[4] == {"robot_0": {}, "robot_1": {}}
+
+
+@pytest.mark.parametrize("infos", ["full", "flat", "none"])
+@pytest.mark.parametrize("form", ["dict", "flat"])
+def test_agents_that_end_stay_with_zeros_until_the_last_one_ends(infos, form):
+    env = make(infos=infos, observation=form, ended_agents="zeros")
+    env.reset(seed=0)
+    env.unwrapped.stop("robot_0", "enough")
+    observations, _, terminations, truncations, _ = step(env)
+    assert env.agents == ["robot_0", "robot_1"]
+    assert not any((*terminations.values(), *truncations.values()))
+    observations, rewards, terminations, truncations, told = step(env)
+    space = env.observation_space("robot_0")
+    assert space.contains(observations["robot_0"])
+    parts = observations["robot_0"].values() if form == "dict" else [observations["robot_0"]]
+    assert not any(part.any() for part in parts)
+    assert rewards["robot_0"] == 0.0
+    assert list(told) == ["robot_0", "robot_1"]
+    if infos != "none":
+        assert [bool(info["active"]) for info in told.values()] == [False, True]
+    env.unwrapped.stop("robot_1", "enough")
+    _, _, terminations, truncations, _ = step(env)
+    assert terminations == {"robot_0": True, "robot_1": True}
+    assert truncations == {"robot_0": False, "robot_1": False}
+    assert env.agents == []
+
+
+def test_agents_that_stay_end_as_terminated_where_the_horizon_cuts_the_others():
+    env = make(ended_agents="zeros", horizon_s=0.5)
+    env.reset(seed=0)
+    env.unwrapped.stop("robot_1", "enough")
+    while env.agents:
+        outcome = step(env)
+    assert outcome[2] == {"robot_0": False, "robot_1": True}
+    assert outcome[3] == {"robot_0": True, "robot_1": False}
+    env.reset(seed=1)
+    assert env.agents == ["robot_0", "robot_1"]
+
+
+@pytest.mark.parametrize(
+    "conventions",
+    [
+        {"ended_agents": "zeros", "infos": "flat", "observation": "flat"},
+        {"team_reward": 0.5, "infos": "none"},
+        {"level": "frontier", "observation": "flat", "action_mask": "beside"},
+    ],
+)
+def test_the_tests_of_pettingzoo_pass(conventions):
+    parallel_api_test(make(CLOSET, stop_on_contact=True, **conventions), num_cycles=60)
+
+
+@pytest.mark.parametrize("share", [0.25, 1.0])
+def test_a_share_of_the_reward_is_the_mean_of_the_team(share):
+    env, own = make(team_reward=share), make()
+    env.reset(seed=0)
+    own.reset(seed=0)
+    for _ in range(5):
+        _, rewards, _, _, infos = step(env)
+        alone = step(own)[1]
+        mean = sum(alone.values()) / 2
+        for agent, reward in rewards.items():
+            assert reward == pytest.approx((1 - share) * alone[agent] + share * mean)
+            assert math.fsum(infos[agent]["reward_terms"].values()) == pytest.approx(reward)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("observation", "box"), ("infos", True), ("ended_agents", "stay"), ("action_mask", None)],
+)
+def test_unknown_forms_are_refused_with_the_known_ones(option, value):
+    with pytest.raises(ValueError, match=re.escape(f"{option} is {value!r}")):
+        make(**{option: value})
+
+
+def test_a_share_beyond_the_whole_is_refused():
+    with pytest.raises(ValueError, match="team_reward is 1.5"):
+        make(team_reward=1.5)
+
+
+@pytest.mark.parametrize("level", ["velocity", "frontier"])
+def test_rows_of_a_batch_take_the_forms_of_single_teams(level):
+    forms = {"observation": "flat", "infos": "flat", "team_reward": 0.5}
+    if level == "frontier":
+        forms["action_mask"] = "beside"
+    options = {**ENDING, "level": level, **forms}
+    batch = lidarium.vector_env(2, CLOSET, **options)
+    teams = [lidarium.parallel_env(CLOSET, **options) for _ in range(2)]
+    observations, infos = batch.reset(seed=6)
+    alone = [env.reset(seed=6 + k) for k, env in enumerate(teams)]
+    assert batch.single_observation_space == teams[0].observation_space("robot_0")
+    assert batch.observation_space.contains(observations)
+    for _ in range(25):
+        for episode, (own, *_, told) in enumerate(alone):
+            for agent in own:
+                row = 2 * episode + int(agent[-1])
+                pairs = (
+                    [(observations[name][row], own[agent][name]) for name in own[agent]]
+                    if level == "frontier"
+                    else [(observations[row], own[agent])]
+                )
+                assert all(np.array_equal(mine, theirs) for mine, theirs in pairs)
+                for name, value in told[agent].items():
+                    assert infos[name][row] == value, name
+        action = 0 if level == "frontier" else AHEAD
+        observations, rewards, *_, infos = batch.step(np.array([action] * 4))
+        alone = [step(env, action) if env.agents else env.reset() for env in teams]
+        for episode, outcome in enumerate(alone):
+            for agent, reward in outcome[1].items() if len(outcome) == 5 else ():
+                assert rewards[2 * episode + int(agent[-1])] == reward
+
+
+def test_rows_for_stable_baselines_take_the_forms():
+    pytest.importorskip("stable_baselines3")
+    env = lidarium.sb3_vec_env(2, CLOSET, observation="flat", infos="flat", team_reward=1.0, **ENDING)
+    env.seed(0)
+    assert env.observation_space.contains(env.reset()[0])
+    ends = 0
+    for _ in range(40):
+        observations, rewards, dones, infos = env.step(np.array([AHEAD] * 4))
+        assert observations.shape == (4, *env.observation_space.shape)
+        for row, info in enumerate(infos):
+            assert "truth.coverage" in info
+            if dones[row]:
+                ends += 1
+                assert env.observation_space.contains(info["terminal_observation"])
+        assert rewards.dtype == np.float32
+    assert ends
+
+
+def test_rows_of_ended_robots_stay_in_any_case():
+    with pytest.raises(ValueError, match="ended_agents is 'zeros'; leave it out"):
+        lidarium.vector_env(2, "scene_room", ended_agents="zeros")
