@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from lidarium.envs.episode_start import EpisodeStart, goal_of_robots, map_frames
 from lidarium.envs.observations import ObservationWriter
+from lidarium.envs.observing.observables import ComputedObservations
+from lidarium.envs.observing.rows import Rows
+from lidarium.envs.onboard.known_poses import KnownPoses
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.simulation import Simulation
 
@@ -25,17 +28,17 @@ class AgentObservations:
         The team and what it observes.
     has_goal : bool
         Whether the goal is observed.
-
-    Attributes
-    ----------
-    offsets : (robots, 2) float64
-        Origin of each robot's map frame in the frame of its believed pose [m].
+    poses : KnownPoses
+        Where the robots know themselves to be; ``start`` writes its ``offsets``.
     """
 
-    def __init__(self, simulation: Simulation, settings: ExplorationSettings, has_goal: bool) -> None:
+    def __init__(
+        self, simulation: Simulation, settings: ExplorationSettings, has_goal: bool, poses: KnownPoses
+    ) -> None:
         self._settings = settings
         self._rows = {agent: row for row, agent in enumerate(settings.agents)}
-        self.offsets = np.zeros((settings.robots, 2))
+        self.offsets = poses.offsets
+        self._computed = ComputedObservations(Rows(simulation, settings, poses))
         self._goals = np.full((settings.robots, 2), np.nan)
         self._writer = ObservationWriter(
             simulation, settings, self.offsets, self._goals if has_goal else None
@@ -48,7 +51,8 @@ class AgentObservations:
 
     def of(self, agents: Sequence[str]) -> dict[str, Observation]:
         """Return what each agent observes now."""
-        arrays = self._writer.write()
+        arrays = {**self._writer.write(), **self._computed.buffers()}
+        self._computed.write(arrays)
         observations: dict[str, Observation] = {}
         for agent in agents:
             row, observation = self._rows[agent], {}

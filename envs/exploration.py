@@ -108,15 +108,17 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
             self.simulation.score,
         )
         self._generator: np.random.Generator | None = None
-        self._observations = AgentObservations(self.simulation, self.settings, self.has_goal)
         self._window: Any = None
         # A world with a window of its own draws itself.
         self._shows_itself = render_mode == "human" and self.world.show()
         self.floor: Floor | None = None
         self.goal: tuple[float, float] | None = None
         self.seed: int | None = None
-        self.scorer = Scorer(self.world, self.score, self.settings)
-        self.perception = Perception(self.simulation, self.settings, self._observations.offsets)
+        self.scorer = Scorer(self.simulation, self.settings)
+        self.perception = Perception(self.simulation, self.settings, np.zeros((self.settings.robots, 2)))
+        self._observations = AgentObservations(
+            self.simulation, self.settings, self.has_goal, self.perception.poses
+        )
         self._software = Software(self.perception, self.settings)
         # In the ideal world nothing runs on board beside the kernels, and nobody fails: asking would cost a
         # tenth of a step.

@@ -5,11 +5,20 @@ import math
 import numpy as np
 from gymnasium import spaces
 
+from lidarium.envs.observing.observables import computed
+from lidarium.envs.observing.rows import FARTHEST
 from lidarium.envs.settings.exploration import OBSERVABLES, ExplorationSettings
 from lidarium.envs.settings.sensors.observables import SENSED
 
-FARTHEST = 1000.0
-"""Bound of positions in observations [m]."""
+KERNEL_SUMMARIES = {
+    "scan": "ranges [m], (beams,)",
+    "pose": "x, y [m], theta [rad] as the robot believes, in its map frame, (3,)",
+    "velocity": "speed [m/s] and turn rate [rad/s] as the wheels measure, (2,)",
+    "bumper": "1 where pressed: left, centre, right, (3,)",
+    "map": "the map around the robot, (1, M, M)",
+    "egocentric_map": "turned crops of the map around the robot, (scales, C, C)",
+}
+"""What each observable of the kernel is, in one line."""
 
 
 KEYS = (*OBSERVABLES, "goal")
@@ -17,17 +26,21 @@ KEYS = (*OBSERVABLES, "goal")
 
 
 def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, ...]:
-    """Return the keys of an observation.
+    """Return the keys of an observation that the writer writes.
 
-    They are what the settings choose, and the goal where there is one.
+    They are what the settings choose but for functions, and the goal where there is one.
     """
-    return (*settings.observe, "goal") if has_goal else settings.observe
+    functions = computed(settings)
+    chosen = tuple(name for name in settings.observe if name not in functions)
+    return (*chosen, "goal") if has_goal else chosen
 
 
 def observation_space(settings: ExplorationSettings, has_goal: bool) -> spaces.Dict:
     """Return the space of one robot's observation; every box is bounded."""
     boxes = boxes_of(settings)
-    return spaces.Dict({name: boxes[name] for name in observed_keys(settings, has_goal)})
+    return spaces.Dict(
+        {name: boxes[name] for name in (*observed_keys(settings, has_goal), *computed(settings))}
+    )
 
 
 def boxes_of(settings: ExplorationSettings) -> dict[str, spaces.Box]:

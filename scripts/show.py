@@ -32,6 +32,7 @@ class Show(Command):
             "formats",
             "studies",
             "rewards",
+            "observables",
             "backends",
             "settings",
             "supervisor",
@@ -201,6 +202,14 @@ def _localizers() -> tuple[dict[str, Any], str]:
     return {"localizers": lines}, table(lines.items(), indent="")
 
 
+def _observables() -> tuple[dict[str, Any], str]:
+    from lidarium.envs.observation_spaces import KERNEL_SUMMARIES
+    from lidarium.envs.settings.sensors.observables import SENSED
+
+    summaries = {**KERNEL_SUMMARIES, **SENSED.summaries}
+    return {"observables": summaries}, table(summaries.items(), indent="")
+
+
 def _rewards() -> tuple[dict[str, Any], str]:
     from lidarium.envs.outcome.reward_terms import REWARD_TERMS
 
@@ -247,6 +256,7 @@ _LISTS = {
     "formats": _formats,
     "studies": _studies,
     "rewards": _rewards,
+    "observables": _observables,
     "backends": _backends,
     "settings": _settings,
     "supervisor": _supervisor,

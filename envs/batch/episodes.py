@@ -23,6 +23,8 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.floor_choice import FloorChoice, Floors
 from lidarium.envs.observation_spaces import observation_space
 from lidarium.envs.observations import ObservationWriter
+from lidarium.envs.observing.observables import ComputedObservations
+from lidarium.envs.observing.rows import Rows
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
 from lidarium.envs.outcome.endings import HORIZON, make_rules, note_endings
@@ -105,7 +107,6 @@ class EpisodeBatch:
         self._beginnings = Beginnings(choice, settings, self.episodes)
         self.simulation = make_simulation(settings, self.episodes)
         self.world, self.score = self.simulation.world, self.simulation.score
-        self._extra = ExtraTerms(settings.reward.more)
         self._offsets, self._goals = np.zeros((self.rows, 2)), np.full((self.rows, 2), np.nan)
         self.perception = Perception(self.simulation, settings, self._offsets)
         self._software = Software(self.perception, settings)
@@ -113,10 +114,15 @@ class EpisodeBatch:
         writer = ObservationWriter(
             self.simulation, settings, self._offsets, self._goals if choice.has_goal else None
         )
+        named = Rows(self.simulation, settings, self.perception.poses)
+        self._computed = ComputedObservations(named)
+        self._extra = ExtraTerms(settings.reward.more, named)
         known = observation_space(settings, choice.has_goal).spaces
         self.observation_space = spaces.Dict({**known, **self.level.boxes})
         self.action_space = self.level.action_space
-        self._buffers = ObservationBuffers(writer, self.rows, self.level.boxes, copy)
+        self._buffers = ObservationBuffers(
+            writer, self.rows, {**self._computed.boxes, **self.level.boxes}, copy
+        )
         self.acted = np.zeros(self.rows, np.bool_)
         self.reasons = np.zeros(self.rows, np.int8)
         self.infos: dict[str, Any] = {}
@@ -210,6 +216,7 @@ class EpisodeBatch:
         self.acted = acted
         self._note_endings(acted, stopping)
         self.infos = self._row_infos.of_step(terms, self.reasons, self.has_endings)
+        self._computed.write(self.observations, seen)
         # Episodes that have not run in this call have nothing to be observed again.
         self.level.observe(self.acted, self.live & seen, seen, self.observations, self.infos)
 
@@ -218,7 +225,7 @@ class EpisodeBatch:
 
         Rows that did not act have earned nothing; ``is_plain`` says that all did.
         """
-        earned = {} if self._extra.is_empty else self._extra.earned(self.world)
+        earned = {} if self._extra.is_empty else self._extra.earned()
         for amounts in earned.values():
             self.score.rewards += amounts
         if not is_plain:
@@ -273,7 +280,7 @@ class EpisodeBatch:
         self._goals[rows] = goal_of_robots(start, self.settings)
         self._rules.goals[episode] = np.nan if start.goal is None else start.goal
         self._commands[rows], self.live[rows] = 0.0, True
-        self._extra.start(self.world, episode)
+        self._extra.start(episode)
         self.perception.start(start.goal, episode)
         self._software.start(episode, start.seed)
         self.level.start(episode)

@@ -21,7 +21,7 @@ class ObservationBuffers:
     rows : int
         How many.
     boxes : dict
-        Spaces of what a level adds to an observation.
+        Spaces of what is observed beside what the writer writes.
     copy : bool
         Whether there are new arrays at each step; otherwise two sets of arrays take turns.
 

@@ -69,6 +69,7 @@ class TeamDriver:
         robot = settings.robot
         self._rows = settings.robots * perception.world.episodes
         self.drives: Drives = no_drives(self._rows)
+        perception.poses.attach_targets(self.drives.is_ordered, self.drives.targets)
         self.planner = PathPlanner(perception, settings, self.drives, footprint_of(robot.radius), shares_map)
         self._right_of_way = RightOfWay(perception, settings, self.drives, self.planner)
         limits = np.array(

@@ -49,6 +49,53 @@ class KnownPoses:
         self.knows_teammates = settings.known_starts and settings.radio.is_ideal
         self.localizers: list[Localizer | None] = [None] * (settings.robots * simulation.episodes)
         self.goals: list[tuple[float, float] | None] = [None] * simulation.episodes
+        rows = settings.robots * simulation.episodes
+        self._is_sent, self._targets = np.zeros(rows, np.bool_), np.zeros((rows, 2))
+
+    @property
+    def offsets(self) -> NDArray[np.float64]:
+        """Origin of each robot's map frame in the frame of its believed pose [m], (rows, 2)."""
+        return self._offsets
+
+    def attach_targets(self, is_sent: NDArray[np.bool_], targets: NDArray[np.float64]) -> None:
+        """Take the arrays that say where robots drive.
+
+        Parameters
+        ----------
+        is_sent : (rows,) bool
+            Whether a robot has a target.
+        targets : (rows, 2) float64
+            The target in the robot's own map frame [m].
+        """
+        self._is_sent, self._targets = is_sent, targets
+
+    def table(self) -> NDArray[np.float64]:
+        """Return what all robots know of their teammates, (rows, robots - 1, 8), in a new array.
+
+        Of each of the others in their order: x, y [m], theta [rad]; x, y of its target [m], and 1 where it is
+        known; age of the pose [s], and 1 where that is known. Zeros where nothing is. All in the knowing
+        robot's map frame. A target is known with a pose of this step.
+        """
+        robots, episodes = self._robots, len(self.goals)
+        table = np.zeros((episodes, robots, robots, 8))
+        teams, offsets = (episodes, robots, -1), self._offsets.reshape(episodes, robots, 1, 2)
+        if self.knows_teammates:
+            table[..., 0:3] = self._beliefs.believed.reshape(teams)[:, None]
+            table[..., 7] = 1.0
+        elif self._hears:
+            for episode, exchange in enumerate(self._exchanges):
+                is_known = exchange.heard_at != NEVER
+                steps = int(self._world.steps[episode]) - exchange.heard_at
+                table[episode, is_known, 0:3] = exchange.heard[is_known]
+                table[episode, is_known, 6] = steps[is_known] * self._settings.time_step
+                table[episode, is_known, 7] = 1.0
+        is_now = (table[..., 7] > 0.0) & (table[..., 6] <= 0.0) & self._is_sent.reshape(episodes, 1, robots)
+        targets = (self._targets + self._offsets).reshape(teams)[:, None]
+        table[..., 3:5] = np.where(is_now[..., None], targets - offsets, 0.0)
+        table[..., 5] = is_now
+        table[..., 0:2] -= np.where(table[..., 7:] > 0.0, offsets, 0.0)
+        others = ~np.eye(robots, dtype=np.bool_)
+        return np.asarray(table[:, others].reshape(episodes * robots, robots - 1, 8))
 
     def offset(self, row: int) -> NDArray[np.float64]:
         """Return the origin of a robot's map frame [m], shape (2,).

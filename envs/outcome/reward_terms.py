@@ -1,23 +1,23 @@
 """Terms of the reward beside those of the kernels: users register them."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.simulation.backend import World
+from lidarium.envs.observing.rows import Rows
 from lidarium.registry import Registry
 
 
 class RewardTerm(Protocol):
     """A term that users add: an amount per robot, weighted by ``settings.reward.more[name]``."""
 
-    def start(self, world: World, episode: int) -> None:
+    def start(self, rows: Rows, episode: int) -> None:
         """Start an episode, after its robots were placed."""
         ...
 
-    def amounts(self, world: World) -> NDArray[np.float64]:
+    def amounts(self, rows: Rows) -> NDArray[np.float64]:
         """Return the amount of each robot since the last call, shape (rows,)."""
         ...
 
@@ -26,23 +26,87 @@ REWARD_TERMS: Registry[Callable[[], RewardTerm]] = Registry("reward term")
 """Terms that ``settings.reward.more`` can weigh, by name: what makes one."""
 
 
+def rows_of(rows: Rows, episode: int) -> slice:
+    """Return the rows of an episode."""
+    return slice(episode * rows.robots, (episode + 1) * rows.robots)
+
+
+class FunctionTerm:
+    """A term that is a plain function of ``Rows``, and keeps nothing.
+
+    Parameters
+    ----------
+    function : callable
+        Takes ``Rows`` and returns the amount of each, (rows,).
+    """
+
+    def __init__(self, function: Callable[[Rows], NDArray[Any]]) -> None:
+        self._function = function
+
+    def start(self, rows: Rows, episode: int) -> None:
+        """Start an episode."""
+
+    def amounts(self, rows: Rows) -> NDArray[np.float64]:
+        """Return what the function does.
+
+        Raises
+        ------
+        ValueError
+            Where it is not a number for each row.
+        """
+        amounts = np.asarray(self._function(rows), np.float64)
+        wanted = (rows.robots * rows.episodes,)
+        if amounts.shape != wanted:
+            raise ValueError(
+                f"the reward term {self._function.__name__!r} has shape {amounts.shape}; want {wanted}: a "
+                "number for each row = episode * robots + robot"
+            )
+        return amounts
+
+
+def reward_term(
+    name: str, summary: str = ""
+) -> Callable[[Callable[[Rows], NDArray[Any]]], Callable[[Rows], NDArray[Any]]]:
+    """Make a function known as a term of the reward; ``reward.more`` then takes its name.
+
+    Parameters
+    ----------
+    name : str
+        What users call it.
+    summary : str
+        One line that says what it is; that of the function's docstring where empty.
+
+    Returns
+    -------
+    callable
+        A decorator of a function that takes ``Rows`` and returns an amount for each row, (rows,).
+    """
+
+    def register(function: Callable[[Rows], NDArray[Any]]) -> Callable[[Rows], NDArray[Any]]:
+        said = summary or (function.__doc__ or name).strip().splitlines()[0]
+        REWARD_TERMS.register(name, lambda: FunctionTerm(function), said)
+        return function
+
+    return register
+
+
 class Turning:
     """Amount: by how much a robot has turned [rad]."""
 
     def __init__(self) -> None:
         self._headings = np.zeros(0)
 
-    def start(self, world: World, episode: int) -> None:
+    def start(self, rows: Rows, episode: int) -> None:
         """Start an episode at the headings of the starts."""
-        if self._headings.shape != (len(world.poses),):
-            self._headings = np.zeros(len(world.poses))
-        rows = slice(episode * world.robots, (episode + 1) * world.robots)
-        self._headings[rows] = world.poses[rows, 2]
+        if self._headings.shape != (len(rows.poses),):
+            self._headings = np.zeros(len(rows.poses))
+        own = rows_of(rows, episode)
+        self._headings[own] = rows.poses[own, 2]
 
-    def amounts(self, world: World) -> NDArray[np.float64]:
+    def amounts(self, rows: Rows) -> NDArray[np.float64]:
         """Return the turns since the last call, each in [0, pi] [rad]."""
-        turns = np.abs((world.poses[:, 2] - self._headings + np.pi) % (2.0 * np.pi) - np.pi)
-        self._headings = world.poses[:, 2].copy()
+        turns = np.abs((rows.poses[:, 2] - self._headings + np.pi) % (2.0 * np.pi) - np.pi)
+        self._headings = rows.poses[:, 2].copy()
         return np.asarray(turns)
 
 
@@ -50,23 +114,89 @@ class Failing:
     """Amount: 1 when a robot fails."""
 
     def __init__(self) -> None:
-        self._failed = np.zeros(0, np.uint8)
+        self._failed = np.zeros(0, np.bool_)
 
-    def start(self, world: World, episode: int) -> None:
+    def start(self, rows: Rows, episode: int) -> None:
         """Start an episode with nobody failed."""
-        if self._failed.shape != world.failed.shape:
-            self._failed = np.zeros_like(world.failed)
-        self._failed[episode * world.robots : (episode + 1) * world.robots] = 0
+        if self._failed.shape != rows.failed.shape:
+            self._failed = np.zeros_like(rows.failed)
+        self._failed[rows_of(rows, episode)] = 0
 
-    def amounts(self, world: World) -> NDArray[np.float64]:
+    def amounts(self, rows: Rows) -> NDArray[np.float64]:
         """Return 1 for each robot that has failed since the last call."""
-        fell = (world.failed != 0) & (self._failed == 0)
-        self._failed = world.failed.copy()
+        fell = rows.failed & ~self._failed
+        self._failed = rows.failed
         return np.asarray(fell, np.float64)
+
+
+class FloorShare:
+    """Amount: the robot's part of what the team has seen anew, as a share of F; at most 1 over an episode.
+
+    What the first scans see is not paid. Robots get equal parts.
+    """
+
+    def __init__(self) -> None:
+        self._coverage = np.zeros(0)
+
+    def start(self, rows: Rows, episode: int) -> None:
+        """Start an episode at what has been seen."""
+        if self._coverage.shape != rows.live.shape:
+            self._coverage = np.zeros(len(rows.live))
+        own = rows_of(rows, episode)
+        self._coverage[own] = rows.coverage[own]
+
+    def amounts(self, rows: Rows) -> NDArray[np.float64]:
+        """Return the increase since the last call, over the number of robots."""
+        gained, self._coverage = rows.coverage - self._coverage, rows.coverage
+        return np.asarray(gained / rows.robots)
+
+
+class Completion:
+    """Amount: 1 for each robot when the team has covered its floor."""
+
+    def __init__(self) -> None:
+        self._is_paid = np.zeros(0, np.bool_)
+
+    def start(self, rows: Rows, episode: int) -> None:
+        """Start an episode that is not complete."""
+        if self._is_paid.shape != rows.live.shape:
+            self._is_paid = np.zeros(len(rows.live), np.bool_)
+        self._is_paid[rows_of(rows, episode)] = False
+
+    def amounts(self, rows: Rows) -> NDArray[np.float64]:
+        """Return 1 where it has been completed since the last call."""
+        is_complete = rows.is_covered & (rows.time_s > 0.0)
+        paid = is_complete & ~self._is_paid
+        self._is_paid |= is_complete
+        return np.asarray(paid, np.float64)
+
+
+class FirstView:
+    """Amount: the area of F that the robot's first scan has seen [m2], in the first step."""
+
+    def __init__(self) -> None:
+        self._seen = np.zeros(0)
+
+    def start(self, rows: Rows, episode: int) -> None:
+        """Start an episode."""
+        if self._seen.shape != rows.live.shape:
+            self._seen = np.zeros(len(rows.live))
+        own = rows_of(rows, episode)
+        self._seen[own] = rows.seen_m2[own]
+
+    def amounts(self, rows: Rows) -> NDArray[np.float64]:
+        """Return what was seen before the first step, once."""
+        begins = rows.time_s <= 0.0
+        paid = np.where(begins, 0.0, self._seen)
+        self._seen = np.where(begins, rows.seen_m2, 0.0)
+        return paid
 
 
 REWARD_TERMS.register("turning", Turning, "radians turned since the last reward")
 REWARD_TERMS.register("failing", Failing, "1 when a robot fails")
+REWARD_TERMS.register("floor_share", FloorShare, "share of F seen anew, in equal parts; 1 over an episode")
+REWARD_TERMS.register("completion", Completion, "1 when the floor is covered")
+REWARD_TERMS.register("first_view", FirstView, "area that the first scan sees [m2], in the first step")
 
 
 class ExtraTerms:
@@ -76,9 +206,12 @@ class ExtraTerms:
     ----------
     weights : tuple of (str, float)
         ``settings.reward.more``.
+    rows : Rows
+        What they are computed from.
     """
 
-    def __init__(self, weights: tuple[tuple[str, float], ...]) -> None:
+    def __init__(self, weights: tuple[tuple[str, float], ...], rows: Rows) -> None:
+        self._rows = rows
         self._terms = {name: (weight, REWARD_TERMS[name]()) for name, weight in weights}
 
     @property
@@ -91,11 +224,11 @@ class ExtraTerms:
         """Whether nothing is added."""
         return not self._terms
 
-    def start(self, world: World, episode: int) -> None:
+    def start(self, episode: int) -> None:
         """Start an episode, after its robots were placed."""
         for _, term in self._terms.values():
-            term.start(world, episode)
+            term.start(self._rows, episode)
 
-    def earned(self, world: World) -> dict[str, NDArray[np.float64]]:
+    def earned(self) -> dict[str, NDArray[np.float64]]:
         """Return what each term has brought each robot since the last call, by name, (rows,) each."""
-        return {name: weight * term.amounts(world) for name, (weight, term) in self._terms.items()}
+        return {name: weight * term.amounts(self._rows) for name, (weight, term) in self._terms.items()}

@@ -6,11 +6,11 @@ Beside ``evaluation`` the only one to see the truth.
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.observing.rows import Rows
 from lidarium.envs.outcome.reward_terms import ExtraTerms
 from lidarium.envs.scoring.rewards import TERMS
-from lidarium.envs.scoring.score import Score
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.simulation.backend import World
+from lidarium.envs.simulation.simulation import Simulation
 
 THRESHOLDS = (0.85, 0.90, 0.95, 0.99)
 """Shares of F of which the time is noted."""
@@ -24,10 +24,8 @@ class Scorer:
 
     Parameters
     ----------
-    world : World
-        The world.
-    score : Score
-        Its score.
+    simulation : Simulation
+        Of the one episode.
     settings : ExplorationSettings
         Weights of the reward and the length of a step.
 
@@ -49,15 +47,15 @@ class Scorer:
         Why each ended agent ended.
     """
 
-    def __init__(self, world: World, score: Score, settings: ExplorationSettings) -> None:
-        self._world, self._score, self._settings = world, score, settings
+    def __init__(self, simulation: Simulation, settings: ExplorationSettings) -> None:
+        self._world, self._score, self._settings = simulation.world, simulation.score, settings
         self.coverage = 0.0
         self.times: dict[float, float] = {}
         self.curve: list[tuple[float, float]] = []
         self.track: list[tuple[float, NDArray[np.float64]]] = []
         self.ended_because: dict[str, str] = {}
-        self.terms: list[dict[str, float]] = [{} for _ in range(world.robots)]
-        self._extra = ExtraTerms(settings.reward.more)
+        self.terms: list[dict[str, float]] = [{} for _ in range(settings.robots)]
+        self._extra = ExtraTerms(settings.reward.more, Rows(simulation, settings))
         self._has_extra = not self._extra.is_empty
         self._last_seen = -1
         self._track_steps = max(round(TRACK_PERIOD_S / settings.time_step), 1)
@@ -65,7 +63,7 @@ class Scorer:
     def start(self) -> None:
         """Start an episode with the scan taken at the start."""
         self._score.rewards[:], self._score.reward_terms[:] = 0.0, 0.0
-        self._extra.start(self._world, 0)
+        self._extra.start(0)
         names = (*TERMS, *self._extra.names)
         self.terms = [dict.fromkeys(names, 0.0) for _ in range(self._world.robots)]
         self.times, self.curve, self.track, self.ended_because = {}, [], [], {}
@@ -109,7 +107,7 @@ class Scorer:
         self.terms = [dict(zip(TERMS, row)) for row in score.reward_terms.tolist()]  # noqa: B905 (hot)
         score.earned.fill(0.0)
         if self._has_extra:
-            for name, earned in self._extra.earned(self._world).items():
+            for name, earned in self._extra.earned().items():
                 for row, value in enumerate(earned.tolist()):
                     self.terms[row][name] = value
                     rewards[row] += value

@@ -1,7 +1,7 @@
-"""What robots can observe of sensors that are no part of the kernels' observations.
+"""What robots can observe beside what the kernels write.
 
-An entry of the registry ``observable`` has the name of an array of ``Simulation.sensors``. It is observed as
-that array has it, row by row.
+An entry of the registry ``observable`` is a function of named arrays, or has the name of an array of
+``Simulation.sensors`` and is observed as that array has it, row by row.
 """
 
 from collections.abc import Callable
@@ -10,28 +10,33 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from lidarium.registry import Registry
 
 
 @dataclass(frozen=True, slots=True)
 class Observable:
-    """A sensor that can be observed.
+    """Something that can be observed.
 
     Attributes
     ----------
     box : callable
-        The space of one robot's observation, from the settings.
+        The space of one robot's observation, from the settings; bounded.
     missing : callable
         What the settings lack for it, in words; empty where nothing.
+    compute : callable or None
+        Takes ``Rows``, named arrays over the robots of all episodes, and returns the values of all, (rows,
+        ...); it keeps nothing from call to call. None for the array of sensors of this name.
     """
 
     box: Callable[[Any], spaces.Box]
     missing: Callable[[Any], str] = lambda settings: ""
+    compute: Callable[[Any], NDArray[Any]] | None = None
 
 
 SENSED: Registry[Observable] = Registry("observable")
-"""Sensors that can be observed, by the name of their array."""
+"""What can be observed by name: sensors have that of their array."""
 
 
 def _depth_box(settings: Any) -> spaces.Box:  # noqa: ANN401
@@ -47,6 +52,17 @@ SENSED.register(
     "depth",
     Observable(_depth_box, _missing_camera),
     "last image of the depth camera [m]; 0 for no measurement",
+)
+
+
+_OF_THE_TEAM = "lidarium.envs.observing.team_observables"
+
+SENSED.register("time_left", f"{_OF_THE_TEAM}:TIME_LEFT", "share of the horizon that is left, (1,)")
+SENSED.register("coverage", f"{_OF_THE_TEAM}:COVERAGE", "true share of F that the team has seen, (1,)")
+SENSED.register(
+    "teammates",
+    f"{_OF_THE_TEAM}:TEAMMATES",
+    "place, heading, goal, age of what is known of each of the others, (robots - 1, 8)",
 )
 
 

@@ -170,7 +170,7 @@ def test_unknown_forms_are_refused_with_the_known_ones(option, value):
 
 
 def test_a_share_beyond_the_whole_is_refused():
-    with pytest.raises(ValueError, match="team_reward is 1.5"):
+    with pytest.raises(ValueError, match=r"team_reward is 1\.5"):
         make(team_reward=1.5)
 
 

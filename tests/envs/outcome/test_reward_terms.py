@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.outcome.reward_terms import REWARD_TERMS
+from lidarium.envs.outcome.reward_terms import REWARD_TERMS, reward_term
 from lidarium.envs.scoring.rewards import TERMS
 
 DRIVE = np.array([0.6, 0.5], np.float32)
@@ -79,3 +79,79 @@ def test_rows_of_a_batch_earn_what_single_episodes_do():
 def test_an_unknown_term_is_refused():
     with pytest.raises(ValueError, match="unknown reward term 'turnin'; did you mean 'turning'"):
         lidarium.parallel_env("scene_room", reward={"more": {"turnin": 1.0}})
+
+
+@pytest.fixture
+def crowding():
+    @reward_term("crowding", "for tests")
+    def crowding(rows):
+        places = rows.true_pose[:, :2].reshape(rows.episodes, rows.robots, 2)
+        gaps = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1)
+        return ((gaps < 4.0).sum(axis=-1) > 1).ravel()
+
+    yield
+    REWARD_TERMS.unregister("crowding")
+
+
+@pytest.mark.usefixtures("crowding")
+def test_a_plain_function_is_a_term():
+    env = lidarium.parallel_env("apartment", robots=3, reward={"more": {"crowding": -0.05}})
+    for rewards, infos in run(env):
+        places = env.world.poses[:, :2]
+        for row, agent in enumerate(rewards):
+            near = (np.linalg.norm(places - places[row], axis=1) < 4.0).sum() > 1
+            assert infos[agent]["reward_terms"]["crowding"] == (-0.05 if near else 0.0)
+
+
+def test_a_function_of_another_shape_is_refused_by_name():
+    def odd(rows):
+        return np.zeros(7)
+
+    reward_term("odd", "for tests")(odd)
+    try:
+        env = lidarium.parallel_env("scene_room", robots=2, reward={"more": {"odd": 1.0}})
+        env.reset(seed=0)
+        with pytest.raises(ValueError, match=r"the reward term 'odd' has shape \(7,\); want \(2,\)"):
+            env.step(dict.fromkeys(env.agents, DRIVE))
+    finally:
+        REWARD_TERMS.unregister("odd")
+
+
+def test_shares_of_the_floor_add_up_to_what_the_team_has_seen():
+    env = lidarium.parallel_env(
+        "scene_room", robots=2, stop_coverage=None, reward={"area": 0.0, "more": {"floor_share": 1.0}}
+    )
+    total = 0.0
+    for number, (_, infos) in enumerate(run(env, 60)):
+        total += sum(info["reward_terms"]["floor_share"] for info in infos.values())
+        if number == 0:
+            first = env.scorer.curve[0][1]
+    assert total == pytest.approx(env.scorer.coverage - first)
+    assert total > 0.01
+
+
+def test_completion_is_paid_once_and_the_first_view_in_the_first_step():
+    env = lidarium.parallel_env(
+        "scene_room",
+        robots=2,
+        stop_coverage=0.02,
+        reward={"more": {"completion": 5.0, "first_view": 1.0}},
+    )
+    env.reset(seed=2)
+    seen = env.score.seen.copy() * env.settings.occupancy.resolution**2
+    views, completions = [], []
+    while env.agents:
+        infos = env.step(dict.fromkeys(env.agents, DRIVE))[4]
+        views.append([info["reward_terms"]["first_view"] for info in infos.values()])
+        completions.append([info["reward_terms"]["completion"] for info in infos.values()])
+    assert views[0] == pytest.approx(seen.tolist())
+    assert not np.any(views[1:])
+    assert completions[-1] == [5.0, 5.0]
+    assert not np.any(completions[:-1])
+
+
+@pytest.mark.usefixtures("crowding")
+@pytest.mark.parametrize("level", ["velocity", "frontier"])
+def test_terms_of_a_batch_are_those_of_single_episodes(compare, level):
+    more = {"crowding": -0.1, "floor_share": 1.0, "completion": 2.0, "first_view": 0.1, "turning": -0.1}
+    compare(level, 2, 40, ["apartment", "clinic"], reward={"more": more}, stop_coverage=0.3, seed=7)

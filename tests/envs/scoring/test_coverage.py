@@ -235,7 +235,7 @@ def scored(weights, robots=2):
     options = ExplorationSettings(robots=robots, reward=weights)
     simulation = team(robots, weights=reward_weights(options))
     simulation.place(0, tables_of(hall()), np.array([[1.0, 2.0, 0.0], [3.0, 2.0, math.pi]])[:robots], 1)
-    scorer = Scorer(simulation.world, simulation.score, options)
+    scorer = Scorer(simulation, options)
     simulation.step(np.zeros((robots, 2)), moves_bodies=False)
     scorer.start()
     return simulation, scorer

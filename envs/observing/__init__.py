@@ -1,0 +1,1 @@
+"""Observables that are plain functions of named arrays."""

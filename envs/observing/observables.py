@@ -1,0 +1,96 @@
+"""Observables that are functions: how one is made known, and what writes them."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.observing.rows import Rows
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.sensors.observables import SENSED, Observable
+
+
+def observable(
+    name: str, low: float, high: float, shape: tuple[int, ...], summary: str = ""
+) -> Callable[[Callable[[Rows], NDArray[Any]]], Callable[[Rows], NDArray[Any]]]:
+    """Make a function known as an observable; ``observe`` then takes its name.
+
+    Parameters
+    ----------
+    name : str
+        What users call it.
+    low, high : float
+        Bounds of its numbers; what lies beyond is clipped.
+    shape : tuple of int
+        Of one robot's value.
+    summary : str
+        One line that says what it is; that of the function's docstring where empty.
+
+    Returns
+    -------
+    callable
+        A decorator of a function that takes ``Rows`` and returns an array (rows, *shape).
+    """
+    box = spaces.Box(low, high, shape, np.float32)
+
+    def register(function: Callable[[Rows], NDArray[Any]]) -> Callable[[Rows], NDArray[Any]]:
+        said = summary or (function.__doc__ or name).strip().splitlines()[0]
+        SENSED.register(name, Observable(lambda _: box, compute=function), said)
+        return function
+
+    return register
+
+
+def computed(settings: ExplorationSettings) -> dict[str, Observable]:
+    """Return the observables that settings choose and that are functions, by name."""
+    chosen = {name: SENSED[name] for name in settings.observe if name in SENSED}
+    return {name: each for name, each in chosen.items() if each.compute is not None}
+
+
+class ComputedObservations:
+    """Computes the observables that settings choose and that are functions.
+
+    Parameters
+    ----------
+    rows : Rows
+        What they are computed from.
+
+    Attributes
+    ----------
+    boxes : dict
+        The space of each.
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self._rows, self._count = rows, rows.robots * rows.episodes
+        self._observables = computed(rows.settings)
+        self.boxes = {name: each.box(rows.settings) for name, each in self._observables.items()}
+
+    def write(self, out: Mapping[str, NDArray[Any]], seen: NDArray[np.bool_] | None = None) -> None:
+        """Write the observables of rows, all or those that are seen.
+
+        Raises
+        ------
+        ValueError
+            Where a function returns values of another shape.
+        """
+        for name, each in self._observables.items():
+            box, compute = self.boxes[name], each.compute
+            assert compute is not None
+            values = np.asarray(compute(self._rows))
+            if values.shape != (self._count, *box.shape):
+                raise ValueError(
+                    f"observable {name!r} has shape {values.shape}; want {(self._count, *box.shape)}: "
+                    "a value for each row = episode * robots + robot"
+                )
+            clipped = np.clip(values, box.low, box.high)
+            if seen is None:
+                out[name][:] = clipped
+            else:
+                out[name][seen] = clipped[seen]
+
+    def buffers(self) -> dict[str, NDArray[Any]]:
+        """Return new arrays for the observables, by name."""
+        return {name: np.zeros((self._count, *box.shape), box.dtype) for name, box in self.boxes.items()}
