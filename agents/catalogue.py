@@ -1,10 +1,13 @@
 """The policies by name."""
 
+import importlib
+import os
+import sys
 from collections.abc import Callable
 from typing import Any
 
 from lidarium.agents.policy import Policy
-from lidarium.registry import Registry
+from lidarium.registry import Registry, unknown
 
 POLICIES: Registry[Callable[..., Policy]] = Registry("policy")
 """What makes a policy, by name; keyword arguments are its settings.
@@ -86,11 +89,48 @@ def policy_names() -> dict[str, str]:
 
 
 def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
-    """Return a new policy by name.
+    """Return a new policy by name, or one of the user's own by ``module:Class``.
 
     Raises
     ------
     ValueError
-        Where the name is unknown; the message suggests the nearest one.
+        Where the name is unknown; the message suggests the nearest one. Where there is no such module or
+        class, or it makes no policy.
     """
-    return POLICIES[name](**settings)
+    if not isinstance(name, str) or ":" not in name:
+        return POLICIES[name](**settings)
+    policy = maker_at(name)(**settings)
+    if not isinstance(policy, Policy):
+        raise ValueError(f"policy {name!r} makes {type(policy).__name__}; want a subclass of Policy")
+    return policy
+
+
+def maker_at(name: str) -> Callable[..., Any]:
+    """Return what makes a policy of the user's own.
+
+    Parameters
+    ----------
+    name : str
+        ``module:attribute``; the module is installed, or in the folder that the command is called in.
+
+    Raises
+    ------
+    ValueError
+        Where it cannot be imported, or has no such attribute.
+    """
+    module_name, _, attribute = name.partition(":")
+    here = os.getcwd()
+    try:
+        if here not in sys.path and "" not in sys.path:
+            sys.path.append(here)
+        module = importlib.import_module(module_name)
+    except (ImportError, ValueError) as error:
+        raise ValueError(
+            f"policy {name!r}: module {module_name!r} cannot be imported ({error}); want module:Class of a "
+            f"module that is installed or in {here}"
+        ) from error
+    if not attribute or not callable(getattr(module, attribute, None)):
+        own = sorted(key for key, value in vars(module).items() if isinstance(value, type))
+        raise ValueError(f"policy {name!r}: {unknown(f'class of {module_name}', attribute, own)}")
+    made: Callable[..., Any] = getattr(module, attribute)
+    return made

@@ -27,7 +27,7 @@ from lidarium.envs.outcome.scorer import Scorer
 from lidarium.envs.outcome.team_state import state_space, team_state
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.reset_options import checked_seed, read_options
+from lidarium.envs.settings.reset_options import Curriculum, checked_seed, of_curriculum, read_options
 from lidarium.envs.station.reports import Station
 
 if TYPE_CHECKING:
@@ -54,6 +54,9 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         ``human`` (a window), ``rgb_array`` or None.
     image_resolution : float or None
         Side of a pixel [m] where the floor is a plain image.
+    curriculum : callable or None
+        Takes the number of an episode, from 0 on, and returns options of ``reset`` for it; those that a reset
+        gets itself go before.
 
     Attributes
     ----------
@@ -84,6 +87,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         settings: ExplorationSettings | None = None,
         render_mode: str | None = None,
         image_resolution: float | None = None,
+        curriculum: Curriculum | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode is {render_mode!r}; want human, rgb_array or None")
@@ -92,6 +96,7 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         self.possible_agents = self.settings.agents
         self.agents: list[str] = []
         self._choice = FloorChoice(floor, image_resolution)
+        self._curriculum, self._begun = curriculum, 0
         self.has_goal = self._choice.has_goal
         space = observation_space(self.settings, self.has_goal)
         self.observation_spaces: dict[str, spaces.Space[Any]] = {
@@ -169,7 +174,10 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
         chosen, seed = read_options(options, self.settings.robots), checked_seed(seed)
         if seed is not None or self._generator is None:
             self._generator = np.random.default_rng(seed)
-        return self.start(begin(self._generator, self._choice, chosen, self.settings))
+        chosen = of_curriculum(self._curriculum, self._begun, chosen, self.settings.robots)
+        beginning = begin(self._generator, self._choice, chosen, self.settings)
+        self._begun += 1
+        return self.start(beginning)
 
     def start(self, beginning: EpisodeStart) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode that begins as was drawn, or as one did before.

@@ -40,7 +40,7 @@ class Evaluate(TeamCommand):
     data: Path | None = None
     """folder of real floors, for presets"""
     policies: tuple[str, ...] = ("nearest_frontier", "utility_frontier", "explore_lite")
-    """who decides; `lidarium show policies` lists them"""
+    """who decides; `lidarium show policies` lists them; module:Class for your own"""
     floors: tuple[str, ...] = ()
     """floors as for `lidarium run`, apartment where left out.
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from tyro.conf import subcommand
 
+import lidarium
 from lidarium.scripts import (
     animate,
     bench,
@@ -144,6 +145,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _ended(arguments: Sequence[str] | None) -> int:
     """Run a command; return its exit code, errors included."""
+    if list(sys.argv[1:] if arguments is None else arguments) == ["--version"]:
+        print_result(f"lidarium {lidarium.__version__}\n")
+        return DONE
     try:
         return _answered(_command(arguments))
     except SystemExit as leaving:  # tyro, having printed help (0) or what is wrong with the options (2)
@@ -173,7 +177,10 @@ def _command(arguments: Sequence[str] | None) -> Command:
     if tuple(words[:2]) in _IN_TWO_WORDS:
         words[:2] = [_IN_TWO_WORDS[words[0], words[1]]]
     config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
-    description = "Teams of lidar robots explore unknown floors. Begin with `lidarium run`."
+    description = (
+        "Teams of lidar robots explore unknown floors. Begin with `lidarium run`; "
+        "`lidarium --version` is the version."
+    )
     try:
         chosen: Any = tyro.cli(Choice, prog="lidarium", description=description, args=words, config=config)
     except BrokenPipeError as error:  # nobody reads the help to its end

@@ -50,7 +50,7 @@ class Run(TeamCommand):
     robots: int = 3
     """number of robots"""
     policy: str | None = None
-    """policy that decides; `lidarium show policies` lists them.
+    """policy that decides; `lidarium show policies` lists them; module:Class for one of your own.
 
     Left out, a team is supervised: it does not know its starts, localizes by SLAM, and merges its maps.
     One robot, or robots with a goal, drive to the nearest frontier as the options say.

@@ -49,6 +49,20 @@ def test_stepping_an_environment_loads_no_plotting():
     assert not loaded & {"matplotlib", "imageio", "tyro"}
 
 
+def test_the_package_is_a_command_that_has_a_version():
+    for arguments in (["-m", "lidarium", "--version"], ["-m", "lidarium_command", "--version"]):
+        result = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=True)
+        assert result.stdout == f"lidarium {lidarium.__version__}\n"
+
+
+def test_versions_of_pettingzoo_without_a_register_do():
+    code = (
+        "import pettingzoo\nif hasattr(pettingzoo, 'register'): del pettingzoo.register\n"
+        "import gymnasium, lidarium\nassert 'lidarium/Exploration-v1' in gymnasium.registry"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_the_version_is_that_of_the_distribution():
     from importlib.metadata import version
 

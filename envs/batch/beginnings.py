@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lidarium.envs.episode_start import EpisodeStart, begin
 from lidarium.envs.floors.floor_choice import FloorChoice
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.reset_options import ResetOptions
+from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, of_curriculum
 
 
 class Beginnings:
@@ -22,10 +22,19 @@ class Beginnings:
         Of every episode.
     episodes : int
         How many.
+    curriculum : callable or None
+        Options of ``reset`` by the number of an episode, counted over all as they begin.
     """
 
-    def __init__(self, choice: FloorChoice, settings: ExplorationSettings, episodes: int) -> None:
-        self._choice, self._settings = choice, settings
+    def __init__(
+        self,
+        choice: FloorChoice,
+        settings: ExplorationSettings,
+        episodes: int,
+        curriculum: Curriculum | None = None,
+    ) -> None:
+        self._choice, self._settings, self._curriculum = choice, settings, curriculum
+        self._begun = 0
         self._generators: list[np.random.Generator | None] = [None] * episodes
 
     def draw(
@@ -57,9 +66,14 @@ class Beginnings:
             generator = generators[episode]
             if seed is not None or generator is None:
                 generator = np.random.default_rng(seed)
-            drawn[episode] = begin(
-                generator, self._choice, options.get(episode, ResetOptions()), self._settings
+            chosen = of_curriculum(
+                self._curriculum,
+                self._begun + k,
+                options.get(episode, ResetOptions()),
+                self._settings.robots,
             )
+            drawn[episode] = begin(generator, self._choice, chosen, self._settings)
             generators[episode] = generator
         self._generators = generators
+        self._begun += len(drawn)
         return drawn

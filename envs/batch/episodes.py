@@ -31,7 +31,7 @@ from lidarium.envs.outcome.endings import HORIZON, make_rules, note_endings
 from lidarium.envs.outcome.reward_terms import ExtraTerms
 from lidarium.envs.scoring.rewards import TERMS
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.reset_options import ResetOptions
+from lidarium.envs.settings.reset_options import Curriculum, ResetOptions
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.mapping.kernels.views import table_of
 
@@ -53,6 +53,8 @@ class EpisodeBatch:
         Side of a pixel [m] where the floor is a plain image.
     copy : bool
         Whether observations are new arrays at each step; otherwise two sets of arrays take turns.
+    curriculum : callable or None
+        As for ``ExplorationEnv``; episodes are counted over all as they begin.
 
     Attributes
     ----------
@@ -91,6 +93,7 @@ class EpisodeBatch:
         level: str = "velocity",
         image_resolution: float | None = None,
         copy: bool = True,
+        curriculum: Curriculum | None = None,
     ) -> None:
         if isinstance(episodes, bool) or not isinstance(episodes, int | np.integer) or episodes < 1:
             raise ValueError(f"the number of episodes is {episodes!r}; want a whole number of at least 1")
@@ -104,7 +107,7 @@ class EpisodeBatch:
                 "use lidarium.parallel_env"
             )
         choice = FloorChoice(floor, image_resolution)
-        self._beginnings = Beginnings(choice, settings, self.episodes)
+        self._beginnings = Beginnings(choice, settings, self.episodes, curriculum)
         self.simulation = make_simulation(settings, self.episodes)
         self.world, self.score = self.simulation.world, self.simulation.score
         self._offsets, self._goals = np.zeros((self.rows, 2)), np.full((self.rows, 2), np.nan)

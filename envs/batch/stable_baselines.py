@@ -14,7 +14,7 @@ from lidarium.envs.batch.requests import options_of, seeds_of, settings_of
 from lidarium.envs.conventions.conventions import split_options
 from lidarium.envs.conventions.row_conventions import RowConventions
 from lidarium.envs.floors.floor_choice import Floors
-from lidarium.envs.settings.reset_options import ResetOptions, read_options
+from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, read_options
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -40,7 +40,7 @@ class ExplorationVecEnv(VecEnv):
 
     Parameters
     ----------
-    episodes, floor, level, image_resolution, **options
+    episodes, floor, level, image_resolution, curriculum, **options
         As for ``ExplorationVectorEnv``.
 
     Notes
@@ -60,11 +60,14 @@ class ExplorationVecEnv(VecEnv):
         floor: Floors = "apartment",
         level: str = "velocity",
         image_resolution: float | None = None,
+        curriculum: Curriculum | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
         conventions, options = split_options(options)
         self.settings = settings_of(options)
-        self.batch = batch = EpisodeBatch(episodes, floor, self.settings, level, image_resolution, copy=False)
+        self.batch = batch = EpisodeBatch(
+            episodes, floor, self.settings, level, image_resolution, False, curriculum
+        )
         self.conventions = RowConventions(batch.observation_space, conventions, batch.robots, batch.rows)
         self.render_mode = None
         self._actions: NDArray[Any] | None = None

@@ -18,6 +18,7 @@ from lidarium.envs.conventions.conventions import split_options
 from lidarium.envs.conventions.row_conventions import RowConventions
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.outcome.team_state import state_space, team_state
+from lidarium.envs.settings.reset_options import Curriculum
 
 _NO_EPISODES = np.zeros(0, np.int64)
 
@@ -48,6 +49,8 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     copy : bool
         Whether each step returns new arrays. Otherwise two sets take turns: what a step returns is
         overwritten by the step after the next one.
+    curriculum : callable or None
+        As for ``lidarium.parallel_env``; episodes are counted over all as they begin.
     render_mode : None
         Batches are not drawn.
     **options
@@ -69,6 +72,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         image_resolution: float | None = None,
         copy: bool = True,
         render_mode: None = None,
+        curriculum: Curriculum | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
         if render_mode is not None:
@@ -78,7 +82,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
             )
         conventions, options = split_options(options)
         settings = settings_of(options)
-        self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy)
+        self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy, curriculum)
         self.conventions = RowConventions(
             self.batch.observation_space, conventions, self.batch.robots, self.batch.rows
         )

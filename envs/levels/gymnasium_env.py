@@ -14,7 +14,7 @@ from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.reset_options import checked_seed
+from lidarium.envs.settings.reset_options import Curriculum, checked_seed
 
 AGENT = "robot_0"
 
@@ -32,6 +32,8 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         ``human``, ``rgb_array`` or None.
     image_resolution : float or None
         Side of a pixel [m] where the floor is a plain image.
+    curriculum : callable or None
+        As for ``lidarium.parallel_env``.
     **options
         As for ``lidarium.parallel_env``, without ``robots``.
 
@@ -49,6 +51,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         level: str = "velocity",
         render_mode: str | None = None,
         image_resolution: float | None = None,
+        curriculum: Curriculum | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
         if options.setdefault("robots", 1) != 1:
@@ -57,7 +60,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
                 "for a team"
             )
         conventions, options = split_options(options)
-        base = ExplorationEnv(floor, make_settings(**options), render_mode, image_resolution)
+        base = ExplorationEnv(floor, make_settings(**options), render_mode, image_resolution, curriculum)
         self.parallel = conventional(at_level(base, level), conventions)
         self.metadata = {**type(self).metadata, "render_fps": self.parallel.metadata["render_fps"]}
         self.render_mode = render_mode

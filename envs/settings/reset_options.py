@@ -1,8 +1,8 @@
 """Options of ``reset``."""
 
 import difflib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,9 @@ class ResetOptions:
     starts: NDArray[np.float64] | str | None = None
     goal: tuple[float, float] | None = None
 
+
+Curriculum = Callable[[int], Mapping[str, Any]]
+"""Takes the number of an episode, from 0 on, and returns options of ``reset`` for it."""
 
 OPTIONS = tuple(each.name for each in fields(ResetOptions))
 """Names of the options of ``reset``."""
@@ -101,3 +104,23 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
     except (TypeError, ValueError):
         return None
     return array if np.isfinite(array).all() else None
+
+
+def of_curriculum(
+    curriculum: Curriculum | None, number: int, chosen: ResetOptions, robots: int
+) -> ResetOptions:
+    """Return the options of an episode: the chosen ones, and those of a curriculum beside them.
+
+    Raises
+    ------
+    ValueError
+        Where the curriculum returns bad options; the episode's number is named.
+    """
+    if curriculum is None:
+        return chosen
+    try:
+        taught = read_options(curriculum(number), robots)
+    except ValueError as error:
+        raise ValueError(f"the curriculum of episode {number}: {error}") from error
+    given = {name: value for name in OPTIONS if (value := getattr(chosen, name)) is not None}
+    return replace(taught, **given)

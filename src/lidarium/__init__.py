@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from lidarium.envs.batch.vector_env import ExplorationVectorEnv
     from lidarium.envs.floors.floor_choice import Floors
     from lidarium.envs.settings.exploration import ExplorationSettings
+    from lidarium.envs.settings.reset_options import Curriculum
 
 __version__ = "0.2.0"
 
@@ -72,6 +73,9 @@ def _register(name: str, version: int, options: dict[str, Any]) -> None:
         vector_entry_point="lidarium.envs.batch.vector_env:make_vector_env",
         kwargs=options,
     )
+    # Versions of PettingZoo before 1.27 have no register of environments.
+    if not hasattr(pettingzoo, "register"):
+        return
     pettingzoo.register("parallel", registered, entry_point="lidarium:parallel_env", kwargs=options)
     pettingzoo.register("aec", registered, entry_point="lidarium:env", kwargs=options)
 
@@ -88,6 +92,7 @@ def parallel_env(
     settings: "ExplorationSettings | None" = None,
     render_mode: str | None = None,
     image_resolution: float | None = None,
+    curriculum: "Curriculum | None" = None,
     **options: Any,  # noqa: ANN401
 ) -> "ParallelEnv[str, Any, Any]":
     """Make a team's environment (PettingZoo parallel API).
@@ -106,6 +111,8 @@ def parallel_env(
         ``human``, ``rgb_array`` or None.
     image_resolution : float or None
         Side of a pixel [m] where the floor is a plain image.
+    curriculum : callable or None
+        Takes the number of an episode, from 0 on, and returns options of ``reset`` for it.
     **options
         Any attribute of ``ExplorationSettings``, such as ``robots=3`` or ``horizon_s=None``; ``robot`` and
         ``lidar`` by name; ``noise`` (none, datasheet, thesis), ``resolution`` of the maps [m], ``max_cycles``
@@ -129,7 +136,9 @@ def parallel_env(
     from lidarium.envs.settings.making import make_settings
 
     conventions, options = split_options(options)
-    base = ExplorationEnv(floor, make_settings(settings, **options), render_mode, image_resolution)
+    base = ExplorationEnv(
+        floor, make_settings(settings, **options), render_mode, image_resolution, curriculum
+    )
     made: ParallelEnv[str, Any, Any] = conventional(at_level(base, level), conventions)
     return made
 
@@ -196,7 +205,7 @@ def sb3_vec_env(
 
 
 def policy(name: str, **settings: Any) -> "Policy":  # noqa: ANN401
-    """Make a policy by name, such as ``nearest_frontier``.
+    """Make a policy by name, such as ``nearest_frontier``, or your own by ``module:Class``.
 
     ``lidarium show policies`` lists them.
 

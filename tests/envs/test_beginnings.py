@@ -55,3 +55,34 @@ def test_unknown_kinds_of_starts_are_refused(starts):
         lidarium.parallel_env("apartment", starts=starts)
     with pytest.raises(ValueError, match=r"option starts is .*; want \(3, 3\) .*one of fixed, drawn"):
         lidarium.parallel_env("apartment").reset(options={"starts": starts})
+
+
+def growing(number):
+    """A curriculum of two floors."""
+    return {"floor": "scene_room" if number < 3 else "apartment", "starts": "drawn"}
+
+
+def test_a_curriculum_chooses_by_the_number_of_the_episode():
+    env = lidarium.parallel_env("clinic", curriculum=growing, **SMALL)
+    names = []
+    for _ in range(5):
+        env.reset()
+        names.append(env.floor.name)
+    assert names == ["scene_room"] * 3 + ["apartment"] * 2
+    env.reset(options={"floor": "clinic"})
+    assert env.floor.name == "clinic"
+
+
+def test_episodes_of_a_batch_are_counted_as_they_begin():
+    batch = lidarium.vector_env(2, "clinic", curriculum=growing, **SMALL)
+    names = []
+    for _ in range(2):
+        batch.reset(seed=1)
+        names += [floor.name for floor in batch.batch.floors]
+    assert names == ["scene_room"] * 3 + ["apartment"]
+
+
+def test_bad_options_of_a_curriculum_are_refused_with_the_number():
+    env = lidarium.parallel_env("clinic", curriculum=lambda number: {"start": number}, **SMALL)
+    with pytest.raises(ValueError, match="the curriculum of episode 0: unknown reset option 'start'"):
+        env.reset(seed=0)
