@@ -23,7 +23,7 @@ from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.meters import Meters
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.onboard.software import Software
-from lidarium.envs.outcome.scorer import Scorer
+from lidarium.envs.outcome.scorer import TRACK_PERIOD_S, Scorer
 from lidarium.envs.outcome.team_state import state_space, team_state
 from lidarium.envs.radio.messages import Order
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -353,11 +353,13 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
     def scene(self) -> "Scene":
         """Return what a frame shows of the environment."""
+        from lidarium.envs.drawing.frame_parts import RECENT_S
         from lidarium.envs.drawing.rendering import Scene
 
         has_ended = [agent not in self.agents for agent in self.possible_agents]
         name = "" if self.floor is None else self.floor.name
-        return Scene(self.simulation, self.scorer, self.settings, name, has_ended)
+        track = [poses for _, poses in self.scorer.track[-round(RECENT_S / TRACK_PERIOD_S) :]]
+        return Scene(self.simulation, self.settings, name, has_ended, track)
 
     def close(self) -> None:
         """Close the window and the world, if they hold anything; closing again does nothing."""

@@ -288,6 +288,28 @@ class EpisodeBatch:
         self._software.start(episode, start.seed)
         self.level.start(episode)
 
+    def frames(self) -> list[NDArray[np.uint8]]:
+        """Draw each episode, all pictures of one size.
+
+        Raises
+        ------
+        RuntimeError
+            Where not every episode has begun.
+        """
+        from lidarium.envs.drawing.batch_frames import batch_frames
+        from lidarium.envs.drawing.rendering import Scene
+
+        if not self.is_ready:
+            raise RuntimeError("the environment was not reset; call reset() before render()")
+        ended = ~self.live.reshape(self.episodes, self.robots)
+        return batch_frames(
+            [
+                Scene(self.simulation, self.settings, floor.name, ended[episode].tolist(), [], episode)
+                for episode, floor in enumerate(self.floors)
+                if floor is not None
+            ]
+        )
+
     @property
     def terminated(self) -> NDArray[np.bool_]:
         """Which robots ended in the last step other than by the horizon, (rows,)."""

@@ -40,7 +40,7 @@ class ExplorationVecEnv(VecEnv):
 
     Parameters
     ----------
-    episodes, floor, level, image_resolution, curriculum, **options
+    episodes, floor, level, image_resolution, curriculum, render_mode, **options
         As for ``ExplorationVectorEnv``.
 
     Notes
@@ -61,15 +61,18 @@ class ExplorationVecEnv(VecEnv):
         level: str = "velocity",
         image_resolution: float | None = None,
         curriculum: Curriculum | None = None,
+        render_mode: str | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode is {render_mode!r}; want rgb_array or None")
         conventions, options = split_options(options)
         self.settings = settings_of(options)
         self.batch = batch = EpisodeBatch(
             episodes, floor, self.settings, level, image_resolution, False, curriculum
         )
         self.conventions = RowConventions(batch.observation_space, conventions, batch.robots, batch.rows)
-        self.render_mode = None
+        self.render_mode = render_mode
         self._actions: NDArray[Any] | None = None
         self._chosen: dict[int, ResetOptions] = {}
         self._is_closed = False
@@ -236,8 +239,8 @@ class ExplorationVecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Return no images: a batch is not drawn."""
-        return [None] * self.num_envs
+        """Return a picture of each episode, which ``render`` tiles; none for each row without a mode."""
+        return [None] * self.num_envs if self.render_mode is None else list(self.batch.frames())
 
 
 def _of_row(values: Any, row: int) -> Any:  # noqa: ANN401

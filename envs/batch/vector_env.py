@@ -51,8 +51,8 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         overwritten by the step after the next one.
     curriculum : callable or None
         As for ``lidarium.parallel_env``; episodes are counted over all as they begin.
-    render_mode : None
-        Batches are not drawn.
+    render_mode : str or None
+        ``rgb_array``, for ``render`` and Gymnasium's ``RecordVideo``, or None.
     **options
         As for ``lidarium.parallel_env``; ``threads`` is that of the machine by default.
 
@@ -62,7 +62,11 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         Where an option cannot be used.
     """
 
-    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}  # noqa: RUF012
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+        "render_modes": ["rgb_array"],
+        "render_fps": 10,
+    }
 
     def __init__(
         self,
@@ -71,22 +75,19 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         level: str = "velocity",
         image_resolution: float | None = None,
         copy: bool = True,
-        render_mode: None = None,
+        render_mode: str | None = None,
         curriculum: Curriculum | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
-        if render_mode is not None:
-            raise ValueError(
-                f"render_mode is {render_mode!r}; a batch is not drawn, use lidarium.parallel_env to look at "
-                "an episode"
-            )
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode is {render_mode!r}; want rgb_array or None")
         conventions, options = split_options(options)
         settings = settings_of(options)
         self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy, curriculum)
         self.conventions = RowConventions(
             self.batch.observation_space, conventions, self.batch.robots, self.batch.rows
         )
-        self.settings, self.render_mode = settings, None
+        self.settings, self.render_mode = settings, render_mode
         self.num_envs = self.batch.rows
         self.single_observation_space, self.single_action_space = (
             self.conventions.space,
@@ -169,6 +170,21 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         """Return the true state of each team, (episodes, numbers); see `team_state`."""
         simulation = self.batch.simulation
         return np.stack([team_state(simulation, self.settings, k) for k in range(self.batch.episodes)])
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Draw the episode of each row; robots of a team have the same picture.
+
+        ``picture`` tiles one of each episode.
+        """
+        if self.render_mode is None:
+            return None
+        return tuple(frame for frame in self.batch.frames() for _ in range(self.batch.robots))
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Draw all episodes side by side in one picture (rows, columns, 3)."""
+        from lidarium.envs.drawing.batch_frames import tiled
+
+        return tiled(self.batch.frames())
 
     def _check_open(self) -> None:
         if self.closed:

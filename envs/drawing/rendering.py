@@ -16,7 +16,6 @@ from lidarium.envs.drawing.frame_parts import (
     BACKGROUND,
     EXPLORED,
     NOT_COUNTED,
-    RECENT_S,
     SHIFT,
     SIZE,
     UNEXPLORED,
@@ -31,7 +30,6 @@ from lidarium.envs.drawing.frame_parts import (
     view_around,
     with_header,
 )
-from lidarium.envs.outcome.scorer import TRACK_PERIOD_S, Scorer
 from lidarium.envs.scoring.coverage import unpack_bits
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
@@ -51,22 +49,36 @@ class Scene:
     Attributes
     ----------
     simulation : Simulation
-        Whose first episode.
-    scorer : Scorer
-        Its tally.
+        Of one episode or many.
     settings : ExplorationSettings
         The team.
     name : str
         The floor's.
     has_ended : list of bool
         Which robots have ended.
+    track : list of (robots, 3) float64
+        True poses of the last time; none where they are not kept.
+    episode : int
+        Which episode.
     """
 
     simulation: Simulation
-    scorer: Scorer
     settings: ExplorationSettings
     name: str
     has_ended: list[bool]
+    track: list[NDArray[np.float64]]
+    episode: int = 0
+
+    @property
+    def rows(self) -> slice:
+        """Rows of the episode's robots."""
+        robots = self.settings.robots
+        return slice(self.episode * robots, (self.episode + 1) * robots)
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """True poses of the episode's robots, (robots, 3)."""
+        return self.simulation.world.poses[self.rows]
 
 
 def view_of(tables: FloorTables, size: int) -> View:
@@ -108,27 +120,21 @@ def draw_frame(
     """
     if size < 64:
         raise ValueError(f"size of the frame is {size} pixels; want at least 64")
-    tables = scene.simulation.world.floors[0]
+    tables = scene.simulation.world.floors[scene.episode]
     if tables is None:
         raise ValueError("the environment was not reset, there is nothing to draw; call reset() first")
     view = view_of(tables, size)
     frame = _draw_floor(scene, tables, view)
     colours = team_colours(scene.settings.robots)
     _draw_fans(frame, scene, view, colours)
-    recent = scene.scorer.track[-round(RECENT_S / TRACK_PERIOD_S) :]
-    draw_paths(
-        frame,
-        view,
-        np.stack([poses[:, :2] for _, poses in recent] + [scene.simulation.world.poses[:, :2]]),
-        colours,
-    )
-    draw_robots(
-        frame, view, scene.simulation.world.poses, scene.settings.robot.radius, scene.has_ended, colours
-    )
+    draw_paths(frame, view, np.stack([poses[:, :2] for poses in (*scene.track, scene.poses)]), colours)
+    draw_robots(frame, view, scene.poses, scene.settings.robot.radius, scene.has_ended, colours)
     if draw_over is not None:
         draw_over(frame, view)
-    frame = with_header(frame, scene.name, scene.scorer.coverage, scene.scorer.time)
-    return _with_panel(frame, scene, tables)
+    simulation, episode = scene.simulation, scene.episode
+    time_s = float(simulation.world.steps[episode]) * scene.settings.time_step
+    frame = with_header(frame, scene.name, simulation.score.coverage(episode), time_s)
+    return _with_panel(frame, scene, tables) if simulation.episodes == 1 else frame
 
 
 def _with_panel(frame: Frame, scene: Scene, tables: FloorTables) -> Frame:
@@ -152,7 +158,10 @@ def _draw_floor(scene: Scene, tables: FloorTables, view: View) -> Frame:
     solid = _shrunk(raster.solid[view.rows, view.columns], view.block)
     seen, counted = (
         _shrunk(_on_raster(mask, raster.solid.shape, multiple)[view.rows, view.columns], view.block)
-        for mask in (scene.simulation.score.team_masks[0], scene.simulation.score.counted_masks[0])
+        for mask in (
+            scene.simulation.score.team_masks[scene.episode],
+            scene.simulation.score.counted_masks[scene.episode],
+        )
     )
     picture = PALETTE[classify(solid, seen, counted, raster.resolution * view.block)]
     return enlarged(picture, view)
@@ -209,13 +218,13 @@ def classify(
 
 
 def _draw_fans(frame: Frame, scene: Scene, view: View, colours: list[Colour]) -> None:
-    lidar, world = scene.settings.lidar, scene.simulation.world
+    lidar, ranges = scene.settings.lidar, scene.simulation.ranges[scene.rows]
     tinted = frame.copy()
     for robot, colour in enumerate(colours):
-        x, y, theta = world.poses[robot]
+        x, y, theta = scene.poses[robot]
         # No return is drawn to the greatest range, an invalid beam not at all.
         lengths = np.clip(
-            np.nan_to_num(scene.simulation.ranges[robot].astype(np.float64), nan=0.0, posinf=lidar.range_max),
+            np.nan_to_num(ranges[robot].astype(np.float64), nan=0.0, posinf=lidar.range_max),
             0.0,
             lidar.range_max,
         )

@@ -368,7 +368,7 @@ def test_a_closed_environment_and_one_without_reset_say_what_to_do():
         ({"episodes": 2.0}, "number of episodes is 2.0"),
         ({"episodes": True}, "number of episodes is True"),
         ({"episodes": 2, "level": "joint"}, "level is 'joint'; want velocity, waypoint or frontier"),
-        ({"episodes": 2, "render_mode": "human"}, "a batch is not drawn"),
+        ({"episodes": 2, "render_mode": "human"}, "want rgb_array or None"),
         (
             {"episodes": 2, "floor": []},
             r"floor is \[\]; want a name",
