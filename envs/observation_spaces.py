@@ -8,6 +8,7 @@ from gymnasium import spaces
 from lidarium.envs.observing.observables import computed
 from lidarium.envs.observing.rows import FARTHEST
 from lidarium.envs.settings.exploration import OBSERVABLES, ExplorationSettings
+from lidarium.envs.settings.limits import GAINS, LEVEL_OBSERVABLES
 from lidarium.envs.settings.sensors.observables import SENSED
 
 KERNEL_SUMMARIES = {
@@ -17,6 +18,7 @@ KERNEL_SUMMARIES = {
     "bumper": "1 where pressed: left, centre, right, (3,)",
     "map": "the map around the robot, (1, M, M)",
     "egocentric_map": "turned crops of the map around the robot, (scales, C, C)",
+    GAINS: "unknown area in view at each frontier on offer [m2], (F,); at the level of frontiers",
 }
 """What each observable of the kernel is, in one line."""
 
@@ -31,7 +33,7 @@ def observed_keys(settings: ExplorationSettings, has_goal: bool) -> tuple[str, .
     They are what the settings choose but for functions, and the goal where there is one.
     """
     functions = computed(settings)
-    chosen = tuple(name for name in settings.observe if name not in functions)
+    chosen = tuple(name for name in settings.observe if name not in (*functions, *LEVEL_OBSERVABLES))
     return (*chosen, "goal") if has_goal else chosen
 
 

@@ -21,6 +21,7 @@ from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.outcome.endings import FRONTIER_UNREACHABLE, NO_FRONTIER
 from lidarium.envs.radio.messages import Orders
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.limits import check_level
 from lidarium.envs.shares import scale_shares
 
 Rows = NDArray[np.bool_]
@@ -236,10 +237,7 @@ class FrontierLevel:
     ) -> None:
         """Give up what was chosen in vain, offer again, and report both."""
         reasons = self._offers.renew(live, seen)
-        for name, array in (
-            ("frontiers", self._offers.offers.tables),
-            ("action_mask", self._offers.offers.masks),
-        ):
+        for name, array in self._offers.observed.items():
             out[name][seen] = array[seen]
         self._waypoints.observe(acted, live, seen, out, infos)
         _add_info(
@@ -273,6 +271,7 @@ def make_level(name: str, perception: Perception, settings: ExplorationSettings)
     ValueError
         Where the level is unknown.
     """
+    check_level(settings.observe, name)
     if name == "velocity":
         return VelocityLevel(settings)
     if name == "waypoint":

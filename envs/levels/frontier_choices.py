@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.driving.drives import STATE_ARRIVED, STATE_GIVING_WAY, STATE_NO_PATH, Drives, drive_state
 from lidarium.envs.driving.planning import Planning, passage_in
+from lidarium.envs.levels.frontier_gains import expected_gain
 from lidarium.envs.onboard.navigation import (
     COLUMNS,
     ROWS,
@@ -27,6 +28,10 @@ from lidarium.mapping.planning.search.search_state import LARGEST_BUDGET, STRAIG
 
 FARTHEST = 1000.0
 """Largest number in a table of offers [m]."""
+
+
+MOST_GAIN = 10_000.0
+"""Largest gain that is expected of a frontier [m2]."""
 
 
 PATIENCE_S = 20.0
@@ -56,6 +61,8 @@ class Offers(NamedTuple):
         Where to stand in the map frame [m] and how to turn there [rad], nan for any.
     cells : (rows, offers, 2) int64
         The frontier cell (row, column) to observe.
+    gains : (rows, offers) float32
+        Area that may be expected to be seen anew at the target [m2]; (0, 0) where nobody asks.
     """
 
     tables: NDArray[np.float32]
@@ -64,6 +71,7 @@ class Offers(NamedTuple):
     targets: NDArray[np.float64]
     headings: NDArray[np.float64]
     cells: NDArray[np.int64]
+    gains: NDArray[np.float32]
 
 
 class Choices(NamedTuple):
@@ -105,6 +113,10 @@ class ViewReach(NamedTuple):
         Shorter frontiers are offered only where there is no longer one [m].
     by_size : int
         How many of the offers are the longest ones, the others are the cheapest.
+    rays : (rays, 2) float64
+        Directions by which gains are measured.
+    range_cells : int
+        How far robots see [cells].
     """
 
     spans: NDArray[np.int64]
@@ -112,6 +124,8 @@ class ViewReach(NamedTuple):
     time_step: float
     least_size: float
     by_size: int
+    rays: NDArray[np.float64]
+    range_cells: int
 
 
 class Renewal(NamedTuple):
@@ -214,6 +228,8 @@ def _offer(
     table, mask = offers.tables[row], offers.masks[row]
     table[:], mask[:], offers.counts[row] = 0.0, 0, 0
     mask[len(table)] = 1
+    if offers.gains.size > 0:
+        offers.gains[row] = 0.0
     if len(starts) < 2:
         return
     record, resolution = planning.records[row // planning.sharing], planning.resolution
@@ -253,6 +269,9 @@ def _offer(
             min(sizes[k] * resolution, FARTHEST),
         )
         mask[i] = 1
+        if offers.gains.size > 0:
+            gain = expected_gain(log_odds, places[k, 0], places[k, 1], view.rays, view.range_cells)
+            offers.gains[row, i] = min(gain * resolution * resolution, MOST_GAIN)
     offers.counts[row] = count
 
 

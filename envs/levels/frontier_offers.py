@@ -8,15 +8,18 @@ is given up by name.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.driving.team_driver import TeamDriver, footprint_of
 from lidarium.envs.levels.frontier_choices import Choices, Offers, Renewal, ViewReach, renew_teams
+from lidarium.envs.levels.frontier_gains import ray_directions
 from lidarium.envs.onboard.perception import Perception
 from lidarium.envs.radio.messages import Orders, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.limits import GAINS
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.kernels.work_queue import new_work
 from lidarium.mapping.planning.frontier_approach import default_reach
@@ -63,7 +66,10 @@ class FrontierOffers:
             settings.time_step,
             settings.least_frontier,
             round(offers * settings.frontiers_by_size),
+            ray_directions(),
+            round(settings.lidar.range_max / resolution),
         )
+        is_gain_observed = GAINS in settings.observe
         self.offers = Offers(
             np.zeros((rows, offers, 4), np.float32),
             np.zeros((rows, offers + 1), np.int8),
@@ -71,6 +77,7 @@ class FrontierOffers:
             np.zeros((rows, offers, 2)),
             np.full((rows, offers), np.nan),
             np.zeros((rows, offers, 2), np.int64),
+            np.zeros((rows, offers) if is_gain_observed else (0, 0), np.float32),
         )
         self.choices = Choices(
             np.zeros(rows, np.bool_),
@@ -87,6 +94,13 @@ class FrontierOffers:
         rows = slice(episode * self._robots, (episode + 1) * self._robots)
         self.offers.counts[rows], self.offers.tables[rows], self.offers.masks[rows] = 0, 0.0, 0
         self.choices.is_chosen[rows], self.choices.tried[rows] = False, -1
+
+    @property
+    def observed(self) -> dict[str, NDArray[Any]]:
+        """What offers add to observations, arrays over rows by key."""
+        offers = self.offers
+        gains = {GAINS: offers.gains} if offers.gains.size else {}
+        return {"frontiers": offers.tables, "action_mask": offers.masks, **gains}
 
     def choose(self, rows: NDArray[np.bool_], numbers: NDArray[np.int64]) -> Orders:
         """Take the choices of robots, those named by ``rows`` (rows,).

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from lidarium.envs.agent_actions import check_agents, missing_action, whole_number
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.decisions import DecisionWrapper, boxes_of
-from lidarium.envs.levels.frontier_choices import FARTHEST
+from lidarium.envs.levels.frontier_choices import FARTHEST, MOST_GAIN
 from lidarium.envs.levels.frontier_offers import REASONS, FrontierOffers
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.limits import GAINS
 from lidarium.mapping.geometry.bounds import shown
 
 
@@ -123,8 +124,7 @@ class FrontierExploration(DecisionWrapper):
         """Add the frontiers in reach to the observations."""
         for agent, observation in observations.items():
             row = self.possible_agents.index(agent)
-            observation["frontiers"] = self._offers.offers.tables[row].copy()
-            observation["action_mask"] = self._offers.offers.masks[row].copy()
+            observation.update({name: array[row].copy() for name, array in self._offers.observed.items()})
         return observations
 
 
@@ -133,7 +133,9 @@ def frontier_boxes(settings: ExplorationSettings) -> dict[str, spaces.Space[Any]
     most = settings.frontiers
     high = np.full((most, 4), FARTHEST, np.float32)
     low = np.tile(np.array([-FARTHEST, -FARTHEST, 0.0, 0.0], np.float32), (most, 1))
+    gains = spaces.Box(0.0, MOST_GAIN, (most,), np.float32)
     return {
+        **({GAINS: gains} if GAINS in settings.observe else {}),
         "frontiers": spaces.Box(low, high, dtype=np.float32),
         "action_mask": spaces.Box(0, 1, (most + 1,), np.int8),
     }

@@ -13,6 +13,7 @@ from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.levels.frontiers import FrontierExploration
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.radio.messages import Order
+from lidarium.envs.settings.limits import check_level
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.reset_options import Curriculum, checked_seed
 
@@ -125,6 +126,7 @@ def at_level(
     ValueError
         Where the level is unknown.
     """
+    check_level(env.settings.observe, level)
     if level == "velocity":
         return env
     if level == "waypoint":

@@ -20,6 +20,12 @@ OBSERVABLES = ("scan", "pose", "velocity", "bumper", "map", "egocentric_map")
 A goal is observed wherever the floor has one. What further sensors measure is in the registry ``observable``.
 """
 
+GAINS = "frontier_gains"
+"""What may be expected to be seen at each frontier on offer."""
+
+LEVEL_OBSERVABLES = ("frontiers", "action_mask", GAINS)
+"""What can be observed at the level of frontiers only; the first two always are."""
+
 MOST_SCAN_CELLS = 16_384
 MOST_BEAMS = 262_144
 MOST_DRIVE = 2e9
@@ -132,8 +138,8 @@ def check_workload(settings: Any) -> None:  # noqa: ANN401
 
 
 def observed_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Return names of what is observed, checked, in the order of ``OBSERVABLES`` and then of the registry."""
-    known = (*OBSERVABLES, *registry("observable"))
+    """Return names of what is observed, checked, in the order of ``OBSERVABLES``, the registry, the level."""
+    known = (*OBSERVABLES, *registry("observable"), *LEVEL_OBSERVABLES)
     wanted = f"want one or more of {', '.join(known)}"
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise ValueError(f"observe is {shown(names)}; {wanted}, in a list or tuple")
@@ -146,6 +152,19 @@ def observed_names(names: Iterable[str]) -> tuple[str, ...]:
     if not names:
         raise ValueError(f"observe is empty ({names}); {wanted}")
     return tuple(name for name in known if name in names)
+
+
+def check_level(names: Iterable[str], level: str) -> None:
+    """Check that what is observed is there at a level of decision.
+
+    Raises
+    ------
+    ValueError
+        Where it is at the level of frontiers only, and the level is another.
+    """
+    absent = [name for name in names if name in LEVEL_OBSERVABLES]
+    if absent and level != "frontier":
+        raise ValueError(f"observe has {absent[0]!r}, which needs level='frontier'; level is {level!r}")
 
 
 def egocentric_scales_of(scales: Iterable[int]) -> tuple[int, ...]:
