@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.batch.episodes import EpisodeBatch
 from lidarium.envs.batch.requests import options_of, seeds_of, settings_of
+from lidarium.envs.batch.row_conventions import RowConventions
 from lidarium.envs.conventions.conventions import split_options
-from lidarium.envs.conventions.row_conventions import RowConventions
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.settings.reset_options import Curriculum, ResetOptions, read_options
 
@@ -71,12 +71,12 @@ class ExplorationVecEnv(VecEnv):
         self.batch = batch = EpisodeBatch(
             episodes, floor, self.settings, level, image_resolution, False, curriculum
         )
-        self.conventions = RowConventions(batch.observation_space, conventions, batch.robots, batch.rows)
+        self.conventions = RowConventions(batch, conventions)
         self.render_mode = render_mode
         self._actions: NDArray[Any] | None = None
         self._chosen: dict[int, ResetOptions] = {}
         self._is_closed = False
-        super().__init__(batch.rows, self.conventions.space, batch.action_space)
+        super().__init__(batch.rows, self.conventions.space, self.conventions.action_space)
 
     def reset(self) -> Any:  # noqa: ANN401
         """Begin all episodes.
@@ -86,6 +86,7 @@ class ExplorationVecEnv(VecEnv):
         self._check_open()
         batch = self.batch
         batch.run(None, np.arange(batch.episodes), self._seeds[:: batch.robots], self._chosen)
+        self.conventions.exchange()
         self._actions = None
         self._reset_seeds()
         self._reset_options()
@@ -145,7 +146,8 @@ class ExplorationVecEnv(VecEnv):
         actions, self._actions = self._actions, None
         batch = self.batch
         masked = ~batch.live
-        batch.run(actions, np.zeros(0, np.int64))
+        batch.run(self.conventions.actions(actions), np.zeros(0, np.int64))
+        self.conventions.exchange()
         rewards, told = self.conventions.rewards(batch.rewards, batch.acted, batch.infos)
         ends_masked = masked & np.repeat(batch.is_over, batch.robots)
         truncated = batch.truncated | ends_masked
@@ -154,9 +156,7 @@ class ExplorationVecEnv(VecEnv):
         for row, info in enumerate(infos):
             info["TimeLimit.truncated"], info["active"] = bool(truncated[row]), not masked[row]
             if dones[row]:
-                info["terminal_observation"] = self.conventions.observation(
-                    {name: array[row].copy() for name, array in batch.observations.items()}
-                )
+                info["terminal_observation"] = self.conventions.observation(batch.observations, row)
         self._begin_again(np.flatnonzero(batch.is_over))
         observations = self.conventions.observations(batch.observations)
         return observations, rewards.astype(np.float32), dones, infos
@@ -167,6 +167,7 @@ class ExplorationVecEnv(VecEnv):
             return
         batch = self.batch
         batch.run(None, over, is_same_step=True)
+        self.conventions.exchange()
         rows = (over[:, None] * batch.robots + np.arange(batch.robots)).ravel()
         for row, info in zip(rows, self._infos_of(batch.infos, rows), strict=True):
             self.reset_infos[row] = info

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from lidarium.envs.batch.episodes import EpisodeBatch
 from lidarium.envs.batch.requests import episodes_of, options_of, seeds_of, settings_of
+from lidarium.envs.batch.row_conventions import RowConventions
 from lidarium.envs.conventions.conventions import split_options
-from lidarium.envs.conventions.row_conventions import RowConventions
 from lidarium.envs.floors.floor_choice import Floors
 from lidarium.envs.outcome.team_state import state_space, team_state
 from lidarium.envs.settings.reset_options import Curriculum
@@ -84,14 +84,12 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         conventions, options = split_options(options)
         settings = settings_of(options)
         self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy, curriculum)
-        self.conventions = RowConventions(
-            self.batch.observation_space, conventions, self.batch.robots, self.batch.rows
-        )
+        self.conventions = RowConventions(self.batch, conventions)
         self.settings, self.render_mode = settings, render_mode
         self.num_envs = self.batch.rows
         self.single_observation_space, self.single_action_space = (
             self.conventions.space,
-            self.batch.action_space,
+            self.conventions.action_space,
         )
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -122,6 +120,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
             [seeds[episode] for episode in chosen],
             options_of(options, chosen, batch.episodes, batch.robots),
         )
+        self.conventions.exchange()
         return self.conventions.observations(batch.observations), self._infos(batch.infos, batch.live.copy())
 
     def step(self, actions: NDArray[Any]) -> Step:
@@ -140,6 +139,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
             raise RuntimeError("the environment was not reset; call reset() before step()")
         if actions is None:
             raise ValueError("actions is None; want an action for each row, row = episode * robots + robot")
+        actions = self.conventions.actions(actions)
         if batch.is_whole:
             batch.run(actions, _NO_EPISODES)
             return self._outcome(batch.truncated, batch.everyone)
@@ -154,6 +154,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     def _outcome(self, truncated: NDArray[np.bool_], active: NDArray[np.bool_]) -> Step:
         """Return what a step of the batch has brought, in the forms of the conventions."""
         batch = self.batch
+        self.conventions.exchange()
         rewards, infos = self.conventions.rewards(batch.rewards, batch.acted, batch.infos)
         observations = self.conventions.observations(batch.observations)
         return observations, rewards, batch.terminated, truncated, self._infos(infos, active)

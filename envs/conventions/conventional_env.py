@@ -1,5 +1,6 @@
 """The environment of a team in the forms that a trainer wants."""
 
+from dataclasses import replace
 from typing import Any
 
 from gymnasium import spaces
@@ -7,6 +8,7 @@ from gymnasium import spaces
 from lidarium.envs.conventions.conventions import Conventions
 from lidarium.envs.conventions.number_infos import ENDED, flat_infos
 from lidarium.envs.conventions.observation_forms import ObservationForm, zeros_of
+from lidarium.envs.conventions.talking_team import TalkingTeam
 from lidarium.envs.conventions.team_rewards import TEAM, shared_among
 from lidarium.envs.team_wrapper import TeamWrapper
 
@@ -134,4 +136,6 @@ class ConventionalEnv(TeamWrapper):
 
 def conventional(env: Any, conventions: Conventions) -> Any:  # noqa: ANN401
     """Return an environment in the forms of conventions: itself where these are the defaults."""
-    return env if conventions == Conventions() else ConventionalEnv(env, conventions)
+    if conventions.comm:
+        env = TalkingTeam(env, conventions.comm)
+    return env if replace(conventions, comm=0) == Conventions() else ConventionalEnv(env, conventions)

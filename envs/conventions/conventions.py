@@ -4,7 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
-from lidarium.mapping.geometry.bounds import check_settings, share, shown
+from lidarium.mapping.geometry.bounds import check_settings, share, shown, within
+
+MOST_FLOATS = 4096
+"""Most numbers of a message."""
 
 FORMS: dict[str, tuple[str, ...]] = {
     "observation": ("dict", "flat"),
@@ -34,6 +37,8 @@ class Conventions:
         ``zeros``, rewards of 0, and ends with the last one.
     team_reward : float
         Share of the reward that is the team's: the mean of all that took part in the step.
+    comm : int
+        How many numbers each robot sends the others with its action, over their radio; 0 for none.
     """
 
     observation: str = "dict"
@@ -41,6 +46,7 @@ class Conventions:
     infos: str = "full"
     ended_agents: str = "leave"
     team_reward: Annotated[float, share()] = 0.0
+    comm: Annotated[int, within(0, MOST_FLOATS)] = 0
 
     def __post_init__(self) -> None:
         check_settings(self)

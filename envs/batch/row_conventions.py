@@ -1,0 +1,111 @@
+"""The forms that trainers want for the rows of a batch."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lidarium.envs.batch.episodes import EpisodeBatch
+from lidarium.envs.conventions.conventions import Conventions
+from lidarium.envs.conventions.messages import MESSAGES, MessageBoard, split_action, talking_space
+from lidarium.envs.conventions.number_infos import flat_row_infos
+from lidarium.envs.conventions.observation_forms import ObservationForm
+from lidarium.envs.conventions.team_rewards import TEAM, shared_rewards
+
+
+class RowConventions:
+    """Gives what a batch takes and returns the forms of conventions.
+
+    Parameters
+    ----------
+    batch : EpisodeBatch
+        The episodes.
+    conventions : Conventions
+        The forms.
+
+    Attributes
+    ----------
+    space, action_space : Space
+        Of the observations and actions of a row in these forms.
+    columns : tuple
+        Where each key lies in the flat form; see ``flat_columns``.
+
+    Raises
+    ------
+    ValueError
+        Where observations cannot take the form, or ended agents are to stay: rows do so in any case.
+    """
+
+    def __init__(self, batch: EpisodeBatch, conventions: Conventions) -> None:
+        if conventions.ended_agents != "leave":
+            raise ValueError(
+                f"ended_agents is {conventions.ended_agents!r}; leave it out: rows of robots that have ended "
+                'repeat their last observation, and infos["active"] says so'
+            )
+        self._batch, self._conventions = batch, conventions
+        self._robots, self._rows = batch.robots, batch.rows
+        self._board: MessageBoard | None = None
+        space, self.action_space = batch.observation_space, batch.action_space
+        if conventions.comm:
+            self._board = MessageBoard(batch.perception, batch.settings, conventions.comm)
+            space = spaces.Dict({**space.spaces, MESSAGES: self._board.box})
+            self.action_space = talking_space(batch.action_space, conventions.comm)
+            self._sent = np.zeros((self._rows, conventions.comm))
+            self._messages = self._board.table()
+        self._form = ObservationForm(space, conventions)
+        self.space, self.columns = self._form.space, self._form.columns
+
+    def actions(self, actions: Any) -> Any:  # noqa: ANN401
+        """Return actions without their messages, which are kept to be sent."""
+        if self._board is None:
+            return actions
+        has_vectors = isinstance(self._batch.action_space, spaces.Box)
+        rest, message = split_action(actions, self._conventions.comm, has_vectors, "all rows")
+        if message.shape != self._sent.shape:
+            raise ValueError(
+                f"messages have shape {message.shape}; want {self._sent.shape}: one for each row = episode * "
+                "robots + robot"
+            )
+        self._sent = message
+        return rest
+
+    def exchange(self) -> None:
+        """Let messages be heard, after a run of the batch, and episodes that have begun hear nothing."""
+        if self._board is None:
+            return
+        batch = self._batch
+        began = np.asarray(batch.world.steps <= 0)
+        seen = batch.acted | np.repeat(began, batch.robots)
+        self._board.exchange(self._sent, batch.acted)
+        self._board.start(np.flatnonzero(began))
+        self._messages = np.where(seen[:, None, None], self._board.table(), self._messages)
+
+    def observations(self, arrays: Mapping[str, NDArray[Any]]) -> Any:  # noqa: ANN401
+        """Return the observations of all rows."""
+        return self._form.of(self._with_messages(arrays), (self._rows,))
+
+    def observation(self, arrays: Mapping[str, NDArray[Any]], row: int) -> Any:  # noqa: ANN401
+        """Return the observation of one row, its own arrays."""
+        return self._form.of({name: array[row].copy() for name, array in self._with_messages(arrays).items()})
+
+    def _with_messages(self, arrays: Mapping[str, NDArray[Any]]) -> Mapping[str, NDArray[Any]]:
+        return arrays if self._board is None else {**arrays, MESSAGES: self._messages}
+
+    def rewards(
+        self, rewards: NDArray[np.float64], acted: NDArray[np.bool_], infos: dict[str, Any]
+    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """Return rewards (rows,) with the team's share, and infos whose terms add up to them."""
+        share = self._conventions.team_reward
+        if not share:
+            return rewards.copy(), infos
+        teams = (-1, self._robots)
+        mixed = shared_rewards(rewards.reshape(teams), acted.reshape(teams), share).ravel()
+        return mixed, {**infos, "reward_terms": {**infos["reward_terms"], TEAM: mixed - rewards}}
+
+    def infos(self, infos: dict[str, Any]) -> dict[str, Any]:
+        """Return infos of all rows, arrays with their masks."""
+        if self._conventions.infos == "full":
+            return infos
+        return {} if self._conventions.infos == "none" else flat_row_infos(infos, self._rows)
