@@ -6,16 +6,14 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.conventions.conventional_env import ConventionalEnv, conventional
-from lidarium.envs.conventions.conventions import split_options
-from lidarium.envs.exploration import ExplorationEnv, Observation
+from lidarium.envs.exploration import Observation
 from lidarium.envs.floors.floor_choice import Floors
+from lidarium.envs.levels.decisions import DecisionWrapper
 from lidarium.envs.levels.frontiers import FrontierExploration
-from lidarium.envs.levels.waypoints import WaypointExploration
+from lidarium.envs.levels.teams import TeamPlan, make_team
 from lidarium.envs.radio.messages import Order
-from lidarium.envs.settings.limits import check_level
-from lidarium.envs.settings.making import make_settings
 from lidarium.envs.settings.reset_options import Curriculum, checked_seed
+from lidarium.envs.team_wrapper import TeamWrapper
 
 AGENT = "robot_0"
 
@@ -60,9 +58,7 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
                 f"robots is {options['robots']}; the Gymnasium form has one robot, use lidarium.parallel_env "
                 "for a team"
             )
-        conventions, options = split_options(options)
-        base = ExplorationEnv(floor, make_settings(**options), render_mode, image_resolution, curriculum)
-        self.parallel = conventional(at_level(base, level), conventions)
+        self.parallel = make_team(TeamPlan(floor, level, render_mode, image_resolution, curriculum), options)
         self.metadata = {**type(self).metadata, "render_fps": self.parallel.metadata["render_fps"]}
         self.render_mode = render_mode
         self.observation_space = self.parallel.observation_space(AGENT)
@@ -91,7 +87,9 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
         AttributeError
             At other levels than that of frontiers.
         """
-        level = self.parallel.env if isinstance(self.parallel, ConventionalEnv) else self.parallel
+        level = self.parallel
+        while isinstance(level, TeamWrapper) and not isinstance(level, DecisionWrapper):
+            level = level.env
         if not isinstance(level, FrontierExploration):
             raise AttributeError(
                 "action_masks are there at the level of frontiers only; use level='frontier'"
@@ -114,23 +112,3 @@ class SoloExploration(gymnasium.Env[Observation, Any]):
     def close(self) -> None:
         """Close the window, if there is one."""
         self.parallel.close()
-
-
-def at_level(
-    env: ExplorationEnv, level: str, shares_map: bool = True
-) -> ExplorationEnv | WaypointExploration | FrontierExploration:
-    """Put the wrapper of a level of decision around an environment.
-
-    Raises
-    ------
-    ValueError
-        Where the level is unknown.
-    """
-    check_level(env.settings.observe, level)
-    if level == "velocity":
-        return env
-    if level == "waypoint":
-        return WaypointExploration(env, shares_map)
-    if level == "frontier":
-        return FrontierExploration(env, shares_map)
-    raise ValueError(f"level is {level!r}; want velocity, waypoint or frontier")

@@ -136,6 +136,19 @@ def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> Explora
     return settings
 
 
+def set_values(settings: ExplorationSettings, values: Mapping[str, Any]) -> ExplorationSettings:
+    """Return settings with values set by the names that ``lidarium show settings`` lists.
+
+    Raises
+    ------
+    ValueError
+        Where a name is no setting, or a value is not one of its own.
+    """
+    for name, value in values.items():
+        settings = _replaced(settings, name.split("."), value, name)
+    return settings
+
+
 def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa: ANN401
     """Return a part with the value at the end of a path replaced."""
     known = [each.name for each in fields(part)] if is_dataclass(part) else []

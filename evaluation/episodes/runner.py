@@ -13,7 +13,7 @@ from lidarium.agents.policy import Policy, Stop, check_observed
 from lidarium.agents.report import GivenUp
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.frontiers import FrontierExploration
-from lidarium.envs.levels.gymnasium_env import at_level
+from lidarium.envs.levels.teams import at_level
 from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.radio.messages import DriveState, OperatingState, Order

@@ -117,7 +117,7 @@ def parallel_env(
         Any attribute of ``ExplorationSettings``, such as ``robots=3`` or ``horizon_s=None``; ``robot`` and
         ``lidar`` by name; ``noise`` (none, datasheet, thesis), ``resolution`` of the maps [m], ``max_cycles``
         [steps]; and ``Conventions``: ``observation``, ``action_mask``, ``infos``, ``ended_agents``,
-        ``team_reward``.
+        ``team_reward``, ``comm``; ``randomize``: distributions of settings by name, drawn for each episode.
 
     Returns
     -------
@@ -129,17 +129,10 @@ def parallel_env(
     ValueError, TypeError, FileNotFoundError
         Where an option or the floor cannot be used.
     """
-    from lidarium.envs.conventions.conventional_env import conventional
-    from lidarium.envs.conventions.conventions import split_options
-    from lidarium.envs.exploration import ExplorationEnv
-    from lidarium.envs.levels.gymnasium_env import at_level
-    from lidarium.envs.settings.making import make_settings
+    from lidarium.envs.levels.teams import TeamPlan, make_team
 
-    conventions, options = split_options(options)
-    base = ExplorationEnv(
-        floor, make_settings(settings, **options), render_mode, image_resolution, curriculum
-    )
-    made: ParallelEnv[str, Any, Any] = conventional(at_level(base, level), conventions)
+    plan = TeamPlan(floor, level, render_mode, image_resolution, curriculum)
+    made: ParallelEnv[str, Any, Any] = make_team(plan, options, settings)
     return made
 
 

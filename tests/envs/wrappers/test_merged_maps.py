@@ -6,7 +6,7 @@ from pettingzoo.test import parallel_api_test
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
-from lidarium.envs.levels.gymnasium_env import at_level
+from lidarium.envs.levels.teams import at_level
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings
 from lidarium.evaluation.episodes.result import result_of

@@ -1,0 +1,118 @@
+"""Settings that are drawn for each episode."""
+
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+
+import lidarium
+
+SMALL = {"robots": 2, "map_cells": 32, "lidar": "lidar_360_6m"}
+NOISE = {"lidar.noise_floor": (0.0, 0.05), "decision_period_s": [1.0, 2.0], "reward.time": (1, 3)}
+
+
+def settings_of(env):
+    return env.settings.lidar.noise_floor, env.settings.decision_period_s, env.settings.reward.time
+
+
+def test_each_episode_has_settings_of_its_own():
+    env = lidarium.parallel_env("scene_room", level="waypoint", randomize=NOISE, **SMALL)
+    drawn = set()
+    for _ in range(12):
+        env.reset()
+        noise, period, price = settings_of(env)
+        assert env.unwrapped.settings is env.settings
+        assert env.drawn == {
+            "lidar.noise_floor": noise,
+            "decision_period_s": period,
+            "reward.time": price,
+        }
+        assert 0.0 <= noise <= 0.05
+        assert period in (1.0, 2.0)
+        assert price in (1, 2, 3)
+        drawn.add((noise, period, price))
+    assert len(drawn) == 12
+    assert len({period for _, period, _ in drawn}) == 2
+
+
+def test_a_seed_gives_the_same_settings_and_the_same_episode():
+    def run(env):
+        observations, _ = env.reset(seed=4)
+        seen = [observations["robot_0"]["scan"].copy(), settings_of(env)]
+        observations, _ = env.reset()
+        return [*seen, observations["robot_0"]["scan"].copy(), settings_of(env)]
+
+    first, again = (run(lidarium.parallel_env("scene_room", randomize=NOISE, **SMALL)) for _ in range(2))
+    assert all(np.array_equal(one, other) for one, other in zip(first, again, strict=True))
+    assert first[1] != first[3]
+
+
+def test_an_episode_is_that_of_an_environment_with_these_settings():
+    env = lidarium.parallel_env("scene_room", randomize={"lidar.noise_floor": (0.01, 0.05)}, **SMALL)
+    observations, _ = env.reset(seed=2)
+    plain = lidarium.parallel_env("scene_room", settings=env.settings)
+    wanted, _ = plain.reset(seed=2)
+    for _ in range(5):
+        for agent, observation in wanted.items():
+            assert all(
+                np.array_equal(observations[agent][name], value) for name, value in observation.items()
+            )
+        actions = dict.fromkeys(env.agents, np.array([0.5, 0.1], np.float32))
+        observations, wanted = env.step(actions)[0], plain.step(actions)[0]
+
+
+def test_conventions_curricula_and_gymnasium_go_with_it():
+    env = lidarium.parallel_env(
+        "scene_room",
+        randomize={"reward.time": (0.0, 1.0)},
+        curriculum=lambda number: {"floor": "apartment" if number else "scene_room"},
+        observation="flat",
+        infos="flat",
+        **SMALL,
+    )
+    names = []
+    for _ in range(3):
+        observations, _ = env.reset()
+        assert env.observation_space("robot_0").contains(observations["robot_0"])
+        names.append(env.unwrapped.floor.name)
+    assert names == ["scene_room", "apartment", "apartment"]
+    solo = gymnasium.make(
+        "lidarium/FrontierExploration-v1", floor="scene_room", randomize={"reward.time": [0.5]}
+    ).unwrapped
+    solo.reset(seed=0)
+    assert solo.action_masks().any()
+    assert solo.parallel.settings.reward.time == 0.5
+
+
+def test_a_copy_goes_on_as_the_original():
+    env = lidarium.parallel_env("scene_room", randomize=NOISE, **SMALL)
+    env.reset(seed=1)
+    copied = pickle.loads(pickle.dumps(env))
+    scans = [each.reset()[0]["robot_0"]["scan"] for each in (env, copied)]
+    assert np.array_equal(*scans)
+
+
+@pytest.mark.parametrize(
+    ("randomize", "words"),
+    [
+        ({}, "randomize is {}; want a dict from names of settings to distributions"),
+        ([("a", 1)], "randomize is"),
+        ({"reward.time": 3}, "the distribution of reward.time is 3; want"),
+        ({"reward.time": (2.0, 1.0)}, "the distribution of reward.time is"),
+        ({"reward.time": (0.0, float("inf"))}, "the distribution of reward.time is"),
+        ({"reward.time": []}, "the distribution of reward.time is"),
+        ({"reward.tim": (0.0, 1.0)}, "'reward.tim' is no setting"),
+        ({"time_step": [-1.0]}, "time_step is -1.0"),
+    ],
+)
+def test_what_is_no_distribution_of_a_setting_is_refused(randomize, words):
+    with pytest.raises(ValueError, match=words):
+        lidarium.parallel_env("scene_room", randomize=randomize, **SMALL)
+
+
+def test_draws_that_change_the_spaces_are_refused():
+    env = lidarium.parallel_env("scene_room", randomize={"map_cells": [32, 64]}, **SMALL)
+    with pytest.raises(ValueError, match="want some that leave the spaces of observations and actions"):
+        for seed in range(20):
+            env.reset(seed=seed)
