@@ -8,11 +8,13 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lidarium.envs.batch.episodes import EpisodeBatch
+from lidarium.envs.batch.merged_rows import MergedRows
 from lidarium.envs.conventions.conventions import Conventions
 from lidarium.envs.conventions.messages import MESSAGES, MessageBoard, split_action, talking_space
 from lidarium.envs.conventions.number_infos import flat_row_infos
 from lidarium.envs.conventions.observation_forms import ObservationForm
 from lidarium.envs.conventions.team_rewards import TEAM, shared_rewards
+from lidarium.envs.wrappers.team_exchange import MergingSettings
 
 
 class RowConventions:
@@ -24,6 +26,8 @@ class RowConventions:
         The episodes.
     conventions : Conventions
         The forms.
+    merging : MergingSettings or None
+        How robots merge their maps; they do not where None.
 
     Attributes
     ----------
@@ -38,7 +42,9 @@ class RowConventions:
         Where observations cannot take the form, or ended agents are to stay: rows do so in any case.
     """
 
-    def __init__(self, batch: EpisodeBatch, conventions: Conventions) -> None:
+    def __init__(
+        self, batch: EpisodeBatch, conventions: Conventions, merging: MergingSettings | None = None
+    ) -> None:
         if conventions.ended_agents != "leave":
             raise ValueError(
                 f"ended_agents is {conventions.ended_agents!r}; leave it out: rows of robots that have ended "
@@ -47,7 +53,11 @@ class RowConventions:
         self._batch, self._conventions = batch, conventions
         self._robots, self._rows = batch.robots, batch.rows
         self._board: MessageBoard | None = None
+        self._merged = None if merging is None else MergedRows(batch, merging)
+        self._seen = np.ones(batch.rows, np.bool_)
         space, self.action_space = batch.observation_space, batch.action_space
+        if self._merged is not None:
+            space = spaces.Dict({**space.spaces, **self._merged.boxes})
         if conventions.comm:
             self._board = MessageBoard(batch.perception, batch.settings, conventions.comm)
             space = spaces.Dict({**space.spaces, MESSAGES: self._board.box})
@@ -72,26 +82,33 @@ class RowConventions:
         return rest
 
     def exchange(self) -> None:
-        """Let messages be heard, after a run of the batch, and episodes that have begun hear nothing."""
-        if self._board is None:
+        """Let messages and maps be exchanged, after a run of the batch."""
+        if self._board is None and self._merged is None:
             return
         batch = self._batch
         began = np.asarray(batch.world.steps <= 0)
-        seen = batch.acted | np.repeat(began, batch.robots)
-        self._board.exchange(self._sent, batch.acted)
-        self._board.start(np.flatnonzero(began))
-        self._messages = np.where(seen[:, None, None], self._board.table(), self._messages)
+        self._seen = batch.acted | np.repeat(began, batch.robots)
+        if self._board is not None:
+            self._board.exchange(self._sent, batch.acted)
+            self._board.start(np.flatnonzero(began))
+            self._messages = np.where(self._seen[:, None, None], self._board.table(), self._messages)
+        if self._merged is not None:
+            self._merged.exchange(self._seen, began)
 
     def observations(self, arrays: Mapping[str, NDArray[Any]]) -> Any:  # noqa: ANN401
         """Return the observations of all rows."""
-        return self._form.of(self._with_messages(arrays), (self._rows,))
+        return self._form.of(self._with_more(arrays), (self._rows,))
 
     def observation(self, arrays: Mapping[str, NDArray[Any]], row: int) -> Any:  # noqa: ANN401
         """Return the observation of one row, its own arrays."""
-        return self._form.of({name: array[row].copy() for name, array in self._with_messages(arrays).items()})
+        return self._form.of({name: array[row].copy() for name, array in self._with_more(arrays).items()})
 
-    def _with_messages(self, arrays: Mapping[str, NDArray[Any]]) -> Mapping[str, NDArray[Any]]:
-        return arrays if self._board is None else {**arrays, MESSAGES: self._messages}
+    def _with_more(self, arrays: Mapping[str, NDArray[Any]]) -> Mapping[str, NDArray[Any]]:
+        """Return the observations with what was exchanged."""
+        more: dict[str, NDArray[Any]] = {} if self._merged is None else dict(self._merged.arrays)
+        if self._board is not None:
+            more[MESSAGES] = self._messages
+        return {**arrays, **more} if more else arrays
 
     def rewards(
         self, rewards: NDArray[np.float64], acted: NDArray[np.bool_], infos: dict[str, Any]
@@ -106,6 +123,8 @@ class RowConventions:
 
     def infos(self, infos: dict[str, Any]) -> dict[str, Any]:
         """Return infos of all rows, arrays with their masks."""
+        if self._merged is not None:
+            infos = self._merged.infos(infos, self._seen)
         if self._conventions.infos == "full":
             return infos
         return {} if self._conventions.infos == "none" else flat_row_infos(infos, self._rows)

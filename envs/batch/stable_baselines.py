@@ -66,12 +66,13 @@ class ExplorationVecEnv(VecEnv):
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode is {render_mode!r}; want rgb_array or None")
+        merging = options.pop("merging", None)
         conventions, options = split_options(options)
         self.settings = settings_of(options)
         self.batch = batch = EpisodeBatch(
             episodes, floor, self.settings, level, image_resolution, False, curriculum
         )
-        self.conventions = RowConventions(batch, conventions)
+        self.conventions = RowConventions(batch, conventions, merging)
         self.render_mode = render_mode
         self._actions: NDArray[Any] | None = None
         self._chosen: dict[int, ResetOptions] = {}

@@ -54,7 +54,8 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     render_mode : str or None
         ``rgb_array``, for ``render`` and Gymnasium's ``RecordVideo``, or None.
     **options
-        As for ``lidarium.parallel_env``; ``threads`` is that of the machine by default.
+        As for ``lidarium.parallel_env``; ``threads`` is that of the machine by default. ``merging``
+        (``MergingSettings``) for the observations of ``MergedMaps``.
 
     Raises
     ------
@@ -81,10 +82,11 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode is {render_mode!r}; want rgb_array or None")
+        merging = options.pop("merging", None)
         conventions, options = split_options(options)
         settings = settings_of(options)
         self.batch = EpisodeBatch(episodes, floor, settings, level, image_resolution, copy, curriculum)
-        self.conventions = RowConventions(self.batch, conventions)
+        self.conventions = RowConventions(self.batch, conventions, merging)
         self.settings, self.render_mode = settings, render_mode
         self.num_envs = self.batch.rows
         self.single_observation_space, self.single_action_space = (

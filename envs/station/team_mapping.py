@@ -75,6 +75,8 @@ class TeamMapping:
         The onboard software with the robots' own maps and poses.
     settings : MergeSettings
         How maps are merged.
+    episode : int
+        Of which episode.
 
     Attributes
     ----------
@@ -88,6 +90,7 @@ class TeamMapping:
     settings: MergeSettings = field(default_factory=MergeSettings)
     received: dict[tuple[str, str], TeammateMap] = field(default_factory=dict)
     fused: dict[str, FusedMap] = field(default_factory=dict)
+    episode: int = 0
     _merger: IncrementalMerger = field(init=False)
 
     def __post_init__(self) -> None:
@@ -120,10 +123,11 @@ class TeamMapping:
             agents.
         """
         agents = self.perception.settings.agents
-        maps = {agent: known_map(self.perception, row) for row, agent in enumerate(agents)}
+        first = self.episode * len(agents)
+        maps = {agent: known_map(self.perception, row) for row, agent in enumerate(agents, first)}
         poses = {
             agent: Transform(*self.perception.poses.pose_in_frame(row, row).tolist())
-            for row, agent in enumerate(agents)
+            for row, agent in enumerate(agents, first)
         }
         pairs = [
             (a, b)

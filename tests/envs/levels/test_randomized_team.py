@@ -114,5 +114,4 @@ def test_what_is_no_distribution_of_a_setting_is_refused(randomize, words):
 def test_draws_that_change_the_spaces_are_refused():
     env = lidarium.parallel_env("scene_room", randomize={"map_cells": [32, 64]}, **SMALL)
     with pytest.raises(ValueError, match="want some that leave the spaces of observations and actions"):
-        for seed in range(20):
-            env.reset(seed=seed)
+        [env.reset(seed=seed) for seed in range(20)]
