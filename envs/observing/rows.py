@@ -80,6 +80,17 @@ class Rows:
         return pose
 
     @property
+    def log_odds(self) -> list[NDArray[np.int8]]:
+        """Maps of the robots, log-odds: 0 unknown, above 0 occupied, below free; one for each row."""
+        return self._beliefs.log_odds
+
+    @property
+    def map_cell(self) -> NDArray[np.int64]:
+        """Row and column of each robot's map in which it believes to be, (rows, 2)."""
+        places = self._beliefs.believed[:, :2] - self._beliefs.origins
+        return np.floor(places[:, ::-1] / self.settings.occupancy.resolution).astype(np.int64)
+
+    @property
     def true_pose(self) -> NDArray[np.float64]:
         """True poses in the frame of the floor [m, rad], (rows, 3)."""
         return self._world.poses

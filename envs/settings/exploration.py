@@ -32,6 +32,7 @@ from lidarium.registry import REGISTRIES, registry
 
 MAX_ROBOTS = 64
 MAX_FRONTIERS = 1024
+MAX_PYRAMID_LEVELS = 16
 MAX_MAP_CELLS = 4096
 MAX_EGOCENTRIC_CELLS = 1024
 
@@ -120,6 +121,10 @@ class ExplorationSettings:
         Side of each crop of the ``egocentric_map`` [cells of the crop], a multiple of 2.
     egocentric_scales : tuple of int
         Side of a cell of each crop of the ``egocentric_map`` [cells of the map].
+    pyramid_cells : int
+        Side of each picture of the ``pyramid`` [cells of the picture], a multiple of 2.
+    pyramid_levels : int
+        How many pictures the ``pyramid`` has.
     frontiers : int
         How many frontiers the level of frontiers offers at most.
     least_frontier : float
@@ -163,6 +168,8 @@ class ExplorationSettings:
     map_cells: Annotated[int, within(2, MAX_MAP_CELLS)] = 256
     egocentric_cells: Annotated[int, within(2, MAX_EGOCENTRIC_CELLS)] = 64
     egocentric_scales: tuple[int, ...] = (1, 4)
+    pyramid_cells: Annotated[int, within(2, MAX_EGOCENTRIC_CELLS)] = 32
+    pyramid_levels: Annotated[int, within(1, MAX_PYRAMID_LEVELS)] = 3
     frontiers: Annotated[int, within(1, MAX_FRONTIERS)] = 32
     least_frontier: Annotated[float, within(0.0, 1e4)] = 0.5
     frontiers_by_size: Annotated[float, share()] = 0.5
@@ -191,7 +198,7 @@ class ExplorationSettings:
             self._check_localizer()
         if self.backend != "kinematic" and self.backend not in registry("backend"):
             raise ValueError(f"backend is {self.backend!r}; want one of {', '.join(registry('backend'))}")
-        for name in ("map_cells", "egocentric_cells"):
+        for name in ("map_cells", "egocentric_cells", "pyramid_cells"):
             if getattr(self, name) % 2:
                 raise ValueError(f"{name} is {getattr(self, name)}; want an even number")
         # Lists, as files of settings have them, become tuples: settings can be compared and hashed.

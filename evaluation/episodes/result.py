@@ -253,7 +253,17 @@ def realism_of(settings: ExplorationSettings) -> str:
     return "custom"
 
 
-LATER = ("localizer", "camera", "starts", "frontiers", "least_frontier", "frontiers_by_size", "state_cells")
+LATER = (
+    "localizer",
+    "camera",
+    "starts",
+    "frontiers",
+    "least_frontier",
+    "frontiers_by_size",
+    "state_cells",
+    "pyramid_cells",
+    "pyramid_levels",
+)
 """Settings that older records do not have."""
 
 

@@ -24,6 +24,11 @@ from lidarium.mapping.kernels.cache_folders import cache_folder
 from lidarium.mapping.kernels.in_python.interpreted import IS_INTERPRETED, interpreted
 from lidarium.mapping.kernels.kept_code import keep
 
+# OpenMP's threads spin where they wait for each other, by default. Where others use the cores as well, as a
+# learner does, two threads then take longer than one. Who has said otherwise is left alone. It has to be said
+# before numba loads OpenMP, which it does when the first threads start.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
 Array = NDArray[Any]
 """An array in the signature of a kernel; its docstring gives shape and type."""
 

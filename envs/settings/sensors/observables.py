@@ -66,6 +66,13 @@ SENSED.register(
 )
 
 
+SENSED.register(
+    "pyramid",
+    "lidarium.envs.observing.map_pyramid:PYRAMID",
+    "the whole known map around the robot in pictures that show more and more, (levels, P, P)",
+)
+
+
 def check_sensed(settings: Any) -> None:  # noqa: ANN401
     """Check that the sensors which are observed are there.
 

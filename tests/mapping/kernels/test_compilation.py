@@ -352,3 +352,31 @@ def test_kernels_that_borrow_arrays_leave_their_count_as_it_was():
     sum_often(values, 100)
     sum_by_scratch(values)
     assert sys.getrefcount(values) == before
+
+
+@pytest.mark.parametrize(("given", "wanted"), [(None, "passive"), ("active", "active")])
+def test_threads_wait_without_spinning_where_nobody_has_said_otherwise(given, wanted):
+    """OpenMP says what it was given when it is loaded, with the first threads."""
+    code = "\n".join(
+        [
+            "import numba, numpy as np",
+            "numba.config.THREADING_LAYER = 'omp'",
+            "from lidarium.envs.observation_kernels import write_parallel",
+            "from lidarium.mapping.kernels.compilation import use_threads",
+            "use_threads(2)",
+            "from numba.np.ufunc import omppool",
+            "numba.np.ufunc.parallel._launch_threads()",
+            "assert numba.threading_layer() == 'omp'",
+        ]
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
+    if given is not None:
+        environment["OMP_WAIT_POLICY"] = given
+    environment["OMP_DISPLAY_ENV"] = "true"
+    result = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+    )
+    if "No module named" in result.stderr or "omppool" in result.stderr:
+        pytest.skip("numba has no OpenMP here")
+    assert result.returncode == 0, result.stderr
+    assert f"OMP_WAIT_POLICY = '{wanted.upper()}'" in result.stderr
