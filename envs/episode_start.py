@@ -68,7 +68,7 @@ def begin(
     """
     choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
     floor = choice_here.load(generator)
-    if chosen.starts is not None:
+    if isinstance(chosen.starts, np.ndarray):
         floor = around(floor, chosen.starts)
     radius = settings.robot.radius
     _check_height(floor, settings.robot.height)
