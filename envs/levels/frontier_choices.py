@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lidarium.envs.driving.drives import STATE_ARRIVED, STATE_GIVING_WAY, STATE_NO_PATH, Drives, drive_state
 from lidarium.envs.driving.planning import Planning, passage_in
 from lidarium.envs.levels.frontier_gains import expected_gain
+from lidarium.envs.levels.frontier_ranking import choose_offers
 from lidarium.envs.onboard.navigation import (
     COLUMNS,
     ROWS,
@@ -167,54 +168,6 @@ def _why_in_vain(planning: Planning, drives: Drives, choices: Choices, row: int,
     elif time - choices.since[row] > PATIENCE_S:
         return NO_PROGRESS
     return 0
-
-
-@kernel
-def _rank(values: Array, is_wanted: Array, ranked: Array, first: int, last: int) -> int:
-    """Write wanted clusters to ``ranked[first:last]``, the highest value first; return where they end.
-
-    The first of equals comes first. What is ranked is wanted no more.
-    """
-    while first < last:
-        best = -1
-        for k in range(len(values)):
-            if is_wanted[k] and (best < 0 or values[k] > values[best]):
-                best = k
-        if best < 0:
-            break
-        is_wanted[best] = False
-        ranked[first] = best
-        first += 1
-    return first
-
-
-@kernel
-def choose_offers(left: Array, sizes: Array, is_wanted: Array, by_size: int, ranked: Array) -> int:
-    """Choose which clusters are offered, and return how many.
-
-    They are the cheapest, and of the others the longest; offered in the order of their cost.
-
-    Parameters
-    ----------
-    left : (clusters,) array
-        What is left of the budget at each cluster: more is cheaper.
-    sizes : (clusters,) array
-        How long each is.
-    is_wanted : (clusters,) bool
-        Which may be offered; overwritten.
-    by_size : int
-        How many of the offers are for the longest.
-    ranked : (offers,) int64
-        Where the numbers of the chosen clusters are written.
-    """
-    count = int(_rank(left, is_wanted, ranked, 0, len(ranked) - by_size))
-    if by_size == 0:
-        return count
-    count = _rank(sizes, is_wanted, ranked, count, len(ranked))
-    is_wanted[:] = False
-    for i in range(count):
-        is_wanted[ranked[i]] = True
-    return int(_rank(left, is_wanted, ranked, 0, count))
 
 
 @kernel

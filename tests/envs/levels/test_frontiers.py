@@ -6,7 +6,7 @@ import pytest
 
 import lidarium
 from lidarium.envs.floors.floor import Floor, Solid
-from lidarium.envs.levels.frontier_choices import choose_offers
+from lidarium.envs.levels.frontier_ranking import choose_offers
 from lidarium.envs.settings.exploration import ExplorationSettings
 
 MOST = ExplorationSettings().frontiers
