@@ -18,6 +18,7 @@ from lidarium.envs.settings.reset_options import (
     checked_seed,
     read_options,
 )
+from lidarium.mapping.geometry.bounds import shown
 from lidarium.mapping.kernels.compilation import available_threads
 
 
@@ -25,7 +26,17 @@ def settings_of(options: dict[str, Any]) -> ExplorationSettings:
     """Return the settings of a batch from the options of ``lidarium.parallel_env``.
 
     All threads of the machine where none are named.
+
+    Raises
+    ------
+    ValueError
+        Where settings are to be drawn for each episode, which batches cannot.
     """
+    if "randomize" in options:
+        raise ValueError(
+            f"randomize is {shown(options['randomize'])}; leave it out: all episodes of a batch have the "
+            "same settings, use lidarium.parallel_env or several batches"
+        )
     names_threads = "threads" in options or options.get("settings") is not None
     return make_settings(**(options if names_threads else {**options, "threads": available_threads()}))
 

@@ -115,3 +115,8 @@ def test_draws_that_change_the_spaces_are_refused():
     env = lidarium.parallel_env("scene_room", randomize={"map_cells": [32, 64]}, **SMALL)
     with pytest.raises(ValueError, match="want some that leave the spaces of observations and actions"):
         [env.reset(seed=seed) for seed in range(20)]
+
+
+def test_batches_have_one_choice_of_settings():
+    with pytest.raises(ValueError, match=r"randomize is .*; leave it out: all episodes of a batch"):
+        lidarium.vector_env(2, "scene_room", randomize={"reward.time": (0.0, 1.0)}, **SMALL)
