@@ -112,6 +112,11 @@ class LocalMapper:
         """How many scans were found elsewhere than odometry said, see ``LocalMatcher``."""
         return self._matcher.recoveries
 
+    @property
+    def explains(self) -> bool:
+        """Whether the last match explains enough of its scan, see ``LocalMatcher``."""
+        return self._matcher.explains
+
     def match(
         self,
         points: NDArray[np.float64],

@@ -33,6 +33,8 @@ class LocalMatcher:
         free.
     recoveries : int
         Scans that were found in another direction or place than odometry said, as nothing there agreed.
+    explains : bool
+        Whether the last match explains enough of its scan.
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry) -> None:
@@ -42,6 +44,7 @@ class LocalMatcher:
             geometry,
         )
         self.usual_score, self.contradiction, self.recoveries = 0.0, 0.0, 0
+        self.explains = True
 
     def match(
         self,
@@ -89,6 +92,7 @@ class LocalMatcher:
             and self._is_good(near)
             and near.score >= settings.convincing_share * self.usual_score
         ):
+            self.explains = self._explains(near)
             return self._noted(near)
         reach = (settings.blind_m, settings.blind_angle) if is_blind else self._reach(moved)
         far = None if is_sparse else self._match_far(submap, points, predicted, reach)
@@ -103,9 +107,15 @@ class LocalMatcher:
         found = good[0] if good else None
         if len(good) == 2 and outweighs(good[1], good[0], settings.better_by):
             found = good[1]
-        if self._uses_odometry and not is_sparse and found is None:
-            found = self._beyond_odometry(submap, points, predicted)
+        if self._uses_odometry and not is_sparse and not self._explains(found):
+            found = self._beyond_odometry(submap, points, predicted) or found
+        self.explains = self._explains(found)
         return None if found is None else self._noted(found)
+
+    def _explains(self, match: Match | None) -> bool:
+        """Whether a match explains enough of a scan: points near what the map knows, and how they agree."""
+        least = self._matching.explained_share * self.usual_score
+        return match is not None and match.score * match.overlap >= least
 
     def _beyond_odometry(
         self, submap: Submap, points: NDArray[np.float64], predicted: NDArray[np.float64]

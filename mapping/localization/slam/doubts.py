@@ -7,6 +7,8 @@ NO_MATCH = "no match: the scans contradict the map where odometry leads, and no 
 
 ELSEWHERE = "odometry contradicted: the scans agree with the map in another direction or place alone"
 
+LITTLE = "little explained: hardly any of the scans agrees with the map, and no other place is sure"
+
 
 @dataclass(frozen=True, slots=True)
 class Doubt:

@@ -25,7 +25,7 @@ from lidarium.mapping.localization.matching.scan_matching import Match
 from lidarium.mapping.localization.matching.scan_points import at_last_beam, scan_points
 from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.matching.wall_compass import WallCompass
-from lidarium.mapping.localization.slam.doubts import ELSEWHERE, NO_MATCH, ODOMETRY_ALONE, Doubts
+from lidarium.mapping.localization.slam.doubts import ELSEWHERE, LITTLE, NO_MATCH, ODOMETRY_ALONE, Doubts
 from lidarium.mapping.localization.slam.loop_closing import LoopClosing
 from lidarium.mapping.localization.slam.odometry_motion import OdometryMotion
 from lidarium.mapping.localization.slam.scan_history import ScanHistory
@@ -262,7 +262,9 @@ class Slam:
         if self._mapper.recoveries > self.counts.recoveries:
             return ELSEWHERE
         is_sparse = points < self._settings.matching.wide_share * self._geometry.beams
-        return None if is_sparse or match.information.any() else ODOMETRY_ALONE
+        if not match.information.any():
+            return None if is_sparse else ODOMETRY_ALONE
+        return None if self._mapper.explains else LITTLE
 
     def _begin(self, ranges: NDArray[np.float32]) -> None:
         """Begin the first map, at a node of its own.

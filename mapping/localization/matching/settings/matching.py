@@ -52,6 +52,9 @@ class MatchingSettings:
         odometry led nowhere.
     evaluations : int
         At most so many placements, and blocks of them, are examined in such a search.
+    explained_share : float
+        Agreement of all returns, as a share of what matches have had of late, below which the search goes in
+        all directions, and a match is doubtful.
     lost_evaluations : int
         The same of a search in all directions, where odometry explains too little of a scan.
     ambiguity : float
@@ -104,6 +107,7 @@ class MatchingSettings:
     wide_share: Positive = 0.08
     blind_overlap: Positive = 0.7
     evaluations: Count = 100_000
+    explained_share: Positive = 0.35
     lost_evaluations: Count = 400_000
     ambiguity: Positive = 0.9
     apart_m: Length = 0.5
