@@ -3,9 +3,9 @@
 The robots know nothing of each other's start.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import Positional
 
@@ -15,15 +15,19 @@ if TYPE_CHECKING:
     from lidarium.mapping.files.map_files import MapImage
     from lidarium.mapping.geometry.rigid import Transform
     from lidarium.mapping.merging.merger import Merged
+    from lidarium.mapping.merging.pair_result import PairResult
 
 DEFAULT_FOLDER = Path("merged")
+
+MOST_ALTERNATIVES = 5
+"""Most hypotheses of a pair that are written."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Merge(Command):
     """Merge maps into one; writes the fused map, transforms.json and a picture.
 
-    Where maps do not join, it says why of each pair.
+    Where maps do not join, it says why of each pair; transforms.json and the picture say more.
     """
 
     maps: Positional[tuple[Path, ...]]
@@ -35,6 +39,15 @@ class Merge(Command):
     """
     mode: str = "default"
     """rules of merging: default, or thesis for those of the thesis as printed."""
+    tolerance: Literal["strict", "normal", "drift"] = "normal"
+    """how far maps may be bent against each other: strict for not at all, drift for maps that have drifted"""
+    guess: str | None = None
+    """X,Y,THETA of the second map's ROS frame in that of the first [m, rad].
+
+    For two maps; right to 2 m and 20 degrees
+    """
+    force: bool = False
+    """join two maps by the best transform, whatever speaks against it"""
 
     def __post_init__(self) -> None:
         Command.__post_init__(self)
@@ -53,18 +66,42 @@ def execute(command: Merge) -> Answer:
         Where a map or ``--out`` is no good; nothing is written then.
     """
     from lidarium.evaluation.episodes.output import check_writable
-    from lidarium.mapping.merging.merger import merge_maps
-    from lidarium.mapping.merging.settings import merge_settings
+    from lidarium.mapping.merging.merger import Question, merge_maps
+    from lidarium.mapping.merging.settings import TOLERANCES, merge_settings
 
     out = command.out or DEFAULT_FOLDER
     check_writable(out)
     images = _read(command)
     settings = merge_settings(command.mode, max(image.resolution for image in images.values()))
-    merged = merge_maps({name: (image.levels, image.resolution) for name, image in images.items()}, settings)
+    if command.mode == "default":
+        settings = replace(settings, confidence=TOLERANCES[command.tolerance])
+    question = Question(
+        guess=_guess(command, list(images.values())), is_forced=command.force, is_explained=True
+    )
+    levels = {name: (image.levels, image.resolution) for name, image in images.items()}
+    merged = merge_maps(levels, settings, question)
     result = _result(merged, images)
-    files = _write(merged, images, result, out) if any(len(group) > 1 for group in merged.groups()) else []
+    files = _write(merged, images, result, out)
     is_whole = len(merged.groups()) == 1
     return Answer(result, _summary(merged, files, out), DONE if is_whole else NO)
+
+
+def _guess(command: Merge, images: "list[MapImage]") -> "Transform | None":
+    """Return the guess between the maps' lower left corners; None where there is none."""
+    if command.guess is None:
+        return None
+    from lidarium.mapping.geometry.rigid import Transform
+
+    try:
+        x, y, theta = (float(word) for word in command.guess.split(","))
+    except ValueError:
+        x = y = theta = float("nan")
+    if not all(abs(value) < float("inf") for value in (x, y, theta)):
+        raise ValueError(f"guess is {command.guess!r}; want X,Y,THETA in metres and radians")
+    if len(images) != 2:
+        raise ValueError(f"a guess is of two maps; {len(images)} are given")
+    first, second = (_corner(image) for image in images)
+    return first.inverse() @ Transform(x, y, theta) @ second
 
 
 def _read(command: Merge) -> "dict[str, MapImage]":
@@ -108,32 +145,57 @@ def _result(merged: "Merged", images: "dict[str, MapImage]") -> dict[str, Any]:
                 transform = merged.tree.lookup(group[0], name)
                 assert transform is not None
                 maps[name] = {**_numbers(root @ transform @ _corner(images[name]).inverse()), "group": number}
-    pairs = []
     used = {(edge.a, edge.b) for edge in merged.tree.edges}
-    for (a, b), found in merged.pairs.items():
-        is_used = (a, b) in used
-        between = (
-            None
-            if found.a_from_b is None
-            else _corner(images[a]) @ found.a_from_b @ _corner(images[b]).inverse()
-        )
-        reason = (
-            "contradicts stronger pairs of the group" if found.is_accepted and not is_used else found.reason
-        )
-        pairs.append(
-            {
-                "a": a,
-                "b": b,
-                "accepted": is_used,
-                "reason": reason,
-                **_numbers(between),
-                "inliers": found.inliers,
-                "score": round(found.score, 6),
-                "overlap_m2": round(found.agreement.overlap_m2, 3),
-                "time_ms": round(found.time_ms, 3),
-            }
-        )
+    pairs = [
+        _pair(pair, found, pair in used, (_corner(images[pair[0]]), _corner(images[pair[1]])))
+        for pair, found in merged.pairs.items()
+    ]
     return {"world": world, "maps": maps, "pairs": pairs}
+
+
+def _pair(
+    names: tuple[str, str], found: "PairResult", is_used: bool, corners: "tuple[Transform, Transform]"
+) -> dict[str, Any]:
+    """Return what is said of a pair."""
+    first, second = corners
+
+    def between(a_from_b: "Transform | None") -> dict[str, float | None]:
+        return _numbers(None if a_from_b is None else first @ a_from_b @ second.inverse())
+
+    agreement = found.agreement
+    bend = found.ranked[0].bend if found.ranked and found.ranked[0].bend.is_held else None
+    return {
+        "a": names[0],
+        "b": names[1],
+        "accepted": is_used,
+        "reason": "contradicts stronger pairs of the group"
+        if found.is_accepted and not is_used
+        else found.reason,
+        **between(found.a_from_b),
+        "found_by": found.found_by,
+        "matches": found.matches,
+        "inliers": found.inliers,
+        "score": round(found.score, 6),
+        "overlap_m2": round(agreement.overlap_m2, 3),
+        "agreeing_m": round(agreement.agreeing_m, 3),
+        "contradiction_m": round(agreement.contradicting_m, 3),
+        "hit_rate": round(agreement.hit_rate, 4),
+        "confidence": round(found.confidence, 4),
+        "bend_m": None if bend is None else round(bend.bend_m, 4),
+        "strain": None if bend is None else round(bend.strain, 5),
+        "scale": None if bend is None else round(bend.scale, 5),
+        "covariance": None if bend is None else [[float(f"{v:.3g}") for v in row] for row in bend.covariance],
+        "alternatives": [
+            {
+                **between(one.bend.a_from_b),
+                "evidence_m": round(one.evidence_m, 3),
+                "agreeing_m": round(one.agreement.agreeing_m, 3),
+                "contradiction_m": round(one.agreement.contradicting_m, 3),
+            }
+            for one in found.ranked[:MOST_ALTERNATIVES]
+        ],
+        "time_ms": round(found.time_ms, 3),
+    }
 
 
 def _numbers(transform: "Transform | None") -> dict[str, float | None]:
@@ -143,7 +205,7 @@ def _numbers(transform: "Transform | None") -> dict[str, float | None]:
 
 
 def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, Any], out: Path) -> list[str]:
-    """Write transforms, the picture and the fused map of each group.
+    """Write transforms, the picture and the fused map of each group of two maps or more.
 
     In the ROS frame of the group's first map.
     """
@@ -160,7 +222,7 @@ def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, An
         origin = _corner(images[group[0]]) @ Transform(*fused.origin)
         write_ros_map(out, name, fused.levels, (origin.x, origin.y, origin.theta), fused.resolution)
         files += [f"{name}.yaml", f"{name}.pgm"]
-    save_merge_picture(out / "merge.png", merged)
+    save_merge_picture(out / "merge.png", merged, {name: _corner(image) for name, image in images.items()})
     write_json(out / "transforms.json", result)
     files += ["transforms.json", "merge.png"]
     check_written(out, files)
@@ -180,9 +242,11 @@ def _summary(merged: "Merged", files: list[str], out: Path) -> str:
         elif found.is_accepted:
             agreement = found.agreement
             reason = (
-                f"accepted: {agreement.agreeing_m:.1f} m of walls agree, {agreement.overlap_m2:.0f} m2 known "
-                "in both"
+                f"{found.reason}: {agreement.agreeing_m:.1f} m of walls agree, {agreement.overlap_m2:.0f} m2 "
+                "known in both"
             )
+            if found.found_by == "bend":
+                reason += f", bent by {found.ranked[0].bend.bend_m:.2f} m"
         else:
             reason = f"refused: {found.reason}"
         rows.append((a, b, reason))
@@ -192,6 +256,6 @@ def _summary(merged: "Merged", files: list[str], out: Path) -> str:
             "",
             table(rows),
             "",
-            f"written to {out}: {', '.join(files)}" if files else "nothing was written",
+            f"written to {out}: {', '.join(files)}",
         ]
     )

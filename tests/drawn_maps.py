@@ -85,3 +85,30 @@ def about_middle(theta, levels, shape=(SPREAD, SPREAD), shift=(0.0, 0.0)):
     target = np.array([shape[1], shape[0]]) * RESOLUTION / 2.0 + shift
     x, y = target - Transform(0.0, 0.0, theta).apply(middle)
     return Transform(float(x), float(y), theta)
+
+
+def hall():
+    """Ten rooms, 18 m by 7.6 m: the apartment and its mirror image, with a door between."""
+    other = apartment()[::-1].copy()
+    other[20:34, 20:40] = OCCUPIED
+    other[120:128, 160:176] = OCCUPIED
+    levels = np.hstack([apartment()[:, :190], other[:, 8:]])
+    levels[105:123, 184:196] = FREE
+    return levels
+
+
+def sagging(points, sag, length):
+    """Return how far points (n, 2) of a bowed map lie from where they belong [m]."""
+    return np.stack([np.zeros(len(points)), sag * np.sin(np.pi * points[:, 0] / length)], axis=1)
+
+
+def bowed(levels, sag, resolution=RESOLUTION):
+    """Return a map whose middle is moved along y, as a map is that has drifted [m]."""
+    rows, columns = np.indices(levels.shape)
+    points = np.stack([columns + 0.5, rows + 0.5], axis=-1).reshape(-1, 2) * resolution
+    there = points - sagging(points, sag, levels.shape[1] * resolution)
+    cells = np.floor(there / resolution).astype(int)
+    inside = (cells >= 0).all(axis=1) & (cells[:, 0] < levels.shape[1]) & (cells[:, 1] < levels.shape[0])
+    result = np.full(levels.size, UNKNOWN, np.uint8)
+    result[inside] = levels[cells[inside, 1], cells[inside, 0]]
+    return result.reshape(levels.shape)

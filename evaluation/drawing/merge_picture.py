@@ -1,35 +1,76 @@
-"""Picture of a merge: the overlaid maps of each group with matched corners.
+"""Picture of a merge: the maps of each group and of each refused pair, with what agrees and contradicts.
 
-Each group's maps have its colours.
+Each map has its colour.
 """
 
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.rendering import Colour, team_colours
 from lidarium.evaluation.drawing.plain_words import plain_words
 from lidarium.evaluation.episodes.output import whole_file
-from lidarium.mapping.files.map_files import FREE, OCCUPIED
-from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.mapping.files.guarded_reading import shortened
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.merger import Merged
 
 INK, SEVERAL = "#1f2937", np.array([31, 41, 55], np.uint8)
 DPI = 130
 _HEIGHT, _WIDEST = 7.0, 14.0
-_MOST_LINES = 60
+_MOST_PANELS, _MOST_TITLE = 6, 60
+_MISS_M = 0.15
+"""A wall contradicts where all within this distance is free [m]."""
+
+_MATCHED: dict[str, Any] = {
+    "color": "#e11d48",
+    "linewidth": 1.2,
+    "marker": "o",
+    "markersize": 3.5,
+    "markerfacecolor": "none",
+}
 
 
-def save_merge_picture(path: Path, merged: Merged) -> None:
-    """Draw each group of joined maps.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Panel:
+    """Maps that are drawn over each other.
 
-    Walls and free space have the colour of the map that saw them, walls that several saw are dark. Lines join
-    the matched corners of each pair, as far apart as the maps' frames leave them.
+    Attributes
+    ----------
+    names : list of str
+        The maps, that in whose frame is drawn first.
+    root_from_map : list of Transform
+        How their lower left corners lie in that map.
+    title : str
+        What is to be said of them.
+    matched : list of (n, 2, 2) float64
+        Matched corners of pairs of them, in the root's frame [m].
+    """
+
+    names: list[str]
+    root_from_map: list[Transform]
+    title: str
+    matched: list[NDArray[np.float64]]
+
+
+def save_merge_picture(path: Path, merged: Merged, corners: Mapping[str, Transform]) -> None:
+    """Draw each group of joined maps, and each refused pair as it would lie best.
+
+    Walls and free space have the colour of the map that saw them, walls that several saw are dark, and walls
+    that stand where another map is free are red. Lines join the matched corners of each pair, as far apart as
+    the maps' frames leave them. Axes are those of the ROS frame of each panel's first map.
 
     Parameters
     ----------
@@ -37,65 +78,130 @@ def save_merge_picture(path: Path, merged: Merged) -> None:
         The PNG file, written whole or not at all.
     merged : Merged
         What `merge_maps` found.
+    corners : mapping of str to Transform
+        From cells' metres into each map's ROS frame.
     """
-    groups = [group for group in merged.groups() if len(group) > 1] or merged.groups()
-    fused = [merged.fused(group) for group in groups]
+    panels = _panels(merged)
+    if not panels:
+        _save_nothing(path)
+        return
+    fused = [
+        fuse([merged.levels[name] for name in panel.names], panel.root_from_map, merged.resolution)
+        for panel in panels
+    ]
     widths = [max(one.levels.shape[1] / one.levels.shape[0], 0.4) for one in fused]
     width = min(max(_HEIGHT * sum(widths), 5.0), _WIDEST)
     figure = Figure(figsize=(width, min(_HEIGHT, width / sum(widths)) + 0.8), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     names = list(merged.levels)
     colours = dict(zip(names, team_colours(len(names)), strict=True))
-    axes_of_groups = figure.subplots(1, len(groups), width_ratios=widths, squeeze=False)[0]
-    for axes, group, one in zip(axes_of_groups, groups, fused, strict=True):
-        _draw_group(axes, merged, group, one, colours)
+    axes_of_panels = figure.subplots(1, len(panels), width_ratios=widths, squeeze=False)[0]
+    for axes, panel, one in zip(axes_of_panels, panels, fused, strict=True):
+        _draw_panel(axes, merged, panel, one, (colours, corners[panel.names[0]]))
     with whole_file(path) as beside, plain_words(figure):
         figure.savefig(beside)
 
 
-def _draw_group(
-    axes: Axes, merged: Merged, group: list[str], fused: FusedMap, colours: dict[str, Colour]
-) -> None:
-    rows, columns = fused.levels.shape
-    x, y = fused.origin
-    extent = (x, x + columns * fused.resolution, y, y + rows * fused.resolution)
-    axes.imshow(
-        _coloured(fused, [colours[name] for name in group]),
-        origin="lower",
-        extent=extent,
-        interpolation="nearest",
-    )
-    lines, walls_m = 0, 0.0
+def _save_nothing(path: Path) -> None:
+    """Draw that there is nothing to draw."""
+    figure = Figure(figsize=(5.0, 1.0), dpi=DPI)
+    FigureCanvasAgg(figure)
+    figure.text(0.5, 0.5, "none of the maps knows anything", ha="center", va="center", color=INK)
+    with whole_file(path) as beside:
+        figure.savefig(beside)
+
+
+def _panels(merged: Merged) -> list[_Panel]:
+    """Return what is drawn: the joined groups and the refused pairs, else the maps alone."""
+    known = {name for name, levels in merged.levels.items() if (levels != UNKNOWN).any()}
+    panels = [_group_panel(merged, group) for group in merged.groups() if len(group) > 1]
+    joined = {edge for group in merged.groups() for edge in itertools.permutations(group, 2)}
+    for (a, b), result in merged.pairs.items():
+        if len(panels) < _MOST_PANELS and (a, b) not in joined and {a, b} <= known:
+            if result.a_from_b is None:
+                continue
+            title = f"refused, {shortened(result.reason, _MOST_TITLE)}"
+            panels.append(_Panel([a, b], [Transform(), result.a_from_b], title, []))
+    return panels or [
+        _Panel([name], [Transform()], "joins none", []) for name in sorted(known)[:_MOST_PANELS]
+    ]
+
+
+def _group_panel(merged: Merged, group: list[str]) -> _Panel:
+    transforms = {name: merged.tree.lookup(group[0], name) or Transform() for name in group}
+    matched, walls_m = [], 0.0
     for (a, b), result in merged.pairs.items():
         if result.is_accepted and a in group and b in group:
-            first, second = merged.tree.lookup(group[0], a), merged.tree.lookup(group[0], b)
-            assert first is not None and second is not None  # noqa: PT018
-            ends = np.stack([first.apply(result.joined[0]), second.apply(result.joined[1])], axis=1)
-            axes.plot(
-                *ends.transpose(2, 1, 0),
-                color="#e11d48",
-                linewidth=1.2,
-                marker="o",
-                markersize=3.5,
-                markerfacecolor="none",
-            )
-            lines += len(ends)
+            ends = [
+                transforms[name].apply(points) for name, points in zip((a, b), result.joined, strict=True)
+            ]
+            matched.append(np.stack(ends, axis=1))
             walls_m += result.agreement.agreeing_m
-    handles = [Patch(color="#{:02x}{:02x}{:02x}".format(*colours[name]), label=name) for name in group]
+    title = f"{walls_m:.0f} m of walls agree, {sum(map(len, matched))} matched corners"
+    return _Panel(group, [transforms[name] for name in group], title, matched)
+
+
+def _draw_panel(
+    axes: Axes,
+    merged: Merged,
+    panel: _Panel,
+    fused: FusedMap,
+    looks: tuple[dict[str, Colour], Transform],
+) -> None:
+    colours, corner = looks
+    rows, columns = fused.levels.shape
+    x, y = fused.origin
+    right, top = x + columns * fused.resolution, y + rows * fused.resolution
+    turn = Affine2D().rotate(corner.theta).translate(corner.x, corner.y)
+    axes.imshow(
+        _coloured(fused, [colours[name] for name in panel.names]),
+        origin="lower",
+        extent=(x, right, y, top),
+        interpolation="nearest",
+        transform=turn + axes.transData,
+    )
+    rim = corner.apply(np.array([(x, y), (right, y), (x, top), (right, top)]))
+    axes.set_xlim(rim[:, 0].min(), rim[:, 0].max())
+    axes.set_ylim(rim[:, 1].min(), rim[:, 1].max())
+    for ends in panel.matched:
+        axes.plot(*corner.apply(ends.reshape(-1, 2)).reshape(-1, 2, 2).transpose(2, 1, 0), **_MATCHED)
+    against = [
+        transform.apply(_contradicting(merged, (panel, i), j))
+        for i, transform in enumerate(panel.root_from_map)
+        for j in range(len(panel.names))
+        if i != j
+    ]
+    places = corner.apply(np.concatenate(against)) if against else np.zeros((0, 2))
+    axes.plot(*places.T, linestyle="none", marker="s", markersize=1.0, color="#dc2626", zorder=3)
+    handles = [Patch(color="#{:02x}{:02x}{:02x}".format(*colours[name]), label=name) for name in panel.names]
+    handles += [Patch(color=INK, label="agrees"), Patch(color="#dc2626", label="contradicts")]
     axes.legend(
         handles=handles,
         loc="upper center",
         bbox_to_anchor=(0.5, -0.06),
-        ncols=min(len(group), 4),
+        ncols=min(len(handles), 4),
         frameon=False,
         fontsize=8,
     )
-    found = f"{walls_m:.0f} m of walls agree, {lines} matched corners" if len(group) > 1 else "joins none"
-    axes.set_title(
-        f"{' + '.join(group) if len(group) <= 4 else f'{len(group)} maps'}: {found}", fontsize=9, color=INK
-    )
-    axes.set_xlabel(f"x in the frame of {group[0]} [m]", fontsize=8)
+    names = " + ".join(panel.names) if len(panel.names) <= 4 else f"{len(panel.names)} maps"
+    axes.set_title(f"{names}: {panel.title}", fontsize=9, color=INK)
+    axes.set_xlabel(f"x in the frame of {panel.names[0]} [m]", fontsize=8)
     axes.tick_params(labelsize=8)
+
+
+def _contradicting(merged: Merged, drawn: tuple[_Panel, int], other: int) -> NDArray[np.float64]:
+    """Return the walls of a map that stand where another one is free, in its own metres (n, 2)."""
+    panel, one = drawn
+    levels, under = (merged.levels[panel.names[k]] for k in (one, other))
+    walls = np.argwhere(levels == OCCUPIED)[:, ::-1] + 0.5
+    other_from_one = panel.root_from_map[other].inverse() @ panel.root_from_map[one]
+    cells = np.floor(other_from_one.apply(walls * merged.resolution) / merged.resolution).astype(np.int64)
+    rows, columns = under.shape
+    is_on = (cells >= 0).all(axis=1) & (cells[:, 0] < columns) & (cells[:, 1] < rows)
+    walls, cells = walls[is_on], cells[is_on]
+    clear = cv2.distanceTransform((under == FREE).astype(np.uint8), cv2.DIST_L2, 5)
+    reach = max(_MISS_M / merged.resolution, 1.5)
+    return np.asarray(walls[clear[cells[:, 1], cells[:, 0]] > reach] * merged.resolution)
 
 
 def _coloured(fused: FusedMap, colours: list[Colour]) -> NDArray[np.uint8]:

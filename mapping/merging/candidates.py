@@ -1,7 +1,7 @@
 """The candidates for the transform that joins two maps, and what the maps say of each."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,10 @@ THIN_WALL_M = 0.1
 NO_INLIERS: NDArray[np.int64] = np.zeros(0, np.int64)
 """The inliers of a candidate that no corners have proposed."""
 
+NEAR_M, NEAR_ANGLE = 2.0, math.radians(20.0)
+"""How far a guess may be off [m, rad]."""
+
+_NEAR_ROTATIONS, _NEAR_PEAKS = 17, 12
 _NEARLY = 4
 _QUARTERS = np.arange(4) * (math.pi / 2.0)
 
@@ -84,13 +88,27 @@ def _residuals(
 
 
 def correlated(
-    a: DescribedMap, b: DescribedMap, angles: NDArray[np.floating], count: int, settings: MergeSettings
+    a: DescribedMap,
+    b: DescribedMap,
+    angles: NDArray[np.floating],
+    count: int,
+    settings: MergeSettings,
+    guess: Transform | None = None,
 ) -> list[Judged]:
-    """Judge the best of all translations at some rotations."""
-    transforms, values = best_translations(
-        a, b, angles, settings.correlation, settings.validation.rival_distance_m
-    )
+    """Judge the best of all translations at some rotations, of those within `NEAR_M` of a guess if any."""
+    peaks = settings.correlation if guess is None else replace(settings.correlation, peaks=_NEAR_PEAKS)
+    transforms, values = best_translations(a, b, angles, peaks, settings.validation.rival_distance_m)
     order = np.argsort(-values, kind="stable")
+    if guess is not None:
+        middle = _middle(b)
+        order = np.array(
+            [
+                k
+                for k in order.tolist()
+                if Transform(*transforms[k].tolist()).difference(guess, middle)[0] <= NEAR_M
+            ],
+            np.int64,
+        )
     chosen = distinct(
         transforms,
         order,
@@ -101,6 +119,15 @@ def correlated(
     reach, samples = settings.alignment.refinement_reach_m, settings.alignment.wall_samples
     refined = (refine_on_walls(a, b, Transform(*transforms[k].tolist()), reach, samples) for k in chosen)
     return [judge(a, b, Candidate(transform, NO_INLIERS), settings) for transform in refined]
+
+
+def near(a: DescribedMap, b: DescribedMap, guess: Transform, settings: MergeSettings) -> list[Judged]:
+    """Judge the guess and the best translations near it, at rotations near it."""
+    angles = guess.theta + np.linspace(-NEAR_ANGLE, NEAR_ANGLE, _NEAR_ROTATIONS)
+    reach = settings.bend.reach_m
+    start = refine_on_walls(a, b, guess, reach, settings.alignment.wall_samples)
+    found = correlated(a, b, angles, 5 * settings.alignment.candidates, settings, guess)
+    return [judge(a, b, Candidate(start, NO_INLIERS), settings), *found]
 
 
 def beside(a: DescribedMap, b: DescribedMap, judged: list[Judged], settings: MergeSettings) -> list[Judged]:

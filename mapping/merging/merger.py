@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.description.described_map import (
     DescribedMap,
     check_resolution,
@@ -19,8 +20,34 @@ from lidarium.mapping.merging.description.described_map import (
 )
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.pair import PairResult, described, is_contradicted, merge_pair, verify_pair
-from lidarium.mapping.merging.settings import MergeSettings
+from lidarium.mapping.merging.pair import (
+    described,
+    is_contradicted,
+    merge_near,
+    merge_pair,
+    verify_pair,
+)
+from lidarium.mapping.merging.pair_result import PairResult, explained
+from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Question:
+    """What is known of two maps beforehand, and what is asked of pairs.
+
+    Attributes
+    ----------
+    guess : Transform or None
+        About how the second map's lower left corner lies in the first map [m, rad].
+    is_forced : bool
+        Whether two maps are joined by the best transform, whatever speaks against it.
+    is_explained : bool
+        Whether of every pair the hypotheses are ranked, also where it joins at once.
+    """
+
+    guess: Transform | None = None
+    is_forced: bool = False
+    is_explained: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +108,11 @@ class Merged:
         return transform @ placed(self.origins.get(name, (0.0, 0.0)))
 
 
-def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSettings | None = None) -> Merged:
+def merge_maps(
+    maps: Mapping[str, tuple[ArrayLike, float]],
+    settings: MergeSettings | None = None,
+    question: Question | None = None,
+) -> Merged:
     """Merge maps of robots that know nothing of each other's start.
 
     Pairs of maps that know most are searched for first, by corners before all rotations and translations are
@@ -95,6 +126,8 @@ def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSetti
         sides differ, all maps are brought to the coarsest.
     settings : MergeSettings or None
         How.
+    question : Question or None
+        What is known of two maps, and what is asked of every pair beside whether it joins.
 
     Returns
     -------
@@ -104,15 +137,49 @@ def merge_maps(maps: Mapping[str, tuple[ArrayLike, float]], settings: MergeSetti
     Raises
     ------
     ValueError
-        Where there are no maps, or one is no map.
+        Where there are no maps, or one is no map, or the question has no answer.
     """
-    settings = settings or MergeSettings()
+    settings, question = settings or MergeSettings(), question or Question()
     if not maps:
         raise ValueError("there are no maps to merge; want at least one")
+    if len(maps) != 2 and (question.guess is not None or question.is_forced):
+        raise ValueError(f"a guess or a forced merge is of two maps; {len(maps)} are given")
     levels, resolution = _alike(maps, settings)
     features = {name: described(grid, resolution, settings) for name, grid in levels.items()}
-    pairs = _all_pairs(features, settings)
+    if question.guess is None:
+        pairs = _all_pairs(features, settings)
+    else:
+        a, b = features
+        _check_guess(features[a], features[b], question.guess)
+        pairs = {(a, b): merge_near(features[a], features[b], question.guess, settings)}
+    if question.is_explained:
+        pairs = {
+            (a, b): explained(features[a], features[b], result, settings) for (a, b), result in pairs.items()
+        }
+    if question.is_forced:
+        pairs = {pair: _forced(result) for pair, result in pairs.items()}
     return Merged(levels, resolution, pairs, joined_tree(features, pairs, settings))
+
+
+def _check_guess(a: DescribedMap, b: DescribedMap, guess: Transform) -> None:
+    """Raise ValueError where a guess lays nothing of one map on the other."""
+    known = np.argwhere(b.levels != UNKNOWN)[:, ::-1] + 0.5
+    cells = guess.apply(known * b.resolution) / a.resolution
+    rows, columns = a.levels.shape
+    is_on = (cells[:, 0] >= 0) & (cells[:, 0] < columns) & (cells[:, 1] >= 0) & (cells[:, 1] < rows)
+    if not is_on.any():
+        raise ValueError(
+            f"the guess is off the map: by ({guess.x:g} m, {guess.y:g} m, {guess.theta:g} rad) between their "
+            "lower left corners nothing of the second map lies on the first; want x, y, theta by which the "
+            "second map's frame lies in that of the first"
+        )
+
+
+def _forced(result: PairResult) -> PairResult:
+    """Return a result that is accepted whatever speaks against it."""
+    if result.is_accepted or result.a_from_b is None:
+        return result
+    return replace(result, is_accepted=True, reason=f"forced against: {result.reason}")
 
 
 def _all_pairs(
@@ -121,7 +188,12 @@ def _all_pairs(
     """Return what comes of each two maps, in their order."""
     every = list(itertools.combinations(features, 2))
     # What corners join spares the search of all rotations and translations, where there is one.
-    by_corners = replace(settings, correlation=replace(settings.correlation, rotations=0))
+    # Maps are bent only where all are known that speak against it.
+    by_corners = replace(
+        settings,
+        correlation=replace(settings.correlation, rotations=0),
+        confidence=TOLERANCES["strict"],
+    )
     passes = (by_corners, settings) if len(every) > 1 and settings != by_corners else (settings,)
     tree: FrameTree[str] = FrameTree(settings.cycle_distance_m, settings.cycle_angle)
     for name in features:

@@ -2,14 +2,15 @@
 
 import math
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.counts import disc_agreement
-from lidarium.mapping.merging.agreement.validation import Agreement, compare, has_contradiction
+from lidarium.mapping.merging.agreement.exact import exact_motion
+from lidarium.mapping.merging.agreement.validation import compare, has_contradiction
 from lidarium.mapping.merging.alignment import Candidate, refine
 from lidarium.mapping.merging.candidates import (
     NO_INLIERS,
@@ -19,52 +20,19 @@ from lidarium.mapping.merging.candidates import (
     correlated,
     judge,
     most_evident,
+    near,
     polished,
 )
 from lidarium.mapping.merging.correspondence import Matches, match_corners
 from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
+from lidarium.mapping.merging.pair_result import NO_POINTS as NO_POINTS
+from lidarium.mapping.merging.pair_result import PairResult as PairResult
+from lidarium.mapping.merging.pair_result import explained as explained
+from lidarium.mapping.merging.pair_result import or_bent
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
-NO_POINTS: NDArray[np.float64] = np.zeros((0, 2))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PairResult:
-    """What came of two maps.
-
-    Attributes
-    ----------
-    is_accepted : bool
-        Whether they are one place.
-    reason : str
-        Why they are refused; ``accepted`` where they are not.
-    a_from_b : Transform or None
-        The best transform that was found, also of a refused pair.
-    matches, inliers : int
-        Number of matched corners, and of those that agree with the transform.
-    score : float
-        1 less the share of contradicting cells; the agreement in discs in the thesis's mode.
-    agreement : Agreement
-        What the score is made of.
-    found_by : str
-        ``corners``, ``correlation``, or ``verification`` of what was found before.
-    time_ms : float
-        Processor time, descriptions of the maps not included [ms].
-    joined : ((n, 2), (n, 2)) float64
-        The corners that agree, in map a and in map b [m].
-    """
-
-    is_accepted: bool
-    reason: str
-    a_from_b: Transform | None = None
-    matches: int = 0
-    inliers: int = 0
-    score: float = 0.0
-    agreement: Agreement = field(default_factory=Agreement)
-    found_by: str = "corners"
-    time_ms: float = 0.0
-    joined: tuple[NDArray[np.float64], NDArray[np.float64]] = (NO_POINTS, NO_POINTS)
+NO_WALLS = "too few corners: a map has no walls that border on free space"
 
 
 def described(levels: ArrayLike, resolution: float, settings: MergeSettings) -> DescribedMap:
@@ -100,9 +68,60 @@ def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None 
     began = time.process_time()
     matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, settings.correspondence)
     merge = _merge_by_discs if settings.validation.test == "discs" else _merge_by_walls
-    return replace(
-        merge(a, b, matches, settings), matches=len(matches), time_ms=1e3 * (time.process_time() - began)
+    result = _exactly(a, b, merge(a, b, matches, settings), settings)
+    return replace(result, matches=len(matches), time_ms=1e3 * (time.process_time() - began))
+
+
+def merge_near(
+    a: DescribedMap, b: DescribedMap, guess: Transform, settings: MergeSettings | None = None
+) -> PairResult:
+    """Find the transform that joins two maps near a guess.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        Maps of one resolution, described by the same settings.
+    guess : Transform
+        About ``a_from_b``, to 2 m and 20 degrees.
+    settings : MergeSettings or None
+        How.
+
+    Returns
+    -------
+    PairResult
+        The transform, or the reason of the refusal. Only what is near the guess can be a rival.
+    """
+    settings = settings or MergeSettings()
+    began = time.process_time()
+    if len(a.walls) == 0 or len(b.walls) == 0:
+        return PairResult(False, NO_WALLS)
+    judged = near(a, b, guess, settings)
+    best = most_evident(judged)
+    assert best is not None
+    best = polished(a, b, best, settings)
+    refusal = best.refusal
+    result = PairResult(
+        is_accepted=refusal is None,
+        reason=refusal or "accepted",
+        a_from_b=best.candidate.a_from_b,
+        score=best.agreement.score,
+        agreement=best.agreement,
+        found_by="guess",
+        tried=tuple(one.candidate.a_from_b for one in judged),
     )
+    result = _exactly(a, b, or_bent(a, b, result, settings), settings)
+    return replace(result, time_ms=1e3 * (time.process_time() - began))
+
+
+def _exactly(a: DescribedMap, b: DescribedMap, result: PairResult, settings: MergeSettings) -> PairResult:
+    """Return an accepted result with the exact motion where the maps share their cells."""
+    if not result.is_accepted or result.a_from_b is None:
+        return result
+    motion = exact_motion(a, b, result.a_from_b)
+    if motion is None:
+        return result
+    agreement = compare(a, b, motion, settings.validation)
+    return replace(result, a_from_b=motion, agreement=agreement, score=agreement.score, ranked=())
 
 
 def verify_pair(
@@ -130,15 +149,16 @@ def verify_pair(
     began = time.process_time()
     start = Candidate(a_from_b, NO_INLIERS)
     judged = polished(a, b, judge(a, b, start, settings), settings)
-    return PairResult(
+    result = PairResult(
         is_accepted=judged.refusal is None,
         reason=judged.refusal or "accepted",
         a_from_b=judged.candidate.a_from_b,
         score=judged.agreement.score,
         agreement=judged.agreement,
         found_by="verification",
-        time_ms=1e3 * (time.process_time() - began),
+        tried=(a_from_b,),
     )
+    return replace(or_bent(a, b, result, settings), time_ms=1e3 * (time.process_time() - began))
 
 
 def is_contradicted(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: MergeSettings) -> bool:
@@ -166,7 +186,7 @@ def _merge_by_walls(
     a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings
 ) -> PairResult:
     if len(a.walls) == 0 or len(b.walls) == 0:
-        return PairResult(False, "too few corners: a map has no walls that border on free space")
+        return PairResult(False, NO_WALLS)
     candidates, shortage = corner_candidates(a, b, matches, settings)
     judged = [
         judge(a, b, refine(a, b, matches, candidate, settings.alignment), settings)
@@ -190,7 +210,7 @@ def _merge_by_walls(
         refusal = f"{shortage}; of all rotations and translations the best is refused, {refusal}"
     inliers, agreement = best.candidate.inliers, best.agreement
     joined = (a.corners.points[matches.first[inliers]], b.corners.points[matches.second[inliers]])
-    return PairResult(
+    result = PairResult(
         is_accepted=refusal is None,
         reason=refusal or "accepted",
         a_from_b=best.candidate.a_from_b,
@@ -199,7 +219,9 @@ def _merge_by_walls(
         agreement=agreement,
         found_by=found_by,
         joined=joined,
+        tried=tuple(one.candidate.a_from_b for one in judged),
     )
+    return or_bent(a, b, result, settings)
 
 
 def _merge_by_discs(

@@ -3,15 +3,19 @@
 import math
 from dataclasses import dataclass, field
 
-from lidarium.mapping.geometry.bounds import Angle, Length, check_settings
+from lidarium.mapping.geometry.bounds import Angle, FromZero, Length, check_settings
 from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.alignment import AlignmentSettings
+from lidarium.mapping.merging.bend.estimation import BendSettings
 from lidarium.mapping.merging.correlation import CorrelationSettings
 from lidarium.mapping.merging.correspondence import CorrespondenceSettings
 from lidarium.mapping.merging.description.corners import CornerSettings
 from lidarium.mapping.merging.description.descriptors import DescriptorSettings
 
 MODES = ("default", "thesis")
+
+TOLERANCES = {"strict": 2.0, "normal": 0.8, "drift": 0.6}
+"""Confidence from which maps are joined that agree only once they are bent, by the name of the tolerance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +26,11 @@ class MergeSettings:
     ----------
     corners, descriptors, correspondence, alignment, validation, correlation
         Settings of each stage.
+    bend : BendSettings
+        How much maps may be bent where no rigid motion is believed.
+    confidence : float
+        Confidence from which maps that agree once they are bent are joined; see `TOLERANCES`. Above 1 none
+        are.
     cycle_distance_m, cycle_angle : float
         By how much transforms around a cycle of maps may miss identity [m, rad].
     """
@@ -32,6 +41,8 @@ class MergeSettings:
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     validation: ValidationSettings = field(default_factory=ValidationSettings)
     correlation: CorrelationSettings = field(default_factory=CorrelationSettings)
+    bend: BendSettings = field(default_factory=BendSettings)
+    confidence: FromZero = TOLERANCES["normal"]
     cycle_distance_m: Length = 0.15
     cycle_angle: Angle = math.radians(3.0)
 
@@ -92,4 +103,5 @@ def merge_settings(mode: str = "default", resolution: float = 0.025) -> MergeSet
         alignment=alignment,
         validation=ValidationSettings(test="discs"),
         correlation=CorrelationSettings(rotations=0),
+        confidence=TOLERANCES["strict"],
     )

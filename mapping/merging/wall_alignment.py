@@ -110,7 +110,7 @@ def _settle(
                 cosine * normals[i, 0] - sine * normals[i, 1],
                 sine * normals[i, 0] + cosine * normals[i, 1],
             )
-            gap = _gap_to_wall(levels, distance, side, x, y, u, v, steps)
+            gap = gap_to_wall(levels, distance, side, x, y, u, v, steps)
             if gap <= steps:
                 places[found, 0], places[found, 1] = x, y
                 facing[found, 0], facing[found, 1] = u, v
@@ -160,7 +160,7 @@ def _best_move(places: Array, facing: Array, gaps: Array, centre_x: float, centr
 
 
 @kernel(inline=True)
-def _gap_to_wall(
+def gap_to_wall(
     levels: Array, distance: Array, side: float, x: float, y: float, u: float, v: float, steps: int
 ) -> float:
     """Return the distance along the normal to the nearest wall [cells].

@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, room
+from drawn_maps import RESOLUTION, about_middle, apartment, blank, bowed, hall, kept, moved, room
 
 from lidarium.mapping.files.map_files import read_ros_map, write_ros_map
 from lidarium.mapping.geometry.rigid import Transform
@@ -64,12 +64,29 @@ def test_two_maps_are_joined_in_the_ros_frame_of_the_first(maps, tmp_path, capsy
         "x",
         "y",
         "theta",
+        "found_by",
+        "matches",
         "inliers",
         "score",
         "overlap_m2",
+        "agreeing_m",
+        "contradiction_m",
+        "hit_rate",
+        "confidence",
+        "bend_m",
+        "strain",
+        "scale",
+        "covariance",
+        "alternatives",
         "time_ms",
     }
     assert pair["accepted"] is True
+    assert pair["hit_rate"] > 0.9
+    assert pair["contradiction_m"] < 0.2
+    assert pair["bend_m"] < 0.03
+    assert np.linalg.eigvalsh(pair["covariance"])[0] > 0.0
+    best, *others = pair["alternatives"]
+    assert all(best["evidence_m"] >= other["evidence_m"] for other in others)
 
 
 def test_the_fused_map_lies_in_the_worlds_frame(maps, tmp_path, capsys):
@@ -90,8 +107,11 @@ def test_what_cannot_be_joined_is_refused_with_the_reason_of_each_pair(maps, els
     assert main(["merge", west, elsewhere, "--out", str(tmp_path / "out")]) == 3
     told = capsys.readouterr().out
     assert "refused" in told
-    assert "nothing was written" in told
-    assert not (tmp_path / "out").exists()
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["merge.png", "transforms.json"]
+    result = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert result["maps"] == {"west": None, "elsewhere": None}
+    assert result["pairs"][0]["accepted"] is False
+    assert result["pairs"][0]["reason"]
 
 
 def test_of_three_maps_those_that_join_are_written(maps, elsewhere, tmp_path, capsys):
@@ -175,6 +195,74 @@ def test_bad_headers_are_named(maps, tmp_path, capsys, key, value, word):
 def test_bad_arguments_are_named(arguments, word, capsys, tmp_path):
     assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
     assert word in capsys.readouterr().err
+
+
+def test_halves_of_one_image_come_out_exact(tmp_path, capsys):
+    whole = apartment()
+    cv2.imwrite(str(tmp_path / "whole.png"), whole[::-1])
+    part = np.rot90(kept(whole, slice(0, 170), slice(40, 200)))
+    cv2.imwrite(str(tmp_path / "part.png"), part[::-1])
+    paths = [str(tmp_path / f"{name}.png") for name in ("whole", "part")]
+    options = ["--resolution", "0.05", "--json", "--out", str(tmp_path / "out")]
+    assert main(["merge", *paths, *options]) == 0
+    found = json.loads(capsys.readouterr().out)["maps"]["part"]
+    turned = np.argwhere(part == 0)[:, ::-1] + 0.5
+    places = Transform(found["x"], found["y"], found["theta"]).apply(turned * 0.05) / 0.05 - 0.5
+    np.testing.assert_allclose(places, np.rint(places), atol=1e-4)
+    columns, rows = np.rint(places).astype(int).T
+    assert (whole[rows, columns] == 0).all()
+
+
+def test_a_refused_pair_is_joined_by_a_guess_or_by_force(maps, elsewhere, tmp_path, capsys):
+    (west, east), truth = maps
+    out = str(tmp_path / "out")
+    guess = f"{truth.x + 0.4},{truth.y - 0.4},{truth.theta + 0.03}"
+    assert main(["merge", west, east, "--guess", guess, "--tolerance", "strict", "--json", "--out", out]) == 0
+    found = json.loads(capsys.readouterr().out)["maps"]["east"]
+    place = Transform(*ORIGINS["east"]).apply((8.0, 8.0))
+    distance, angle = Transform(found["x"], found["y"], found["theta"]).difference(truth, place)
+    assert distance < 0.05
+    assert angle < math.radians(0.5)
+    assert main(["merge", west, elsewhere, "--force", "--json", "--out", out]) == 0
+    (pair,) = json.loads(capsys.readouterr().out)["pairs"]
+    assert pair["accepted"] is True
+    assert pair["reason"].startswith("forced against: ")
+
+
+@pytest.mark.parametrize(
+    ("guess", "word"),
+    [
+        ("1,2", "want X,Y,THETA"),
+        ("1,2,nan", "want X,Y,THETA"),
+        ("a,b,c", "want X,Y,THETA"),
+        ("900,0,0", "off the map"),
+    ],
+)
+def test_bad_guesses_are_named_before_anything_is_written(maps, tmp_path, capsys, guess, word):
+    (west, east), _ = maps
+    assert main(["merge", west, east, "--guess", guess, "--out", str(tmp_path / "out")]) == 2
+    assert word in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_guess_and_force_are_of_two_maps(maps, elsewhere, tmp_path, capsys):
+    (west, east), _ = maps
+    for option in (["--guess", "0,0,0"], ["--force"]):
+        assert main(["merge", west, east, elsewhere, *option, "--out", str(tmp_path / "out")]) == 2
+        assert "two maps" in capsys.readouterr().err
+
+
+def test_bent_maps_join_with_a_tolerance_alone(tmp_path, capsys):
+    write_ros_map(tmp_path, "straight", hall(), (0.0, 0.0, 0.0), RESOLUTION)
+    write_ros_map(tmp_path, "bent", bowed(hall(), 0.35, RESOLUTION), (0.0, 0.0, 0.0), RESOLUTION)
+    paths = [str(tmp_path / f"{name}.yaml") for name in ("straight", "bent")]
+    for tolerance, code in (("strict", 3), ("normal", 0), ("drift", 0)):
+        options = ["--tolerance", tolerance, "--json", "--out", str(tmp_path / tolerance)]
+        assert main(["merge", *paths, *options]) == code
+        (pair,) = json.loads(capsys.readouterr().out)["pairs"]
+    assert pair["found_by"] == "bend"
+    assert pair["bend_m"] > 0.05
+    assert pair["confidence"] > 0.8
 
 
 def test_unknown_modes_are_named(maps, tmp_path, capsys):

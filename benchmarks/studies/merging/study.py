@@ -15,7 +15,7 @@ import lidarium
 from lidarium.benchmarks.studies.merging import tables
 from lidarium.benchmarks.studies.merging.bank.bank import read_maps, read_pairs
 from lidarium.benchmarks.studies.merging.bank.floors import bank_floors
-from lidarium.benchmarks.studies.merging.bank.groups import merge_real_pairs, merge_teams
+from lidarium.benchmarks.studies.merging.bank.groups import merge_teams
 from lidarium.benchmarks.studies.merging.bank.making import kept_floors, make_bank
 from lidarium.benchmarks.studies.merging.features import (
     compare_descriptors,
@@ -24,6 +24,8 @@ from lidarium.benchmarks.studies.merging.features import (
 )
 from lidarium.benchmarks.studies.merging.figures import Tried
 from lidarium.benchmarks.studies.merging.pictures import draw_pairs
+from lidarium.benchmarks.studies.merging.real_maps import merge_real_maps
+from lidarium.benchmarks.studies.merging.real_tables import real_maps
 from lidarium.benchmarks.studies.merging.trials import METHODS, read_outcomes, try_pairs
 from lidarium.benchmarks.studies.shared.kept import Progress
 from lidarium.benchmarks.studies.shared.study import Study
@@ -67,7 +69,7 @@ def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]
         return compare_methods(maps, [pair for pair in read_pairs(folder) or [] if pair.half == "test"])
     if name == "teams":
         return merge_teams(maps)
-    return [] if data is None else merge_real_pairs(data)
+    return [] if data is None else merge_real_maps(data)
 
 
 def page(folder: Path, command: str) -> str:
@@ -98,7 +100,7 @@ def page(folder: Path, command: str) -> str:
         "## Five robots\n\n" + tables.teams(extra["teams"]),
     ]
     if extra["real"]:
-        parts.append("## Maps of real robots\n\n" + tables.real_maps(extra["real"]))
+        parts.append("## Maps of real robots\n\n" + real_maps(extra["real"]))
     return "\n\n".join(parts) + "\n"
 
 

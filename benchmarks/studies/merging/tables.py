@@ -251,28 +251,5 @@ def teams(rows: list[dict[str, Any]]) -> str:
     )
 
 
-def real_maps(rows: list[dict[str, Any]]) -> str:
-    """Return how pairs of maps of real robots are joined."""
-    lines = ["| pair | result | error [m] | [deg] | time [ms] |", "|---|---|---:|---:|---:|"]
-    for row in rows:
-        error = (
-            ("-", "-")
-            if row["distance_m"] is None
-            else (f"{row['distance_m']:.2f}", f"{math.degrees(row['angle']):.2f}")
-        )
-        result = (
-            f"joined by {row['found_by']}"
-            if row["is_accepted"]
-            else row["reason"].split(";")[-1].strip().split(":")[0]
-        )
-        lines.append(f"| {row['pair']} | {result} | {error[0]} | {error[1]} | {row['time_ms']:.0f} |")
-    joined = sum(row["is_accepted"] for row in rows)
-    return (
-        f"Parts of logs of real robots, rendered with one trajectory's estimate: {joined} of {len(rows)} are "
-        "joined. The error is that of "
-        "the best transform, also where it is refused.\n\n" + "\n".join(lines)
-    )
-
-
 def _printed(rows: Mapping[str, tuple[int, ...]]) -> str:
     return ", ".join(f"{name} {'/'.join(str(one) for one in times)}" for name, times in rows.items())

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_settings, share, within
 from lidarium.mapping.geometry.rigid import Transform
@@ -172,7 +173,30 @@ def compare(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: Val
     for k, (field_of, walls_of, transform) in enumerate(((a, b, a_from_b), (b, a, b_from_a))):
         field = WallField(field_of.levels, field_of.distance, field_of.is_open, 1.0 / side, hit, miss)
         count_walls(field, walls_of.walls, walls_of.normals, pose_numbers(transform), walls[k], facing[k])
-    area = np.zeros(3)
+    return agreement_of(a, b, a_from_b, walls, facing)
+
+
+def agreement_of(
+    a: DescribedMap,
+    b: DescribedMap,
+    a_from_b: Transform,
+    walls: NDArray[np.int64],
+    facing: NDArray[np.float64],
+) -> Agreement:
+    """Return the agreement of two maps of which the walls have been counted.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        Maps of one resolution.
+    a_from_b : Transform
+        Maps points of b into a.
+    walls : (2, 3) int64
+        Wall cells of each map that agree, miss by little, and contradict.
+    facing : (2, 3) float64
+        Sums of the squares of the normals of those that agree: xx, xy, yy.
+    """
+    side, area = a.resolution, np.zeros(3)
     count_overlap(a.levels, b.levels, side, pose_numbers(a_from_b), area)
     both = float(area[0])
     hits, soft, hard = (float(count) for count in walls.sum(axis=0))

@@ -12,7 +12,9 @@ from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.description.corners import Corners, CornerSettings, detect_corners
 from lidarium.mapping.merging.description.descriptors import Descriptors, DescriptorSettings, describe_corners
 
-MAX_SIDE = 20_000
+MAX_SIDE, MAX_CELLS = 20_000, 50_000_000
+"""Most rows or columns of a map, and most cells: each takes some 20 bytes while maps are compared."""
+
 _FACING_REACH = 3
 _FAR = 1e6
 
@@ -114,6 +116,10 @@ def three_levels_of(levels: ArrayLike, settings: CornerSettings) -> NDArray[np.u
         raise ValueError(f"a map has shape {grid.shape}; want rows and columns of one grey each")
     if max(grid.shape) > MAX_SIDE:
         raise ValueError(f"a map has shape {grid.shape}; want at most {MAX_SIDE} rows and columns")
+    if grid.size > MAX_CELLS:
+        raise ValueError(
+            f"a map has shape {grid.shape}; want at most {MAX_CELLS:,} cells: crop it, or use coarser ones"
+        )
     if grid.dtype != np.uint8:
         raise ValueError(f"a map has type {grid.dtype}; want uint8 greys: 0 occupied, 127 unknown, 255 free")
     three = np.full(grid.shape, UNKNOWN, np.uint8)

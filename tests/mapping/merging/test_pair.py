@@ -13,11 +13,13 @@ from lidarium.mapping.merging.agreement.counts import disc_agreement
 from lidarium.mapping.merging.agreement.validation import Agreement, ValidationSettings, compare, why_refused
 from lidarium.mapping.merging.description.described_map import describe_map, resampled
 from lidarium.mapping.merging.pair import described, merge_pair
-from lidarium.mapping.merging.settings import MergeSettings, merge_settings
+from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings, merge_settings
 
 
-def merged(a, b, resolution=RESOLUTION, mode="default"):
+def merged(a, b, resolution=RESOLUTION, mode="default", tolerance=None):
     chosen = merge_settings(mode, resolution)
+    if tolerance is not None:
+        chosen = replace(chosen, confidence=TOLERANCES[tolerance])
     return merge_pair(described(a, resolution, chosen), described(b, resolution, chosen), chosen)
 
 
@@ -139,20 +141,46 @@ def test_a_straight_corridor_is_ambiguous():
     assert "ambiguous" in result.reason
 
 
-def test_a_room_that_differs_by_a_metre_of_wall_is_refused():
+def test_a_room_that_differs_by_a_metre_of_wall_is_refused_where_maps_may_not_differ():
     changed = apartment()
     changed[110:115, 83:105] = OCCUPIED
-    result = merged(moved(apartment(), about_middle(0.9, apartment())), changed)
+    result = merged(moved(apartment(), about_middle(0.9, apartment())), changed, tolerance="strict")
     assert not result.is_accepted
     assert "contradiction" in result.reason
 
 
-def test_a_door_that_was_moved_is_refused():
+def test_a_door_that_was_moved_is_refused_where_maps_may_not_differ():
     changed = apartment()
     changed[55:58, 110:128], changed[55:58, 86:104] = OCCUPIED, FREE
-    result = merged(moved(apartment(), about_middle(0.9, apartment())), changed)
+    result = merged(moved(apartment(), about_middle(0.9, apartment())), changed, tolerance="strict")
     assert not result.is_accepted
     assert "contradiction" in result.reason
+
+
+def test_moved_furniture_leaves_an_apartment_the_same_place():
+    changed = apartment()
+    changed[110:115, 83:105] = OCCUPIED
+    changed[38:46, 150:170], changed[20:28, 150:170] = FREE, OCCUPIED
+    truth = about_middle(0.9, apartment())
+    result = merged(moved(apartment(), truth), changed)
+    assert result.is_accepted, result.reason
+    assert result.found_by == "bend"
+    assert result.confidence > TOLERANCES["normal"]
+    assert is_right(result, truth, (5.0, 4.0))
+
+
+def test_rooms_of_one_plan_with_other_furniture_are_refused():
+    levels = blank(140, 160)
+    room(levels, 20, 20, 76, 68)
+    one, other = levels.copy(), levels.copy()
+    for grid, boxes in (
+        (one, ((20, 20, 40, 38), (76, 70, 96, 88))),
+        (other, ((20, 20, 40, 38), (76, 70, 96, 88), (50, 20, 60, 48))),
+    ):
+        for box in boxes:
+            grid[box[0] : box[2], box[1] : box[3]] = OCCUPIED
+    for tolerance in TOLERANCES:
+        assert not merged(moved(one, about_middle(0.4, one)), other, tolerance=tolerance).is_accepted
 
 
 @pytest.mark.parametrize("mode", ["default", "thesis"])

@@ -1,0 +1,236 @@
+"""Pairs of maps that others made of real buildings, and what the merger says of each.
+
+Three collections are of one building a pair: hand-set correspondences between maps of two buildings
+(Halmstad), two robots' or two programs' maps (real), and halves of logs rendered with one trajectory's
+estimate (log_split). Maps of different buildings are strangers. The model was fitted to the tuned pairs.
+"""
+
+import gzip
+import itertools
+import json
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.files.map_files import read_grey_map, read_ros_map
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.description.described_map import resampled
+from lidarium.mapping.merging.pair import described, merge_pair
+from lidarium.mapping.merging.pair_result import PairResult, explained
+from lidarium.mapping.merging.settings import merge_settings
+
+HALMSTAD_M, REAL_M = 0.02, 0.05
+"""Sides of the pixels of maps that do not say it [m]."""
+
+RIGHT_M, RIGHT_ANGLE = 1.0, math.radians(8.0)
+"""Errors of a right transform at the median correspondence [m, rad]: these maps are bent by up to 0.5 m."""
+
+EXACT_M, EXACT_ANGLE = 0.5, math.radians(3.0)
+"""The same where the truth is exact, at the middle of the overlap."""
+
+TUNED_BUILDING = "E5"
+
+ONE_BUILDING = {
+    "intel_lab_bwi": "intel",
+    "radish_intel": "intel",
+    "mit_stata_basement": "stata",
+    "mit_stata_hallways": "stata",
+    "radish_csail": "stata",
+}
+"""Buildings of which there are several maps; the others are named as their map."""
+
+PARTS = ("gdc_floor2_raw", "gdc_floor3_northeast")
+"""Maps that are versions or parts of others."""
+
+STRANGERS_OF_HALMSTAD = ("E5_01", "E5_08", "KPT4A_01", "KPT4A_03")
+
+
+class _Grid(NamedTuple):
+    """A map: levels, row 0 at the lowest y, and side of a cell [m]."""
+
+    levels: NDArray[np.uint8]
+    resolution: float
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What the merger says of a pair.
+
+    Attributes
+    ----------
+    pair, collection : str
+        Names of the maps, and where they come from: ``halmstad``, ``real``, ``log_split`` or ``strangers``.
+    is_tuned : bool
+        Whether the model of strangers was fitted to the pair.
+    is_accepted, is_right : bool
+        Whether it is joined, and whether the best transform is right; strangers have no right one.
+    distance_m, angle : float or None
+        Error of the best transform [m, rad].
+    found_by, reason : str
+        How it was found, and why it is refused.
+    confidence, bend_m, time_ms : float
+        Of the best hypothesis, and processor time, description included [ms].
+    """
+
+    pair: str
+    collection: str
+    is_tuned: bool
+    is_accepted: bool
+    is_right: bool
+    distance_m: float | None
+    angle: float | None
+    found_by: str
+    reason: str
+    confidence: float
+    bend_m: float
+    time_ms: float
+
+
+def merge_real_maps(data: Path) -> list[dict[str, Any]]:
+    """Merge all pairs of real maps below a folder, those of one building first.
+
+    Returns a `Row` of each; none where the folder has none.
+    """
+    cv2.setNumThreads(1)
+    folder = Path(data) / "map_pairs"
+    if not folder.is_dir():
+        return []
+    rows = itertools.chain(_halmstad(folder / "halmstad"), _exact(folder), _strangers(Path(data)))
+    return [asdict(row) for row in rows]
+
+
+def transform_of_pixels(pixel: dict[str, float], resolution: float, rows_a: int, rows_b: int) -> Transform:
+    """Return the transform from map b into a of a pair given in pixels.
+
+    Its truth is q_a = R q_b + t in pixels whose y runs down.
+    """
+    theta = math.radians(pixel["theta_deg"])
+    corner = Transform(pixel["tx"], pixel["ty"], theta).apply((0.0, rows_b))
+    return Transform(float(corner[0]) * resolution, (rows_a - float(corner[1])) * resolution, -theta)
+
+
+def correspondence_error(
+    truth: dict[str, Any], resolution: float, rows: tuple[int, int], a_from_b: Transform
+) -> tuple[float, float]:
+    """Return the median distance of correspondences under a transform, and its error of rotation [m, rad].
+
+    Correspondences are pixels whose y runs down, of maps a (``dst_pts``) and b (``src_pts``).
+    """
+    in_a, in_b = (
+        np.column_stack([points[:, 0], count - points[:, 1]]) * resolution
+        for points, count in zip((np.array(truth["dst_pts"]), np.array(truth["src_pts"])), rows, strict=True)
+    )
+    distance = float(np.median(np.linalg.norm(a_from_b.apply(in_b) - in_a, axis=1)))
+    return distance, abs(math.remainder(a_from_b.theta + math.radians(truth["theta_deg"]), 2.0 * math.pi))
+
+
+def _halmstad(folder: Path) -> Iterator[Row]:
+    """Yield the usable pairs of sensor maps with correspondences."""
+    if not (folder / "ground_truth.json.gz").is_file():
+        return
+    for name, truth in json.loads(gzip.decompress((folder / "ground_truth.json.gz").read_bytes())).items():
+        source, target = name.split("__")
+        if not truth.get("usable") or "layout" in name:
+            continue
+        a, b = (
+            _Grid(read_grey_map(folder / f"{one}.png", HALMSTAD_M).levels, HALMSTAD_M)
+            for one in (target, source)
+        )
+        result, time_ms = _merged(a, b)
+        error = None
+        if result.a_from_b is not None:
+            error = correspondence_error(truth, HALMSTAD_M, (len(a.levels), len(b.levels)), result.a_from_b)
+        is_right = error is not None and error[0] < RIGHT_M and error[1] < RIGHT_ANGLE
+        yield _row((name, "halmstad"), source.startswith(TUNED_BUILDING), (result, time_ms), error, is_right)
+
+
+def _exact(folder: Path) -> Iterator[Row]:
+    """Yield the pairs with an exact truth in pixels."""
+    for collection in ("real", "log_split"):
+        path = folder / collection / "ground_truth.json"
+        if not path.is_file():
+            continue
+        for name, truth in json.loads(path.read_text(encoding="utf-8")).items():
+            resolution = float(truth["resolution"]) if collection == "log_split" else REAL_M
+            a, b = (
+                _Grid(read_grey_map(path.parent / truth[key], resolution).levels, resolution) for key in "AB"
+            )
+            result, time_ms = _merged(a, b)
+            wanted = transform_of_pixels(truth.get("pixel", truth), resolution, len(a.levels), len(b.levels))
+            error = None
+            if result.a_from_b is not None:
+                error = result.a_from_b.difference(wanted, result.agreement.centre)
+            is_right = error is not None and error[0] < EXACT_M and error[1] < EXACT_ANGLE
+            is_tuned = collection == "log_split" and name.endswith("easy")
+            yield _row((name, collection), is_tuned, (result, time_ms), error, is_right)
+
+
+def _strangers(data: Path) -> Iterator[Row]:
+    """Yield all pairs of maps of different buildings; every other one was for tuning."""
+    every = list(_single_maps(data))
+    pairs = [(first, second) for first, second in itertools.combinations(every, 2) if first[1] != second[1]]
+    for number, ((a, _, grid), (b, _, other)) in enumerate(pairs, 1):
+        yield _row((f"{a}, {b}", "strangers"), number % 2 == 0, _merged(grid, other), None, is_right=False)
+
+
+def _single_maps(data: Path) -> Iterator[tuple[str, str, _Grid]]:
+    """Yield a name, a building and a map of each building, or two."""
+    for path in sorted((data / "slam_maps").glob("*.yaml")):
+        if path.stem not in PARTS:
+            image = read_ros_map(path)
+            yield path.stem, ONE_BUILDING.get(path.stem, path.stem), _Grid(image.levels, image.resolution)
+    folder = data / "map_pairs"
+    for name in STRANGERS_OF_HALMSTAD:
+        path = folder / "halmstad" / f"{name}.png"
+        if path.is_file():
+            grid = _Grid(read_grey_map(path, HALMSTAD_M).levels, HALMSTAD_M)
+            yield name, name.split("_")[0], grid
+    path = folder / "real" / "soorajsunil_A.png"
+    if path.is_file():
+        yield path.stem, path.stem, _Grid(read_grey_map(path, REAL_M).levels, REAL_M)
+
+
+def _merged(a: _Grid, b: _Grid) -> tuple[PairResult, float]:
+    """Return what comes of two maps, in cells of the coarser one, and how long it took [ms].
+
+    What is explained of a pair that is joined at once is not in the time.
+    """
+    settings, side = merge_settings(), max(a.resolution, b.resolution)
+    levels = [resampled(grid.levels, grid.resolution, side) for grid in (a, b)]
+    began = time.process_time()
+    first, second = (described(each, side, settings) for each in levels)
+    result = merge_pair(first, second, settings)
+    spent = 1e3 * (time.process_time() - began)
+    return explained(first, second, result, settings), spent
+
+
+def _row(
+    names: tuple[str, str],
+    is_tuned: bool,
+    found: tuple[PairResult, float],
+    error: tuple[float, float] | None,
+    is_right: bool,
+) -> Row:
+    result, time_ms = found
+    distance_m, angle = (None, None) if error is None else error
+    return Row(
+        names[0],
+        names[1],
+        is_tuned,
+        result.is_accepted,
+        is_right,
+        distance_m,
+        angle,
+        result.found_by,
+        result.reason,
+        round(result.confidence, 4),
+        round(result.ranked[0].bend.bend_m, 4) if result.ranked else 0.0,
+        round(time_ms, 3),
+    )

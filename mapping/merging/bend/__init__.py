@@ -1,0 +1,1 @@
+"""Finds how much two maps of one place are bent against each other."""

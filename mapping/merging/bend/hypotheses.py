@@ -1,0 +1,170 @@
+"""What speaks for and against each transform once maps may be bent, and how sure the best one is.
+
+The confidence is that of a logistic model of maps of one place against strangers. It was fitted to maps of
+real buildings; the reference on merging says to which, and which were kept for the figures.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.agreement.validation import Agreement, ValidationSettings, compare
+from lidarium.mapping.merging.bend.bent_agreement import compare_bent
+from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, estimate_bend
+from lidarium.mapping.merging.description.described_map import DescribedMap
+
+LOOSE = ValidationSettings(hit_distance_m=0.3, miss_distance_m=0.6)
+"""Tolerance with which transforms are chosen that are worth bending: bends of halls are not longer."""
+
+LEAST_OVERLAP_M2, LEAST_EVIDENCE_M, MOST_RIVAL_SHARE = 15.0, 4.0, 0.6
+"""Overlap of a room, which looks like others [m2], least evidence [m], and most that a rival may have."""
+
+MOST_STRAIN = 0.05
+"""Most that a map is stretched against another of the same place."""
+
+SHARP_SPREAD_M, FEW_ROOMS_M2, SHARP_QUALITY = 0.035, 60.0, 0.9
+"""Spread of gaps of sharp maps [m], overlap of a few rooms [m2], and their least quality."""
+
+WEIGHTS = (-11.308, 1.034, -1.06, -2.6, 3.195, 2.35, 1.4, -1.655)
+"""Weights of the logistic model: of 1, of the logarithms of evidence and of one less the quality, of the
+rival's share, and of the logarithms of overlap, evidence over extent, `Signs.across_m` and contradiction."""
+
+RIVAL_M, RIVAL_ANGLE = 1.0, math.radians(8.0)
+"""Hypotheses that differ by more are of different places [m, rad]; by less, bends make them one."""
+
+
+class Hypothesis(NamedTuple):
+    """A transform, how the map is bent under it, and what the maps say of it.
+
+    Attributes
+    ----------
+    bend : Bend
+        Rigid motion and bend.
+    agreement : Agreement
+        What agrees once the map is bent.
+    """
+
+    bend: Bend
+    agreement: Agreement
+
+    @property
+    def evidence_m(self) -> float:
+        """Length of walls that agree, less half of those that do not and of those that contradict [m].
+
+        A wall that contradicts is among both.
+        """
+        found = self.agreement
+        return found.agreeing_m - 0.5 * (found.wall_m - found.agreeing_m) - 0.5 * found.contradicting_m
+
+
+def ranked_hypotheses(
+    a: DescribedMap, b: DescribedMap, transforms: list[Transform], settings: BendSettings
+) -> list[Hypothesis]:
+    """Return the most promising transforms with the bend under each, that with most evidence first.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        Maps of one resolution.
+    transforms : list of Transform
+        Candidates for ``a_from_b``.
+    settings : BendSettings
+        How much maps may be bent, and how many candidates are bent.
+    """
+    loose = [compare(a, b, transform, LOOSE).evidence_m for transform in transforms]
+    order = np.argsort(-np.array(loose), kind="stable")[: settings.candidates].tolist()
+    bends = [estimate_bend(a, b, transforms[k], settings) for k in order]
+    found = [Hypothesis(bend, compare_bent(a, b, bend)) for bend in bends]
+    return sorted(found, key=lambda one: -one.evidence_m)
+
+
+def is_other(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two hypotheses are of different places."""
+    distance, angle = one.bend.a_from_b.difference(other.bend.a_from_b, one.agreement.centre)
+    return distance > RIVAL_M or angle > RIVAL_ANGLE
+
+
+class Signs(NamedTuple):
+    """What tells maps of one place from strangers.
+
+    Attributes
+    ----------
+    evidence_m : float
+        Evidence of the best hypothesis [m].
+    quality : float
+        The same as a share of the walls that agree.
+    overlap_m2 : float
+        Area that both know [m2].
+    across_m : float
+        Length of walls that hold the maps in the direction in which they are held least [m].
+    rival_share : float
+        Evidence of the best hypothesis of another place, as a share.
+    extent_m : float
+        Geometric mean of the lengths of wall of both maps: longer ones offer more places to look alike [m].
+    contradicting_m : float
+        Length of walls in the free space of the other map, the sum of both maps [m].
+    strain : float
+        By how much of the distance one map is stretched or sheared against the other.
+    spread_m : float
+        Spread of the gaps between walls that the bend leaves [m].
+    """
+
+    evidence_m: float
+    quality: float
+    overlap_m2: float
+    across_m: float
+    rival_share: float
+    extent_m: float
+    contradicting_m: float
+    strain: float
+    spread_m: float
+
+
+def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> Signs:
+    """Return what tells the best of ranked hypotheses from a chance."""
+    best = ranked[0]
+    evidence = max(best.evidence_m, 0.0)
+    rival = next((one.evidence_m for one in ranked[1:] if is_other(best, one)), 0.0)
+    return Signs(
+        evidence,
+        evidence / max(best.agreement.agreeing_m, 1e-9),
+        best.agreement.overlap_m2,
+        best.agreement.across_m,
+        min(max(rival, 0.0) / max(evidence, 1e-9), 1.0),
+        a.resolution * math.sqrt(len(a.walls) * len(b.walls)),
+        best.agreement.contradicting_m,
+        best.bend.strain,
+        best.bend.spread_m,
+    )
+
+
+def confidence_of(signs: Signs) -> float:
+    """Return how sure it is that two maps are of one place, from 0 to 1.
+
+    It is 0 where an overlap is no larger than rooms that look alike, where another place explains the maps
+    nearly as well, where one map would have to be stretched more than robots' maps are, and where much
+    differs between sharp maps of a few rooms: in these, only furniture may.
+    """
+    is_sharp = signs.spread_m < SHARP_SPREAD_M and signs.overlap_m2 < FEW_ROOMS_M2
+    if (
+        signs.overlap_m2 < LEAST_OVERLAP_M2
+        or signs.evidence_m < LEAST_EVIDENCE_M
+        or signs.rival_share > MOST_RIVAL_SHARE
+        or signs.strain > MOST_STRAIN
+        or (is_sharp and signs.quality < SHARP_QUALITY)
+    ):
+        return 0.0
+    known = (
+        1.0,
+        math.log(signs.evidence_m),
+        math.log(max(1.0 - signs.quality, 0.01)),
+        signs.rival_share,
+        math.log(signs.overlap_m2),
+        math.log(signs.evidence_m / signs.extent_m),
+        math.log(max(signs.across_m, 0.1)),
+        math.log(0.3 + signs.contradicting_m),
+    )
+    total = sum(weight * value for weight, value in zip(WEIGHTS, known, strict=True))
+    return 1.0 / (1.0 + math.exp(-min(max(total, -50.0), 50.0)))
