@@ -16,6 +16,7 @@ from lidarium.benchmarks.studies.merging.trials import Outcome
 
 Tried = Sequence[tuple[Pair, Outcome]]
 
+SAME_PLACE = ("positive", "refurnished")
 NEGATIVE, UNDECIDABLE = ("negative", "look_alike"), ("symmetric", "indistinct")
 
 
@@ -53,13 +54,18 @@ class Share:
 
 
 def is_plenty(pair: Pair) -> bool:
-    """Return whether a pair is a positive with much overlap."""
-    return pair.category == "positive" and pair.overlap >= PLENTY
+    """Return whether a pair is of one place with much overlap, moved furniture or not."""
+    return pair.category in SAME_PLACE and pair.overlap >= PLENTY
 
 
 def is_little(pair: Pair) -> bool:
-    """Return whether a pair is a positive with little overlap."""
-    return pair.category == "positive" and pair.overlap < PLENTY
+    """Return whether a pair is of one place with little overlap."""
+    return pair.category in SAME_PLACE and pair.overlap < PLENTY
+
+
+def is_refurnished(pair: Pair) -> bool:
+    """Return whether a pair is of one place whose furniture was taken away between its maps."""
+    return pair.category == "refurnished"
 
 
 def recall(tried: Tried, of: Callable[[Pair], bool], above: float = -math.inf) -> Share:
@@ -93,7 +99,7 @@ def wrong_positives(tried: Tried) -> Share:
 
     It is more than 0.5 m or 5 degrees off.
     """
-    chosen = [outcome for pair, outcome in tried if pair.category == "positive"]
+    chosen = [outcome for pair, outcome in tried if pair.category in SAME_PLACE]
     return Share(sum(one.is_accepted and not _is_near(one) for one in chosen), len(chosen))
 
 
@@ -113,7 +119,7 @@ def errors(tried: Tried) -> tuple[float, float, float]:
     found = [
         (one.distance_m, one.angle)
         for pair, one in tried
-        if pair.category == "positive" and one.is_accepted and one.distance_m is not None
+        if pair.category in SAME_PLACE and one.is_accepted and one.distance_m is not None
     ]
     if not found:
         return math.nan, math.nan, math.nan

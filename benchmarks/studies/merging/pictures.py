@@ -52,7 +52,11 @@ def _chosen(pairs: list[Pair], outcomes: list[Outcome]) -> list[tuple[str, Pair]
         ),
         (
             "look-alike, refused",
-            lambda pair, one: pair.category == "look_alike" and pair.overlap > 0.5 and not one.is_accepted,
+            lambda pair, one: pair.category == "look_alike" and not one.is_accepted,
+        ),
+        (
+            "furniture taken away, joined",
+            lambda pair, one: pair.category == "refurnished" and pair.differing_m > 2.0 and one.is_accepted,
         ),
         ("symmetric, refused", lambda pair, one: pair.category == "symmetric" and not one.is_accepted),
     )

@@ -19,6 +19,7 @@ def bank_table(tried: dict[str, figures.Tried]) -> str:
     rows: list[tuple[str, Callable[[figures.Tried], object]]] = [
         ("recall, overlap 30 % and more", lambda one: figures.recall(one, figures.is_plenty)),
         ("recall, overlap 15 to 30 %", lambda one: figures.recall(one, figures.is_little)),
+        ("recall, furniture taken away", lambda one: figures.recall(one, figures.is_refurnished)),
         ("false accepts", lambda one: figures.accepted(one, figures.NEGATIVE)),
         ("of these look-alikes", lambda one: figures.accepted(one, ("look_alike",))),
         ("positives joined far off", figures.wrong_positives),
@@ -110,10 +111,8 @@ def reading(tried: dict[str, figures.Tried]) -> str:
         "common under the best transform: what both know is open floor, on which any two rooms agree. "
         "Whoever accepts on less accepts "
         "strangers too.\n"
-        "- Indistinct negatives are maps of a floor and its copy whose difference neither robot has seen, or "
-        "less than 1 m of it: they are "
-        "the same as maps of one floor, so whoever joins those joins them. To refuse them all is to refuse "
-        "every pair. Symmetric positives "
+        "- Indistinct negatives are like rooms that differ by less than 1 m of wall: whoever joins maps of "
+        "one room joins them. Symmetric positives "
         "that are accepted are like rooms whose wrong overlay shows more walls than the true one."
     )
 
@@ -129,7 +128,7 @@ def by_stage(tried: figures.Tried) -> str:
             def of(pair: Pair, low: float = low, high: float = high, early: int | None = early) -> bool:
                 stages = [int(key.rsplit("_", 1)[1]) for key in (pair.a, pair.b)]
                 return (
-                    pair.category == "positive"
+                    pair.category in figures.SAME_PLACE
                     and low <= pair.overlap < high
                     and early in (None, stages.count(0))
                 )
@@ -155,7 +154,7 @@ def beside_thesis(tried: dict[str, figures.Tried]) -> str:
         f"{sum(spent) / len(spent):.0f} ms mean, {max(spent):.0f} ms worst |",
     ]
     for method, name in (("thesis", "thesis mode"), ("default", "default mode")):
-        positives = figures.recall(tried[method], lambda pair: pair.category == "positive")
+        positives = figures.recall(tried[method], lambda pair: pair.category in figures.SAME_PLACE)
         times = figures.times(tried[method])
         negatives = figures.accepted(tried[method], figures.NEGATIVE)
         lines.append(

@@ -83,9 +83,10 @@ class Pair:
     half : str
         ``tuning`` or ``test``.
     category : str
-        ``positive``; ``negative``; ``look_alike``, a negative that differs by 1 m of wall or more wherever it
-        looks alike; ``symmetric``, a positive that another transform explains as well; ``indistinct``, a
-        negative that differs by less.
+        ``positive``; ``refurnished``, a positive whose furniture was taken away between the maps;
+        ``negative``; ``look_alike``, a negative that differs by 1 m of wall or more wherever it looks alike;
+        ``symmetric``, a positive that another transform explains as well; ``indistinct``, a negative that
+        differs by less.
     overlap : float
         Share of the smaller known area that both know, of maps of one floor.
     pose : (x, y, theta) or None

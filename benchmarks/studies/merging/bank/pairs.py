@@ -196,11 +196,11 @@ def _within_floors(
 
 
 def _copies(known: list[_Known], half: str, wanted: Wanted, generator: np.random.Generator) -> Iterator[Pair]:
-    """Yield pairs of a floor's and its copy's maps.
+    """Yield pairs of a floor's and its copy's maps: the same place, whose furniture was taken away.
 
-    What was removed between them was seen by both.
+    Most of them have both seen what was taken away.
     """
-    room = {"look_alike": wanted.copies, "indistinct": wanted.indistinct}
+    room = {True: wanted.copies, False: wanted.indistinct}
     originals = [one for one in known if not one.map.floor.is_copy]
     copies = [one for one in known if one.map.floor.is_copy]
     candidates = [(a, b) for a in originals for b in copies if b.map.floor.original == a.map.floor.name]
@@ -211,10 +211,13 @@ def _copies(known: list[_Known], half: str, wanted: Wanted, generator: np.random
         if overlap < OVERLAPPING:
             continue
         differing = compare(a.truth, b.truth, Transform(), _TRUTH).contradicting_m
-        category = "look_alike" if differing >= DIFFERENT_M else "indistinct"
-        if room[category] > 0:
-            room[category] -= 1
-            yield Pair(a.map.key, b.map.key, half, category, round(overlap, 4), None, at, round(differing, 3))
+        has_seen = differing >= DIFFERENT_M
+        if room[has_seen] > 0:
+            room[has_seen] -= 1
+            pose = (true.x, true.y, true.theta)
+            yield Pair(
+                a.map.key, b.map.key, half, "refurnished", round(overlap, 4), pose, at, round(differing, 3)
+            )
 
 
 def _across_floors(

@@ -85,9 +85,11 @@ def test_figures_count_what_they_say():
         (negative, outcome(True, confidence=0.95)),
         (alike, outcome(False)),
         (symmetric, outcome(False)),
+        (Pair("a", "b", "test", "refurnished", 0.5), outcome(True, 0.01, 0.0, confidence=0.5)),
     ]
-    assert figures.recall(tried, figures.is_plenty).hits == 1
-    assert figures.recall(tried, figures.is_plenty).total == 3
+    assert figures.recall(tried, figures.is_plenty).hits == 2
+    assert figures.recall(tried, figures.is_plenty).total == 4
+    assert figures.recall(tried, figures.is_refurnished).value == 1.0
     assert figures.safe_threshold(tried) == 0.95
     assert figures.safe_threshold(tried, ("look_alike",)) == 0.0
     assert figures.accepted(tried, ("negative",), above=0.95).hits == 0
@@ -96,7 +98,7 @@ def test_figures_count_what_they_say():
     assert str(figures.accepted(tried, figures.NEGATIVE)).startswith("50.0 % (1 of 2")
     assert figures.refused(tried, figures.UNDECIDABLE).value == 1.0
     assert figures.wrong_positives(tried).hits == 1
-    assert figures.errors(tried)[0] == pytest.approx(0.3)
+    assert figures.errors(tried)[0] == pytest.approx(0.16)
     assert figures.times(tried).median == 10.0
     assert figures.times([]).count == 0
 
