@@ -3,7 +3,6 @@
 Each map has its colour.
 """
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +29,7 @@ from lidarium.mapping.merging.merger import Merged
 INK, SEVERAL = "#1f2937", np.array([31, 41, 55], np.uint8)
 DPI = 130
 _HEIGHT, _WIDEST = 7.0, 14.0
-_MOST_PANELS, _MOST_TITLE = 6, 60
+_MOST_PANELS, _MOST_COLUMNS, _MOST_TITLE = 6, 3, 60
 _MISS_M = 0.15
 """A wall contradicts where all within this distance is free [m]."""
 
@@ -89,15 +88,20 @@ def save_merge_picture(path: Path, merged: Merged, corners: Mapping[str, Transfo
         fuse([merged.levels[name] for name in panel.names], panel.root_from_map, merged.resolution)
         for panel in panels
     ]
-    widths = [max(one.levels.shape[1] / one.levels.shape[0], 0.4) for one in fused]
-    width = min(max(_HEIGHT * sum(widths), 5.0), _WIDEST)
-    figure = Figure(figsize=(width, min(_HEIGHT, width / sum(widths)) + 0.8), dpi=DPI, layout="constrained")
+    columns = min(len(panels), _MOST_COLUMNS)
+    rows = -(-len(panels) // columns)
+    ratio = max(one.levels.shape[1] / one.levels.shape[0] for one in fused)
+    width = min(max(_HEIGHT * max(ratio, 0.4) * columns, 5.0), _WIDEST)
+    height = min(_HEIGHT, max(width / columns / ratio, 2.0)) + 0.8
+    figure = Figure(figsize=(width, height * rows), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     names = list(merged.levels)
     colours = dict(zip(names, team_colours(len(names)), strict=True))
-    axes_of_panels = figure.subplots(1, len(panels), width_ratios=widths, squeeze=False)[0]
-    for axes, panel, one in zip(axes_of_panels, panels, fused, strict=True):
+    every = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes, panel, one in zip(every, panels, fused, strict=False):
         _draw_panel(axes, merged, panel, one, (colours, corners[panel.names[0]]))
+    for axes in every[len(panels) :]:
+        axes.set_axis_off()
     with whole_file(path) as beside, plain_words(figure):
         figure.savefig(beside)
 
@@ -112,14 +116,13 @@ def _save_nothing(path: Path) -> None:
 
 
 def _panels(merged: Merged) -> list[_Panel]:
-    """Return what is drawn: the joined groups and the refused pairs, else the maps alone."""
+    """Return what is drawn: joined groups, and refused pairs of maps that join none, else the maps alone."""
     known = {name for name, levels in merged.levels.items() if (levels != UNKNOWN).any()}
     panels = [_group_panel(merged, group) for group in merged.groups() if len(group) > 1]
-    joined = {edge for group in merged.groups() for edge in itertools.permutations(group, 2)}
+    joined = {name for panel in panels for name in panel.names}
     for (a, b), result in merged.pairs.items():
-        if len(panels) < _MOST_PANELS and (a, b) not in joined and {a, b} <= known:
-            if result.a_from_b is None:
-                continue
+        is_refused = {a, b} <= known and not {a, b} <= joined
+        if len(panels) < _MOST_PANELS and is_refused and result.a_from_b is not None:
             title = f"refused, {shortened(result.reason, _MOST_TITLE)}"
             panels.append(_Panel([a, b], [Transform(), result.a_from_b], title, []))
     return panels or [

@@ -1,6 +1,4 @@
-"""Common frames of maps that were joined in pairs.
-
-They follow from the best forest of transforms, in which none contradicts another.
+"""Common frames of maps that were joined in pairs, by the best forest of transforms.
 
 Maps are nodes, accepted transforms edges. Of each group of joined maps one is the root; the world's frame is
 that of the root of the group that was there first, and stays where it is while others join.
@@ -15,6 +13,9 @@ from typing import Generic, TypeVar
 from lidarium.mapping.geometry.rigid import Transform
 
 Name = TypeVar("Name", bound=Hashable)
+
+BEND_LENGTH_M = 10.0
+"""Over such a length a bend turns a map by its offset [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +32,8 @@ class Edge(Generic[Name]):
         How much speaks for it; edges of more weight are kept before others.
     centre : (x, y)
         Where the maps overlap, in map b [m]; distances around cycles are taken there.
+    slack_m : float
+        By how much more than others it may be off, as maps are bent [m].
     """
 
     a: Name
@@ -38,6 +41,7 @@ class Edge(Generic[Name]):
     a_from_b: Transform
     weight: float
     centre: tuple[float, float] = (0.0, 0.0)
+    slack_m: float = 0.0
 
 
 @dataclass(slots=True)
@@ -276,7 +280,10 @@ class FrameTree(Generic[Name]):
         """
         through = self._reached_from(edge.a)[edge.b]
         distance, angle = through.difference(edge.a_from_b, edge.centre)
-        return max(distance / self.cycle_distance_m, angle / self.cycle_angle)
+        slack_m = edge.slack_m + sum(one.slack_m for one in self._way(edge.a, edge.b))
+        return max(
+            distance / (self.cycle_distance_m + slack_m), angle / (self.cycle_angle + slack_m / BEND_LENGTH_M)
+        )
 
     def _settle_roots(self) -> None:
         """Keep the roots that there were, the oldest one where groups have become one.

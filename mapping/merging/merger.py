@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging.bend.hypotheses import agrees_bent
 from lidarium.mapping.merging.description.described_map import (
     DescribedMap,
     check_resolution,
@@ -208,9 +209,7 @@ def _all_pairs(
             )
             found[a, b] = result
             if result.is_accepted and result.a_from_b is not None:
-                tree.add_edge(
-                    Edge(a, b, result.a_from_b, result.agreement.evidence_m, result.agreement.centre)
-                )
+                tree.add_edge(_edge(a, b, result, result.a_from_b, result.agreement.centre))
     return {pair: found[pair] for pair in every}
 
 
@@ -270,16 +269,25 @@ def joined_tree(
         if result.is_accepted and result.a_from_b is not None:
             centre = frames[b].apply(result.agreement.centre)
             a_from_b = frames[a] @ result.a_from_b @ frames[b].inverse()
-            edges.append(
-                Edge(a, b, a_from_b, result.agreement.evidence_m, (float(centre[0]), float(centre[1])))
-            )
+            edges.append(_edge(a, b, result, a_from_b, (float(centre[0]), float(centre[1]))))
+    are_bent = any(edge.slack_m > 0.0 for edge in edges)
 
     def contradicts(a: str, b: str, a_from_b: Transform) -> bool:
         implied = frames[a].inverse() @ a_from_b @ frames[b]
-        return is_contradicted(features[a], features[b], implied, settings)
+        if not is_contradicted(features[a], features[b], implied, settings):
+            return False
+        return not (are_bent and agrees_bent(features[a], features[b], implied, settings.bend))
 
     tree.set_edges(edges, contradicts)
     return tree
+
+
+def _edge(a: str, b: str, result: PairResult, a_from_b: Transform, centre: tuple[float, float]) -> Edge[str]:
+    """Return the edge of an accepted pair; bent maps may miss each other by their bend around cycles."""
+    if result.found_by != "bend" or not result.ranked:
+        return Edge(a, b, a_from_b, result.agreement.evidence_m, centre)
+    best = result.ranked[0]
+    return Edge(a, b, a_from_b, best.evidence_m, centre, 2.0 * best.bend.bend_m)
 
 
 def placed(origin: tuple[float, float]) -> Transform:

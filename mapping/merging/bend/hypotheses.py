@@ -75,15 +75,25 @@ def ranked_hypotheses(
     """
     loose = [compare(a, b, transform, LOOSE).evidence_m for transform in transforms]
     order = np.argsort(-np.array(loose), kind="stable")[: settings.candidates].tolist()
-    bends = [estimate_bend(a, b, transforms[k], settings) for k in order]
-    found = [Hypothesis(bend, compare_bent(a, b, bend)) for bend in bends]
+    found = [_bent(a, b, transforms[k], settings) for k in order]
     return sorted(found, key=lambda one: -one.evidence_m)
+
+
+def _bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings) -> Hypothesis:
+    bend = estimate_bend(a, b, a_from_b, settings)
+    return Hypothesis(bend, compare_bent(a, b, bend))
 
 
 def is_other(one: Hypothesis, other: Hypothesis) -> bool:
     """Whether two hypotheses are of different places."""
     distance, angle = one.bend.a_from_b.difference(other.bend.a_from_b, one.agreement.centre)
     return distance > RIVAL_M or angle > RIVAL_ANGLE
+
+
+def agrees_bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings) -> bool:
+    """Return whether maps that others join agree once they are bent, as most of what both know does."""
+    bent = _bent(a, b, a_from_b, settings)
+    return bent.agreement.wall_m == 0.0 or bent.evidence_m > 0.0
 
 
 class Signs(NamedTuple):

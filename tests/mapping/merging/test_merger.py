@@ -1,9 +1,10 @@
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, noisy, room
+from drawn_maps import RESOLUTION, about_middle, apartment, blank, bowed, hall, kept, moved, noisy, room
 
 import lidarium
 from lidarium.envs.exploration import ExplorationEnv
@@ -13,9 +14,9 @@ from lidarium.mapping.files.map_files import FREE, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import three_levels
 from lidarium.mapping.merging import merger
-from lidarium.mapping.merging.merger import merge_maps
-from lidarium.mapping.merging.pair import merge_pair
-from lidarium.mapping.merging.settings import merge_settings
+from lidarium.mapping.merging.merger import joined_tree, merge_maps
+from lidarium.mapping.merging.pair import described, merge_pair
+from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 
 
 def parts():
@@ -135,3 +136,46 @@ def test_maps_of_robots_that_start_apart_are_joined_where_they_met():
     distance, angle = found.difference(truth, merged.pairs["first", "second"].agreement.centre)
     assert distance < 0.1
     assert angle < math.radians(1.0)
+
+
+def test_a_ring_of_bent_maps_is_joined_and_its_one_false_pair_is_named():
+    whole, settings = hall(), MergeSettings()
+    parts = {
+        "west": kept(whole, slice(0, 180), slice(0, 260)),
+        "east": kept(whole, slice(0, 180), slice(100, 400)),
+        "south": kept(whole, slice(0, 130), slice(0, 400)),
+        "north": kept(whole, slice(50, 180), slice(0, 400)),
+        "all": whole,
+    }
+    sags = (0.0, 0.25, -0.2, 0.15, 0.3)
+    maps = {
+        name: (bowed(part, sag), RESOLUTION) for (name, part), sag in zip(parts.items(), sags, strict=True)
+    }
+    merged = merge_maps(maps)
+    assert len(merged.groups()) == 1
+    assert not merged.tree.dropped
+    for name in parts:
+        transform = merged.tree.lookup("west", name)
+        assert transform is not None
+        distance, angle = transform.difference(Transform(), (7.0, 4.0))
+        assert distance < 0.3
+        assert angle < math.radians(3.0)
+    false = replace(merged.pairs["south", "north"], a_from_b=Transform(3.0, 0.0, 0.0))
+    weak = replace(false.agreement, agreeing_m=8.0, wall_m=9.0)
+    pairs = {**merged.pairs, ("south", "north"): replace(false, agreement=weak, found_by="corners")}
+    features = {name: described(levels, RESOLUTION, settings) for name, levels in merged.levels.items()}
+    tree = joined_tree(features, pairs, settings)
+    assert [(edge.a, edge.b) for edge in tree.dropped] == [("south", "north")]
+    assert len(tree.groups()) == 1
+
+
+def test_maps_of_too_many_cells_are_refused_with_the_limit():
+    one = np.broadcast_to(np.uint8(255), (20_000, 20_000))
+    with pytest.raises(ValueError, match=r"'large': .* want at most 50,000,000 cells"):
+        merge_maps({"large": (one, 0.05), "small": (hall(), 0.05)})
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, math.nan, math.inf])
+def test_scales_that_are_none_are_refused(scale):
+    with pytest.raises(ValueError, match="'b': the resolution of a map is"):
+        merge_maps({"a": (hall(), 0.05), "b": (hall(), scale)})
