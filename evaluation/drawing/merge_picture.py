@@ -149,9 +149,9 @@ def _draw_panel(
     merged: Merged,
     panel: _Panel,
     fused: FusedMap,
-    looks: tuple[dict[str, Colour], Transform],
+    style: tuple[dict[str, Colour], Transform],
 ) -> None:
-    colours, corner = looks
+    colours, corner = style
     rows, columns = fused.levels.shape
     x, y = fused.origin
     right, top = x + columns * fused.resolution, y + rows * fused.resolution

@@ -56,8 +56,8 @@ def _figures(rows: Rows, name: str) -> str:
     times = [row["time_ms"] for row in rows]
     bends = [row["bend_m"] for row in joined]
     bend = f"{np.median(bends):.2f}" if bends else "-"
-    told = "-" if name == "strangers" else str(right)
-    return f"{count} | {told} | {wrong} | {bend} | {np.median(times):.0f} / {np.quantile(times, 0.95):.0f}"
+    share = "-" if name == "strangers" else str(right)
+    return f"{count} | {share} | {wrong} | {bend} | {np.median(times):.0f} / {np.quantile(times, 0.95):.0f}"
 
 
 def _curve(rows: Rows) -> str:

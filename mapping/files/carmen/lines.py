@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from lidarium.mapping.files.mending.beam_directions import Beams, stated_beams
 
 _QUIET = ("#", "NEFF", "PARAM", "SYNC", "MARKER", "RLASER", "REMISSION", "TRUEPOS")
-"""Messages that tell nothing that is needed here."""
+"""Messages that hold nothing that is needed here."""
 
 
 @dataclass(slots=True, eq=False)

@@ -1,6 +1,6 @@
 """Estimation of the bend between two maps: many local alignments that hold each other.
 
-Each wall of map b looks along its normal for a wall of map a that faces the same direction. The offsets at
+Each wall of map b seeks along its normal a wall of map a that faces the same direction. The offsets at
 the nodes of a coarse grid are those that bring walls onto walls, with springs between neighbouring nodes.
 They follow the walls where many agree, and stay with their neighbours elsewhere.
 
@@ -46,7 +46,7 @@ class BendSettings:
     most_nodes : int
         Along a side of the grid.
     reach_m : float
-        How far a wall looks for another at first [m].
+        How far a wall seeks another at first [m].
     last_reach_m : float
         How far at last [m].
     stiffness : float

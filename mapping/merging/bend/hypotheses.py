@@ -19,7 +19,7 @@ LOOSE = ValidationSettings(hit_distance_m=0.3, miss_distance_m=0.6)
 """Tolerance with which transforms are chosen that are worth bending: bends of halls are not longer."""
 
 LEAST_OVERLAP_M2, LEAST_EVIDENCE_M, MOST_RIVAL_SHARE = 15.0, 4.0, 0.6
-"""Overlap of a room, which looks like others [m2], least evidence [m], and most that a rival may have."""
+"""Overlap of a room, which is like others [m2], least evidence [m], and most that a rival may have."""
 
 MOST_STRAIN = 0.05
 """Most that a map is stretched against another of the same place."""
@@ -97,7 +97,7 @@ def agrees_bent(a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings:
 
 
 class Signs(NamedTuple):
-    """What tells maps of one place from strangers.
+    """What distinguishes maps of one place from strangers.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Signs(NamedTuple):
     rival_share : float
         Evidence of the best hypothesis of another place, as a share.
     extent_m : float
-        Geometric mean of the lengths of wall of both maps: longer ones offer more places to look alike [m].
+        Geometric mean of the lengths of wall of both maps: longer ones offer more places that are alike [m].
     contradicting_m : float
         Length of walls in the free space of the other map, the sum of both maps [m].
     strain : float
@@ -133,7 +133,7 @@ class Signs(NamedTuple):
 
 
 def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> Signs:
-    """Return what tells the best of ranked hypotheses from a chance."""
+    """Return what distinguishes the best of ranked hypotheses from a chance."""
     best = ranked[0]
     evidence = max(best.evidence_m, 0.0)
     rival = next((one.evidence_m for one in ranked[1:] if is_other(best, one)), 0.0)
@@ -153,7 +153,7 @@ def signs_of(a: DescribedMap, b: DescribedMap, ranked: list[Hypothesis]) -> Sign
 def confidence_of(signs: Signs) -> float:
     """Return how sure it is that two maps are of one place, from 0 to 1.
 
-    It is 0 where an overlap is no larger than rooms that look alike, where another place explains the maps
+    It is 0 where an overlap is no larger than rooms that are alike, where another place explains the maps
     nearly as well, where one map would have to be stretched more than robots' maps are, and where much
     differs between sharp maps of a few rooms: in these, only furniture may.
     """
