@@ -144,8 +144,8 @@ def _about_bank(folder: Path, tested: int) -> str:
         "had been looked at: of the 554 and 572 negatives there 1 and 6 were accepted, the bounds were "
         "tightened, and like rooms of which "
         "some overlay shows no difference were counted as indistinct. When maps could be bent, 2 pairs of "
-        "this half were wrongly joined, and the bounds of rivals, of stretch and of sharp maps were set. A positive is "
-        "recalled where it is "
+        "this half were wrongly joined, and the bounds of rivals, of stretch and of sharp maps were set. "
+        "A positive is recalled where it is "
         "joined within 0.10 m and 1 degree "
         "at the overlap's centroid. Intervals are Clopper and Pearson's, 95 %."
     )
