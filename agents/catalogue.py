@@ -42,6 +42,11 @@ POLICIES.register(
     "least cost of distance less size of the frontier, both in metres (explore_lite)",
 )
 POLICIES.register(
+    "sparse_frontier",
+    "lidarium.agents.sparse_frontier:SparseFrontier",
+    "robots see all ground with depth cameras, and plan on sparse maps of boxes",
+)
+POLICIES.register(
     "srt",
     "lidarium.agents.srt.policy:SensorBasedRandomTree",
     "grows a tree of safe regions towards openings and the goal (sensor-based random tree)",

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from lidarium.agents.report import GivenUp, PolicyReport
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
-from lidarium.envs.radio.messages import DriveState, OperatingState, Order, Target
+from lidarium.envs.radio.messages import DriveState, OperatingState, Order, Route, Target
+from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.station.reports import Report
 from lidarium.mapping.merging.fusion import FusedMap
 
@@ -29,7 +30,7 @@ class Stop:
     reason: str
 
 
-Action = NDArray[np.float32] | Target | int | Stop | Order | None
+Action = NDArray[np.float32] | Target | Route | int | Stop | Order | None
 
 
 class Team(Protocol):
@@ -95,9 +96,9 @@ class Policy(ABC):
     Attributes
     ----------
     level : str
-        What it decides: ``velocity`` (shares of the limits, for a step), ``waypoint`` (a ``Target``, None to
-        stay, or two shares, for a decision period) or ``frontier`` (the number of a frontier on offer, for a
-        decision period).
+        What it decides: ``velocity`` (shares of the limits, for a step), ``waypoint`` (a ``Target``, a
+        ``Route``, None to stay, or two shares, for a decision period) or ``frontier`` (the number of a
+        frontier on offer, for a decision period).
     shares_map : bool
         Whether the robots plan on the team's map, where it reaches them, or on their own.
     observes : tuple of str
@@ -145,9 +146,23 @@ def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:
     """
     missing = [each for each in policy.observes if each not in observe]
     if missing:
+        camera = ", with a depth camera: camera='xtion_tilted'" if "depth" in missing else ""
         raise ValueError(
             f"{name} needs {', '.join(missing)}, which the robots do not observe; add to settings.observe"
+            f"{camera}"
         )
+
+
+def settings_for(policy: Policy, settings: ExplorationSettings) -> ExplorationSettings:
+    """Return settings in which the robots observe, beside all else, what a policy reads.
+
+    Raises
+    ------
+    ValueError
+        Where they lack a sensor for it; the message says how to add it.
+    """
+    missing = tuple(each for each in policy.observes if each not in settings.observe)
+    return replace(settings, observe=(*settings.observe, *missing)) if missing else settings
 
 
 class PerRobot(Policy):

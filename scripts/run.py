@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name
+from lidarium.scripts.output.run_files import write_run
 from lidarium.scripts.output.run_summary import run_summary
 from lidarium.scripts.process import first_start
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from lidarium.agents.policy import Policy
     from lidarium.envs.exploration import ExplorationEnv
     from lidarium.envs.settings.exploration import ExplorationSettings
     from lidarium.evaluation.episodes.history import History
@@ -28,8 +30,8 @@ LONE_POLICY, TEAM_POLICY = "nearest_frontier", "supervised"
 TEAM_WORLD: dict[str, Any] = {"noise": "datasheet", "odometry": "typical", "localization": "slam"}
 """How real the world of a team is where nothing is said."""
 
-VIEW_SIZE = 900, 1200
-"""Rows and columns of the picture from above [pixels]."""
+CAMERA = "xtion_tilted"
+"""Camera of the robots where nothing is said and the policy needs one."""
 
 STOP_COVERAGE = 0.99
 """Share of the floor at which a run without a goal ends."""
@@ -65,7 +67,7 @@ class Run(TeamCommand):
     stop_coverage: float | None = None
     """share of the floor at which the run ends.
 
-    0.99 where left out, and none on a floor with a goal
+    0.99 where left out, and none on a floor with a goal or where the policy explores by camera
     """
     starts: str | None = None
     """where the robots start: fixed, drawn, or x,y,theta of each.
@@ -103,8 +105,10 @@ def execute(command: Run) -> Answer:
     check_writable(command.out or DEFAULT_FOLDER)
     command = _completed(command)
     policy = lidarium.policy(command.chosen_policy)
+    if "depth" in policy.observes and command.camera is None:
+        command = replace(command, camera=CAMERA)
     recorder = _recorder(command)
-    env, history = _environment(command, recorder)
+    env, history = _environment(command, policy, recorder)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
     first_start.compile_first(command.json)
     episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
@@ -113,7 +117,7 @@ def execute(command: Run) -> Answer:
     from lidarium.evaluation.episodes.result import result_of
 
     result = result_of(episode, command.chosen_policy, history)
-    files = _write(command, episode, result, folder, recorder)
+    files = write_run(folder, episode, result, recorder, command.chosen_policy, has_film=command.video)
     return Answer(
         result,
         run_summary(command.chosen_policy, episode, result, folder, files),
@@ -139,16 +143,19 @@ def _completed(command: Run) -> Run:
     return team if is_world_given else replace(team, **TEAM_WORLD)
 
 
-def _settings(command: Run) -> "ExplorationSettings":
+def _settings(command: Run, policy: "Policy") -> "ExplorationSettings":
+    from lidarium.agents.policy import settings_for
     from lidarium.envs.floors.floor_choice import FloorChoice
     from lidarium.envs.settings.making import make_settings
 
-    stop = command.stop_coverage
-    if stop is None and not FloorChoice(command.floor, command.resolution).has_goal:
+    # Coverage is what lasers see: who explores by camera ends when that has seen all.
+    stop, by_laser = command.stop_coverage, "depth" not in policy.observes
+    if stop is None and by_laser and not FloorChoice(command.floor, command.resolution).has_goal:
         stop = STOP_COVERAGE
-    return make_settings(
+    settings = make_settings(
         robots=command.robots, horizon_s=command.horizon_s, stop_coverage=stop, **command.team_options
     )
+    return settings_for(policy, settings)
 
 
 def _recorder(command: Run) -> "Recorder | None":
@@ -159,14 +166,16 @@ def _recorder(command: Run) -> "Recorder | None":
     return Recorder(command.chosen_policy, command.seed, command.floor, command.resolution)
 
 
-def _environment(command: Run, recorder: "Recorder | None") -> "tuple[WatchedExploration, History]":
+def _environment(
+    command: Run, policy: "Policy", recorder: "Recorder | None"
+) -> "tuple[WatchedExploration, History]":
     from lidarium.evaluation.episodes.history import History
     from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 
     history = History()
     watchers: list[Watcher] = [history] if recorder is None else [history, recorder]
     return WatchedExploration(
-        command.floor, _settings(command), image_resolution=command.resolution, watchers=watchers
+        command.floor, _settings(command, policy), image_resolution=command.resolution, watchers=watchers
     ), history
 
 
@@ -241,58 +250,6 @@ def _film(
 
 def _folder(command: Run, floor: str) -> Path:
     return command.out or DEFAULT_FOLDER / file_name(f"{floor}-{command.chosen_policy}-{command.seed}")
-
-
-def _write(
-    command: Run, episode: "Episode", result: dict[str, Any], folder: Path, recorder: "Recorder | None"
-) -> list[str]:
-    """Write the figures first, then the record, the map and the picture.
-
-    Return the files' names.
-    """
-    from lidarium.evaluation.drawing.run_picture import save_run_picture
-    from lidarium.evaluation.episodes.output import check_written, write_json, write_text
-    from lidarium.evaluation.episodes.supervision import decision_lines
-    from lidarium.evaluation.truth.beliefs import team_log_odds
-    from lidarium.mapping.files.map_files import write_ros_map
-    from lidarium.mapping.grids.occupancy import three_levels
-
-    write_json(folder / "result.json", result)
-    if recorder is not None:
-        from lidarium.evaluation.record import write_record
-
-        write_record(folder / "episode.npz", recorder.finish(is_interrupted=episode.is_interrupted))
-    log_odds, (x, y) = team_log_odds(episode.env)
-    write_ros_map(folder, "map", three_levels(log_odds), (x, y, 0.0), command.map_resolution)
-    save_run_picture(folder / "run.png", episode, command.chosen_policy)
-    if command.camera is not None:
-        _save_view(folder / "view.png", episode)
-    report = episode.policy.report()
-    if report.supervision is not None:
-        write_text(folder / "decisions.jsonl", decision_lines(report))
-    asked_for = [
-        *(["view.png"] if command.camera is not None else []),
-        *(["decisions.jsonl"] if report.supervision is not None else []),
-        *(["episode.npz"] if recorder is not None else []),
-        *(["run.mp4"] if command.video else []),
-    ]
-    files = ["result.json", "map.yaml", "map.pgm", "run.png", *asked_for]
-    check_written(folder, files)
-    return files
-
-
-def _save_view(path: Path, episode: "Episode") -> None:
-    """Draw the floor from above, with the robots where they ended."""
-    import imageio.v3 as imageio
-
-    from lidarium.envs.drawing.views import views_of
-    from lidarium.evaluation.episodes.output import whole_file
-
-    env = episode.env
-    assert env.floor is not None
-    views = views_of(env.floor, env.settings.robot, env.settings.robots)
-    with whole_file(path) as beside:
-        imageio.imwrite(beside, views.from_above(env.world.poses, VIEW_SIZE), extension=".png")
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401

@@ -39,6 +39,8 @@ class Drives(NamedTuple):
         The target in the robot's map frame [m], and the heading to turn to there [rad], nan for any.
     has_path : (rows,) bool
         Whether there is a path to drive.
+    is_given : (rows,) bool
+        Whether the path was given: then it is followed as it is, and none is planned.
     paths, room : (rows, points, 2), (rows, points) float64
         Points x, y in the frame of the believed pose [m], and the room beside the body on the piece that
         leads to each [m].
@@ -62,6 +64,7 @@ class Drives(NamedTuple):
     targets: NDArray[np.float64]
     target_headings: NDArray[np.float64]
     has_path: NDArray[np.bool_]
+    is_given: NDArray[np.bool_]
     paths: NDArray[np.float64]
     room: NDArray[np.float64]
     cells: NDArray[np.int64]
@@ -114,6 +117,7 @@ def no_drives(rows: int) -> Drives:
         targets=np.zeros((rows, 2)),
         target_headings=np.full(rows, np.nan),
         has_path=np.zeros(rows, np.bool_),
+        is_given=np.zeros(rows, np.bool_),
         paths=np.zeros((rows, MAX_POINTS, 2)),
         room=np.zeros((rows, MAX_POINTS)),
         cells=np.zeros((rows, MAX_POINTS, 2), np.int64),

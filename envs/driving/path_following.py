@@ -19,12 +19,13 @@ from lidarium.envs.driving.safety_stop import (
     Sensed,
     safe_speed,
 )
+from lidarium.envs.radio.messages import MOST_POINTS
 from lidarium.mapping.kernels.compilation import Array, kernel
 
 IDLE, DRIVING, ARRIVED, BLOCKED = range(4)
 """States of a drive."""
 
-MAX_POINTS = 512
+MAX_POINTS = MOST_POINTS
 """Most points of a path."""
 
 LEAST_LOOKAHEAD, MOST_LOOKAHEAD = 0.08, 0.25

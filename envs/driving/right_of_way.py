@@ -133,12 +133,14 @@ class RightOfWay:
         goal, heading = (int(last[0]), int(last[1])), float(drives.headings[row])
         if not near:
             # A wall, not a robot: back out a little along the path by which it came, and plan again.
-            self._planner.drive_to(row, goal, [], heading)
+            if not drives.is_given[row]:
+                self._planner.drive_to(row, goal, [], heading)
             drives.backing[row] = BACKING_STEPS
             return
         left = self._planner.remaining(row)
         length = float(np.hypot(*np.diff(left, axis=0).T).sum())
-        if self._planner.drive_to(row, goal, near, heading, 1.5 * length + DETOUR):
+        is_planned = not drives.is_given[row]
+        if is_planned and self._planner.drive_to(row, goal, near, heading, 1.5 * length + DETOUR):
             return
         movable = [other for other in near if other in live]
         for other in sorted(

@@ -14,11 +14,12 @@ from lidarium.envs.driving.drives import (
     Following,
     drive_state,
     drive_states,
+    drop_path,
     follow_teams,
     is_done,
     no_drives,
 )
-from lidarium.envs.driving.path_following import IDLE
+from lidarium.envs.driving.path_following import DRIVING, IDLE
 from lidarium.envs.driving.path_planner import PathPlanner, footprint_of
 from lidarium.envs.driving.planning import (
     Planning,
@@ -28,7 +29,7 @@ from lidarium.envs.driving.planning import (
 from lidarium.envs.driving.right_of_way import RightOfWay
 from lidarium.envs.driving.safety_stop import FORESIGHT_TIMES
 from lidarium.envs.onboard.perception import Perception
-from lidarium.envs.radio.messages import DriveState, Orders, Target
+from lidarium.envs.radio.messages import DriveState, Orders, Route, Target
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.simulation.kernels.arrays import ENDED
 from lidarium.mapping.kernels.work_queue import new_work
@@ -100,6 +101,7 @@ class TeamDriver:
             max(grid.size for grid in self._perception.beliefs.log_odds[rows]), self.planner.passage.slots
         )
         drives.is_ordered[rows], drives.passing[rows], drives.has_path[rows] = False, -1, False
+        drives.is_given[rows] = False
         drives.states[rows], drives.stood[rows], drives.counts[rows], drives.backing[rows] = IDLE, 0, 0, 0
 
     def assign(self, rows: NDArray[np.bool_], orders: Orders) -> None:
@@ -116,7 +118,7 @@ class TeamDriver:
             ~orders.is_ordered | is_same_place & is_same_heading
         )
         changed = np.flatnonzero(rows & ~is_same)
-        drives.is_ordered[changed] = orders.is_ordered[changed]
+        drives.is_ordered[changed], drives.is_given[changed] = orders.is_ordered[changed], False
         drives.targets[changed], drives.target_headings[changed] = (
             orders.targets[changed],
             orders.headings[changed],
@@ -128,6 +130,39 @@ class TeamDriver:
             0,
             0,
         )
+
+    def follow(self, row: int, route: Route | None) -> None:
+        """Let a robot follow a route to its target as it is; who does already goes on.
+
+        None leaves it without a path.
+        """
+        drives = self.drives
+        drives.is_given[row] = True
+        if drives.passing[row] >= 0:
+            return
+        if route is None:
+            drop_path(drives, row)
+            return
+        count, points = len(route.points), route.points + self._perception.poses.offset(row)
+        heading = math.nan if route.heading is None else route.heading
+        if drives.has_path[row] and drives.counts[row] == count:
+            has_heading = np.array_equal(drives.headings[row], heading, equal_nan=True)
+            if has_heading and np.array_equal(drives.paths[row, :count], points):
+                return
+        drives.paths[row, :count], drives.room[row, :count] = points, route.room
+        drives.counts[row], drives.places[row], drives.headings[row] = count, min(1, count - 1), heading
+        drives.states[row], drives.stood[row], drives.has_path[row] = DRIVING, 0, True
+
+    def route_left(self, row: int) -> NDArray[np.float64] | None:
+        """Return what is left of the route that a robot follows, from the last point that it has passed.
+
+        It is (P, 2) in its map frame [m]; None where it follows none.
+        """
+        drives = self.drives
+        if not (drives.is_given[row] and drives.has_path[row]):
+            return None
+        first = max(int(drives.places[row]) - 1, 0)
+        return drives.paths[row, first : drives.counts[row]] - self._perception.poses.offset(row)
 
     def orders(self) -> Orders:
         """Return the targets that all robots have; the arrays are the driver's own."""

@@ -3,7 +3,7 @@
 A decision holds for a period or until a robot is done.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,10 @@ from lidarium.envs.agent_actions import check_agents, missing_action, numbers_of
 from lidarium.envs.driving.team_driver import TeamDriver
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.levels.decisions import DecisionWrapper
-from lidarium.envs.radio.messages import DriveState, Orders, Target
+from lidarium.envs.radio.messages import DriveState, Orders, Route, Target
 from lidarium.mapping.geometry.bounds import shown
 
-Waypoint = Target | NDArray[np.float32] | None
+Waypoint = Target | Route | NDArray[np.float32] | None
 
 
 class WaypointExploration(DecisionWrapper):
@@ -27,7 +27,8 @@ class WaypointExploration(DecisionWrapper):
     the robot's map frame from where it believes to be, as a share of half the map's side. A ``Target`` gives
     a position in the map frame directly, and None lets the robot stay and give way. The onboard driving plans
     a path over what the robot knows, so a point that is not known to be free is approached as near as
-    planning can come: where there is no path, the robot stays.
+    planning can come: where there is no path, the robot stays. A ``Route`` is a path that the policy has
+    planned itself: the robot follows it as it is, with the safety stop and right of way of all driving.
 
     A decision lasts ``decision_period_s``; it ends earlier when any robot with a target has arrived or found
     no path, pauses by itself or gets an order late, or the episode ends. A robot that was given an order may
@@ -39,6 +40,14 @@ class WaypointExploration(DecisionWrapper):
         The environment to drive in.
     shares_map : bool
         Whether robots plan on the team's map, where it reaches them.
+
+    Attributes
+    ----------
+    driver : TeamDriver
+        Who drives the robots.
+    router : callable or None
+        Called in each decision, when all robots have their targets: it may let the driver follow routes to
+        them. None where paths are planned on grids.
     """
 
     def __init__(self, env: ExplorationEnv, shares_map: bool = True) -> None:
@@ -49,6 +58,7 @@ class WaypointExploration(DecisionWrapper):
         }
         self._shares_map = shares_map
         self.driver = TeamDriver(env.perception, env.settings, shares_map)
+        self.router: Callable[[], None] | None = None
         env.operating.attach(self.driver)
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -80,30 +90,39 @@ class WaypointExploration(DecisionWrapper):
         env = self.env
         check_agents(actions, env.possible_agents)
         targets: list[Target | None] = [None] * env.settings.robots
+        routes: dict[int, Route] = {}
         is_chosen = np.zeros(env.settings.robots, np.bool_)
         for agent in env.agents:
             row = env.possible_agents.index(agent)
             is_chosen[row] = agent in actions or agent in env.stopping
             if agent in actions:
-                targets[row] = self._target(agent, actions[agent])
+                waypoint = actions[agent]
+                if isinstance(waypoint, Route):
+                    routes[row], targets[row] = waypoint, waypoint.target
+                else:
+                    targets[row] = self._target(agent, waypoint)
             elif agent not in env.stopping and not env.operating.is_addressed(row):
                 raise missing_action(agent)
-        return self.carry_out(Orders.of(targets), is_chosen)
+        return self.carry_out(Orders.of(targets), is_chosen, routes)
 
     def carry_out(
-        self, orders: Orders, is_chosen: NDArray[np.bool_]
+        self, orders: Orders, is_chosen: NDArray[np.bool_], routes: Mapping[int, Route] | None = None
     ) -> tuple[
         dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
         """Drive for one decision by the orders of the chosen robots.
 
-        ``is_chosen`` (robots,) names them; the others keep their orders. Returns as ``step``.
+        ``is_chosen`` (robots,) names them; the others keep their orders. Those with ``routes`` follow them.
+        Returns as ``step``.
         """
         env, driver = self.env, self.driver
         if not env.agents:
             return env.step({})
         rows = {agent: env.possible_agents.index(agent) for agent in env.agents}
-        self._assign(orders, is_chosen & np.isin(np.arange(env.settings.robots), list(rows.values())))
+        is_live = np.isin(np.arange(env.settings.robots), list(rows.values()))
+        self._assign(orders, is_chosen & is_live, routes or {})
+        if self.router is not None:
+            self.router()
         driver.prepare()
         if not env.stopping:
             waiting = {row for row in rows.values() if driver.is_done(row)}
@@ -119,18 +138,22 @@ class WaypointExploration(DecisionWrapper):
             info["drive"] = driver.state(rows[agent])
         return outcome
 
-    def _assign(self, orders: Orders, is_chosen: NDArray[np.bool_]) -> None:
-        """Give robots their targets.
+    def _assign(self, orders: Orders, is_chosen: NDArray[np.bool_], routes: Mapping[int, Route]) -> None:
+        """Give robots their targets, and routes to them.
 
         Who is paused keeps what it had, and where an order sends a robot goes before its policy's choice.
         """
         operating, driver = self.env.operating, self.driver
-        driver.assign(is_chosen & ~operating.held, orders)
+        is_assigned = is_chosen & ~operating.held
+        driver.assign(is_assigned, orders)
+        for row, route in routes.items():
+            if is_assigned[row]:
+                driver.follow(row, route)
         for row, target in operating.take_sent().items():
             one = np.arange(self.env.settings.robots) == row
             driver.assign(one, Orders.of([target] * self.env.settings.robots))
 
-    def _target(self, agent: str, waypoint: Waypoint) -> Target | None:
+    def _target(self, agent: str, waypoint: Target | NDArray[np.float32] | None) -> Target | None:
         if waypoint is None or isinstance(waypoint, Target):
             return waypoint
         share = numbers_of(waypoint)

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from lidarium.envs.onboard.navigation import NavigationMap
 from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.onboard.sparse_belief import SparseBelief
 from lidarium.envs.onboard.teammate import Teammate
 from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.settings.robots import Robot
@@ -82,6 +83,25 @@ class Belief:
         With unknown starts None until the robot is sent what others know.
         """
         return self._perception.shared_map(self._row)
+
+    @property
+    def sparse_map(self) -> SparseBelief:
+        """The own sparse map, ready to be planned on; it is made from when it is first asked for.
+
+        Raises
+        ------
+        ValueError
+            Where the robot has no depth camera, or one that sees no ground.
+        """
+        return self._perception.sparse_maps.belief(self._row, shares_map=False)
+
+    @property
+    def shared_sparse_map(self) -> SparseBelief:
+        """What the team's sparse maps hold, as far as they reach this robot at once; else its own.
+
+        With unknown starts, and where the radio is not ideal, they do not.
+        """
+        return self._perception.sparse_maps.belief(self._row)
 
     @property
     def teammates(self) -> dict[str, Teammate]:

@@ -26,6 +26,7 @@ from lidarium.envs.onboard.navigation import (
     refresh_map,
 )
 from lidarium.envs.onboard.received_maps import ReceivedMaps
+from lidarium.envs.onboard.sparse_maps import SparseMaps
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team, sum_team
 from lidarium.envs.radio.exchange import Exchange
 from lidarium.envs.settings.exploration import ExplorationSettings
@@ -61,6 +62,8 @@ class Perception:
         What the robots know together with what reached them from others.
     trails : ForgottenTrails
         The trails of others along which robots forget the walls of their maps.
+    sparse_maps : SparseMaps
+        The sparse maps that they make by their depth cameras, where these were asked for.
     meters : Meters or None
         Odometers and battery gauges of the robots of a lone episode; None in batches, which have none.
     """
@@ -89,6 +92,7 @@ class Perception:
         self.poses = KnownPoses(simulation, settings, offsets, self.exchanges)
         self.received = ReceivedMaps(simulation, settings, self.poses, self.exchanges)
         self.trails = ForgottenTrails(simulation, settings, self.poses, self._fresh_at)
+        self.sparse_maps = SparseMaps(simulation, settings, self.poses)
         self.meters: Meters | None = None
 
     @property
@@ -110,6 +114,7 @@ class Perception:
         ]
         self.received.start(range(first, last))
         self.trails.start(range(first, last))
+        self.sparse_maps.start(range(first, last))
         self.poses.goals[episode], self._fresh_at[episode] = goal, STALE
 
     @property

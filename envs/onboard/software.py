@@ -75,14 +75,16 @@ class Software:
         simulation.step(commands, moves_bodies=moves_bodies, perceives=not self._localizes, runs=runs)
         if not self.is_staged:
             return
+        perception = self._perception
         episodes = range(simulation.episodes) if runs is None else np.flatnonzero(runs).tolist()
         if self._localizes:
             for episode in episodes:
                 self._localize(episode)
             simulation.perceive(runs)
-        if self._perception.exchanges:
+        if perception.exchanges:
             for episode in episodes:
                 self._exchange(episode)
+        perception.sparse_maps.sense(runs)
 
     def _localize(self, episode: int) -> None:
         """Let the robots of an episode find out where they are."""
@@ -101,6 +103,7 @@ class Software:
             if correction is not None:
                 simulation.render_again(row, correction.poses, correction.ranges)
                 self._perception.trails.forget_again(row)
+                self._perception.sparse_maps.correct(row, correction)
 
     def _exchange(self, episode: int) -> None:
         """Let the robots of an episode exchange messages.

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 
+MOST_POINTS = 512
+"""Most points of a path."""
+
 
 class DriveState(Enum):
     """What a robot's driving is about."""
@@ -44,6 +47,50 @@ class Target:
             raise ValueError(f"target is ({self.x}, {self.y}); want finite metres")
         if self.heading is not None and not math.isfinite(self.heading):
             raise ValueError(f"heading of the target is {self.heading}; want a finite angle or None")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Route:
+    """A path that a robot should follow as it is, in its map frame.
+
+    Attributes
+    ----------
+    points : (P, 2) float64
+        x, y from where the robot is to where it should come [m].
+    room : (P,) float64
+        Room beside the body on the piece that leads to each point: where there is more of it, the robot cuts
+        corners a little and drives faster through them [m].
+    heading : float or None
+        Heading to turn to at the end [rad]; None for any.
+
+    Raises
+    ------
+    ValueError
+        Where there is no point, too many, or something is not finite.
+    """
+
+    points: NDArray[np.float64]
+    room: NDArray[np.float64]
+    heading: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.points.ndim != 2 or self.points.shape[1] != 2 or not 1 <= len(self.points) <= MOST_POINTS:
+            raise ValueError(
+                f"points of the route have shape {self.points.shape}; want (P, 2) with 1 to {MOST_POINTS} "
+                "points x, y"
+            )
+        if self.room.shape != self.points.shape[:1]:
+            raise ValueError(f"room of the route has shape {self.room.shape}; want ({len(self.points)},)")
+        if not (np.isfinite(self.points).all() and np.isfinite(self.room).all()):
+            raise ValueError("points or room of the route are not finite; want metres")
+        if self.heading is not None and not math.isfinite(self.heading):
+            raise ValueError(f"heading of the route is {self.heading}; want a finite angle or None")
+
+    @property
+    def target(self) -> Target:
+        """Where the route ends."""
+        x, y = self.points[-1].tolist()
+        return Target(x, y, self.heading)
 
 
 class OperatingState(Enum):

@@ -17,6 +17,7 @@ from lidarium.envs.settings.robots import ROBOTS, Robot
 from lidarium.envs.settings.sensors.cameras import CAMERAS as CAMERAS
 from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.settings.sensors.observables import check_sensed
+from lidarium.envs.settings.sensors.sparse_maps import SparseMapSettings
 from lidarium.mapping.geometry.bounds import (
     above,
     check_anything,
@@ -74,6 +75,8 @@ class ExplorationSettings:
         The depth camera of each; None for none.
     occupancy : OccupancySettings
         Their maps.
+    sparse_map : SparseMapSettings
+        Their sparse maps, which robots with cameras make when asked to.
     reward : RewardSettings
         Weights of the reward.
     known_starts : bool
@@ -147,6 +150,7 @@ class ExplorationSettings:
     lidar: Lidar = field(default_factory=lambda: LIDARS["urg"])
     camera: DepthCamera | None = None
     occupancy: Annotated[OccupancySettings, OCCUPANCY] = field(default_factory=OccupancySettings)
+    sparse_map: SparseMapSettings = field(default_factory=SparseMapSettings)
     reward: RewardSettings = field(default_factory=RewardSettings)
     known_starts: bool = True
     starts: str | None = None

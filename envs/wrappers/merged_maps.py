@@ -16,6 +16,7 @@ from lidarium.envs.levels.waypoints import WaypointExploration
 from lidarium.envs.station.team_mapping import Frames, TeamMapping
 from lidarium.envs.team_wrapper import TeamWrapper
 from lidarium.envs.wrappers.contacts import CanTalk
+from lidarium.envs.wrappers.sparse_planning import SparsePlanning
 from lidarium.envs.wrappers.team_exchange import TEAM_VALIDATION as TEAM_VALIDATION
 from lidarium.envs.wrappers.team_exchange import (
     MergeEvent,
@@ -40,7 +41,7 @@ class MergedMaps(TeamWrapper):
 
     Parameters
     ----------
-    env : ExplorationEnv, WaypointExploration or FrontierExploration
+    env : ExplorationEnv, WaypointExploration, FrontierExploration or SparsePlanning
         The environment, at any level of decision, with two robots or more.
     settings : MergingSettings or None
         How; the defaults where None.
@@ -61,7 +62,7 @@ class MergedMaps(TeamWrapper):
 
     def __init__(
         self,
-        env: ExplorationEnv | WaypointExploration | FrontierExploration,
+        env: ExplorationEnv | WaypointExploration | FrontierExploration | SparsePlanning,
         settings: MergingSettings | None = None,
         can_talk: NDArray[np.bool_] | CanTalk | None = None,
     ) -> None:

@@ -272,12 +272,14 @@ def settings_sha256(settings: ExplorationSettings) -> str:
 
     It is of their JSON with sorted keys, without ``threads``, and without what older records do not have
     where it is not used: `LATER` settings at their defaults, more rewards, the build of robots without
-    forces.
+    forces, sparse maps of robots without cameras.
     """
     values, plain = asdict(settings), ExplorationSettings()
     del values["threads"]
+    if values["camera"] is None:
+        del values["sparse_map"]
     for name in LATER:
-        if getattr(settings, name) == getattr(plain, name):
+        if name in values and getattr(settings, name) == getattr(plain, name):
             del values[name]
     if not values["reward"]["more"]:
         del values["reward"]["more"]

@@ -19,6 +19,7 @@ from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.radio.messages import DriveState, OperatingState, Order
 from lidarium.envs.station.reports import Report
 from lidarium.envs.wrappers.merged_maps import MergedMaps, MergeEvent, MergingSettings, true_frames
+from lidarium.envs.wrappers.sparse_planning import SparsePlanning
 from lidarium.evaluation.episodes.events import merge_event
 from lidarium.evaluation.episodes.interrupts import PatientInterrupt
 from lidarium.evaluation.episodes.watching import WatchedExploration
@@ -26,6 +27,10 @@ from lidarium.mapping.merging.fusion import FusedMap
 from lidarium.moved import renamed_method
 
 Progress = Callable[[ExplorationEnv], None]
+
+Level = ExplorationEnv | WaypointExploration | FrontierExploration
+
+World = Level | SparsePlanning | MergedMaps
 
 
 @dataclass(slots=True)
@@ -127,6 +132,7 @@ def run_episode(
     on_decision: Progress | None = None,
     raise_interrupt: bool = True,
     merging: MergingSettings | None = None,
+    plans_sparsely: bool = False,
 ) -> Episode:
     """Run a policy from reset until every robot has ended.
 
@@ -149,6 +155,8 @@ def run_episode(
         all the same.
     merging : MergingSettings or None
         How the robots merge their maps (`MergedMaps`); they do not where None.
+    plans_sparsely : bool
+        Whether robots drive to their goals along routes on their sparse maps (`SparsePlanning`).
 
     Returns
     -------
@@ -158,7 +166,8 @@ def run_episode(
     check_observed(policy, type(policy).__name__, env.settings.observe)
     level = at_level(env, policy.level, policy.shares_map)
     driver = _driver_of(level)
-    world = level if merging is None else MergedMaps(level, merging)
+    world: World = _planning_sparsely(level, policy.shares_map) if plans_sparsely else level
+    world = world if merging is None else MergedMaps(world, merging)
     episode = Episode(env, policy, seed)
     began = time.perf_counter()
     observations, _ = world.reset(seed=seed, options=None if options is None else dict(options))
@@ -193,9 +202,13 @@ def _note_merges(episode: Episode, merges: list[MergeEvent]) -> None:
             env.note_event(merge_event(env, merge))
 
 
-def _driver_of(
-    level: ExplorationEnv | WaypointExploration | FrontierExploration,
-) -> WaypointExploration | None:
+def _planning_sparsely(level: Level, shares_map: bool) -> SparsePlanning:
+    if isinstance(level, ExplorationEnv):
+        raise ValueError("plans_sparsely is set, but the policy decides speeds; want waypoints or frontiers")
+    return SparsePlanning(level, shares_map)
+
+
+def _driver_of(level: Level) -> WaypointExploration | None:
     """Return what drives the robots to their targets, None where a policy decides speeds."""
     below = level.waypoints if isinstance(level, FrontierExploration) else level
     return below if isinstance(below, WaypointExploration) else None
@@ -238,7 +251,7 @@ def merges_of(policy: Policy, env: ExplorationEnv) -> list[MergeEvent]:
 
 def decide(
     policy: Policy,
-    world: ExplorationEnv | WaypointExploration | FrontierExploration | MergedMaps,
+    world: World,
     observations: Mapping[str, Observation],
 ) -> dict[str, NDArray[np.float32] | Any]:
     """Ask a policy for actions, and pass ``Stop`` and ``Order`` to the environment.

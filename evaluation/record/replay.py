@@ -25,7 +25,7 @@ from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.state import state_sha256
 from lidarium.mapping.files.guarded_reading import reason as said_by
 
-ADDED = frozenset({"camera", "localizer"})
+ADDED = frozenset({"camera", "localizer", "sparse_map"})
 """Settings that older records do not have."""
 
 

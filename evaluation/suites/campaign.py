@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import lidarium
+from lidarium.agents.policy import settings_for
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.evaluation.episodes.output import clear_unfinished, write_json
 from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
@@ -126,7 +127,8 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     from lidarium.evaluation.record import Recorder
 
     began = time.perf_counter()
-    settings = suite.settings(trial.variant, trial.robots)
+    policy = suite.make_policy(trial.policy)
+    settings = settings_for(policy, suite.settings(trial.variant, trial.robots))
     history = History()
     image_resolution = _image_resolution(suite, trial)
     recorder = Recorder(trial.policy, trial.seed, trial.floor, image_resolution)
@@ -139,7 +141,7 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     )
     options = None if starts is None else {"starts": starts}
     episode = run_episode(
-        suite.make_policy(trial.policy),
+        policy,
         env,
         trial.seed,
         options,

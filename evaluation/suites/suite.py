@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.agents import Policy, make_policy
+from lidarium.agents.policy import settings_for
 from lidarium.envs.floors.catalogue.names import is_generated, load_floor, set_floors
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
@@ -142,13 +143,14 @@ class Suite:
                 raise ValueError(
                     f"the suite has settings of a policy {name!r}, which is not among its policies"
                 )
-        for name in self.policies:
-            self.make_policy(name)
+        made = {name: self.make_policy(name) for name in self.policies}
         for floor in self.floors:
             _check_floor(floor, self.image_resolution)
         for variant in self.variants:
             for robots in self.robots:
-                self.settings(variant, robots)
+                settings = self.settings(variant, robots)
+                for name, policy in made.items():
+                    _check_sensors(name, policy, variant, settings)
         stop_rule_of(self.stop)
         for floor, given in self.starts.items():
             if floor not in self.floors:
@@ -279,6 +281,14 @@ def suite_of(content: Mapping[str, Any]) -> Suite:
         image_resolution=content.get("image_resolution"),
         policy_settings=tables_of(content.get("policy_settings", {}), "policy_settings"),
     )
+
+
+def _check_sensors(name: str, policy: Policy, variant: str, settings: ExplorationSettings) -> None:
+    """Check that the robots of a variant have the sensors that a policy reads."""
+    try:
+        settings_for(policy, settings)
+    except ValueError as error:
+        raise ValueError(f"policy {name!r} cannot run with variant {variant!r}: {error}") from error
 
 
 def _check_floor(floor: str, image_resolution: float | None) -> None:

@@ -1,1 +1,1 @@
-"""What commands print of their results."""
+"""What commands leave of their results, on the screen or in files."""

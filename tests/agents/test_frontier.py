@@ -138,6 +138,8 @@ def test_policies_read_beliefs_and_never_the_truth():
         "map",
         "map_origin",
         "shared_map",
+        "sparse_map",
+        "shared_sparse_map",
         "teammates",
         "energy_left_j",
         "goal",

@@ -102,6 +102,11 @@ CAMERAS: Registry[DepthCamera] = Registry("camera")
 """Depth cameras by name."""
 
 CAMERAS.register("xtion", DepthCamera(), "Asus Xtion: 320 x 240, 58 degrees, 0.4 to 4 m, exact depths")
+CAMERAS.register(
+    "xtion_tilted",
+    DepthCamera(pitch=math.radians(20.0)),
+    "the Xtion looking 20 degrees down, at the ground",
+)
 CAMERAS.register("xtion_vga", DepthCamera(columns=640, rows=480), "the Xtion at 640 x 480")
 CAMERAS.register(
     "xtion_noisy",

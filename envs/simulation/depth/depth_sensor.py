@@ -40,11 +40,14 @@ class DepthSensor:
         The camera of every robot.
     frames : (rows, image rows, image columns) float32
         The last image of each robot [m]; 0 where nothing was measured.
+    taken_at : (rows,) int64
+        After how many steps of its episode each was taken, -1 where none was yet.
     """
 
     def __init__(self, world: World, camera: DepthCamera, time_step: float, threads: int = 1) -> None:
         rows = world.robots * world.episodes
         self.camera, self.frames = camera, np.zeros((rows, camera.rows, camera.columns), np.float32)
+        self.taken_at: NDArray[np.int64] = np.full(rows, -1)
         self._world, self._threads, self._period = world, threads, camera.period_steps(time_step)
         self._faces: list[Faces | None] = [None] * world.episodes
         self._face_rows = np.zeros((world.episodes, 4), np.int64)
@@ -56,7 +59,8 @@ class DepthSensor:
         robots = self._world.robots
         self._faces[episode] = floor.faces
         self._point_at(episode)
-        self.frames[episode * robots : (episode + 1) * robots] = 0.0
+        rows = slice(episode * robots, (episode + 1) * robots)
+        self.frames[rows], self.taken_at[rows] = 0.0, -1
 
     def take(self, steps: NDArray[np.int64], runs: NDArray[np.bool_] | None = None) -> None:
         """Take the images that are due.
@@ -88,6 +92,7 @@ class DepthSensor:
         threads = use_threads(self._threads) if np.count_nonzero(takes) > 1 else 1
         take_frames = take_frames_parallel if threads > 1 else take_frames_serial
         take_frames(cameras, world.robots, takes, self.frames)
+        self.taken_at[takes] = (np.repeat(steps, world.robots) + 1)[takes]
 
     def _point_at(self, episode: int) -> None:
         """Note where the faces of an episode lie, for kernels."""

@@ -41,10 +41,13 @@ class KeyScans:
     ranges : (scans, beams) float32
         Ranges as seen from these poses, motion within the scan undone [m]; inf for no return, nan for an
         invalid beam.
+    times_s : (scans,) float64
+        When each was taken, as ``Sensing`` said, in order [s].
     """
 
     poses: NDArray[np.float64]
     ranges: NDArray[np.float32]
+    times_s: NDArray[np.float64]
 
 
 class Localizer(Protocol):

@@ -87,7 +87,7 @@ class Slam:
         # Poses in the frame of the older local map: now, at the last match, at the last node.
         self._local, self._matched, self._at_node = np.zeros(3), np.zeros(3), np.zeros(3)
         self._spread = np.zeros((3, 3))
-        self._path, self._failed = 0.0, 0
+        self._path, self._failed, self._time_s = 0.0, 0, 0.0
         self._is_corrected = False
 
     def localize(self, sensing: Sensing) -> NDArray[np.float64]:
@@ -105,6 +105,7 @@ class Slam:
                 f"ranges have shape {sensing.ranges.shape}; want ({self._geometry.beams},), one per beam"
             )
         self.counts.scans += 1
+        self._time_s = sensing.time_s
         self._correct(sensing.time_s)
         motion, period = self._motion.take(sensing)
         self._local = composed(self._local, motion)
@@ -370,7 +371,7 @@ class Slam:
 
     def _note_key(self, ranges: NDArray[np.float32]) -> None:
         node, pose = self.place
-        self._history.append(node, pose, ranges)
+        self._history.append(node, pose, ranges, self._time_s)
 
     def _correct(self, time_s: float) -> None:
         """Let closures act whose time has come."""

@@ -25,17 +25,22 @@ class ScanHistory:
         self._geometry, self._resolution = geometry, resolution
         self._nodes, self._poses = GrowingArray((), np.int64), GrowingArray((3,), np.float64)
         self._ranges = GrowingArray((geometry.beams,), np.float32)
+        self._times = GrowingArray((), np.float64)
         self._map, self._mapped = OccupancyGrid(), 0
 
-    def append(self, node: int, pose: NDArray[np.float64], ranges: NDArray[np.float32]) -> None:
-        """Take in a scan."""
+    def append(
+        self, node: int, pose: NDArray[np.float64], ranges: NDArray[np.float32], time_s: float
+    ) -> None:
+        """Take in a scan that was taken at a time [s]."""
         self._nodes.append(node)
         self._poses.append(pose)
         self._ranges.append(ranges)
+        self._times.append(time_s)
 
     def scans(self, nodes: NDArray[np.float64]) -> KeyScans:
         """Return all scans at their poses, by the poses of the nodes (n, 3) [m, rad]."""
-        return KeyScans(composed(nodes[self._nodes.rows], self._poses.rows), self._ranges.rows)
+        poses = composed(nodes[self._nodes.rows], self._poses.rows)
+        return KeyScans(poses, self._ranges.rows, self._times.rows)
 
     def since(self, node: int) -> NDArray[np.int64]:
         """Return the numbers of the scans that were taken at a node or after it."""

@@ -130,6 +130,10 @@ class IncrementalMapper:
         """Move the codes with corrected poses (F, 4, 4) of the frames that were taken."""
         self._map = self.map.moved(poses)
 
+    def forget(self, gone: NDArray[np.bool_]) -> None:
+        """Leave out occupied codes of the map that are no longer there, (M,) bool."""
+        self._map = replace(self.map, occupied=self.map.occupied.taken(~gone))
+
     def _coded_frame(
         self, cloud: NDArray[np.float64], known: SparseMap, floor: FloorPlane
     ) -> tuple[OccupiedCodes, FreeCodes]:

@@ -16,7 +16,7 @@ NO_NODE = -1
 
 
 @kernel(borrowing=True)
-def _push(heap: Array, keys: Array, size: int, node: int, key: float) -> int:
+def push(heap: Array, keys: Array, size: int, node: int, key: float) -> int:
     """Put a node into a binary heap of nodes by their keys; return its size."""
     place = size
     while place > 0:
@@ -30,7 +30,7 @@ def _push(heap: Array, keys: Array, size: int, node: int, key: float) -> int:
 
 
 @kernel(borrowing=True)
-def _pop(heap: Array, keys: Array, size: int) -> int:
+def pop(heap: Array, keys: Array, size: int) -> int:
     """Take the least node out of a binary heap, which is that of place 0; return its size."""
     size -= 1
     node, key = heap[size], keys[size]
@@ -82,11 +82,11 @@ def shortest_path(
     for node in range(count):
         if first[node] < np.inf:
             costs[node] = first[node]
-            size = _push(heap, keys, size, node, first[node] + _estimate(nodes[node], goal))
+            size = push(heap, keys, size, node, first[node] + _estimate(nodes[node], goal))
     best, best_cost = NO_NODE, np.inf
     while size > 0 and keys[0] < best_cost:
         node = heap[0]
-        size = _pop(heap, keys, size)
+        size = pop(heap, keys, size)
         if is_closed[node]:
             continue
         is_closed[node] = True
@@ -96,7 +96,7 @@ def shortest_path(
             other, cost = ends[k], costs[node] + weights[k]
             if cost < costs[other]:
                 costs[other], before[other] = cost, node
-                size = _push(heap, keys, size, other, cost + _estimate(nodes[other], goal))
+                size = push(heap, keys, size, other, cost + _estimate(nodes[other], goal))
     length, node = 0, best
     while node != NO_NODE:
         length, node = length + 1, before[node]

@@ -104,7 +104,7 @@ def _terminal(graph: TopologicalGraph, name: str, point: NDArray[np.float64]) ->
 
 
 @kernel
-def _connect(index: BoxIndex, grid: NodeGrid, point: Array, body: Array, costs: Array) -> bool:
+def connect(index: BoxIndex, grid: NodeGrid, point: Array, body: Array, costs: Array) -> bool:
     """Write what it costs to go straight from a point to its nearest nodes, where the body can; inf else."""
     found, gaps = np.empty(CONNECTORS, np.int64), np.empty(CONNECTORS)
     count, is_connected = nearest_nodes(grid, point, found, gaps, -1), False
@@ -137,7 +137,7 @@ def _plan(
     if shortens and is_free(index, start, goal, body):
         return straight, 2, FOUND
     first, last = np.full(grid.nodes.shape[0], np.inf), np.full(grid.nodes.shape[0], np.inf)
-    if not _connect(index, grid, start, body, first) or not _connect(index, grid, goal, body, last):
+    if not connect(index, grid, start, body, first) or not connect(index, grid, goal, body, last):
         return nothing, 0, NO_PATH
     nodes, _ = shortest_path(grid.nodes, starts, ends, weights, first, last, goal)
     if nodes.shape[0] == 0:

@@ -30,7 +30,7 @@ class Reckoner:
     def localize(self, sensing):
         place = self.start @ Transform(*(float(value) for value in sensing.odometry))
         pose = np.array([place.x, place.y, place.theta])
-        self.keys.append((pose, sensing.ranges))
+        self.keys.append((pose, sensing.ranges, sensing.time_s))
         return pose
 
     def take_correction(self):
@@ -46,7 +46,9 @@ class Corrector(Reckoner):
         if len(self.keys) % 10 == 0:
             # The last scan is mapped by the robot itself.
             self.correction = KeyScans(
-                np.stack([key[0] for key in self.keys[:-1]]), np.stack([key[1] for key in self.keys[:-1]])
+                np.stack([key[0] for key in self.keys[:-1]]),
+                np.stack([key[1] for key in self.keys[:-1]]),
+                np.array([key[2] for key in self.keys[:-1]]),
             )
         return pose
 
