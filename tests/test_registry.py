@@ -70,3 +70,11 @@ def test_naming_policies_and_localizers_imports_none_of_them():
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
+
+
+def test_a_message_names_as_many_known_names_as_can_be_read():
+    said = unknown("setting", "zz", [f"setting_{number}" for number in range(200)], 300)
+    assert len(said) < 450
+    assert said.endswith(" more)")
+    assert "setting_0, setting_1, " in said
+    assert unknown("setting", "zz", ["one", "two"]).endswith("(known: one, two)")

@@ -28,6 +28,10 @@ SHORT_OPTIONS = ("assigned", "max_cycles", "noise", "realism", "resolution")
 """Options of ``make_settings`` that are no attributes of the settings."""
 
 
+MOST_LISTED = 300
+"""Longest list of known settings in a message [characters]."""
+
+
 def make_settings(settings: ExplorationSettings | None = None, **options: Any) -> ExplorationSettings:  # noqa: ANN401
     """Fill settings from the short options of ``lidarium.parallel_env``.
 
@@ -153,7 +157,8 @@ def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa
     """Return a part with the value at the end of a path replaced."""
     known = [each.name for each in fields(part)] if is_dataclass(part) else []
     if path[0] not in known:
-        raise ValueError(f"{name!r} is no setting: {unknown('setting', path[0], known)}")
+        said = unknown("setting", path[0], known, MOST_LISTED)
+        raise ValueError(f"{name!r} is no setting: {said}")
     if len(path) > 1:
         value = _replaced(getattr(part, path[0]), path[1:], value, name)
     elif isinstance(part, OccupancySettings):

@@ -121,12 +121,19 @@ class UnknownNameError(KeyError, ValueError):
         return str(self.args[0])
 
 
-def unknown(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return the message for an unknown name: the nearest known one, and all of them."""
+def unknown(kind: str, name: object, known: Iterable[str], most: int | None = None) -> str:
+    """Return the message for an unknown name: the nearest known one, and all of them.
+
+    With ``most`` as many as fit into so many characters.
+    """
     names = list(known)
+    listed = names
+    while most is not None and len(", ".join(listed)) > most:
+        listed = listed[:-1]
+    left = f" and {len(names) - len(listed)} more" if len(listed) < len(names) else ""
     near = difflib.get_close_matches(_shown(name)[:100], names, n=1, cutoff=0.3)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"unknown {kind} {_shown(name)}{hint} (known: {', '.join(names) or 'none'})"
+    return f"unknown {kind} {_shown(name)}{hint} (known: {', '.join(listed) or 'none'}{left})"
 
 
 def _shown(name: object) -> str:
