@@ -31,7 +31,7 @@ def observable(
     Returns
     -------
     callable
-        A decorator of a function that takes ``Rows`` and returns an array (rows, *shape).
+        A decorator of a function that takes ``Rows`` and returns an array of shape ``(rows, *shape)``.
     """
     box = spaces.Box(low, high, shape, np.float32)
 
