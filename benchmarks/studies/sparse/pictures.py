@@ -64,7 +64,7 @@ def draw_errors(path: Path, lines: Sequence[Line]) -> None:
 
 
 def draw_paths(path: Path, lines: Sequence[Line]) -> None:
-    """Draw means of what is measured of paths over the straight distance of their ends, of all places."""
+    """Draw what is measured of paths over the straight distance of their ends, of all places."""
     straight = np.concatenate([line["straight"] for line in lines])
     bins = np.floor(straight / BIN_M).astype(np.int64)
     figure = Figure(figsize=(12.0, 6.4), dpi=110, layout="constrained")
@@ -77,8 +77,10 @@ def draw_paths(path: Path, lines: Sequence[Line]) -> None:
             drawn = [bins == place for place in range(int(bins.max()) + 1)]
             drawn = [part & has for part in drawn if (part & has).sum() >= LEAST_IN_BIN]
             middles = [straight[part].mean() for part in drawn]
-            means = [values[part, column].mean() * unit for part in drawn]
-            axes.plot(middles, means, color=colours(5)[number], linestyle=dash(number), label=title)
+            # A median time is not that of what else the machine did.
+            middle_of = np.median if column == SECONDS else np.mean
+            drawn_values = [middle_of(values[part, column]) * unit for part in drawn]
+            axes.plot(middles, drawn_values, color=colours(5)[number], linestyle=dash(number), label=title)
     for axes, (title, shown, _, _) in zip(panels, PANELS, strict=False):
         dress(axes, title, "straight distance [m]", shown)
     panels[1].set_yscale("log")

@@ -77,7 +77,8 @@ def _save_plane(
     axes = figure.subplots()
     order = np.argsort(boxes[:, 1, 2], kind="stable")
     patches = [Rectangle(tuple(box[0, :2]), *(box[1, :2] - box[0, :2])) for box in boxes[order]]
-    heights = PatchCollection(patches, cmap="viridis_r", alpha=0.75, linewidth=0.0)
+    # Walls that were measured exactly have no thickness: their outlines show them.
+    heights = PatchCollection(patches, cmap="viridis_r", alpha=0.75, linewidth=1.0, edgecolor="face")
     heights.set_array(boxes[order, 1, 2])
     axes.add_collection(heights)
     if graph is not None:
