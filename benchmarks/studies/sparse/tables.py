@@ -164,19 +164,21 @@ def memory_table(lines: Sequence[Line]) -> str:
     return markdown_table(header, rows)
 
 
+ERROR_HEADER = (
+    "clouds",
+    "codes",
+    "K-means",
+    "LBG",
+    "K-means++",
+    "K-means++ / K-means",
+    "K-means",
+    "LBG",
+    "K-means++",
+)
+
+
 def error_table(lines: Sequence[Line], codes: Sequence[int] = (16, 32, 64, 128, 256, 512)) -> str:
     """Return mean distances and times of the quantisers by kind of cloud, tables 5.3 and 5.4."""
-    header = (
-        "clouds",
-        "codes",
-        "K-means",
-        "LBG",
-        "K-means++",
-        "K-means++ / K-means",
-        "K-means",
-        "LBG",
-        "K-means++",
-    )
     rows = []
     for kind, own in _by_kind(lines).items():
         for count in codes:
@@ -185,7 +187,7 @@ def error_table(lines: Sequence[Line], codes: Sequence[int] = (16, 32, 64, 128, 
             times = [f"{1e3 * found[method][1]:.1f}" for method in found]
             ratio = f"{found['kmeans++'][0] / found['kmeans'][0]:.3f}"
             rows.append([kind, str(count), *errors, ratio, *times])
-    return markdown_table(header, rows)
+    return markdown_table(ERROR_HEADER, rows)
 
 
 def _by_kind(lines: Sequence[Line]) -> dict[str, list[Line]]:
@@ -203,17 +205,6 @@ def _means(lines: Sequence[Line], method: str, codes: int) -> tuple[float, float
 
 def thesis_error_table() -> str:
     """Return what the thesis prints of errors and times."""
-    header = (
-        "clouds",
-        "codes",
-        "K-means",
-        "LBG",
-        "K-means++",
-        "K-means++ / K-means",
-        "K-means",
-        "LBG",
-        "K-means++",
-    )
     rows = []
     for kind, by_codes in thesis.ERRORS.items():
         for codes, errors in by_codes.items():
@@ -227,4 +218,4 @@ def thesis_error_table() -> str:
                     *times,
                 ]
             )
-    return markdown_table(header, rows)
+    return markdown_table(ERROR_HEADER, rows)
