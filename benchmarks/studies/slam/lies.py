@@ -161,7 +161,7 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
         "what is wrong",
         "ATE of the whole, m",
         "ATE, m",
-        "within 1.5 x",
+        "within 1.5 x or named",
         "recovered",
         "doubtful scans",
     )

@@ -98,7 +98,7 @@ use, so closures act after one scan; orebro has no odometry, and scans up to a m
 Every tenth line of odometry is removed; or scans during one turn of 60 to 90 degrees are left out, and
 odometry does not know of it ({turns} turns of each log, one at a time). Of {count} such logs {honest} end
 within 1.5 x the error of the whole log, or name the lie as doubtful. *Recovered* are scans that were found in
-another direction than odometry said; *doubtful* those that no map says anything of.
+another direction than odometry said; *doubtful* are these, and those that no map is sure of.
 
 {lies}
 
