@@ -105,7 +105,7 @@ class MapperSettings:
     merges: bool = True
     slack_m: Annotated[float, within(0.0, 1.0)] = 0.02
     most_boxes: Annotated[int, within(1, 1_000_000)] = 1500
-    merge_radius_m: Annotated[float, within(0.0, 10.0)] = 0.20
+    merge_radius_m: Annotated[float, within(0.0, 10.0)] = 0.25
     least_motion_m: Annotated[float, within(0.0, 1e3)] = 0.5
     least_turn: Annotated[float, within(0.0, 2.0 * math.pi)] = math.radians(45.0)
     seed: Annotated[int, within(0, 2**32 - 1)] = 0
