@@ -42,6 +42,11 @@ POLICIES.register(
     "least cost of distance less size of the frontier, both in metres (explore_lite)",
 )
 POLICIES.register(
+    "tour_frontier",
+    "lidarium.agents.tours.policy:TourFrontier",
+    "the team shares out all frontiers as tours past places from which much is seen",
+)
+POLICIES.register(
     "sparse_frontier",
     "lidarium.agents.sparse_frontier:SparseFrontier",
     "robots see all ground with depth cameras, and plan on sparse maps of boxes",

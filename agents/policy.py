@@ -103,11 +103,14 @@ class Policy(ABC):
         Whether the robots plan on the team's map, where it reaches them, or on their own.
     observes : tuple of str
         What it reads of observations, of ``settings.observe``; a run checks it before the first step.
+    decision_period_s : float or None
+        How often it decides at the level of waypoints [s]; None for as often as the settings say.
     """
 
     level: str
     shares_map: bool = True
     observes: tuple[str, ...] = ()
+    decision_period_s: float | None = None
 
     @abstractmethod
     def reset(self, team: Team, seed: int) -> None:
@@ -180,6 +183,7 @@ class PerRobot(Policy):
         self._factory = factory
         probe = factory()
         self.level, self.shares_map, self.observes = probe.level, probe.shares_map, probe.observes
+        self.decision_period_s = probe.decision_period_s
         self._policies: dict[str, Policy] = {}
 
     @property

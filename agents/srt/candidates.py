@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.intent import Intent
 from lidarium.agents.srt.frontier_arcs import Opening, least_opening
 from lidarium.agents.srt.memories.memory import Memory
-from lidarium.agents.srt.motion.progress import Intent
 from lidarium.agents.srt.safe_region import DIRECTIONS, UNIT
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node

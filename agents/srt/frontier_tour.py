@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.agents.intent import KEPT_NEAR, Intent
 from lidarium.agents.srt.memories.memory import Legs, Memory, Place
 from lidarium.agents.srt.motion.drive import Limits
-from lidarium.agents.srt.motion.progress import KEPT_NEAR, Intent
 from lidarium.agents.srt.senses import Senses
 from lidarium.mapping.geometry.rigid import wrapped
 from lidarium.mapping.planning.tours import shortest_tour

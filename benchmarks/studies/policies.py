@@ -19,7 +19,14 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 
-POLICIES = ("random_walk", "nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite")
+POLICIES = (
+    "random_walk",
+    "nearest_frontier",
+    "nearest_frontier_own_map",
+    "utility_frontier",
+    "explore_lite",
+    "tour_frontier",
+)
 FLOORS = ("apartment", "clinic", "scene_room", "scene_loop", "scene_corridor")
 TEAMS = (1, 2, 3)
 SEEDS = range(3)

@@ -86,9 +86,11 @@ def _environment(
 
 
 def at_level(
-    env: ExplorationEnv, level: str, shares_map: bool = True
+    env: ExplorationEnv, level: str, shares_map: bool = True, decision_period_s: float | None = None
 ) -> ExplorationEnv | WaypointExploration | FrontierExploration:
     """Put the wrapper of a level of decision around an environment.
+
+    ``decision_period_s`` is for the level of waypoints; None for that of the settings.
 
     Raises
     ------
@@ -99,7 +101,7 @@ def at_level(
     if level == "velocity":
         return env
     if level == "waypoint":
-        return WaypointExploration(env, shares_map)
+        return WaypointExploration(env, shares_map, decision_period_s)
     if level == "frontier":
         return FrontierExploration(env, shares_map)
     raise ValueError(f"level is {level!r}; want velocity, waypoint or frontier")

@@ -40,6 +40,8 @@ class WaypointExploration(DecisionWrapper):
         The environment to drive in.
     shares_map : bool
         Whether robots plan on the team's map, where it reaches them.
+    decision_period_s : float or None
+        How long a decision lasts [s]; None for that of the settings.
 
     Attributes
     ----------
@@ -50,8 +52,12 @@ class WaypointExploration(DecisionWrapper):
         them. None where paths are planned on grids.
     """
 
-    def __init__(self, env: ExplorationEnv, shares_map: bool = True) -> None:
+    def __init__(
+        self, env: ExplorationEnv, shares_map: bool = True, decision_period_s: float | None = None
+    ) -> None:
         super().__init__(env, "lidarium_waypoint_exploration_v0")
+        period_s = env.settings.decision_period_s if decision_period_s is None else decision_period_s
+        self._decision_steps = max(round(period_s / env.settings.time_step), 1)
         self._half_side = 0.5 * env.settings.map_cells * env.settings.occupancy.resolution
         self._action_spaces = {
             agent: spaces.Box(-1.0, 1.0, (2,), np.float32) for agent in self.possible_agents
@@ -126,7 +132,7 @@ class WaypointExploration(DecisionWrapper):
         driver.prepare()
         if not env.stopping:
             waiting = {row for row in rows.values() if driver.is_done(row)}
-            for _ in range(env.settings.decision_steps):
+            for _ in range(self._decision_steps):
                 env.drive_at(driver.commands())
                 if env.ends_now() or any(driver.is_done(row) and row not in waiting for row in rows.values()):
                     break

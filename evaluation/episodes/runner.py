@@ -164,7 +164,7 @@ def run_episode(
         What it left.
     """
     check_observed(policy, type(policy).__name__, env.settings.observe)
-    level = at_level(env, policy.level, policy.shares_map)
+    level = at_level(env, policy.level, policy.shares_map, policy.decision_period_s)
     driver = _driver_of(level)
     world: World = _planning_sparsely(level, policy.shares_map) if plans_sparsely else level
     world = world if merging is None else MergedMaps(world, merging)

@@ -64,6 +64,24 @@ class Clusters:
         """Cells (M, 2) of cluster k."""
         return self.cells[self.starts[k] : self.starts[k + 1]]
 
+    def without(self, left_out: NDArray[np.bool_], minimum_cells: int = 1) -> "Clusters":
+        """Return what is left of the clusters without some cells of the map, (rows, columns) bool.
+
+        Clusters of which fewer cells are left are dropped.
+        """
+        is_kept = ~left_out[self.cells[:, 0], self.cells[:, 1]]
+        counts = np.diff(np.concatenate([[0], np.cumsum(is_kept)])[self.starts])
+        is_large = counts >= max(minimum_cells, 1)
+        cells = self.cells[is_kept & np.repeat(is_large, self.counts)]
+        resolution = self.sizes[is_large] / np.maximum(self.counts[is_large], 1)
+        return Clusters(
+            cells,
+            np.concatenate([[0], np.cumsum(counts[is_large])]).astype(np.int64),
+            self.centroids[is_large],
+            self.representatives[is_large],
+            counts[is_large] * resolution,
+        )
+
 
 class FrontierMap:
     """Frontier cells kept beside a belief.

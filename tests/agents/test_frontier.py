@@ -21,7 +21,13 @@ TWO_ROOMS = Floor(
     (wall(3.4, 0.0, 0.2, 1.6), wall(3.4, 2.6, 0.2, 1.9), wall(5.0, 2.0, 0.6, 0.6)),
     starts=np.array([[1.0, 1.0, 0.5], [1.0, 3.0, -0.5]]),
 )
-NAMES = ("nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite")
+NAMES = (
+    "nearest_frontier",
+    "nearest_frontier_own_map",
+    "utility_frontier",
+    "explore_lite",
+    "tour_frontier",
+)
 
 
 def with_a_crack(crack):

@@ -13,7 +13,13 @@ from lidarium.agents import GivenUp, PerRobot, Policy, Stop, make_policy, policy
 from lidarium.envs.radio.messages import Target
 from lidarium.evaluation.episodes.runner import run_episode
 
-FRONTIER_POLICIES = ("nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite")
+FRONTIER_POLICIES = (
+    "nearest_frontier",
+    "nearest_frontier_own_map",
+    "utility_frontier",
+    "explore_lite",
+    "tour_frontier",
+)
 REASONS = {"covered", "no_frontier", "frontier_unreachable"}
 
 

@@ -1,9 +1,8 @@
-"""What a robot remembers of its way: what it goes for, and whether it gets on."""
+"""What a robot remembers of its way: whether it gets on."""
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lidarium.agents.srt.senses import Senses
 from lidarium.mapping.geometry.rigid import wrapped
@@ -47,50 +46,3 @@ class Progress:
         self._blocks = self._blocks + 1 if senses.distance_to(self._blocked_at) < SAME_PLACE else 1
         self._blocked_at = senses.pose[:2]
         return self._blocks
-
-
-KEPT = 1.0
-"""What a robot goes for is left only for a tour that is shorter by this [m]."""
-
-KEPT_NEAR = 0.5
-"""What lies this near to what a robot goes for is still the same [m]."""
-
-
-class Intent:
-    """What a robot goes for.
-
-    Two targets may each seem the nearer one from where the robot is on its way to the other. It would turn
-    between them for ever; with every time that it comes back to one that it had left, what it goes for is
-    kept for twice the gain.
-
-    Attributes
-    ----------
-    latest : (2,) float64 or None
-        What it went for last [m].
-    """
-
-    def __init__(self) -> None:
-        self.latest: NDArray[np.float64] | None = None
-        self._left: list[NDArray[np.float64]] = []
-        self._returns = 0
-
-    @property
-    def kept(self) -> float:
-        """A tour has to be shorter by this for the robot to go for something else [m]."""
-        return KEPT * 2.0**self._returns
-
-    def go_for(self, focus: NDArray[np.float64] | None) -> None:
-        """Go for something, or for nothing."""
-        if focus is not None and self.latest is not None and not _is_near(focus, self.latest):
-            self._returns += any(_is_near(focus, left) for left in self._left)
-            self._left.append(self.latest)
-        self.latest = focus
-
-    def settle(self) -> None:
-        """Have come to it, or have seen it through: what was left before counts no more."""
-        self._left.clear()
-        self._returns = 0
-
-
-def _is_near(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
-    return math.dist(first, second) < KEPT_NEAR

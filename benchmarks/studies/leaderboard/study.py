@@ -15,7 +15,15 @@ from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
 
-POLICIES = ("nearest_frontier", "nearest_frontier_own_map", "utility_frontier", "explore_lite", "random_walk")
+POLICIES = (
+    "nearest_frontier",
+    "nearest_frontier_own_map",
+    "utility_frontier",
+    "explore_lite",
+    "tour_frontier",
+    "srt",
+    "random_walk",
+)
 BASELINE = "nearest_frontier"
 TEAMS = (1, 2, 3)
 SETTINGS = {"resolution": 0.025, "stop_coverage": 0.99, "horizon_s": 1800.0}

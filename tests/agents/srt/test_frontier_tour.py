@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lidarium.agents.intent import Intent
 from lidarium.agents.srt.candidates import Candidate, CandidateSource
 from lidarium.agents.srt.choice import WayChooser
 from lidarium.agents.srt.frontier_tour import first_on_tour
 from lidarium.agents.srt.memories.map_memory import MapMemory
 from lidarium.agents.srt.memories.region_memory import RegionMemory
 from lidarium.agents.srt.motion.drive import Limits
-from lidarium.agents.srt.motion.progress import Intent
 from lidarium.agents.srt.safe_region import DIRECTIONS, safe_region, seen_region
 from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings

@@ -1,0 +1,1 @@
+"""Explorers whose tours pass all frontiers that are left."""

@@ -1,0 +1,209 @@
+"""The tours of robots past the frontiers of one map, and the first leg of each."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.tours.settings import TourSettings
+from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.planning.frontiers import Clusters
+from lidarium.mapping.planning.grid_planning import Cell
+from lidarium.mapping.planning.touring.coarse_distances import (
+    STRAIGHT,
+    UNREACHED,
+    CoarseGrid,
+    coarse_grid,
+    distances_from,
+    place_in,
+)
+from lidarium.mapping.planning.touring.frontier_views import ViewRules, Views, gain_at, views_of
+from lidarium.mapping.planning.touring.team_tours import team_tours
+
+AHEAD = 0.5
+"""The direction in which a path begins is that of a place about so far along it [m]."""
+
+SAME = 0.5
+"""Frontiers nearer than this to what a robot drives to are what it drives to [m]."""
+
+NO_PATH = 1e4
+"""Length of a path that there is none of [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tourist:
+    """A robot that tours are planned for.
+
+    Attributes
+    ----------
+    pose : (3,) float64
+        x, y from the corner of the map's first cell, and heading [m, rad].
+    kept_cell : (row, column) or None
+        The frontier cell that it drives to.
+    kept : float
+        How much shorter another tour has to be [m].
+    """
+
+    pose: NDArray[np.float64]
+    kept_cell: Cell | None = None
+    kept: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """The first leg of a tour.
+
+    Attributes
+    ----------
+    cell : (row, column)
+        Where it ends.
+    frontier_cell : (row, column)
+        The nearest cell of the frontier that is observed from there.
+    cells : (n, 2) int64
+        All cells of that frontier.
+    gain : float
+        Unknown area in view [m2].
+    direction : float
+        Mean direction to it [rad].
+    """
+
+    cell: Cell
+    frontier_cell: Cell
+    cells: NDArray[np.int64]
+    gain: float
+    direction: float
+
+
+def plan_legs(
+    navigation: NavigationMap,
+    clusters: Clusters,
+    robots: Sequence[Tourist],
+    radius: float,
+    settings: TourSettings,
+    rules: ViewRules,
+) -> list[Leg | None]:
+    """Return the first leg of each robot's tour past the frontiers of a map.
+
+    Parameters
+    ----------
+    navigation : NavigationMap
+        The map.
+    clusters : Clusters
+        Its frontiers that may be visited.
+    robots : sequence of Tourist
+        Who visits them.
+    radius : float
+        Radius of their bodies [m].
+    settings : TourSettings
+        How tours are planned.
+    rules : ViewRules
+        How views are measured.
+
+    Returns
+    -------
+    list of Leg or None
+        One for each robot; None where nothing is left for it.
+    """
+    if not len(clusters):
+        return [None] * len(robots)
+    resolution = navigation.resolution
+    grid = coarse_grid(navigation.log_odds, navigation.clearance, radius)
+    starts = np.array([grid.cell_of(_cell_at(robot.pose, resolution)) for robot in robots])
+    lengths = distances_from(grid, starts)
+    groups = (clusters.cells, clusters.starts)
+    views = views_of(navigation.log_odds, resolution, grid, lengths.min(axis=0), groups, rules)
+    chosen = _nearest(views, settings)
+    if not len(chosen):
+        return [None] * len(robots)
+    places = views.cells[chosen]
+    first = _metres(lengths[:, places[:, 0], places[:, 1]], grid)
+    fields = distances_from(grid, places)
+    between = _metres(fields[:, places[:, 0], places[:, 1]], grid)
+    is_reached = first < NO_PATH
+    for k, robot in enumerate(robots):
+        first[k] += settings.turn_length * _turns(robot.pose, starts[k], fields, grid, resolution)
+        first[k] -= robot.kept * _are_kept(robot, clusters, chosen, resolution)
+    sequence = team_tours(first, between, views.gains[chosen], settings.weights)
+    return [
+        _leg(navigation, grid, places[number], clusters.of(int(chosen[number])), rules)
+        if number is not None and is_reached[k, number]
+        else None
+        for k, number in enumerate(first_places(sequence, len(chosen)))
+    ]
+
+
+def first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
+    """Return the first place of each robot's tour in a sequence of ``team_tours``, None where it has none.
+
+    ``count`` is the number of places.
+    """
+    firsts: list[int | None] = [None]
+    for number in sequence:
+        if number >= count:
+            firsts.append(None)
+        elif firsts[-1] is None:
+            firsts[-1] = int(number)
+    return firsts
+
+
+def _cell_at(pose: NDArray[np.float64], resolution: float) -> Cell:
+    return math.floor(pose[1] / resolution), math.floor(pose[0] / resolution)
+
+
+def _nearest(views: Views, settings: TourSettings) -> NDArray[np.int64]:
+    """Return the numbers of the frontiers to visit, the nearest first."""
+    order = np.argsort(views.lengths, kind="stable")
+    is_wanted = (views.lengths[order] < UNREACHED) & (views.gains[order] >= settings.least_gain)
+    return order[is_wanted][: settings.most]
+
+
+def _metres(lengths: NDArray[np.int32], grid: CoarseGrid) -> NDArray[np.float64]:
+    return np.where(lengths == UNREACHED, NO_PATH, lengths * (grid.side / STRAIGHT))
+
+
+def _turns(
+    pose: NDArray[np.float64],
+    start: NDArray[np.int64],
+    fields: NDArray[np.int32],
+    grid: CoarseGrid,
+    resolution: float,
+) -> NDArray[np.float64]:
+    """Return by how much a robot turns to set out to each of n places, (n,) [rad].
+
+    ``fields`` (n, rows, columns) are lengths of paths from each place.
+    """
+    reach = max(round(AHEAD / grid.side), 1)
+    low = np.maximum(start - reach, 0)
+    part = fields[:, low[0] : start[0] + reach + 1, low[1] : start[1] + reach + 1]
+    nearest = part.reshape(len(fields), -1).argmin(axis=1)
+    rows, columns = np.unravel_index(nearest, part.shape[1:])
+    x = (grid.column + (low[1] + columns + 0.5) * grid.factor) * resolution - pose[0]
+    y = (grid.row + (low[0] + rows + 0.5) * grid.factor) * resolution - pose[1]
+    turns = np.abs((np.arctan2(y, x) - pose[2] + math.pi) % (2.0 * math.pi) - math.pi)
+    return np.where(np.hypot(x, y) > grid.side, turns, 0.0)
+
+
+def _are_kept(
+    robot: Tourist, clusters: Clusters, chosen: NDArray[np.int64], resolution: float
+) -> NDArray[np.bool_]:
+    """Return which of the chosen frontiers are what a robot drives to already."""
+    if robot.kept_cell is None:
+        return np.zeros(len(chosen), np.bool_)
+    at, reach = np.asarray(robot.kept_cell), SAME / resolution
+    return np.array([np.abs(clusters.of(int(k)) - at).max(axis=1).min() < reach for k in chosen])
+
+
+def _leg(
+    navigation: NavigationMap,
+    grid: CoarseGrid,
+    place: NDArray[np.int64],
+    cells: NDArray[np.int64],
+    rules: ViewRules,
+) -> Leg:
+    log_odds = navigation.log_odds
+    cell = place_in(grid, log_odds, navigation.clearance, (int(place[0]), int(place[1])))
+    nearest = cells[int(np.argmin(np.hypot(*(cells - np.asarray(cell)).T)))]
+    gain, direction = gain_at(log_odds, navigation.resolution, cell, rules)
+    return Leg(cell, (int(nearest[0]), int(nearest[1])), cells, gain, direction)

@@ -1,0 +1,190 @@
+"""Tour frontier: robots share out the frontiers of a map, and each drives the first leg of its own tour.
+
+Each frontier is observed from where much of what is unknown is in view, not from beside the corner behind
+which it hides. All frontiers are assigned and ordered at once, as tours of the team, planned again when a
+robot has seen what it drove to. Tours are short, the longest one most of all, and show much early. When
+nothing of a size is left, robots go to the nearest frontiers, as near as they can come.
+
+References
+----------
+M. Kulich, J. Faigl and L. Preucil, "On distance utility in the exploration task", 2011: tours past all
+frontiers. C. Cao, H. Zhu, H. Choset and J. Zhang, "TARE: a hierarchical framework for efficiently exploring
+complex 3D environments", 2021: tours past places from which much is seen. B. Zhou, H. Xu and S. Shen, "RACER:
+rapid collaborative exploration with a decentralized multi-UAV system", 2023: tours shared out among robots.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.frontier import FrontierExplorer
+from lidarium.agents.frontier_reach import Choice
+from lidarium.agents.intent import Intent
+from lidarium.agents.policy import Team
+from lidarium.agents.tours.planning import Leg, Tourist, plan_legs
+from lidarium.agents.tours.settings import TourSettings
+from lidarium.envs.onboard.belief import Belief
+from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.geometry.rigid import wrapped
+from lidarium.mapping.grids.grid_lines import visible
+from lidarium.mapping.planning.frontier_approach import nearest_frontier
+from lidarium.mapping.planning.frontier_kernels import FRONTIER
+from lidarium.mapping.planning.frontiers import Clusters
+from lidarium.mapping.planning.grid_planning import centres_of
+from lidarium.mapping.planning.touring.frontier_views import gain_at
+
+SIGHT_MARGIN = 0.5
+"""What is this far within the edges of a laser's field of view is seen for certain [rad]."""
+
+FRESH_S = 60.0
+"""Teammates of which a robot has not heard for this long have no part in its tours [s]."""
+
+ON_THE_SPOT = 0.2
+"""A robot that is this near to where a leg ends arrives with the heading that it has [m]."""
+
+
+class TourFrontier(FrontierExplorer):
+    """Explorers that share out all frontiers as tours.
+
+    Robots on one map are planned for together; where the radio is limited, each plans on its own map for
+    itself and for the teammates that it has heard of.
+
+    Parameters
+    ----------
+    shares_map : bool
+        Whether robots explore on the team's map.
+    **settings
+        Any attribute of ``TourSettings``.
+    """
+
+    decision_period_s = 0.5
+
+    def __init__(self, shares_map: bool = True, **settings: float) -> None:
+        super().__init__(shares_map)
+        self.settings = TourSettings(**settings)  # type: ignore[arg-type]
+
+    def reset(self, team: Team, seed: int) -> None:
+        """Begin an episode."""
+        super().reset(team, seed)
+        self._rules = self.settings.rules(team.belief(team.agents[0]).lidar.range_max)
+        self._legs: dict[Choice, Leg] = {}
+        self._intents = {agent: Intent() for agent in team.agents}
+        self._in_vain: dict[int, NDArray[np.bool_]] = {}
+
+    def still_stands(self, navigation: NavigationMap, choice: Choice) -> bool:
+        """Whether much is left to see from where a choice leads."""
+        leg = self._legs.get(choice)
+        if leg is None:
+            return super().still_stands(navigation, choice)
+        if not (navigation.frontiers.flags[leg.cells[:, 0], leg.cells[:, 1]] == FRONTIER).any():
+            return False
+        gain, _ = gain_at(navigation.log_odds, navigation.resolution, choice.cell, self._rules)
+        return gain >= self.settings.kept_share * leg.gain
+
+    def choose(self, agents: list[str], open_agents: list[str]) -> dict[str, Choice | None]:
+        """Plan the tours of all robots that explore on one map with an open one."""
+        groups: dict[int, list[str]] = {}
+        for agent in agents:
+            groups.setdefault(id(self.navigation(agent)), []).append(agent)
+        chosen: dict[str, Choice | None] = {}
+        for members in groups.values():
+            if any(agent in open_agents for agent in members):
+                chosen |= self._share_out(members)
+        return chosen
+
+    def _share_out(self, agents: list[str]) -> dict[str, Choice | None]:
+        """Return what each robot on one map drives to."""
+        navigation = self.navigation(agents[0])
+        least = max(math.ceil(self.settings.minimum_size / navigation.resolution - 1e-9), 1)
+        clusters = self._without_vain(navigation, least)
+        robots = [self._tourist(agent, agent) for agent in agents] + self._others(agents)
+        legs = plan_legs(navigation, clusters, robots, self.footprint.radius, self.settings, self._rules)
+        chosen = {agent: self._begun(agent, leg) for agent, leg in zip(agents, legs, strict=False)}
+        if any(chosen.values()):
+            return chosen
+        return {agent: self.current(agent) or self._nearest(agent) for agent in agents}
+
+    def _begun(self, agent: str, leg: Leg | None) -> Choice | None:
+        """Return the choice of a robot that begins a leg."""
+        if leg is None:
+            return None
+        choice = Choice(leg.cell, leg.frontier_cell)
+        self._legs[choice] = leg
+        self._intents[agent].go_for(np.array(leg.frontier_cell) * self.navigation(agent).resolution)
+        return choice
+
+    def _tourist(self, agent: str, viewer: str) -> Tourist:
+        """Return a robot that has a map of its own, as tours see it."""
+        belief, intent, current = self.team.belief(agent), self._intents[agent], self.current(agent)
+        if current is None:
+            intent.settle()
+            intent.latest = None
+        kept = None if current is None else current.frontier_cell
+        return Tourist(_on_map(belief.pose, self.team.belief(viewer)), kept, self.settings.kept * intent.kept)
+
+    def _others(self, agents: list[str]) -> list[Tourist]:
+        """Return the teammates that a robot has heard of, and that explore on other maps."""
+        belief = self.team.belief(agents[0])
+        return [
+            Tourist(_on_map(teammate.pose, belief))
+            for name, teammate in belief.teammates.items()
+            if name not in agents and not teammate.has_ended and teammate.age_s <= FRESH_S
+        ]
+
+    def _nearest(self, agent: str) -> Choice | None:
+        """Return the nearest frontier of any size, to be observed from beside it."""
+        navigation, start = self.navigation(agent), self.start_cell(agent)
+        if not len(navigation.frontiers):
+            return None
+        found = nearest_frontier(
+            navigation.frontiers,
+            navigation.space,
+            navigation.log_odds,
+            navigation.clearance,
+            start,
+            self.footprint,
+        )
+        if found is None:
+            return None
+        choice = Choice(found.cell, found.frontier_cell)
+        self._legs.pop(choice, None)
+        return choice
+
+    def _without_vain(self, navigation: NavigationMap, least: int) -> Clusters:
+        """Return the frontiers of at least so many cells that were not observed in vain."""
+        clusters, vain = navigation.frontiers.clusters(minimum_cells=least), self._in_vain.get(id(navigation))
+        return clusters if vain is None else clusters.without(vain, least)
+
+    def _give_up_around(self, agent: str, choice: Choice, reason: str) -> None:
+        """Drop what a leg led to from the tours; what was gone to by itself is given up for good."""
+        leg = self._legs.get(choice)
+        if leg is None:
+            super()._give_up_around(agent, choice, reason)
+            return
+        navigation = self.navigation(agent)
+        vain = self._in_vain.setdefault(id(navigation), np.zeros(navigation.frontiers.flags.shape, np.bool_))
+        cells = leg.cells
+        if reason == "unseen":
+            reach = self._rules.reach / navigation.resolution
+            in_sight = visible(navigation.log_odds, choice.cell, cells, reach)
+            cells = cells[in_sight] if in_sight.any() else cells
+        vain[cells[:, 0], cells[:, 1]] = True
+
+    def _heading(self, agent: str, choice: Choice) -> float:
+        """Return the heading nearest to that of arrival from which the robot sees what it came for."""
+        leg = self._legs.get(choice)
+        if leg is None:
+            return super()._heading(agent, choice)
+        belief = self.team.belief(agent)
+        place = centres_of(np.asarray(choice.cell), belief.map_origin, self.navigation(agent).resolution)
+        run, rise = place - belief.pose[:2]
+        arrival = math.atan2(rise, run) if math.hypot(run, rise) > ON_THE_SPOT else float(belief.pose[2])
+        room = max(0.5 * belief.lidar.field_of_view - SIGHT_MARGIN, 0.0)
+        gap = wrapped(leg.direction - arrival)
+        return float(wrapped(leg.direction - math.copysign(min(abs(gap), room), gap)))
+
+
+def _on_map(pose: NDArray[np.float64], belief: Belief) -> NDArray[np.float64]:
+    """Return a pose from the corner of a map's first cell."""
+    return np.array([*(pose[:2] - belief.map_origin), pose[2]])

@@ -1,0 +1,1 @@
+"""Tours of teams past the frontiers of a map."""

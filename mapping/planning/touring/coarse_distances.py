@@ -1,0 +1,239 @@
+"""Lengths of paths over a grid of coarse cells.
+
+An order of visits needs many lengths of paths, and none of them to the centimetre. A coarse cell is open
+where a body may stand anywhere in it; lengths are those over open cells, straight and diagonal.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.planning.clearance import ClearanceField, limit_of
+
+STRAIGHT, DIAGONAL = 5, 7
+"""Lengths of the steps to the neighbours of a cell, in fifths of its side."""
+
+_BUCKETS = DIAGONAL + 1
+
+_STEPS = (
+    (0, 1, STRAIGHT),
+    (1, 0, STRAIGHT),
+    (0, -1, STRAIGHT),
+    (-1, 0, STRAIGHT),
+    (1, 1, DIAGONAL),
+    (1, -1, DIAGONAL),
+    (-1, 1, DIAGONAL),
+    (-1, -1, DIAGONAL),
+)
+
+UNREACHED = np.iinfo(np.int32).max
+
+
+class CoarseGrid(NamedTuple):
+    """Where a body may stand, in coarse cells.
+
+    Attributes
+    ----------
+    is_open : (rows, columns) bool
+        Whether it may stand anywhere in the cell.
+    factor : int
+        Side of a coarse cell [cells of the map].
+    row, column : int
+        The map's cell at which coarse cell (0, 0) begins.
+    side : float
+        Side of a coarse cell [m].
+    most : int
+        Closeness up to which the body may stand in a cell of the map.
+    """
+
+    is_open: NDArray[np.bool_]
+    factor: int
+    row: int
+    column: int
+    side: float
+    most: int
+
+    def cell_of(self, cell: tuple[int, int]) -> tuple[int, int]:
+        """Return the coarse cell that holds a cell of the map, the nearest one where none does."""
+        rows, columns = self.is_open.shape
+        row, column = (int(cell[0]) - self.row) // self.factor, (int(cell[1]) - self.column) // self.factor
+        return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
+
+
+def coarse_grid(
+    log_odds: NDArray[np.int8], clearance: ClearanceField, radius: float, side: float = 0.1
+) -> CoarseGrid:
+    """Return where a body of a radius may stand on a map.
+
+    Parameters
+    ----------
+    log_odds : (rows, columns) int8
+        The map: < 0 free.
+    clearance : ClearanceField
+        Its clearance.
+    radius : float
+        Radius of the body [m].
+    side : float
+        Side of a coarse cell [m], rounded to whole cells. As bodies keep their radius from both sides of a
+        wall, coarse cells of less than half a body's width never join what the wall parts.
+    """
+    factor = max(round(side / clearance.resolution), 1)
+    most = clearance.limit - limit_of(radius, clearance.resolution)
+    is_open, row, column = _opened(log_odds, clearance.closeness, most, factor)
+    return CoarseGrid(is_open, factor, int(row), int(column), factor * clearance.resolution, most)
+
+
+def place_in(
+    grid: CoarseGrid, log_odds: NDArray[np.int8], clearance: ClearanceField, cell: tuple[int, int]
+) -> tuple[int, int]:
+    """Return the cell (row, column) of the map, within a coarse cell that is open, with most clearance."""
+    row, column = grid.row + cell[0] * grid.factor, grid.column + cell[1] * grid.factor
+    part = np.s_[row : row + grid.factor, column : column + grid.factor]
+    closeness = np.where(log_odds[part] < 0, clearance.closeness[part].astype(np.int64), 1 << 20)
+    best = np.unravel_index(int(np.argmin(closeness)), closeness.shape)
+    return row + int(best[0]), column + int(best[1])
+
+
+def distances_from(
+    grid: CoarseGrid, starts: NDArray[np.int64], maximum: float = math.inf
+) -> NDArray[np.int32]:
+    """Return the lengths of the shortest paths from each of some coarse cells to all.
+
+    Parameters
+    ----------
+    grid : CoarseGrid
+        Where a body may stand.
+    starts : (n, 2) int64
+        Coarse cells (row, column); they count as open.
+    maximum : float
+        Longer paths are left out [m].
+
+    Returns
+    -------
+    (n, rows, columns) int32
+        Lengths in fifths of the side of a coarse cell; ``UNREACHED`` where there is no path.
+    """
+    most = UNREACHED - _BUCKETS if math.isinf(maximum) else int(maximum / grid.side * STRAIGHT)
+    lengths = np.full((len(starts), *grid.is_open.shape), UNREACHED, np.int32)
+    _spread(grid.is_open, np.ascontiguousarray(starts, np.int64), most, lengths)
+    return lengths
+
+
+def nearest_places(
+    grid: CoarseGrid,
+    lengths: NDArray[np.int32],
+    cells: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    reach: float,
+) -> NDArray[np.int64]:
+    """Return the coarse cell beside each group of the map's cells to which the path is shortest.
+
+    Parameters
+    ----------
+    grid : CoarseGrid
+        Where a body may stand.
+    lengths : (rows, columns) int32
+        Lengths of the paths to all coarse cells.
+    cells, starts : (N, 2), (K + 1,) int64
+        Cells (row, column) of the map; group k has ``cells[starts[k]:starts[k + 1]]``.
+    reach : float
+        How far from a cell of the group its place may be, along rows and along columns [m].
+
+    Returns
+    -------
+    (K, 2) int64
+        Coarse cells (row, column); -1 where none within reach can be come to.
+    """
+    return np.asarray(
+        _beside(lengths, cells, starts, (grid.row, grid.column, grid.factor), math.ceil(reach / grid.side))
+    )
+
+
+@kernel
+def _beside(
+    lengths: Array, cells: Array, starts: Array, frame: tuple[int, int, int], reach: int
+) -> NDArray[np.int64]:
+    rows, columns = lengths.shape
+    count = len(starts) - 1
+    places = np.full((count, 2), -1, np.int64)
+    for k in range(count):
+        least = UNREACHED
+        for i in range(starts[k], starts[k + 1]):
+            row, column = (cells[i, 0] - frame[0]) // frame[2], (cells[i, 1] - frame[1]) // frame[2]
+            for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
+                for another in range(max(column - reach, 0), min(column + reach + 1, columns)):
+                    if lengths[other, another] < least:
+                        least = lengths[other, another]
+                        places[k, 0], places[k, 1] = other, another
+    return places
+
+
+@kernel
+def _opened(log_odds: Array, closeness: Array, most: int, factor: int) -> tuple[NDArray[np.bool_], int, int]:
+    """Return which coarse cells hold a cell to stand in, cut to those around what is known."""
+    rows, columns = log_odds.shape
+    row_low, row_high, column_low, column_high = rows, 0, columns, 0
+    for row in range(rows):
+        first = -1
+        last = -1
+        for column in range(columns):
+            if log_odds[row, column] < 0:
+                if first < 0:
+                    first = column
+                last = column
+        if first >= 0:
+            row_low, row_high = min(row_low, row), row + 1
+            column_low, column_high = min(column_low, first), max(column_high, last + 1)
+    if row_high == 0:
+        return np.zeros((1, 1), np.bool_), 0, 0
+    row_low, column_low = row_low // factor * factor, column_low // factor * factor
+    shape = (-(-(row_high - row_low) // factor), -(-(column_high - column_low) // factor))
+    is_open = np.zeros(shape, np.bool_)
+    for row in range(row_low, row_high):
+        opened = is_open[(row - row_low) // factor]
+        for column in range(column_low, column_high):
+            if log_odds[row, column] < 0 and closeness[row, column] <= most:
+                opened[(column - column_low) // factor] = True
+    return is_open, row_low, column_low
+
+
+@kernel
+def _spread(is_open: Array, starts: Array, most: int, lengths: Array) -> None:
+    """Spread lengths from each start, the cells of equal length after each other."""
+    rows, columns = is_open.shape
+    # A bucket holds cells of one length, and none of them twice.
+    queues = np.empty((_BUCKETS, rows * columns), np.int32)
+    counts = np.zeros(_BUCKETS, np.int64)
+    for k in range(starts.shape[0]):
+        length_of = lengths[k].reshape(-1)
+        length_of[starts[k, 0] * columns + starts[k, 1]] = 0
+        counts[:] = 0
+        queues[0, 0] = starts[k, 0] * columns + starts[k, 1]
+        counts[0] = 1
+        length, empty = 0, 0
+        while empty < _BUCKETS and length <= most:
+            bucket = length % _BUCKETS
+            count = counts[bucket]
+            counts[bucket] = 0
+            empty = empty + 1 if count == 0 else 0
+            for i in range(count):
+                cell = queues[bucket, i]
+                if length_of[cell] != length:
+                    continue
+                row, column = cell // columns, cell % columns
+                for rise, run, step in _STEPS:
+                    at_row, at_column = row + rise, column + run
+                    if not (0 <= at_row < rows and 0 <= at_column < columns):
+                        continue
+                    if not is_open[at_row, at_column]:
+                        continue
+                    other = at_row * columns + at_column
+                    if length + step < length_of[other]:
+                        length_of[other] = length + step
+                        target = (length + step) % _BUCKETS
+                        queues[target, counts[target]] = other
+                        counts[target] += 1
+            length += 1

@@ -1,0 +1,74 @@
+"""The first legs of tours past the frontiers of a map."""
+
+import numpy as np
+
+from lidarium.agents.tours.planning import Tourist, first_places, plan_legs
+from lidarium.agents.tours.settings import TourSettings
+from lidarium.envs.onboard.navigation import NavigationMap
+
+RESOLUTION = 0.05
+
+
+def corridor():
+    """Return a corridor of 12 m of which the ends are unknown."""
+    log_odds = np.zeros((40, 280), np.int8)
+    log_odds[10:30, 20:260] = -20
+    log_odds[9, 19:261] = log_odds[30, 19:261] = 20
+    navigation = NavigationMap(log_odds, RESOLUTION)
+    navigation.changed((0, 40, 0, 280))
+    return navigation
+
+
+def legs_of(navigation, robots, **settings):
+    chosen = TourSettings(**settings)
+    clusters = navigation.frontiers.clusters(minimum_cells=6)
+    return plan_legs(navigation, clusters, robots, 0.18, chosen, chosen.rules(5.6))
+
+
+def robot(x, y=1.0, heading=0.0, **kept):
+    return Tourist(np.array([x, y, heading]), **kept)
+
+
+def test_a_robot_goes_to_the_nearer_end():
+    navigation = corridor()
+    for x, is_left in ((4.0, True), (10.0, False)):
+        (leg,) = legs_of(navigation, [robot(x)])
+        assert (leg.frontier_cell[1] < 140) == is_left
+        assert leg.gain > 1.0
+        assert navigation.log_odds[leg.cell] < 0
+        assert np.cos(leg.direction) * (-1 if is_left else 1) > 0.9
+
+
+def test_two_robots_side_by_side_take_one_end_each():
+    left, right = legs_of(corridor(), [robot(6.9), robot(7.1)])
+    assert left.frontier_cell[1] < 140 < right.frontier_cell[1]
+
+
+def test_a_robot_sets_out_to_the_front():
+    for heading, is_left in ((0.0, False), (np.pi, True)):
+        (leg,) = legs_of(corridor(), [robot(7.0, heading=heading)])
+        assert (leg.frontier_cell[1] < 140) == is_left
+
+
+def test_a_robot_keeps_to_what_it_drives_to():
+    navigation = corridor()
+    (far,) = legs_of(navigation, [robot(7.5)])
+    assert far.frontier_cell[1] > 140
+    kept = (20, 20)
+    (leg,) = legs_of(navigation, [robot(7.5, kept_cell=kept, kept=3.0)])
+    assert leg.frontier_cell[1] < 140
+
+
+def test_frontiers_that_show_little_are_left_to_the_end():
+    assert legs_of(corridor(), [robot(4.0)], least_gain=100.0) == [None]
+
+
+def test_robots_without_a_frontier_stay():
+    legs = legs_of(corridor(), [robot(6.0), robot(7.0), robot(8.0)])
+    assert sum(leg is None for leg in legs) == 1
+
+
+def test_first_places_are_those_behind_each_separator():
+    assert first_places(np.array([2, 0, 4, 1, 3]), 4) == [2, 1]
+    assert first_places(np.array([3, 1, 0, 4, 2]), 3) == [None, 1, 2]
+    assert first_places(np.array([0, 1]), 0) == [None, None, None]

@@ -1,0 +1,94 @@
+"""Lengths of paths over coarse cells against a plain search."""
+
+import heapq
+import math
+
+import numpy as np
+import pytest
+
+from lidarium.mapping.planning.clearance import ClearanceField
+from lidarium.mapping.planning.touring.coarse_distances import UNREACHED, coarse_grid, distances_from
+
+
+def lengths_by_heap(is_open, start):
+    """Return lengths in fifths of a side, written plainly."""
+    lengths = np.full(is_open.shape, UNREACHED, np.int64)
+    lengths[start] = 0
+    heap = [(0, start)]
+    while heap:
+        length, (row, column) = heapq.heappop(heap)
+        if length > lengths[row, column]:
+            continue
+        for i in (-1, 0, 1):
+            for j in (-1, 0, 1):
+                other = row + i, column + j
+                if (i, j) == (0, 0) or not (
+                    0 <= other[0] < is_open.shape[0] and 0 <= other[1] < is_open.shape[1]
+                ):
+                    continue
+                further = length + (7 if i and j else 5)
+                if is_open[other] and further < lengths[other]:
+                    lengths[other] = further
+                    heapq.heappush(heap, (further, other))
+    return lengths
+
+
+def drawn_map(seed, shape=(90, 120)):
+    generator = np.random.default_rng(seed)
+    log_odds = np.full(shape, -20, np.int8)
+    for _ in range(25):
+        row, column = generator.integers(0, shape[0] - 8), generator.integers(0, shape[1] - 8)
+        height, width = (2, 20) if generator.random() < 0.5 else (20, 2)
+        log_odds[row : row + height, column : column + width] = 20
+    log_odds[:, :5] = 0
+    field = ClearanceField(shape, 0.05, 0.6)
+    field.update(log_odds)
+    return log_odds, field
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_lengths_are_those_of_a_plain_search(seed):
+    log_odds, field = drawn_map(seed)
+    grid = coarse_grid(log_odds, field, 0.18)
+    starts = np.argwhere(grid.is_open)[:: max(len(np.argwhere(grid.is_open)) // 4, 1)][:4]
+    lengths = distances_from(grid, starts)
+    for start, found in zip(starts, lengths, strict=True):
+        assert np.array_equal(found, lengths_by_heap(grid.is_open, tuple(start)))
+
+
+def test_a_cell_is_open_where_the_body_may_stand_in_it():
+    log_odds, field = drawn_map(7)
+    grid = coarse_grid(log_odds, field, 0.18)
+    clearance = field.values() if hasattr(field, "values") else None
+    may_stand = np.zeros(log_odds.shape, bool)
+    occupied = np.argwhere(log_odds > 0)
+    for row, column in np.argwhere(log_odds < 0):
+        gaps = np.maximum(np.abs(occupied - (row, column)) - 0.5, 0.0) * 0.05
+        may_stand[row, column] = np.hypot(*gaps.T).min() >= 0.18 - 1e-9
+    rows, columns = grid.is_open.shape
+    for row in range(rows):
+        for column in range(columns):
+            r, c = grid.row + row * grid.factor, grid.column + column * grid.factor
+            assert grid.is_open[row, column] == may_stand[r : r + grid.factor, c : c + grid.factor].any()
+    assert clearance is None or clearance.shape == log_odds.shape
+
+
+def test_walls_part_cells_and_far_cells_are_left_out():
+    log_odds = np.full((40, 80), -20, np.int8)
+    log_odds[:, 40] = 20
+    field = ClearanceField(log_odds.shape, 0.05, 0.6)
+    field.update(log_odds)
+    grid = coarse_grid(log_odds, field, 0.18)
+    lengths = distances_from(grid, np.array([[5, 5]]))[0]
+    assert (lengths[:, 25:] == UNREACHED).all()
+    assert lengths[5, 15] == 50
+    near = distances_from(grid, np.array([[5, 5]]), maximum=0.5)[0]
+    assert near[5, 10] == 25
+    assert near[5, 15] == UNREACHED
+
+
+def test_a_map_without_anything_known_has_one_closed_cell():
+    log_odds = np.zeros((10, 10), np.int8)
+    grid = coarse_grid(log_odds, ClearanceField(log_odds.shape, 0.05, 0.6), 0.18)
+    assert not grid.is_open.any()
+    assert math.isclose(grid.side, 0.1)
