@@ -26,6 +26,7 @@ from lidarium.scripts import (
 )
 from lidarium.scripts.animate import Animate
 from lidarium.scripts.bench import Bench
+from lidarium.scripts.bounds import bound
 from lidarium.scripts.common import (
     BAD_INPUT,
     DEFECT,
@@ -66,6 +67,7 @@ Choice = (
     | Annotated[sparse_map.SparseMapping, subcommand("sparse-map")]
     | Annotated[edit_map.EditSparseMap, subcommand("sparse-map-edit")]
     | Annotated[plan.Plan, subcommand("plan")]
+    | Annotated[bound.Bound, subcommand("bound")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -83,6 +85,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     sparse_map.SparseMapping: sparse_map.execute,
     edit_map.EditSparseMap: edit_map.execute,
     plan.Plan: plan.execute,
+    bound.Bound: bound.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,
@@ -105,6 +108,7 @@ _WITH_KERNELS = (
     sparse_map.SparseMapping,
     edit_map.EditSparseMap,
     plan.Plan,
+    bound.Bound,
     floors.Prepare,
     Bench,
 )

@@ -8,6 +8,11 @@ STUDIES: Registry[Study] = Registry("study")
 
 _PACKAGE = "lidarium.benchmarks.studies"
 STUDIES.register(
+    "bounds",
+    f"{_PACKAGE}.bounds:STUDY",
+    "what a team that knows the floor needs, how tight that is, and explorers beside it",
+)
+STUDIES.register(
     "evaluation",
     f"{_PACKAGE}.evaluation.study:STUDY",
     "what an evaluation costs beside its episodes, what two workers gain, what survives kills",

@@ -198,6 +198,17 @@ def drawn_starts(
     return [[float(number) for number in start] for start in drawn]
 
 
+def starts_in(
+    floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
+) -> list[list[float]]:
+    """Return where a reset with a seed lets robots start on a floor, x, y, theta of each [m, rad]."""
+    from lidarium.envs.exploration import ExplorationEnv
+
+    env = ExplorationEnv(floor, settings, image_resolution=image_resolution)
+    env.reset(seed=seed)
+    return [[float(number) for number in start] for start in env.world.starts]
+
+
 def check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:
     """Check that existing episodes are of this version and the suite's settings.
 

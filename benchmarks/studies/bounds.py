@@ -1,0 +1,202 @@
+"""Bounds: what a team that knows the floor needs, how tight that is, and what explorers need beside it."""
+
+import math
+import statistics
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import lidarium
+from lidarium.agents import make_policy
+from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.catalogue.names import load_floor, set_floors
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.bounds.bound import graph_of, known_floor_bound
+from lidarium.evaluation.bounds.relaxation import relax
+from lidarium.evaluation.bounds.tours import plan_tours
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.suites.campaign import starts_in
+
+SMALL_FLOORS = tuple(f"apartment:{number}" for number in range(20))
+"""Floors on which the plan is compared with what no walk can beat."""
+
+SPACING = (0.9, 0.4)
+"""Side of the squares of places, and distance of points to see, on small floors [m]."""
+
+POLICIES = ("nearest_frontier", "utility_frontier", "explore_lite", "tour_frontier", "srt")
+TEAMS = (1, 2, 3)
+GOAL, HORIZON_S = 0.99, 1800.0
+ROUNDS = 300
+PLAN_ROUNDS = 3000
+EXACT_S = 120.0
+
+TIGHT_FILE, FLOORS_FILE = "tight.jsonl", "floors.jsonl"
+
+PAGE = """# Bounds
+
+How soon a team that knows the floor sees 99 % of it. Views that see all are chosen from a lattice of places,
+ordered by OR-Tools and improved by taking stops out and covering again; the tours are driven with the robots'
+limits. The plan is feasible, so its time is an upper bound on the optimum.
+
+Made with `{command}`, lidarium {version}.
+
+## How tight
+
+One robot on {tight_count} generated apartments, on a graph of places {side:g} m apart: the plan's length over
+the bound of a linear program with cuts, below which no walk on that graph sees as much.
+
+| | mean | worst |
+|---|---:|---:|
+| plan over lower bound | {mean:.3f} | {worst:.3f} |
+
+{exact}
+
+| floor | places | plan [m] | lower bound [m] | ratio | optimum [m] |
+|---|---:|---:|---:|---:|---:|
+{tight}
+
+## Explorers beside it
+
+Kobuki, URG-04LX, perfect poses, maps of 5 cm, {floor_count} floors of the set `validation`, starts drawn by the
+seed. Medians over floors: the time of the plan, then each policy's time to 99 % as a multiple of it; runs that
+did not get there within {horizon:.0f} s count as that.
+
+| robots | known floor [s] | {titles} |
+|---:|---:|{rule}
+{table}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Small:
+    """A small floor."""
+
+    floor: str
+
+    @property
+    def key(self) -> str:
+        """Name that no other one of its file has."""
+        return self.floor
+
+
+@dataclass(frozen=True, slots=True)
+class Team:
+    """A floor and a number of robots."""
+
+    floor: str
+    robots: int
+
+    @property
+    def key(self) -> str:
+        """Name that no other one of its file has."""
+        return f"{self.floor} | {self.robots}"
+
+
+def settings_of(robots: int) -> ExplorationSettings:
+    """Return the settings of all teams."""
+    return make_settings(
+        robots=robots, starts="drawn", resolution=0.05, stop_coverage=GOAL, horizon_s=HORIZON_S
+    )
+
+
+def measure_small(small: Small) -> dict[str, Any]:
+    """Plan on a small floor, and bound the plan's length."""
+    settings = settings_of(1)
+    graph = graph_of(load_floor(small.floor), settings, starts_in(small.floor, settings, 0), SPACING)
+    plan = min(float(plan_tours(graph, GOAL, PLAN_ROUNDS, seed).lengths[0]) for seed in range(4))
+    found = relax(graph, GOAL, exact_s=EXACT_S)
+    optimum = found.optimum_m if math.isfinite(found.optimum_m) else None
+    return {
+        "floor": small.floor,
+        "places": len(graph.places),
+        "plan_m": plan,
+        "lower_m": found.lower_m,
+        "optimum_m": optimum,
+    }
+
+
+def measure_team(team: Team) -> dict[str, Any]:
+    """Let a team that knows the floor and all explorers see it."""
+    settings = settings_of(team.robots)
+    starts = starts_in(team.floor, settings, 0)
+    bound = known_floor_bound(team.floor, settings, starts, ROUNDS)
+    times = {}
+    for name in POLICIES:
+        env = ExplorationEnv(team.floor, settings)
+        run_episode(make_policy(name), env, 0, {"starts": starts})
+        times[name] = env.scorer.times.get(GOAL)
+    known = bound.time_s if math.isfinite(bound.time_s) else None
+    return {
+        "floor": team.floor,
+        "robots": team.robots,
+        "known_s": known,
+        "seen": bound.share,
+        "times_s": times,
+    }
+
+
+def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
+    """Do the small floors, then the set `validation`."""
+    small = [Small(floor) for floor in SMALL_FLOORS[::every]]
+    yield from do_missing(folder / TIGHT_FILE, "small floors", small, measure_small, workers)
+    floors = set_floors("validation")[::every]
+    teams = [Team(floor, robots) for floor in floors for robots in TEAMS]
+    yield from do_missing(folder / FLOORS_FILE, "teams", teams, measure_team, workers)
+
+
+def table(lines: Sequence[Mapping[str, Any]]) -> str:
+    """Return a row for each size of team: the bound's time, and multiples of it."""
+    rows = []
+    for robots in TEAMS:
+        members = [line for line in lines if line["robots"] == robots and line["known_s"] is not None]
+        known = statistics.median(line["known_s"] for line in members)
+        cells = [
+            f"{statistics.median((line['times_s'][name] or HORIZON_S) / line['known_s'] for line in members):.2f}"
+            for name in POLICIES
+        ]
+        rows.append(f"| {robots} | {known:.0f} | " + " | ".join(cells) + " |")
+    return "\n".join(rows)
+
+
+def page(folder: Path, command: str) -> str:
+    """Return the results as markdown."""
+    tight, teams = kept_lines(folder / TIGHT_FILE), kept_lines(folder / FLOORS_FILE)
+    ratios = [line["plan_m"] / line["lower_m"] for line in tight]
+    solved = [line for line in tight if line["optimum_m"] is not None]
+    exact = f"Solved to the optimum within {EXACT_S:.0f} s: {len(solved)} of {len(tight)}."
+    if solved:
+        gaps = [line["optimum_m"] / line["lower_m"] for line in solved]
+        plans = [line["plan_m"] / line["optimum_m"] for line in solved]
+        exact += (
+            f" There the optimum is {statistics.mean(gaps):.3f} times the lower bound, and the plan "
+            f"{statistics.mean(plans):.3f} times the optimum, in the mean."
+        )
+    missed = sum(line["known_s"] is None for line in teams)
+    rows = "\n".join(
+        f"| {line['floor']} | {line['places']} | {line['plan_m']:.2f} | {line['lower_m']:.2f} | {ratio:.3f} | "
+        + (f"{line['optimum_m']:.2f} |" if line["optimum_m"] is not None else "- |")
+        for line, ratio in zip(tight, ratios, strict=True)
+    )
+    text = PAGE.format(
+        command=command,
+        version=lidarium.__version__,
+        tight_count=len(tight),
+        side=SPACING[0],
+        mean=statistics.mean(ratios),
+        worst=max(ratios),
+        exact=exact,
+        tight=rows,
+        floor_count=len({line["floor"] for line in teams}),
+        horizon=HORIZON_S,
+        titles=" | ".join(f"`{name}`" for name in POLICIES),
+        rule="---:|" * len(POLICIES),
+        table=table(teams),
+    )
+    return text + (f"\nPlans whose drive did not see 99 %: {missed}, left out.\n" if missed else "")
+
+
+STUDY = Study(page, work=work)

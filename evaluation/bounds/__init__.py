@@ -1,0 +1,1 @@
+"""How soon a team that knew a floor could have seen it."""

@@ -1,0 +1,1 @@
+"""Commands about what a team that knew the floor could do."""

@@ -1,0 +1,28 @@
+"""`lidarium bound` from the command line."""
+
+import json
+import sys
+
+import pytest
+
+from lidarium.scripts.main import main
+
+
+def test_the_bound_is_printed_and_drawn(tmp_path, capsys):
+    pytest.importorskip("ortools", reason="OR-Tools is not installed")
+    arguments = ["bound", "apartment:3", "--map-resolution", "0.05", "--rounds", "20", "--json"]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["seen"] >= 0.99
+    assert 0.0 < result["time_s"] < 200.0
+    assert json.loads((tmp_path / "out" / "bound.json").read_text()) == result
+    assert (tmp_path / "out" / "bound.png").stat().st_size > 5000
+
+
+def test_without_the_extra_the_message_names_it(monkeypatch, capsys, tmp_path):
+    monkeypatch.setitem(sys.modules, "ortools.constraint_solver", None)
+    monkeypatch.setenv("LIDARIUM_FLOOR_STORE", "off")
+    out = tmp_path / "out"
+    assert main(["bound", "apartment:3", "--map-resolution", "0.05", "--rounds", "0", "--out", str(out)]) == 2
+    assert 'pip install "lidarium[bounds]"' in capsys.readouterr().err
+    assert not out.exists() or not list(out.iterdir())
