@@ -74,8 +74,8 @@ STUDIES.register(
 )
 STUDIES.register(
     "splines",
-    f"{_PACKAGE}.splines:STUDY",
-    "maps of walls as B-splines and localization on them",
+    f"{_PACKAGE}.splines.study:STUDY",
+    "maps of walls as B-splines and localization on them, also in buildings",
 )
 STUDIES.register(
     "srt",

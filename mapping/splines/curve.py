@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.splines.curves.basis import ORDER
 from lidarium.mapping.splines.curves.bspline import Spline
@@ -58,6 +59,20 @@ class Curve:
     way: Way
     box: Box
     line: NDArray[np.float64] | None
+
+    def moved(self, pose: Transform) -> "Curve":
+        """Return the curve in the frame in which its own has a pose."""
+        points = pose.apply(self.way.points)
+        line = np.empty(4)
+        return Curve(
+            Spline(self.spline.knots, pose.apply(self.spline.control_points)),
+            self.weights,
+            self.count,
+            self.last_seen,
+            Way(points, self.way.weights),
+            box_of(points),
+            line if _find_line(points, line) else None,
+        )
 
 
 def make_curve(

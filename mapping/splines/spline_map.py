@@ -79,6 +79,37 @@ class Landmarks:
             np.concatenate([last_seen[is_kept], np.full(added, update, np.int64)]),
         )
 
+    def moved(self, pose: Transform) -> "Landmarks":
+        """Return the landmarks in the frame in which their own has a pose."""
+        return Landmarks(pose.apply(self.points), self.weights, self.counts, self.last_seen)
+
+    def within(self, reach: float) -> "Landmarks":
+        """Return those in a square around the origin of which half the side is given [m]."""
+        return self.chosen(np.abs(self.points).max(axis=1, initial=0.0) <= reach)
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Landmarks":
+        """Return some of the landmarks, by a mask (n,)."""
+        return Landmarks(self.points[which], self.weights[which], self.counts[which], self.last_seen[which])
+
+    def joined(self, others: "Landmarks", most_distance: float, most_weight: float) -> "Landmarks":
+        """Return these and other landmarks of the same frame; those that are near each other are one [m]."""
+        which, known = match_points(others.points, self.points, most_distance)
+        weights, counts, last_seen = self.weights.copy(), self.counts.copy(), self.last_seen.copy()
+        points, share = self.points.copy(), others.weights[which] / (others.weights[which] + weights[known])
+        points[known] += share[:, None] * (others.points[which] - points[known])
+        weights[known] = np.minimum(weights[known] + others.weights[which], most_weight)
+        counts[known] += others.counts[which]
+        last_seen[known] = np.maximum(last_seen[known], others.last_seen[which])
+        rest = np.ones(len(others), np.bool_)
+        rest[which] = False
+        added = others.chosen(rest)
+        return Landmarks(
+            np.concatenate([points, added.points]),
+            np.concatenate([weights, added.weights]),
+            np.concatenate([counts, added.counts]),
+            np.concatenate([last_seen, added.last_seen]),
+        )
+
 
 def no_landmarks() -> Landmarks:
     """Return landmarks of a blank map."""
@@ -121,12 +152,51 @@ class SplineMap:
         """
         self.updates += 1
         for spline, sigmas in curves_of(observation, self.settings):
-            self._take_in(Spline(spline.knots, pose.apply(spline.control_points)), sigmas)
+            seen = Spline(spline.knots, pose.apply(spline.control_points))
+            self._take_in(self._way_of(seen, sigmas), seen.control_points, 1)
         self._forget()
         limits = self.updates, self.settings.association.point_distance, self.settings.map
-        seen = observation.features.moved(pose)
-        self.corners = self.corners.updated(seen.corners, seen.corner_sigmas, *limits)
-        self.peaks = self.peaks.updated(seen.peaks, seen.peak_sigmas, *limits)
+        features = observation.features.moved(pose)
+        self.corners = self.corners.updated(features.corners, features.corner_sigmas, *limits)
+        self.peaks = self.peaks.updated(features.peaks, features.peak_sigmas, *limits)
+
+    def absorb(self, other: "SplineMap", pose: Transform) -> None:
+        """Join another map to this one.
+
+        Parameters
+        ----------
+        other : SplineMap
+            A map of neighbouring walls, which is left as it is.
+        pose : Transform
+            Where its frame lies in this map's, ``this_from_other``.
+        """
+        self.updates = max(self.updates, other.updates)
+        for curve in other.curves:
+            moved = curve.moved(pose)
+            self._take_in(moved.way, moved.spline.control_points, curve.count)
+        distance, most_weight = self.settings.association.point_distance, self.settings.map.most_weight
+        self.corners = self.corners.joined(other.corners.moved(pose), distance, most_weight)
+        self.peaks = self.peaks.joined(other.peaks.moved(pose), distance, most_weight)
+
+    def around(self, frame: Transform, reach: float) -> "SplineMap":
+        """Return a map of what lies near a frame, in that frame.
+
+        Parameters
+        ----------
+        frame : Transform
+            The frame, ``this_from_frame``.
+        reach : float
+            Half the side of the square around it that walls and points have to meet [m].
+        """
+        there = frame.inverse()
+        found = SplineMap(self.settings)
+        curves = [curve.moved(there) for curve in self.curves]
+        found.curves = [curves[k] for k in curves_in(curves, (-reach, -reach, reach, reach))]
+        found.corners, found.peaks = (
+            marks.moved(there).within(reach) for marks in (self.corners, self.peaks)
+        )
+        found.updates = self.updates
+        return found
 
     @property
     def lines(self) -> NDArray[np.float64]:
@@ -165,14 +235,17 @@ class SplineMap:
             or curve.way.length >= settings.trusted_length
         ]
 
-    def _take_in(self, spline: Spline, sigmas: NDArray[np.float64]) -> None:
-        """Join a seen curve with the map's curves along it, or add it as a new one."""
-        settings = self.settings.map
-        parameters = spline.sample_parameters(settings.sample_spacing)
+    def _way_of(self, spline: Spline, sigmas: NDArray[np.float64]) -> Way:
+        """Return points along a seen curve, whose points have standard deviations (m,) [m]."""
+        parameters = spline.sample_parameters(self.settings.map.sample_spacing)
         places = np.arange(len(parameters)) * ((len(sigmas) - 1) / (len(parameters) - 1))
         noise = np.interp(places, np.arange(len(sigmas)), sigmas)
-        way, count = Way(spline.evaluate(parameters), (0.01 / noise) ** 2), 1
-        while (best := self._best_match(way, spline.control_points)) is not None:
+        return Way(spline.evaluate(parameters), (0.01 / noise) ** 2)
+
+    def _take_in(self, way: Way, control_points: NDArray[np.float64], count: int) -> None:
+        """Join a curve that so many scans have seen with those along it, or add it as a new one."""
+        settings, seen = self.settings.map, count
+        while (best := self._best_match(way, control_points)) is not None:
             known = self.curves.pop(best[0])
             way, extends = join(way, known.way, best[1], settings)
             count += known.count
@@ -184,7 +257,7 @@ class SplineMap:
                     if piece is not longest and self._is_new(piece):
                         self._add(piece, count)
                 return
-        if count > 1 or self._is_new(way):
+        if count > seen or self._is_new(way):
             self._add(way, count)
 
     def _add(self, way: Way, count: int) -> None:

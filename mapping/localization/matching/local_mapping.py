@@ -128,6 +128,13 @@ class LocalMapper:
         """Return where a scan lies on the older local map, see ``LocalMatcher.match``."""
         return self._matcher.match(self._active[0].submap, points, predicted, moved, uncertainty, failed)
 
+    def judge(self, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
+        """Note how well a scan agrees with the older local map at a pose found otherwise.
+
+        Its points are (n, 2) [m]; the pose is x, y, theta (3,) in the map's frame [m, rad].
+        """
+        self._matcher.judge(self._active[0].submap, points, pose)
+
     def rendered_again(self, points: NDArray[np.float64]) -> Match | None:
         """Return where the older local map's first scan now lies on that map.
 

@@ -227,6 +227,12 @@ class LocalMatcher:
         weight = settings.weight(len(points))
         return refine(submap.grid, points, pose, pose, nothing, weight, settings.unseen, settings.surface_m)
 
+    def judge(self, submap: Submap, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
+        """Note how well points (n, 2) agree with a local map near a pose (3,) found otherwise."""
+        match = self._refined(submap, points, pose)
+        if self._is_good(match) and not self._is_new_ground(match, len(points)):
+            self._noted(match)
+
     def match_first(self, submap: Submap, points: NDArray[np.float64]) -> Match | None:
         """Return where the first scan of a local map now lies on that map.
 

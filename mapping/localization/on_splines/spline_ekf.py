@@ -1,6 +1,7 @@
 """The extended Kalman filter on a map of curves.
 
-One Gaussian over the pose and all corners and peaks that it trusts.
+One Gaussian over the pose, by what share wheels measure paths and turns too long or too short, and all
+corners and peaks that it trusts.
 
 A landmark enters when the map has seen it often enough, with the pose's uncertainty carried over; the cost of
 a correction grows with the square of their number. Curves are measured too: how far the ends of rays lie
@@ -20,6 +21,12 @@ from lidarium.mapping.localization.on_splines.spline_matches import Matches
 from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker, TrackingSettings, steps_of
 from lidarium.mapping.splines.features import Observation, match_points
 
+POSE, SCALES = 3, 2
+"""Numbers of the state that are the pose, and those that are scales of odometry after it."""
+
+BODY = POSE + SCALES
+"""Numbers of the state before the landmarks."""
+
 _TURNED = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
@@ -35,12 +42,17 @@ class SplineEkfSettings:
         Measurements that miss what is expected by more standard deviations are left out.
     start_distance, start_turn : float
         Standard deviations of the first pose [m, rad].
+    distance_bias, turn_bias : float
+        By what share odometry may measure paths and turns too long or too short all the time, as a standard
+        deviation.
     """
 
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     gate_sigmas: FromZero = 3.0
     start_distance: Distance = 0.0
     start_turn: Turn = 0.0
+    distance_bias: FromZero = 0.05
+    turn_bias: FromZero = 0.05
 
     def __post_init__(self) -> None:
         check_settings(self, "the filter")
@@ -70,10 +82,12 @@ class SplineEkf(SplineTracker):
 
     Attributes
     ----------
+    scales : (2,) float64
+        What a path and a turn are taken to be, of what odometry measures.
     landmarks : (k, 2) float64
-        Corners and peaks in the state [m].
-    state_covariance : (3 + 2 k, 3 + 2 k) float64
-        Covariance of the pose and the landmarks [m, rad].
+        Corners and peaks in the state, in the frame of the local map [m].
+    state_covariance : (5 + 2 k, 5 + 2 k) float64
+        Covariance of the pose, the scales and the landmarks [m, rad, 1].
     """
 
     Settings = SplineEkfSettings
@@ -85,20 +99,32 @@ class SplineEkf(SplineTracker):
         super().__init__(self.settings.tracking, geometry or ScanGeometry())
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
-        """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2]."""
+    def local_covariance(self) -> NDArray[np.float64]:
+        """Covariance of the last pose in the local map, shape (3, 3) [m^2, m rad, rad^2]."""
         return self.state_covariance[:3, :3].copy()
 
     def _begin(self, pose: NDArray[np.float64], seed: int) -> None:
         settings = self.settings
         self.landmarks = np.empty((0, 2))
-        self.state_covariance = np.diag(
-            [settings.start_distance**2, settings.start_distance**2, settings.start_turn**2]
-        )
+        self.scales = np.ones(SCALES)
+        start = [settings.start_distance, settings.start_distance, settings.start_turn]
+        self.state_covariance = np.diag([*start, settings.distance_bias, settings.turn_bias]) ** 2
+
+    def _change_frame(self, change: Transform, reach: float) -> None:
+        points = change.apply(self.landmarks)
+        is_kept = np.abs(points).max(axis=1, initial=0.0) <= reach
+        kept = np.concatenate([np.ones(BODY, np.bool_), np.repeat(is_kept, 2)])
+        rotation = np.eye(len(self.state_covariance))
+        for k in [0, *range(BODY, len(rotation), 2)]:
+            rotation[k : k + 2, k : k + 2] = _rotation(change.theta)
+        covariance = rotation @ self.state_covariance @ rotation.T
+        self.landmarks, self.state_covariance = points[is_kept], covariance[np.ix_(kept, kept)]
 
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
-        first, distance, second = steps_of(motion)
-        x, y, theta = (float(value) for value in self.pose)
+        measured = steps_of(motion)
+        of_way, of_turn = self.scales.tolist()
+        first, distance, second = measured[0] * of_turn, measured[1] * of_way, measured[2] * of_turn
+        x, y, theta = (float(value) for value in self.local)
         heading = theta + first
         cosine, sine = math.cos(heading), math.sin(heading)
         tracking = self.tracking
@@ -114,16 +140,20 @@ class SplineEkf(SplineTracker):
         by_steps = np.array(
             [[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]]
         )
+        by_body = np.eye(BODY)
+        by_body[:POSE, :POSE] = by_pose
+        by_body[:POSE, POSE] = by_steps[:, 1] * measured[1]
+        by_body[:POSE, POSE + 1] = by_steps[:, 0] * measured[0] + by_steps[:, 2] * measured[2]
         covariance = self.state_covariance
-        covariance[:3] = by_pose @ covariance[:3]
-        covariance[:, :3] = covariance[:, :3] @ by_pose.T
+        covariance[:BODY] = by_body @ covariance[:BODY]
+        covariance[:, :BODY] = covariance[:, :BODY] @ by_body.T
         covariance[:3, :3] += (by_steps * spread**2) @ by_steps.T
         return np.array([x + distance * cosine, y + distance * sine, wrapped(heading + second)])
 
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
         seen = np.concatenate([observation.features.corners, observation.features.peaks])
         sigmas = np.concatenate([observation.features.corner_sigmas, observation.features.peak_sigmas])
-        here = Transform(*(float(value) for value in self.pose))
+        here = Transform(*(float(value) for value in self.local))
         which, known = match_points(
             here.apply(seen), self.landmarks, self.tracking.splines.association.point_distance
         )
@@ -136,7 +166,7 @@ class SplineEkf(SplineTracker):
         ]
         self._update(_stacked(measured))
         self._add_landmarks(matches)
-        return self.pose
+        return self.local
 
     def _gated(self, measured: _Measured) -> _Measured:
         """Return the measurements without those that exceed their expected deviation.
@@ -160,9 +190,10 @@ class SplineEkf(SplineTracker):
         change = gain @ measured.misses
         covariance = covariance - gain @ spread
         self.state_covariance = (covariance + covariance.T) / 2.0
-        self.pose = self.pose + change[:3]
-        self.pose[2] = wrapped(float(self.pose[2]))
-        self.landmarks = self.landmarks + change[3:].reshape(-1, 2)
+        self.local = self.local + change[:POSE]
+        self.local[2] = wrapped(float(self.local[2]))
+        self.scales = self.scales + change[POSE:BODY]
+        self.landmarks = self.landmarks + change[BODY:].reshape(-1, 2)
 
     def _landmarks_measured(
         self, seen: NDArray[np.float64], known: NDArray[np.int64], sigmas: NDArray[np.float64]
@@ -172,12 +203,12 @@ class SplineEkf(SplineTracker):
         Both coordinates of each are measured in the robot's frame.
         """
         count = len(seen)
-        back = _rotation(float(self.pose[2])).T
-        offsets = self.landmarks[known] - self.pose[:2]
+        back = _rotation(float(self.local[2])).T
+        offsets = self.landmarks[known] - self.local[:2]
         jacobian = np.zeros((count, 2, len(self.state_covariance)))
         jacobian[:, :, :2] = -back
         jacobian[:, :, 2] = offsets @ (back @ _TURNED.T).T
-        columns = 3 + 2 * known
+        columns = BODY + 2 * known
         for row, column in enumerate(columns.tolist()):
             jacobian[row, :, column : column + 2] = back
         misses = (seen - offsets @ back.T).reshape(-1)
@@ -187,11 +218,11 @@ class SplineEkf(SplineTracker):
     def _lines_measured(self, matches: Matches) -> _Measured:
         """Measure how lines lie beside lines of the map and against their directions."""
         count = len(matches.lines)
-        lever = matches.lines[:, :2] @ _rotation(float(self.pose[2])).T
+        lever = matches.lines[:, :2] @ _rotation(float(self.local[2])).T
         known = matches.known_lines
         normals = np.stack([-np.sin(known[:, 2]), np.cos(known[:, 2])], axis=1)
-        asides = ((lever + self.pose[:2] - known[:, :2]) * normals).sum(axis=1)
-        turns = self.pose[2] + matches.lines[:, 2] - known[:, 2]
+        asides = ((lever + self.local[:2] - known[:, :2]) * normals).sum(axis=1)
+        turns = self.local[2] + matches.lines[:, 2] - known[:, 2]
         jacobian = np.zeros((2 * count, 3))
         jacobian[:count, :2] = normals
         jacobian[:count, 2] = ((lever @ _TURNED.T) * normals).sum(axis=1)
@@ -203,12 +234,12 @@ class SplineEkf(SplineTracker):
 
     def _rays_measured(self, matches: Matches) -> _Measured:
         """Measure how the ends of rays lie beside the curves."""
-        lever, found = matches.rays @ _rotation(float(self.pose[2])).T, matches.pieces
+        lever, found = matches.rays @ _rotation(float(self.local[2])).T, matches.pieces
         normals = np.stack([-found[:, 3], found[:, 2]], axis=1)
         jacobian = np.empty((len(found), 3))
         jacobian[:, :2] = normals
         jacobian[:, 2] = ((lever @ _TURNED.T) * normals).sum(axis=1)
-        misses = -((lever + self.pose[:2] - found[:, :2]) * normals).sum(axis=1)
+        misses = -((lever + self.local[:2] - found[:, :2]) * normals).sum(axis=1)
         variance = self.tracking.curve_sigma**2 / self.tracking.ray_share
         return _Measured(misses, jacobian, np.full(len(found), variance))
 
@@ -219,9 +250,9 @@ class SplineEkf(SplineTracker):
         """
         distance = self.tracking.splines.association.point_distance
         for seen, sigma in zip(matches.points, matches.point_sigmas, strict=True):
-            rotation = _rotation(float(self.pose[2]))
+            rotation = _rotation(float(self.local[2]))
             lever = rotation @ seen
-            place = self.pose[:2] + lever
+            place = self.local[:2] + lever
             if len(self.landmarks) and float(np.linalg.norm(self.landmarks - place, axis=1).min()) < distance:
                 continue
             by_pose = np.column_stack([np.eye(2), _TURNED @ lever])

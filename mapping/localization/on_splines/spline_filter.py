@@ -50,7 +50,7 @@ class SplineFilterSettings:
         deviation: particles try how much, and those that fit the walls teach it.
     bias_wander : float
         Standard deviation by which that share is changed whenever particles are drawn again, so that they go
-        on trying.
+        on trying; at most the share itself. Without evidence it comes back to none.
     lost_likelihood : float
         Where rays fit worse than this in the mean for ten corrections, some particles are drawn again; 0 for
         never.
@@ -60,12 +60,12 @@ class SplineFilterSettings:
     """
 
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
-    particles: Annotated[int, within(1, 100_000)] = 200
+    particles: Annotated[int, within(1, 100_000)] = 400
     start_distance: Distance = 0.0
     start_turn: Turn = 0.0
     distance_bias: FromZero = 0.05
     turn_bias: FromZero = 0.05
-    bias_wander: FromZero = 0.01
+    bias_wander: FromZero = 0.005
     lost_likelihood: FromZero = 0.3
     recovered_share: Annotated[float, share()] = 0.1
     recovery_distance: Distance = 0.25
@@ -88,7 +88,7 @@ class SplineFilter(SplineTracker):
     Attributes
     ----------
     particles : (n, 3) float64
-        Poses x, y, theta [m, rad].
+        Poses x, y, theta in the frame of the local map [m, rad].
     scales : (n, 2) float64
         What each takes a path and a turn to be, of what odometry measures.
     weights : (n,) float64
@@ -106,9 +106,9 @@ class SplineFilter(SplineTracker):
         super().__init__(self.settings.tracking, geometry or ScanGeometry())
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
+    def local_covariance(self) -> NDArray[np.float64]:
         """Covariance of the particles, shape (3, 3) [m^2, m rad, rad^2]."""
-        offsets = self.particles - self.pose
+        offsets = self.particles - self.local
         offsets[:, 2] = np.arctan2(np.sin(offsets[:, 2]), np.cos(offsets[:, 2]))
         return np.asarray((offsets * self.weights[:, None]).T @ offsets)
 
@@ -124,11 +124,15 @@ class SplineFilter(SplineTracker):
         self.resamplings, self._lost_steps, self._box = 0, 0, 0.0
         self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
 
+    def _change_frame(self, change: Transform, reach: float) -> None:
+        self.particles[:, :2] = change.apply(self.particles[:, :2])
+        self.particles[:, 2] += change.theta
+
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
         first, distance, second = steps_of(motion)
         noise, tracking = self._generator.standard_normal((3, len(self.particles))), self.tracking
         if first == 0.0 and distance == 0.0 and second == 0.0:
-            return self.pose
+            return self.local
         turns = abs(first), abs(second)
         sway = tracking.turn_per_metre * abs(distance)
         of_way, of_turn = self.scales.T
@@ -190,10 +194,16 @@ class SplineFilter(SplineTracker):
         teeth = (self._generator.random() + np.arange(count)) / count
         chosen = np.searchsorted(np.cumsum(self.weights), teeth).clip(max=count - 1)
         self.particles, self.weights = self.particles[chosen], np.full(count, 1.0 / count)
-        self.scales = self.scales[chosen] + self.settings.bias_wander * self._generator.standard_normal(
-            (count, 2)
-        )
+        self.scales = self._wandered(self.scales[chosen])
         self.resamplings += 1
+
+    def _wandered(self, scales: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Change scales (n, 2) a little, so that without evidence they spread as at first, and no wider."""
+        biases = np.array([self.settings.distance_bias, self.settings.turn_bias])
+        wander = np.minimum(self.settings.bias_wander, biases)
+        kept = np.sqrt(1.0 - (wander / np.maximum(biases, np.finfo(np.float64).tiny)) ** 2)
+        drawn = self._generator.standard_normal(scales.shape)
+        return np.asarray(1.0 + kept * (scales - 1.0) + wander * drawn)
 
     def _recover(self, likelihood: float, pose: NDArray[np.float64]) -> None:
         """Draw some particles around the pose where rays have not fitted for a while.

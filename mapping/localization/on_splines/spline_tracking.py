@@ -1,6 +1,11 @@
 """Common base of both localizers on spline maps.
 
-Odometry, the map that they build on the path, and what they match of a scan to it.
+Odometry, the local maps that they build on the path, and what they match of a scan to them.
+
+A filter knows where the robot is in the frame of a local map. The laser's path is a graph of nodes, as SLAM
+has it: local maps begin anew along it with the walls around the robot, places are recognised, and all nodes
+are brought to agree. How far a local map itself may be off grows with the path, and is added to what the
+filter knows.
 """
 
 import math
@@ -19,10 +24,15 @@ from lidarium.mapping.geometry.bounds import (
     Turn,
     check_settings,
 )
-from lidarium.mapping.geometry.rigid import Transform, wrapped
+from lidarium.mapping.geometry.covariance import turned
+from lidarium.mapping.geometry.rigid import Transform, composed, relative, wrapped
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
+from lidarium.mapping.localization.dead_reckoning.odometry import compounded
+from lidarium.mapping.localization.matching.scan_points import at_last_beam
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.on_splines.spline_matches import Matches, match
+from lidarium.mapping.localization.slam.mapped_path import MappedPath
 from lidarium.mapping.splines.curve_lookup import CurveLookup
 from lidarium.mapping.splines.curves.settings import SplineSettings
 from lidarium.mapping.splines.features import Observation, observe
@@ -61,6 +71,9 @@ class TrackingSettings:
         [m, rad].
     map_distance, map_turn : float
         The map takes in a scan whenever the robot has moved as far since the last one [m, rad].
+    path : SlamSettings
+        How local maps follow each other, places are recognised and poses brought to agree; its matching
+        serves to recognise places only.
     """
 
     splines: SplineSettings = field(default_factory=SplineSettings)
@@ -81,6 +94,7 @@ class TrackingSettings:
     still_turn: Turn = math.radians(0.1)
     map_distance: Positive = 0.1
     map_turn: Angle = math.radians(5.0)
+    path: SlamSettings = field(default_factory=SlamSettings)
 
     def __post_init__(self) -> None:
         check_settings(self, "tracking")
@@ -100,10 +114,12 @@ class SplineTracker(ABC):
 
     Attributes
     ----------
-    map : SplineMap
-        The map so far.
-    pose : (3,) float64
-        The last pose, x, y, theta [m, rad].
+    local_map : SplineMap
+        The local map that grows, in a frame of its own.
+    local : (3,) float64
+        The last pose in that frame, x, y, theta [m, rad].
+    updates : int
+        How many scans the local maps have taken in.
     """
 
     def __init__(self, settings: TrackingSettings, geometry: ScanGeometry) -> None:
@@ -119,14 +135,20 @@ class SplineTracker(ABC):
         if begin.shape != (3,) or not np.isfinite(begin).all():
             raise ValueError(f"pose is {pose}; want x, y, theta, all finite")
         begin[2] = wrapped(float(begin[2]))
-        self.pose = begin
-        self.map = SplineMap(self.tracking.splines)
+        self.local, self.updates = np.zeros(3), 0
+        self.local_map = SplineMap(self.tracking.splines)
+        self._mount = np.array([self.tracking.splines.points.laser_x, 0.0, 0.0])
+        self._path = MappedPath(self.tracking.path, self.geometry, composed(begin, self._mount))
+        self._path.local = self._path.at_node = self._mount.copy()
+        # Local maps that are finished, each with the node in whose frame it is.
+        self._finished: list[tuple[int, SplineMap]] = []
         self._lookup = CurveLookup(self.geometry.range_max, self.tracking.curve_distance)
         self._odometry: Transform | None = None
         self._time_s = -math.inf
         self._unmapped = self._uncorrected = Transform()
         self._is_mapped = False
-        self._begin(begin, seed)
+        self._spread_at_node = np.zeros((3, 3))
+        self._begin(np.zeros(3), seed)
 
     def localize(self, sensing: Sensing) -> NDArray[np.float64]:
         """Take in what was sensed, later than all before.
@@ -147,8 +169,9 @@ class SplineTracker(ABC):
         motion = Transform() if self._odometry is None else self._odometry.inverse() @ odometry
         motion_s = sensing.time_s - self._time_s if self._odometry is not None else 0.0
         self._odometry, self._time_s = odometry, sensing.time_s
+        self._path.correct(sensing.time_s)
         self._unmapped, self._uncorrected = self._unmapped @ motion, self._uncorrected @ motion
-        self.pose = self._predict(motion)
+        self.local = self._predict(motion)
         observation = observe(
             scan_points(sensing.ranges, self.geometry, self.tracking.splines.points, motion, motion_s),
             self.tracking.splines,
@@ -158,23 +181,60 @@ class SplineTracker(ABC):
             self._uncorrected = Transform()
             matches = self._match(observation)
             if matches.features >= tracking.least_features or len(matches.rays) >= tracking.least_rays:
-                self.pose = self._correct(matches, observation)
+                self.local = self._correct(matches, observation)
         if not self._is_mapped or _is_beyond(self._unmapped, tracking.map_distance, tracking.map_turn):
-            self._take_in(observation)
-        return self.pose.copy()
+            self._take_in(observation, self._at_last_beam(sensing, motion, motion_s))
+        self._path.local = composed(self.local, self._mount)
+        return self.pose
+
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """The last pose, x, y, theta (3,) [m, rad]."""
+        return composed(self._path.pose, -self._mount)
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2]."""
+        path = self._path
+        of_laser = path.covariance(path.motion_covariance(self._growth(), path.place[1]))
+        return compounded(path.pose, of_laser, -self._mount, np.zeros((3, 3)))
 
     @property
     @abstractmethod
-    def covariance(self) -> NDArray[np.float64]:
-        """Covariance of the last pose, shape (3, 3) [m^2, m rad, rad^2]."""
+    def local_covariance(self) -> NDArray[np.float64]:
+        """Covariance of the last pose in the local map, shape (3, 3) [m^2, m rad, rad^2]."""
+
+    @property
+    def map(self) -> SplineMap:
+        """The map of all local maps, at the poses that are now believed."""
+        nodes, whole = self._path.nodes, SplineMap(self.tracking.splines)
+        for node, part in [*self._finished, (self._path.mapper_node, self.local_map)]:
+            whole.absorb(part, Transform(*nodes[node].tolist()))
+        return whole
+
+    @property
+    def key_scans(self) -> KeyScans:
+        """All scans that local maps have taken in, at the poses where they are now believed taken."""
+        return self._path.key_scans
 
     def take_correction(self) -> KeyScans | None:
-        """Return None: the past is never corrected."""
-        return None
+        """Return all scans at their poses, once after each time the past was corrected; else None."""
+        return self._path.take_correction()
+
+    def finish(self) -> None:
+        """Let all closures act that were found so far."""
+        self._path.correct(math.inf)
 
     @abstractmethod
     def _begin(self, pose: NDArray[np.float64], seed: int) -> None:
         """Begin at a pose."""
+
+    @abstractmethod
+    def _change_frame(self, change: Transform, reach: float) -> None:
+        """Bring what is kept to the frame of another local map, ``new_from_old``.
+
+        What lies beyond a square of half the side ``reach`` around it is left behind [m].
+        """
 
     @abstractmethod
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
@@ -185,21 +245,79 @@ class SplineTracker(ABC):
         """Weigh what was matched; return the pose."""
 
     def _match(self, observation: Observation) -> Matches:
-        """Match a scan to the map from the pose as it is believed now."""
-        if not self._lookup.covers(self.pose[:2]):
-            self._lookup.renew(self.map.curves, self.pose[:2])
-        here = Transform(*(float(value) for value in self.pose))
+        """Match a scan to the local map from the pose as it is believed now."""
+        if not self._lookup.covers(self.local[:2]):
+            self._lookup.renew(self.local_map.curves, self.local[:2])
+        here = Transform(*(float(value) for value in self.local))
         return match(
-            observation, self.map, self._lookup, here, self.tracking.ray_stride, self.tracking.least_sightings
+            observation,
+            self.local_map,
+            self._lookup,
+            here,
+            self.tracking.ray_stride,
+            self.tracking.least_sightings,
         )
 
-    def _take_in(self, observation: Observation) -> None:
-        """Let the map learn from a scan at the pose."""
+    def _take_in(self, observation: Observation, ranges: NDArray[np.float32]) -> None:
+        """Let the local map and the path learn from a scan at the pose."""
         if len(observation.pieces) == 0:
             return
-        self.map.update(observation, Transform(*(float(value) for value in self.pose)))
-        self._lookup.renew(self.map.curves, self.pose[:2])
-        self._unmapped, self._is_mapped = Transform(), True
+        self.local_map.update(observation, Transform(*(float(value) for value in self.local)))
+        self.updates += 1
+        self._unmapped = Transform()
+        self._extend(ranges)
+        self._is_mapped = True
+        self._lookup.renew(self.local_map.curves, self.local[:2])
+
+    def _extend(self, ranges: NDArray[np.float32]) -> None:
+        """Take a scan into the path; begin another local map where it is time to."""
+        path, matching = self._path, self.tracking.path.matching
+        path.local = composed(self.local, self._mount)
+        node, last_node = path.mapper_node, path.last_node
+        if not self._is_mapped:
+            frame: NDArray[np.float64] | None = path.begin(ranges, self._growth(), self._time_s)
+        else:
+            points = path.points(ranges, matching.spacing_m, matching.points)
+            path.mapper.judge(points, path.local)
+            frame = path.take(path.local, self._growth(), ranges, points, self._time_s)
+        if path.last_node > last_node:
+            self._spread_at_node = self.local_covariance
+        if frame is None:
+            return
+        if self._is_mapped:
+            self._finished.append((node, self.local_map))
+        self._begin_local_map(Transform(*frame.tolist()))
+
+    def _begin_local_map(self, frame: Transform) -> None:
+        """Go on in a new frame, ``old_from_new``, with what is known around the robot."""
+        self.local = relative(np.array([frame.x, frame.y, frame.theta]), self.local)
+        reach = self.geometry.range_max + 1.0 + float(np.hypot(*self.local[:2]))
+        self.local_map = self.local_map.around(frame, reach)
+        self._spread_at_node = turned(self._spread_at_node, -frame.theta)
+        self._change_frame(frame.inverse(), reach)
+
+    def _growth(self) -> NDArray[np.float64]:
+        """Return how much less well the pose in the local map is known than at the last node, (3, 3).
+
+        Where it is known better since, nothing is added: what lies between the nodes is no better known.
+        """
+        moved = composed(self.local, self._mount)[:2] - self._path.at_node[:2]
+        lever = np.array([[1.0, 0.0, -moved[1]], [0.0, 1.0, moved[0]], [0.0, 0.0, 1.0]])
+        now = self.local_covariance + np.diag([1e-10, 1e-10, 1e-10])
+        root = np.linalg.cholesky(now)
+        back = np.linalg.inv(root)
+        shares, directions = np.linalg.eigh(
+            np.eye(3) - back @ lever @ self._spread_at_node @ lever.T @ back.T
+        )
+        grown = root @ directions
+        return np.asarray((grown * np.maximum(shares, 0.0)) @ grown.T)
+
+    def _at_last_beam(self, sensing: Sensing, motion: Transform, motion_s: float) -> NDArray[np.float32]:
+        """Return the scan as if all beams had been taken with the last one."""
+        ranges = np.asarray(sensing.ranges, np.float32)
+        interval = self.tracking.splines.points.beam_interval_s
+        step = np.array([motion.x, motion.y, motion.theta])
+        return at_last_beam(ranges, self.geometry, step, interval, motion_s)
 
 
 def steps_of(motion: Transform) -> tuple[float, float, float]:

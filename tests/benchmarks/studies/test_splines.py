@@ -7,7 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.studies import STUDIES, splines
+from lidarium.benchmarks.studies import STUDIES
+from lidarium.benchmarks.studies.splines import buildings
+from lidarium.benchmarks.studies.splines import study as splines
 from lidarium.envs.settings.making import make_settings
 
 
@@ -15,17 +17,29 @@ from lidarium.envs.settings.making import make_settings
 def tiny(monkeypatch):
     monkeypatch.setattr(splines, "make_settings", partial(make_settings, horizon_s=6.0))
     monkeypatch.setattr(splines, "SEEDS", range(100, 101))
+    monkeypatch.setattr(buildings, "HORIZON_S", 6.0)
+    monkeypatch.setattr(buildings, "FLOORS", ("apartment",))
 
 
 def test_a_tiny_share_runs_and_is_not_run_again(tiny, tmp_path):
     study = STUDIES["splines"]
-    assert list(study.work(tmp_path, None, 100, 1)) == [("floors", 1, 1)]
+    assert list(study.work(tmp_path, None, 100, 1)) == [("floors", 1, 1), ("buildings", 1, 1)]
     assert list(study.work(tmp_path, None, 100, 1)) == []
     page = study.page(tmp_path, "lidarium reproduce splines --every 100")
     assert "Made with `lidarium reproduce splines --every 100`" in page
     for name in splines.LOCALIZERS:
         assert f"| srt_corridor | `{name}` | " in page
+    assert "| apartment | `splines` | " in page
+    for name in splines.LOCALIZERS:
         assert (tmp_path / splines.PICTURES_FOLDER / f"srt_corridor_{name}.png").exists()
+
+
+def test_distances_are_counted_in_standard_deviations_round_the_circle():
+    true = np.array([[0.0, 0.0, math.pi - 0.01], [1.0, 2.0, 0.0]])
+    believed = np.array([[0.0, 0.0, -math.pi + 0.01], [1.2, 2.0, 0.0]])
+    covariances = np.stack([np.eye(3) * 1e-4, np.diag([0.01, 1.0, 1.0])])
+    found = buildings.squared_distances(true, believed, covariances)
+    np.testing.assert_allclose(found, [4.0, 4.0], rtol=1e-6)
 
 
 def test_figures_that_are_no_numbers_are_kept():

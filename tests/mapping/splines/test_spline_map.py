@@ -167,3 +167,30 @@ def test_the_lookup_finds_the_nearest_curve_and_how_far_it_is(room_map):
 @pytest.mark.parametrize("scale", [1.0, -1.0, 3.0])
 def test_the_yaw_of_a_quaternion_is_right_in_all_quadrants_and_for_both_signs(theta, scale):
     assert yaw_of_quaternion(scale * math.sin(theta / 2), scale * math.cos(theta / 2)) == pytest.approx(theta)
+
+
+def test_a_map_in_another_frame_joins_the_same_walls_once(room_map):
+    frame = Transform(0.7, -0.4, 0.9)
+    joined = SplineMap()
+    joined.absorb(room_map, Transform())
+    joined.absorb(room_map.around(frame, 20.0), frame)
+    assert len(joined.curves) <= len(room_map.curves) + 1
+    assert joined.length == pytest.approx(room_map.length, rel=0.05)
+    assert distances_to(ROOM, joined.sample()).mean() < 0.01
+    assert len(joined.corners) == len(room_map.corners)
+    np.testing.assert_allclose(joined.corners.points, room_map.corners.points, atol=1e-9)
+
+
+def test_a_map_around_a_place_holds_what_is_near_it(room_map):
+    near = room_map.around(Transform(-2.0, -1.5, 0.3), 0.5)
+    assert 0 < len(near.curves) < len(room_map.curves)
+    assert np.abs(near.corners.points).max() <= 0.5
+    assert len(near.corners) >= 1
+
+
+def test_maps_of_both_ends_of_a_wall_become_one_wall():
+    wall = np.array([(-8.0, 1.0, 8.0, 1.0)])
+    left = taken(wall, [(-2.0 + 0.2 * k, 0.0, math.pi / 2.0) for k in range(4)])
+    right = taken(wall, [(1.0 + 0.2 * k, 0.0, math.pi / 2.0) for k in range(4)])
+    left.absorb(right, Transform())
+    assert len(left.curves) == 1

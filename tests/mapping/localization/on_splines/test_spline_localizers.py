@@ -177,8 +177,9 @@ def test_particles_that_were_led_astray_find_back(seed):
     still = np.zeros(3)
     for k in range(3):
         localizer.localize(Sensing(0.1 * k, still, SCANS[0]))
-    localizer.particles[:, :2] += 0.15
-    localizer.pose = localizer.pose + np.array([0.15, 0.15, 0.0])
+    astray = Transform(0.0, 0.0, -POSES[0][2]).apply(np.array([[0.15, 0.15]]))[0]
+    localizer.particles[:, :2] += astray
+    localizer.local = localizer.local + np.array([*astray, 0.0])
     for k in range(3, 60):
         turned = POSES[0] + np.array([0.0, 0.0, 0.02 * (k % 2)])
         ranges = scan(WORLD_2, turned, LASER, 0.01, seed=k)

@@ -26,6 +26,7 @@ from lidarium.agents import make_policy
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.map_figures import MapFigures, map_figures
 from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.benchmarks.studies.splines import buildings
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
@@ -63,7 +64,7 @@ NOISE = "datasheet"
 BIAS = 0.05
 """Share by which ways and turns of odometry are too long."""
 
-FLOORS_FILE, PICTURES_FOLDER = "floors.jsonl", "pictures"
+FLOORS_FILE, BUILDINGS_FILE, PICTURES_FOLDER = "floors.jsonl", "buildings.jsonl", "pictures"
 
 
 @dataclass(slots=True)
@@ -146,15 +147,15 @@ def measure(name: str, floor: Floor, walk: Drive, seed: int, picture: Path | Non
     localizer.reset(poses[0], seed)
     believed, seconds, returns = [], [], 0
     for k, ranges in enumerate(walk.ranges):
-        updates = localizer.map.updates
+        updates = localizer.updates
         began = time.process_time()
         believed.append(localizer.localize(Sensing(k * TIME_STEP, reckoned[k], ranges)))
         seconds.append(time.process_time() - began)
-        returns += int(np.isfinite(ranges).sum()) if localizer.map.updates > updates else 0
-    track = np.array(believed)
+        returns += int(np.isfinite(ranges).sum()) if localizer.updates > updates else 0
+    track, spline_map = np.array(believed), localizer.map
     if picture is not None:
-        save_spline_picture(picture, floor, localizer.map, poses, track)
-    figures = map_figures(floor, localizer.map, localizer.geometry, poses, track, reckoned, returns)
+        save_spline_picture(picture, floor, spline_map, poses, track)
+    figures = map_figures(floor, spline_map, localizer.geometry, poses, track, reckoned, returns)
     return Run(
         figures, 1000.0 * statistics.median(seconds[1:]), 1000.0 * float(np.quantile(seconds[1:], 0.95))
     )
@@ -193,11 +194,15 @@ def _run_of(entry: Mapping[str, Any]) -> Run:
     return Run(MapFigures(**figures), entry["step_ms"], entry["step_p95_ms"])
 
 
-def work(folder: Path, _data: Path | None, every: int, _workers: int) -> Progress:
-    """Measure on every N-th floor, in this process alone, as steps are timed."""
+def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
+    """Measure on every N-th floor, in this process alone, as steps are timed; then in buildings."""
     tasks = [Task(floor) for floor in FLOORS[::every]]
     measured = partial(measure_floor, folder / PICTURES_FOLDER)
     yield from do_missing(folder / FLOORS_FILE, "floors", tasks, measured, 1)
+    stays = [buildings.Stay(floor, name) for floor in buildings.FLOORS for name in buildings.LOCALIZERS]
+    yield from do_missing(
+        folder / BUILDINGS_FILE, "buildings", stays[::every], buildings.measure_stay, workers
+    )
 
 
 HEADER = (
@@ -237,7 +242,7 @@ MEANING = """\
 *Walls found* counts walls within 5 cm of which true beams end; *curves right* is the share of the curves'
 length within 5 cm of a wall. *Bytes* are those of the compact form, corners and peaks included; end points
 are those of the scans that went into the map, as two float32 each; a grid has one byte a cell over the
-floor's bounds. Steps are CPU times of single calls with 200 particles and 727 rays; every few steps the map
+floor's bounds. Steps are CPU times of single calls with 400 particles and 727 rays; every few steps the map
 takes in a scan, which makes the 95 %. On a machine that does other things at the same time they scatter."""
 
 
@@ -260,7 +265,9 @@ def page(folder: Path, command: str) -> str:
 on {date.today()}, lidarium {lidarium.__version__}, Python {platform.python_version()},
 numpy {np.__version__}, scipy {scipy.__version__}, {platform.machine()}."""
     table = "\n".join([HEADER, *rows])
-    return "\n\n".join(["# Spline maps and localization on them", how, table, TO_REACH, MEANING, made]) + "\n"
+    in_buildings = buildings.section(kept_lines(folder / BUILDINGS_FILE))
+    parts = ["# Spline maps and localization on them", how, table, TO_REACH, MEANING, in_buildings, made]
+    return "\n\n".join(parts) + "\n"
 
 
 STUDY = Study(page, work=work)

@@ -1,0 +1,1 @@
+"""The study of spline maps: on worlds with a goal, and in buildings."""

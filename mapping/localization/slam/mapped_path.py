@@ -1,0 +1,316 @@
+"""The path of a robot as a graph of nodes, with the local maps and closures on it.
+
+Whoever knows how the robot moves in a local map's frame hands in scans at their poses there. Local maps begin
+and end, nodes are set, places are recognised, and all nodes are brought to agree.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.geometry.rigid import Transform, composed, relative
+from lidarium.mapping.grids.occupancy import OccupancyGrid
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
+from lidarium.mapping.localization.dead_reckoning.odometry import compounded
+from lidarium.mapping.localization.graph.node_graph import NodeGraph
+from lidarium.mapping.localization.matching.local_mapping import LocalMapper, way
+from lidarium.mapping.localization.matching.scan_points import scan_points
+from lidarium.mapping.localization.matching.settings.slam import SlamSettings
+from lidarium.mapping.localization.matching.wall_compass import WallCompass
+from lidarium.mapping.localization.slam.loop_closing import LoopClosing
+from lidarium.mapping.localization.slam.scan_history import ScanHistory
+
+
+class MappedPath:
+    """The path so far, and what was seen on it.
+
+    Parameters
+    ----------
+    settings : SlamSettings
+        How local maps are made, places recognised and nodes brought to agree.
+    geometry : ScanGeometry
+        Directions of the beams.
+    pose : (3,) float64
+        Where the path begins: x, y, theta [m, rad].
+
+    Attributes
+    ----------
+    mapper : LocalMapper
+        The local maps that grow.
+    local, matched, at_node : (3,) float64
+        Poses in the frame of the older local map: now, at the last scan that was taken in, at the last node
+        [m, rad]. The owner moves the first.
+    spread : (3, 3) float64
+        Covariance of the motion from the last node to the last scan [m^2, m rad, rad^2].
+    length : float
+        Length of the path; turns count as a metre per radian [m].
+    closures, corrections : int
+        Closures that have acted, and how often the past was corrected.
+    """
+
+    def __init__(self, settings: SlamSettings, geometry: ScanGeometry, pose: NDArray[np.float64]) -> None:
+        self._settings, self._geometry = settings, geometry
+        self._unit_vectors = geometry.unit_vectors
+        self.mapper = LocalMapper(settings, geometry)
+        self._loops = LoopClosing(settings)
+        self._compass = WallCompass(settings.compass) if settings.uses_walls else None
+        self._graph = NodeGraph(settings.graph, self._compass, pose)
+        self._history = ScanHistory(geometry, settings.submaps.resolution)
+        # After so much of the path it is surveyed where walls run.
+        self._orients_at = settings.graph.start_path_m
+        # The first scan's points and pose, until the map shows how well they match.
+        self._first: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self.local, self.matched, self.at_node = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.spread = np.zeros((3, 3))
+        self.length, self.closures, self.corrections = 0.0, 0, 0
+        self._is_corrected = self._has_begun = False
+
+    @property
+    def last_node(self) -> int:
+        """Number of the last node."""
+        return len(self._graph.nodes) - 1
+
+    @property
+    def mapper_node(self) -> int:
+        """The node in whose frame the older local map is; the path's beginning before there is one."""
+        return self.mapper.node if self._has_begun else 0
+
+    @property
+    def place(self) -> tuple[int, NDArray[np.float64]]:
+        """The last node, and the robot's pose x, y, theta (3,) in its frame.
+
+        Later corrections of the node apply to the robot as well.
+        """
+        return self.last_node, relative(self.at_node, self.local)
+
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """x, y, theta of the robot, shape (3,) [m, rad]."""
+        node, pose = self.place
+        return composed(self._graph.nodes[node], pose)
+
+    @property
+    def nodes(self) -> NDArray[np.float64]:
+        """Poses of all nodes as they are now believed, shape (nodes, 3) [m, rad]."""
+        return self._graph.nodes.copy()
+
+    @property
+    def pending(self) -> int:
+        """How many closures were found that have not acted yet."""
+        return self._loops.pending
+
+    @property
+    def key_scans(self) -> KeyScans:
+        """All scans that were taken in, at the poses where they are now believed to have been taken."""
+        return self._history.scans(self._graph.nodes)
+
+    @property
+    def map(self) -> OccupancyGrid:
+        """The map of all scans that were taken in, rendered again after corrections."""
+        return self._history.map(self._graph.nodes)
+
+    def take_correction(self) -> KeyScans | None:
+        """Return all scans at their poses, once after each time the past was corrected; else None."""
+        if not self._is_corrected:
+            return None
+        self._is_corrected = False
+        return self.key_scans
+
+    def covariance(self, spread: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the covariance (3, 3) of the pose [m^2, m rad, rad^2].
+
+        That of the motion since the last node is given, in the node's frame.
+        """
+        node, pose = self.place
+        return compounded(self._graph.nodes[node], self._graph.covariance, pose, spread)
+
+    def begin(
+        self, ranges: NDArray[np.float32], covariance: NDArray[np.float64], time_s: float
+    ) -> NDArray[np.float64]:
+        """Begin the first local map where the robot is, at a node of its own.
+
+        The covariance (3, 3) of its motion from the path's beginning is given. Return the new local map's
+        frame, (3,), as seen from the one before.
+        """
+        self._has_begun = True
+        self.note_key(ranges, time_s)
+        self._first = self.all_points(ranges), self.local.copy()
+        return self._begin_maps(ranges, self.motion_covariance(covariance, self.local))
+
+    def restart(
+        self, ranges: NDArray[np.float32], covariance: NDArray[np.float64], time_s: float
+    ) -> NDArray[np.float64]:
+        """Begin new local maps where the robot is, as ``begin`` does; what it has learned is kept."""
+        self._first = None
+        if self._compass is not None:
+            self._compass.forget()
+            self._orients_at = self.length + self._settings.graph.start_path_m
+        frame = self._begin_maps(ranges, covariance)
+        self.note_key(ranges, time_s)
+        return frame
+
+    def take(
+        self,
+        pose: NDArray[np.float64],
+        covariance: NDArray[np.float64],
+        ranges: NDArray[np.float32],
+        points: NDArray[np.float64],
+        time_s: float,
+    ) -> NDArray[np.float64] | None:
+        """Take in a scan.
+
+        Parameters
+        ----------
+        pose, covariance : (3,) and (3, 3) float64
+            Where it was taken, in the frame of the older local map, and how well the motion there from the
+            last node is known [m, rad].
+        ranges : (beams,) float32
+            The scan [m].
+        points : (n, 2) float64
+            Few points of it in the robot's frame, by which places are recognised [m].
+        time_s : float
+            When [s].
+
+        Returns
+        -------
+        (3,) float64 or None
+            Frame of the local map that is now the older one, as seen from the one before, where that has
+            changed.
+        """
+        driven = way(relative(self.matched, pose))
+        self.length += driven
+        self.local, self.matched, self.spread = pose, pose.copy(), covariance
+        if not self.mapper.insert(pose, driven, ranges):
+            since = relative(self.at_node, self.local)
+            return self.restart(ranges, self.motion_covariance(covariance, since), time_s)
+        self._measure_walls(ranges)
+        if self._first is not None and self.length >= self._settings.graph.start_path_m:
+            self._find_start(*self._first)
+        if self._compass is not None and not self._compass.is_surveyed and self.length >= self._orients_at:
+            self._orient(self._compass)
+        self._set_node(covariance, ranges, points, time_s)
+        self.note_key(ranges, time_s)
+        poses, ended = self.mapper.hand_over(np.stack([self.local, self.matched, self.at_node, np.zeros(3)]))
+        self.local, self.matched, self.at_node = poses[0], poses[1], poses[2]
+        self._loops.remember(ended, self.length)
+        return relative(poses[3], np.zeros(3)) if poses[3].any() else None
+
+    def correct(self, time_s: float) -> None:
+        """Let closures act whose time has come; all where that is inf."""
+        acting = self._loops.take_due(time_s)
+        if not acting and not (time_s == np.inf and self._graph.has_waiting):
+            return
+        self.closures += len(acting)
+        is_due = self._graph.close(acting) if acting else True
+        if is_due or time_s == np.inf:
+            self._graph.settle(len(acting))
+            self._note_correction()
+
+    def points(self, ranges: NDArray[np.float32], spacing_m: float, limit: int) -> NDArray[np.float64]:
+        """Return representative points in which beams ended, (n, 2) [m].
+
+        In the robot's frame, thinned to few.
+        """
+        longest = min(self._settings.matching.range_m, self._geometry.range_max)
+        return scan_points(
+            ranges, self._unit_vectors, self._geometry.angle_increment, longest, spacing_m, limit
+        )
+
+    def all_points(self, ranges: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return nearly all points in which beams ended.
+
+        They serve what is found once per run and gains from each point, such as the direction of
+        walls.
+        """
+        return self.points(ranges, self._settings.compass.spacing_m, self._geometry.beams)
+
+    def motion_covariance(
+        self, matched: NDArray[np.float64], since: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return how well the motion between two nodes is known, both by matches."""
+        graph = self._settings.graph
+        along = (graph.deviation_m + graph.deviation_per_metre * float(np.hypot(since[0], since[1]))) ** 2
+        turned = np.eye(3)
+        cosine, sine = np.cos(self.at_node[2]), np.sin(self.at_node[2])
+        turned[:2, :2] = [[cosine, sine], [-sine, cosine]]
+        return np.asarray(np.diag([along, along, graph.deviation_angle**2]) + turned @ matched @ turned.T)
+
+    def note_key(self, ranges: NDArray[np.float32], time_s: float) -> None:
+        """Keep a scan for the map, where the robot is."""
+        node, pose = self.place
+        self._history.append(node, pose, ranges, time_s)
+
+    def _set_node(
+        self,
+        covariance: NDArray[np.float64],
+        ranges: NDArray[np.float32],
+        points: NDArray[np.float64],
+        time_s: float,
+    ) -> None:
+        """Set a node where the robot is, if it is far enough from the last one or a local map begins."""
+        graph = self._settings.graph
+        since = relative(self.at_node, self.local)
+        wants_another = self.mapper.wants_another
+        if wants_another or np.hypot(since[0], since[1]) >= graph.distance_m or abs(since[2]) >= graph.angle:
+            self._add_node(since, self.motion_covariance(covariance, since))
+            self.mapper.note_node(self.last_node, self.local)
+            if wants_another:
+                self.mapper.add(self.last_node, self.local, ranges)
+            self._loops.find(self._graph, points, self.length, self.mapper.usual_score, time_s)
+
+    def _begin_maps(
+        self, ranges: NDArray[np.float32], covariance: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Begin new local maps by a scan, at a new node at the robot's pose.
+
+        The covariance of its motion since the last node is given.
+        """
+        frame = self.local
+        self._add_node(relative(self.at_node, self.local), covariance)
+        self._loops.remember(self.mapper.begin(self.last_node, ranges), self.length)
+        self.local, self.matched, self.at_node = np.zeros(3), np.zeros(3), np.zeros(3)
+        return frame
+
+    def _add_node(self, since: NDArray[np.float64], covariance: NDArray[np.float64]) -> None:
+        """Set a node where the robot is, so far from the last one."""
+        self._graph.add(since, covariance)
+        self.at_node = self.local.copy()
+        self.spread = np.zeros((3, 3))
+
+    def _find_start(self, points: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
+        """Match the first scan with the map to correct the start.
+
+        The map was begun by few scans, whose errors displace the scan from the robot's start.
+        """
+        self._first = None
+        match = self.mapper.rendered_again(points) if self.mapper.node == 1 else None
+        if match is not None:
+            self._graph.begin_at(composed(pose, relative(match.pose, np.zeros(3))))
+            self._note_correction()
+
+    def _orient(self, compass: WallCompass) -> None:
+        """Survey where walls run in the local map.
+
+        Where none do, survey again after as much of the path.
+        """
+        self._orients_at = self.length + self._settings.graph.start_path_m
+        node, scans = self.mapper.node, self.key_scans
+        since = self._history.since(node)
+        poses = relative(self._graph.nodes[node], scans.poses[since])
+        points = [
+            Transform(*pose).apply(self.all_points(ranges))
+            for pose, ranges in zip(poses, scans.ranges[since], strict=True)
+        ]
+        if points:  # none of the scans since may have been kept
+            compass.survey(np.concatenate(points), node, float(self._graph.nodes[node, 2]))
+
+    def _measure_walls(self, ranges: NDArray[np.float32]) -> None:
+        if self._compass is not None and self._compass.is_surveyed:
+            self._compass.observe(
+                Transform(*relative(self.at_node, self.local)).apply(self.all_points(ranges))
+            )
+
+    def _note_correction(self) -> None:
+        self.corrections += 1
+        self._history.discard_map()
+        self._is_corrected = True
