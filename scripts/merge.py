@@ -14,6 +14,8 @@ from lidarium.scripts.common import DONE, NO, Answer, Command, file_name, table
 if TYPE_CHECKING:
     from lidarium.mapping.files.map_files import MapImage
     from lidarium.mapping.geometry.rigid import Transform
+    from lidarium.mapping.merging.bend.deforming import Deformation
+    from lidarium.mapping.merging.fusion import FusedMap
     from lidarium.mapping.merging.merger import Merged
     from lidarium.mapping.merging.pair_result import PairResult
 
@@ -48,6 +50,8 @@ class Merge(Command):
     """
     force: bool = False
     """join two maps by the best transform, whatever speaks against it"""
+    deform: bool = False
+    """bend the maps of each group until they agree; the first of each stays as it is"""
 
     def __post_init__(self) -> None:
         Command.__post_init__(self)
@@ -81,7 +85,13 @@ def execute(command: Merge) -> Answer:
     levels = {name: (image.levels, image.resolution) for name, image in images.items()}
     merged = merge_maps(levels, settings, question)
     result = _result(merged, images)
-    files = _write(merged, images, result, out)
+    joined = [group for group in merged.groups() if len(group) > 1]
+    deformed = [merged.deformed(group, settings.bend) for group in joined] if command.deform else []
+    for group, bent in zip(joined, deformed, strict=False):
+        for name, deformation in zip(group, bent.deformations, strict=True):
+            result["maps"][name]["deformation"] = _deformation(deformation)
+    fused = [bent.fused for bent in deformed] or [merged.fused(group) for group in joined]
+    files = _write(merged, fused, images, result, out)
     is_whole = len(merged.groups()) == 1
     return Answer(result, _summary(merged, files, out), DONE if is_whole else NO)
 
@@ -198,13 +208,30 @@ def _pair(
     }
 
 
+def _deformation(found: "Deformation | None") -> dict[str, float] | None:
+    """Return how much a map is bent to agree with those before it."""
+    if found is None:
+        return None
+    return {
+        "mean_m": round(found.mean_m, 4),
+        "most_m": round(found.most_m, 4),
+        "strain": round(found.bend.strain, 5),
+    }
+
+
 def _numbers(transform: "Transform | None") -> dict[str, float | None]:
     if transform is None:
         return {"x": None, "y": None, "theta": None}
     return {"x": round(transform.x, 6), "y": round(transform.y, 6), "theta": round(transform.theta, 8)}
 
 
-def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, Any], out: Path) -> list[str]:
+def _write(
+    merged: "Merged",
+    fused_maps: "list[FusedMap]",
+    images: "dict[str, MapImage]",
+    result: dict[str, Any],
+    out: Path,
+) -> list[str]:
     """Write transforms, the picture and the fused map of each group of two maps or more.
 
     In the ROS frame of the group's first map.
@@ -216,8 +243,7 @@ def _write(merged: "Merged", images: "dict[str, MapImage]", result: dict[str, An
 
     files = []
     joined = [group for group in merged.groups() if len(group) > 1]
-    for number, group in enumerate(joined):
-        fused = merged.fused(group)
+    for number, (group, fused) in enumerate(zip(joined, fused_maps, strict=True)):
         name = "map" if number == 0 else f"map-{number + 1}"
         origin = _corner(images[group[0]]) @ Transform(*fused.origin)
         write_ros_map(out, name, fused.levels, (origin.x, origin.y, origin.theta), fused.resolution)

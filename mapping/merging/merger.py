@@ -12,10 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging.bend.deforming import Deformed, deform
+from lidarium.mapping.merging.bend.estimation import BendSettings
 from lidarium.mapping.merging.bend.hypotheses import agrees_bent
 from lidarium.mapping.merging.description.described_map import (
     DescribedMap,
     check_resolution,
+    describe_map,
     resampled,
     three_levels_of,
 )
@@ -97,6 +100,25 @@ class Merged:
             [self._into(group[0], name) for name in group],
             self.resolution,
         )
+
+    def deformed(self, group: list[str], settings: BendSettings | None = None) -> Deformed:
+        """Return the map of a group whose maps are bent to agree, in the frame of its first.
+
+        Parameters
+        ----------
+        group : list of str
+            Maps that are joined; the first is not bent.
+        settings : BendSettings or None
+            How much the others may be.
+
+        Raises
+        ------
+        ValueError
+            As `fused` does.
+        """
+        maps = [describe_map(self.levels[name], self.resolution) for name in group]
+        transforms = [self._into(group[0], name) for name in group]
+        return deform(maps, transforms, settings or BendSettings())
 
     def _into(self, root: str, name: str) -> Transform:
         """Return the transform from a map's lower left corner into another's frame.

@@ -269,3 +269,25 @@ def test_unknown_modes_are_named(maps, tmp_path, capsys):
     (west, east), _ = maps
     assert main(["merge", west, east, "--mode", "printed", "--out", str(tmp_path / "out")]) == 2
     assert "mode" in capsys.readouterr().err
+
+
+def test_maps_are_bent_to_agree_only_where_asked(tmp_path, capsys):
+    levels = {"straight": hall(), "bowed": bowed(hall(), 0.35)}
+    paths = [
+        str(write_ros_map(tmp_path / "in", name, levels[name], (0.0, 0.0, 0.0), RESOLUTION))
+        for name in levels
+    ]
+    walls = {}
+    for name, options in (("rigid", []), ("bent", ["--deform"])):
+        out = tmp_path / name
+        assert main(["merge", *paths, "--out", str(out), *options, "--json"]) == 0
+        result = json.loads(capsys.readouterr().out)
+        bowed_map = result["maps"]["bowed"]
+        assert ("deformation" in bowed_map) == bool(options)
+        walls[name] = int((read_ros_map(out / "map.yaml").levels == 0).sum())
+    assert result["maps"]["straight"]["deformation"] is None
+    found = bowed_map["deformation"]
+    assert set(found) == {"mean_m", "most_m", "strain"}
+    assert 0.05 < found["mean_m"] < found["most_m"] < 0.6
+    # Walls that lie on each other are fewer cells than walls beside each other.
+    assert walls["bent"] < 0.9 * walls["rigid"]

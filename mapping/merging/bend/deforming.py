@@ -1,0 +1,163 @@
+"""Maps of a group bent to agree: each onto what those before it know.
+
+The first stays as it is. Where walls do not hold a map on the others, where it would have to be moved or
+stretched more than maps of one place are, or where it then agrees less, it is laid rigidly.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging.bend.bent_agreement import compare_bent
+from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, estimate_bend
+from lidarium.mapping.merging.bend.hypotheses import MOST_STRAIN, Hypothesis
+from lidarium.mapping.merging.bend.offset_field import OffsetField
+from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
+from lidarium.mapping.merging.fusion import FusedMap, fuse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deformed:
+    """What came of bending the maps of a group.
+
+    Attributes
+    ----------
+    fused : FusedMap
+        Their map, in the frame of the first.
+    deformations : list of Deformation or None
+        How each map is bent; None where it is laid as it was joined.
+    """
+
+    fused: FusedMap
+    deformations: "list[Deformation | None]"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deformation:
+    """How a map is bent against those before it.
+
+    Attributes
+    ----------
+    bend : Bend
+        In the cells of their fused map.
+    moves : (n, 2) float64
+        How far its walls are moved from where it was joined [m].
+    """
+
+    bend: Bend
+    moves: NDArray[np.float64]
+
+    @property
+    def mean_m(self) -> float:
+        """Root mean square of the moves [m]."""
+        return float(np.sqrt((self.moves**2).sum(axis=1).mean()))
+
+    @property
+    def most_m(self) -> float:
+        """Longest of the moves [m]."""
+        return float(np.hypot(*self.moves.T).max())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Laid:
+    """A map in cells of the common frame.
+
+    Attributes
+    ----------
+    levels : (rows, columns) uint8
+        What it knows.
+    common_from_cells : Transform
+        Where the lower left corner of its cell (0, 0) lies.
+    """
+
+    levels: NDArray[np.uint8]
+    common_from_cells: Transform
+
+
+def deform(
+    maps: Sequence[DescribedMap],
+    common_from_map: Sequence[Transform],
+    settings: BendSettings,
+) -> Deformed:
+    """Bend maps that were joined until they agree.
+
+    Parameters
+    ----------
+    maps : sequence of DescribedMap
+        At least one, of one resolution.
+    common_from_map : sequence of Transform
+        From the lower left corner of each into the common frame, right to about the reach of the settings.
+    settings : BendSettings
+        How much a map may be bent; walls are moved by its reach at most.
+    """
+    resolution = maps[0].resolution
+    laid = [Laid(maps[0].levels, common_from_map[0])]
+    found: list[Deformation | None] = [None]
+    for one, transform in zip(maps[1:], common_from_map[1:], strict=True):
+        known = _fused(laid, resolution)
+        under = describe_map(known.levels, resolution)
+        corner = Transform(*known.origin)
+        deformation = _held(under, one, corner.inverse() @ transform, settings)
+        found.append(deformation)
+        laid.append(
+            Laid(one.levels, transform) if deformation is None else bent_map(one, deformation.bend, corner)
+        )
+    return Deformed(_fused(laid, resolution), found)
+
+
+def bent_map(one: DescribedMap, bend: Bend, corner: Transform) -> Laid:
+    """Return a bent map in cells of its own along the axes of the map onto which it is bent.
+
+    Parameters
+    ----------
+    one : DescribedMap
+        The map.
+    bend : Bend
+        How it lies and is bent in the other map.
+    corner : Transform
+        Where the other map's lower left corner lies in the common frame.
+    """
+    side = one.resolution
+    rows, columns = np.nonzero(one.levels != UNKNOWN)
+    sides = (columns.min(), columns.max() + 1), (rows.min(), rows.max() + 1)
+    outline = np.array([(x, y) for x in sides[0] for y in sides[1]])
+    margin = float(np.abs(bend.field.offsets).max(initial=0.0)) + side
+    box = bend.a_from_b.apply(outline * side)
+    low = np.floor((box.min(axis=0) - margin) / side).astype(np.int64)
+    high = np.ceil((box.max(axis=0) + margin) / side).astype(np.int64)
+    shape = int(high[1] - low[1]), int(high[0] - low[0])
+    levels = np.full(shape, UNKNOWN, np.uint8)
+    x = (low[0] + np.arange(shape[1]) + 0.5) * side
+    for row in range(shape[0]):
+        places = np.column_stack([x, np.full(shape[1], (low[1] + row + 0.5) * side)])
+        cells = np.floor(bend.field.unbent(bend.a_from_b, places) / side).astype(np.int64)
+        inside = ((cells >= 0) & (cells < one.levels.shape[::-1])).all(axis=1)
+        levels[row, inside] = one.levels[cells[inside, 1], cells[inside, 0]]
+    return Laid(levels, corner @ Transform(float(low[0] * side), float(low[1] * side), 0.0))
+
+
+def _fused(laid: Sequence[Laid], resolution: float) -> FusedMap:
+    return fuse([one.levels for one in laid], [one.common_from_cells for one in laid], resolution)
+
+
+def _held(
+    a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings
+) -> Deformation | None:
+    """Return how map b is bent against map a, None where it is better laid rigidly."""
+    if len(a.walls) == 0 or len(b.walls) == 0:
+        return None
+    bend = estimate_bend(a, b, a_from_b, settings)
+    found = Deformation(bend, bend.field.bent(bend.a_from_b, b.walls) - a_from_b.apply(b.walls))
+    if not bend.is_held or bend.strain > MOST_STRAIN or found.most_m > settings.reach_m:
+        return None
+    rigid = replace(
+        bend,
+        a_from_b=a_from_b,
+        field=OffsetField(bend.field.corner, bend.field.spacing_m, 0.0 * bend.field.offsets),
+    )
+    evidence = [Hypothesis(one, compare_bent(a, b, one)).evidence_m for one in (bend, rigid)]
+    return found if evidence[0] > evidence[1] else None
