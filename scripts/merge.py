@@ -3,6 +3,7 @@
 The robots know nothing of each other's start.
 """
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,14 +13,21 @@ from tyro.conf import Positional
 from lidarium.scripts.common import DONE, NO, Answer, Command, file_name, table
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from lidarium.mapping.files.map_files import MapImage
     from lidarium.mapping.geometry.rigid import Transform
     from lidarium.mapping.merging.bend.deforming import Deformation
     from lidarium.mapping.merging.fusion import FusedMap
     from lidarium.mapping.merging.merger import Merged
     from lidarium.mapping.merging.pair_result import PairResult
+    from lidarium.mapping.merging.settings import MergeSettings
 
 DEFAULT_FOLDER = Path("merged")
+
+LEAST_SCALE = 0.01
+"""Least scale that can be given, and one over the greatest."""
 
 MOST_ALTERNATIVES = 5
 """Most hypotheses of a pair that are written."""
@@ -50,6 +58,11 @@ class Merge(Command):
     """
     force: bool = False
     """join two maps by the best transform, whatever speaks against it"""
+    scale: str = "fixed"
+    """fixed, auto, or a number by which the second of two maps has to grow.
+
+    auto seeks it, as for a drawn plan
+    """
     deform: bool = False
     """bend the maps of each group until they agree; the first of each stays as it is"""
 
@@ -59,6 +72,29 @@ class Merge(Command):
             raise ValueError(f"{len(self.maps)} map is given; want two or more")
         if self.resolution is not None and not 0.0 < self.resolution < float("inf"):
             raise ValueError(f"resolution is {self.resolution} m; want a positive number of metres per pixel")
+        factor = self.factor
+        if self.scale != "fixed" and len(self.maps) != 2:
+            raise ValueError(f"a scale is of two maps; {len(self.maps)} are given")
+        if factor is None and (self.guess is not None or self.force or self.mode != "default"):
+            raise ValueError(
+                "--scale auto goes without --guess, --force and --mode; give the scale as a number"
+            )
+
+    @property
+    def factor(self) -> float | None:
+        """By how much the second map has to grow; None where that is sought."""
+        if self.scale in ("fixed", "auto"):
+            return 1.0 if self.scale == "fixed" else None
+        try:
+            factor = float(self.scale)
+        except ValueError:
+            factor = math.nan
+        if not LEAST_SCALE <= factor <= 1.0 / LEAST_SCALE:
+            raise ValueError(
+                f"scale is {self.scale!r}; want fixed, auto, or a number from {LEAST_SCALE:g} to "
+                f"{1.0 / LEAST_SCALE:g}"
+            )
+        return factor
 
 
 def execute(command: Merge) -> Answer:
@@ -70,7 +106,6 @@ def execute(command: Merge) -> Answer:
         Where a map or ``--out`` is no good; nothing is written then.
     """
     from lidarium.evaluation.episodes.output import check_writable
-    from lidarium.mapping.merging.merger import Question, merge_maps
     from lidarium.mapping.merging.settings import TOLERANCES, merge_settings
 
     out = command.out or DEFAULT_FOLDER
@@ -79,12 +114,11 @@ def execute(command: Merge) -> Answer:
     settings = merge_settings(command.mode, max(image.resolution for image in images.values()))
     if command.mode == "default":
         settings = replace(settings, confidence=TOLERANCES[command.tolerance])
-    question = Question(
-        guess=_guess(command, list(images.values())), is_forced=command.force, is_explained=True
-    )
-    levels = {name: (image.levels, image.resolution) for name, image in images.items()}
-    merged = merge_maps(levels, settings, question)
+    merged, images, scale = _merged(command, images, settings)
     result = _result(merged, images)
+    second = result["maps"][list(images)[1]]
+    if command.scale != "fixed" and second is not None:
+        second["scale"] = round(scale, 5)
     joined = [group for group in merged.groups() if len(group) > 1]
     deformed = [merged.deformed(group, settings.bend) for group in joined] if command.deform else []
     for group, bent in zip(joined, deformed, strict=False):
@@ -94,6 +128,38 @@ def execute(command: Merge) -> Answer:
     files = _write(merged, fused, images, result, out)
     is_whole = len(merged.groups()) == 1
     return Answer(result, _summary(merged, files, out), DONE if is_whole else NO)
+
+
+def _merged(
+    command: Merge, images: "dict[str, MapImage]", settings: "MergeSettings"
+) -> "tuple[Merged, dict[str, MapImage], float]":
+    """Merge maps; return also the maps with the second one grown, and by how much it has."""
+    from lidarium.mapping.merging.merger import Question, merge_maps
+    from lidarium.mapping.merging.scaling.scaled_merge import merge_scaled
+
+    factor = command.factor
+    if factor is None:
+        scaled = merge_scaled(_grids(images), settings)
+        return scaled.merged, _grown(images, scaled.scale), scaled.scale
+    images = _grown(images, factor)
+    question = Question(
+        guess=_guess(command, list(images.values())), is_forced=command.force, is_explained=True
+    )
+    return merge_maps(_grids(images), settings, question), images, factor
+
+
+def _grids(images: "dict[str, MapImage]") -> "dict[str, tuple[NDArray[np.uint8], float]]":
+    return {name: (image.levels, image.resolution) for name, image in images.items()}
+
+
+def _grown(images: "dict[str, MapImage]", factor: float) -> "dict[str, MapImage]":
+    """Return maps of which the second has grown about its ROS frame's origin."""
+    if factor == 1.0:
+        return images
+    (first, kept), (second, image) = images.items()
+    x, y, yaw = image.origin
+    grown = replace(image, resolution=image.resolution * factor, origin=(x * factor, y * factor, yaw))
+    return {first: kept, second: grown}
 
 
 def _guess(command: Merge, images: "list[MapImage]") -> "Transform | None":

@@ -291,3 +291,45 @@ def test_maps_are_bent_to_agree_only_where_asked(tmp_path, capsys):
     assert 0.05 < found["mean_m"] < found["most_m"] < 0.6
     # Walls that lie on each other are fewer cells than walls beside each other.
     assert walls["bent"] < 0.9 * walls["rigid"]
+
+
+def scaled_maps(folder):
+    """Return the paths of a map and of a plan drawn 1.25 times as small, and where the plan's frame lies."""
+    truth = about_middle(0.6, hall(), (480, 480))
+    plan = moved(hall(), truth, (480, 480))
+    origin = (2.0, -1.0, 0.3)
+    paths = [
+        write_ros_map(folder, "seen", hall(), (0.0, 0.0, 0.0), RESOLUTION),
+        write_ros_map(folder, "plan", plan, tuple(np.array(origin) / (1.25, 1.25, 1.0)), RESOLUTION / 1.25),
+    ]
+    return [str(path) for path in paths], truth.inverse() @ Transform(*origin).inverse()
+
+
+@pytest.mark.parametrize("scale", ["auto", "1.25"])
+def test_a_plan_of_another_scale_is_joined(scale, tmp_path, capsys):
+    paths, truth = scaled_maps(tmp_path / "in")
+    assert main(["merge", *paths, "--out", str(tmp_path / "out"), "--scale", scale, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["maps"]["plan"]
+    assert found["scale"] == pytest.approx(1.25, rel=0.01)
+    place = truth.inverse().apply((8.0, 5.0))
+    # A point p of the plan lies at scale * R p + t.
+    there = Transform(found["x"], found["y"], found["theta"]).apply(np.array(place) / 1.25 * found["scale"])
+    assert math.dist(there, (8.0, 5.0)) < 0.15
+
+
+@pytest.mark.parametrize("scale", ["0", "-1", "nan", "much", "1e9"])
+def test_a_scale_that_is_none_is_refused(scale, maps, tmp_path, capsys):
+    paths, _ = maps
+    assert main(["merge", *paths, "--out", str(tmp_path / "out"), f"--scale={scale}"]) == 2
+    told = " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert "want fixed, auto, or a number from 0.01 to 100" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scale_is_of_two_maps_and_is_sought_without_a_guess(maps, elsewhere, tmp_path, capsys):
+    paths, _ = maps
+    assert main(["merge", *paths, elsewhere, "--out", str(tmp_path / "out"), "--scale", "auto"]) == 2
+    assert "a scale is of two maps; 3 are given" in capsys.readouterr().err
+    guess = ["--guess", "0,0,0"]
+    assert main(["merge", *paths, "--out", str(tmp_path / "out"), "--scale", "auto", *guess]) == 2
+    assert "without --guess" in capsys.readouterr().err

@@ -52,7 +52,7 @@ PARTS = ("gdc_floor2_raw", "gdc_floor3_northeast")
 STRANGERS_OF_HALMSTAD = ("E5_01", "E5_08", "KPT4A_01", "KPT4A_03")
 
 
-class _Grid(NamedTuple):
+class Grid(NamedTuple):
     """A map: levels, row 0 at the lowest y, and side of a cell [m]."""
 
     levels: NDArray[np.uint8]
@@ -140,7 +140,7 @@ def _halmstad(folder: Path) -> Iterator[Row]:
         if not truth.get("usable") or "layout" in name:
             continue
         a, b = (
-            _Grid(read_grey_map(folder / f"{one}.png", HALMSTAD_M).levels, HALMSTAD_M)
+            Grid(read_grey_map(folder / f"{one}.png", HALMSTAD_M).levels, HALMSTAD_M)
             for one in (target, source)
         )
         result, time_ms = _merged(a, b)
@@ -160,7 +160,7 @@ def _exact(folder: Path) -> Iterator[Row]:
         for name, truth in json.loads(path.read_text(encoding="utf-8")).items():
             resolution = float(truth["resolution"]) if collection == "log_split" else REAL_M
             a, b = (
-                _Grid(read_grey_map(path.parent / truth[key], resolution).levels, resolution) for key in "AB"
+                Grid(read_grey_map(path.parent / truth[key], resolution).levels, resolution) for key in "AB"
             )
             result, time_ms = _merged(a, b)
             wanted = transform_of_pixels(truth.get("pixel", truth), resolution, len(a.levels), len(b.levels))
@@ -174,30 +174,30 @@ def _exact(folder: Path) -> Iterator[Row]:
 
 def _strangers(data: Path) -> Iterator[Row]:
     """Yield all pairs of maps of different buildings; every other one was for tuning."""
-    every = list(_single_maps(data))
+    every = list(single_maps(data))
     pairs = [(first, second) for first, second in itertools.combinations(every, 2) if first[1] != second[1]]
     for number, ((a, _, grid), (b, _, other)) in enumerate(pairs, 1):
         yield _row((f"{a}, {b}", "strangers"), number % 2 == 0, _merged(grid, other), None, is_right=False)
 
 
-def _single_maps(data: Path) -> Iterator[tuple[str, str, _Grid]]:
+def single_maps(data: Path) -> Iterator[tuple[str, str, Grid]]:
     """Yield a name, a building and a map of each building, or two."""
     for path in sorted((data / "slam_maps").glob("*.yaml")):
         if path.stem not in PARTS:
             image = read_ros_map(path)
-            yield path.stem, ONE_BUILDING.get(path.stem, path.stem), _Grid(image.levels, image.resolution)
+            yield path.stem, ONE_BUILDING.get(path.stem, path.stem), Grid(image.levels, image.resolution)
     folder = data / "map_pairs"
     for name in STRANGERS_OF_HALMSTAD:
         path = folder / "halmstad" / f"{name}.png"
         if path.is_file():
-            grid = _Grid(read_grey_map(path, HALMSTAD_M).levels, HALMSTAD_M)
+            grid = Grid(read_grey_map(path, HALMSTAD_M).levels, HALMSTAD_M)
             yield name, name.split("_")[0], grid
     path = folder / "real" / "soorajsunil_A.png"
     if path.is_file():
-        yield path.stem, path.stem, _Grid(read_grey_map(path, REAL_M).levels, REAL_M)
+        yield path.stem, path.stem, Grid(read_grey_map(path, REAL_M).levels, REAL_M)
 
 
-def _merged(a: _Grid, b: _Grid) -> tuple[PairResult, float]:
+def _merged(a: Grid, b: Grid) -> tuple[PairResult, float]:
     """Return what comes of two maps, in cells of the coarser one, and how long it took [ms].
 
     What is explained of a pair that is joined at once is not in the time.

@@ -24,6 +24,7 @@ from lidarium.benchmarks.studies.merging.features import (
 )
 from lidarium.benchmarks.studies.merging.figures import Tried
 from lidarium.benchmarks.studies.merging.pictures import draw_pairs
+from lidarium.benchmarks.studies.merging.plans import merge_plans, plan_tables
 from lidarium.benchmarks.studies.merging.real_maps import merge_real_maps
 from lidarium.benchmarks.studies.merging.real_tables import real_maps
 from lidarium.benchmarks.studies.merging.trials import METHODS, read_outcomes, try_pairs
@@ -33,7 +34,7 @@ from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.suites.workers import shared_out
 
 EXTRA_FILE = "extra.json"
-EXTRA = ("detectors", "descriptors", "methods", "teams", "real")
+EXTRA = ("detectors", "descriptors", "methods", "teams", "real", "plans")
 
 
 def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
@@ -69,7 +70,9 @@ def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]
         return compare_methods(maps, [pair for pair in read_pairs(folder) or [] if pair.half == "test"])
     if name == "teams":
         return merge_teams(maps)
-    return [] if data is None else merge_real_maps(data)
+    if data is None:
+        return []
+    return merge_plans(data) if name == "plans" else merge_real_maps(data)
 
 
 def page(folder: Path, command: str) -> str:
@@ -101,6 +104,8 @@ def page(folder: Path, command: str) -> str:
     ]
     if extra["real"]:
         parts.append("## Maps of real robots\n\n" + real_maps(extra["real"]))
+    if extra["plans"]:
+        parts.append("## Drawn plans\n\n" + plan_tables(extra["plans"]))
     return "\n\n".join(parts) + "\n"
 
 
