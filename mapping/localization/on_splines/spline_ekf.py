@@ -17,6 +17,13 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_settings
 from lidarium.mapping.geometry.rigid import Transform, wrapped
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
+from lidarium.mapping.localization.on_splines.linear_measurements import (
+    TURNED,
+    Measured,
+    measured_lines,
+    measured_rays,
+    rotation_of,
+)
 from lidarium.mapping.localization.on_splines.spline_matches import Matches
 from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker, TrackingSettings, steps_of
 from lidarium.mapping.splines.features import Observation, match_points
@@ -26,8 +33,6 @@ POSE, SCALES = 3, 2
 
 BODY = POSE + SCALES
 """Numbers of the state before the landmarks."""
-
-_TURNED = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,18 +61,6 @@ class SplineEkfSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, "the filter")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Measured:
-    """Linearised measurements: residuals (m,), Jacobian (m, n), variances (m,).
-
-    The Jacobian is by the first n numbers of the state.
-    """
-
-    misses: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
-    variances: NDArray[np.float64]
 
 
 class SplineEkf(SplineTracker):
@@ -116,7 +109,7 @@ class SplineEkf(SplineTracker):
         kept = np.concatenate([np.ones(BODY, np.bool_), np.repeat(is_kept, 2)])
         rotation = np.eye(len(self.state_covariance))
         for k in [0, *range(BODY, len(rotation), 2)]:
-            rotation[k : k + 2, k : k + 2] = _rotation(change.theta)
+            rotation[k : k + 2, k : k + 2] = rotation_of(change.theta)
         covariance = rotation @ self.state_covariance @ rotation.T
         self.landmarks, self.state_covariance = points[is_kept], covariance[np.ix_(kept, kept)]
 
@@ -158,7 +151,11 @@ class SplineEkf(SplineTracker):
             here.apply(seen), self.landmarks, self.tracking.splines.association.point_distance
         )
         of_walls = [
-            self._gated(part) for part in (self._lines_measured(matches), self._rays_measured(matches))
+            self._gated(part)
+            for part in (
+                measured_lines(matches, self.local, self.tracking),
+                measured_rays(matches, self.local, self.tracking),
+            )
         ]
         measured = [
             self._gated(self._landmarks_measured(seen[which], known, sigmas[which])),
@@ -168,7 +165,7 @@ class SplineEkf(SplineTracker):
         self._add_landmarks(matches)
         return self.local
 
-    def _gated(self, measured: _Measured) -> _Measured:
+    def _gated(self, measured: Measured) -> Measured:
         """Return the measurements without those that exceed their expected deviation.
 
         Expected from the measurement's own variance and that of the state.
@@ -177,9 +174,9 @@ class SplineEkf(SplineTracker):
         spread = measured.jacobian @ self.state_covariance[:columns, :columns]
         expected = (spread * measured.jacobian).sum(axis=1) + measured.variances
         is_kept = measured.misses**2 <= self.settings.gate_sigmas**2 * expected
-        return _Measured(measured.misses[is_kept], measured.jacobian[is_kept], measured.variances[is_kept])
+        return Measured(measured.misses[is_kept], measured.jacobian[is_kept], measured.variances[is_kept])
 
-    def _update(self, measured: _Measured) -> None:
+    def _update(self, measured: Measured) -> None:
         """Correct the state by measurements."""
         if len(measured.misses) == 0:
             return
@@ -197,51 +194,23 @@ class SplineEkf(SplineTracker):
 
     def _landmarks_measured(
         self, seen: NDArray[np.float64], known: NDArray[np.int64], sigmas: NDArray[np.float64]
-    ) -> _Measured:
+    ) -> Measured:
         """Return seen points (m, 2) that are landmarks, as measurements.
 
         Both coordinates of each are measured in the robot's frame.
         """
         count = len(seen)
-        back = _rotation(float(self.local[2])).T
+        back = rotation_of(float(self.local[2])).T
         offsets = self.landmarks[known] - self.local[:2]
         jacobian = np.zeros((count, 2, len(self.state_covariance)))
         jacobian[:, :, :2] = -back
-        jacobian[:, :, 2] = offsets @ (back @ _TURNED.T).T
+        jacobian[:, :, 2] = offsets @ (back @ TURNED.T).T
         columns = BODY + 2 * known
         for row, column in enumerate(columns.tolist()):
             jacobian[row, :, column : column + 2] = back
         misses = (seen - offsets @ back.T).reshape(-1)
         variances = np.repeat(np.maximum(sigmas, self.tracking.feature_sigma) ** 2, 2)
-        return _Measured(misses, jacobian.reshape(2 * count, len(self.state_covariance)), variances)
-
-    def _lines_measured(self, matches: Matches) -> _Measured:
-        """Measure how lines lie beside lines of the map and against their directions."""
-        count = len(matches.lines)
-        lever = matches.lines[:, :2] @ _rotation(float(self.local[2])).T
-        known = matches.known_lines
-        normals = np.stack([-np.sin(known[:, 2]), np.cos(known[:, 2])], axis=1)
-        asides = ((lever + self.local[:2] - known[:, :2]) * normals).sum(axis=1)
-        turns = self.local[2] + matches.lines[:, 2] - known[:, 2]
-        jacobian = np.zeros((2 * count, 3))
-        jacobian[:count, :2] = normals
-        jacobian[:count, 2] = ((lever @ _TURNED.T) * normals).sum(axis=1)
-        jacobian[count:, 2] = 1.0
-        sigmas = np.maximum(matches.line_sigmas, self.tracking.feature_sigma)
-        angles = np.full(count, self.tracking.line_angle_sigma)
-        misses = -np.concatenate([asides, np.arctan2(np.sin(turns), np.cos(turns))])
-        return _Measured(misses, jacobian, np.concatenate([sigmas, angles]) ** 2)
-
-    def _rays_measured(self, matches: Matches) -> _Measured:
-        """Measure how the ends of rays lie beside the curves."""
-        lever, found = matches.rays @ _rotation(float(self.local[2])).T, matches.pieces
-        normals = np.stack([-found[:, 3], found[:, 2]], axis=1)
-        jacobian = np.empty((len(found), 3))
-        jacobian[:, :2] = normals
-        jacobian[:, 2] = ((lever @ _TURNED.T) * normals).sum(axis=1)
-        misses = -((lever + self.local[:2] - found[:, :2]) * normals).sum(axis=1)
-        variance = self.tracking.curve_sigma**2 / self.tracking.ray_share
-        return _Measured(misses, jacobian, np.full(len(found), variance))
+        return Measured(misses, jacobian.reshape(2 * count, len(self.state_covariance)), variances)
 
     def _add_landmarks(self, matches: Matches) -> None:
         """Append landmarks that the map knows well and the state lacks.
@@ -250,12 +219,12 @@ class SplineEkf(SplineTracker):
         """
         distance = self.tracking.splines.association.point_distance
         for seen, sigma in zip(matches.points, matches.point_sigmas, strict=True):
-            rotation = _rotation(float(self.local[2]))
+            rotation = rotation_of(float(self.local[2]))
             lever = rotation @ seen
             place = self.local[:2] + lever
             if len(self.landmarks) and float(np.linalg.norm(self.landmarks - place, axis=1).min()) < distance:
                 continue
-            by_pose = np.column_stack([np.eye(2), _TURNED @ lever])
+            by_pose = np.column_stack([np.eye(2), TURNED @ lever])
             old = self.state_covariance
             size = len(old)
             grown = np.empty((size + 2, size + 2))
@@ -268,21 +237,21 @@ class SplineEkf(SplineTracker):
             self.landmarks = np.concatenate([self.landmarks, place[None]])
 
 
-def _stacked(parts: list[_Measured]) -> _Measured:
+def _stacked(parts: list[Measured]) -> Measured:
     """Return several measurements as one.
 
     What one part does not concern is nothing to it.
     """
     columns = max(part.jacobian.shape[1] for part in parts)
     jacobians = [np.pad(part.jacobian, ((0, 0), (0, columns - part.jacobian.shape[1]))) for part in parts]
-    return _Measured(
+    return Measured(
         np.concatenate([part.misses for part in parts]),
         np.concatenate(jacobians),
         np.concatenate([part.variances for part in parts]),
     )
 
 
-def _condensed(measured: _Measured) -> _Measured:
+def _condensed(measured: Measured) -> Measured:
     """Return at most three measurements equivalent to many for the pose.
 
     They are the triangle of the QR decomposition.
@@ -291,9 +260,4 @@ def _condensed(measured: _Measured) -> _Measured:
         return measured
     scales = 1.0 / np.sqrt(measured.variances)
     basis, triangle = np.linalg.qr(measured.jacobian * scales[:, None])
-    return _Measured(basis.T @ (measured.misses * scales), triangle, np.ones(len(triangle)))
-
-
-def _rotation(theta: float) -> NDArray[np.float64]:
-    cosine, sine = math.cos(theta), math.sin(theta)
-    return np.array([[cosine, -sine], [sine, cosine]])
+    return Measured(basis.T @ (measured.misses * scales), triangle, np.ones(len(triangle)))

@@ -8,8 +8,9 @@ short. What fits the walls survives, and carries the robot past where walls show
 References
 ----------
 Motion by turn, way and turn, and resampling by one comb: Thrun, Burgard, Fox, "Probabilistic robotics", 2005,
-chapters 4 and 5. Printed forms that divide the prior by the proposal leave the likelihood out; here it is the
-weight.
+chapters 4 and 5. Particles are drawn by motion and matches together: Montemerlo, Thrun, Koller, Wegbreit,
+"FastSLAM 2.0", IJCAI 2003. Printed forms that divide the prior by the proposal leave the likelihood out; here
+it is in the weight.
 """
 
 import math
@@ -23,11 +24,19 @@ from lidarium.mapping.geometry.bounds import Distance, FromZero, Turn, check_set
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.localization.on_splines.linear_measurements import (
+    joined,
+    measured_lines,
+    measured_points,
+    measured_rays,
+)
 from lidarium.mapping.localization.on_splines.spline_matches import Matches
 from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker, TrackingSettings, steps_of
 from lidarium.mapping.splines.features import Observation
 
 _HIT_SHARE = 0.95
+_GATE_SIGMAS = 3.0
+_LEAST_MOTION = np.array([1e-4, 1e-4, 1e-4])
 _RECOVERY_STEPS = 10
 _LEAST_BOX = 0.1
 _ENTRIES_PER_METRE, _FARTHEST = 2000.0, 0.5
@@ -123,15 +132,19 @@ class SplineFilter(SplineTracker):
         ) * self._generator.standard_normal((settings.particles, 2))
         self.resamplings, self._lost_steps, self._box = 0, 0, 0.0
         self._ray_table = _ray_likelihoods(self.tracking.curve_sigma)
+        # Where odometry alone leads each particle from its last place, and the covariance of that motion.
+        self._expected, self._motion_covariance = self.particles.copy(), np.diag(_LEAST_MOTION**2)
 
     def _change_frame(self, change: Transform, reach: float) -> None:
-        self.particles[:, :2] = change.apply(self.particles[:, :2])
-        self.particles[:, 2] += change.theta
+        self.particles = np.column_stack(
+            [change.apply(self.particles[:, :2]), self.particles[:, 2] + change.theta]
+        )
 
     def _predict(self, motion: Transform) -> NDArray[np.float64]:
         first, distance, second = steps_of(motion)
         noise, tracking = self._generator.standard_normal((3, len(self.particles))), self.tracking
         if first == 0.0 and distance == 0.0 and second == 0.0:
+            self._expected, self._motion_covariance = self.particles.copy(), np.diag(_LEAST_MOTION**2)
             return self.local
         turns = abs(first), abs(second)
         sway = tracking.turn_per_metre * abs(distance)
@@ -141,11 +154,24 @@ class SplineFilter(SplineTracker):
             tracking.slip_per_metre * abs(distance) + tracking.slip_per_turn * sum(turns)
         )
         seconds = second * of_turn + noise[2] * (tracking.turn_per_turn * turns[1] + sway)
-        headings = self.particles[:, 2] + firsts
-        self.particles[:, 0] += ways * np.cos(headings)
-        self.particles[:, 1] += ways * np.sin(headings)
-        self.particles[:, 2] = headings + seconds
-        return self._mean()
+        plain = np.stack([first * of_turn, distance * of_way, second * of_turn], axis=1)
+        self._expected = _driven(self.particles, plain)
+        self.particles = _driven(self.particles, np.stack([firsts, ways, seconds], axis=1))
+        pose = self._mean()
+        spread = np.array(
+            [
+                tracking.turn_per_turn * turns[0] + sway,
+                tracking.slip_per_metre * abs(distance) + tracking.slip_per_turn * sum(turns),
+                tracking.turn_per_turn * turns[1] + sway,
+            ]
+        )
+        heading = float(pose[2]) - second
+        cosine, sine = math.cos(heading), math.sin(heading)
+        by_steps = np.array(
+            [[-distance * sine, cosine, 0.0], [distance * cosine, sine, 0.0], [1.0, 0.0, 1.0]]
+        )
+        self._motion_covariance = (by_steps * spread**2) @ by_steps.T + np.diag(_LEAST_MOTION**2)
+        return pose
 
     def _correct(self, matches: Matches, observation: Observation) -> NDArray[np.float64]:
         tracking = self.tracking
@@ -172,6 +198,8 @@ class SplineFilter(SplineTracker):
             logarithms,
             fits,
         )
+        if self._box <= _LEAST_BOX and float(self.weights @ fits) >= self.settings.lost_likelihood:
+            logarithms = self._move_to_matches(matches)
         weights = self.weights * np.exp(logarithms - logarithms.max())
         self.weights = weights / weights.sum()
         pose = self._mean()
@@ -180,6 +208,37 @@ class SplineFilter(SplineTracker):
             self._resample()
         self._recover(likelihood if len(matches.rays) else 1.0, pose)
         return pose
+
+    def _move_to_matches(self, matches: Matches) -> NDArray[np.float64]:
+        """Draw each particle anew from where its motion and the matches together say it is.
+
+        Return the logarithms of the weights (particles,) by which matches fit the motions. Drawn by the
+        motion alone, few particles would fit, and those that live on by chance would lose along a corridor
+        what they spread over.
+        """
+        here, tracking = self._mean(), self.tracking
+        measured = joined(
+            [
+                part.within(_GATE_SIGMAS)
+                for part in (
+                    measured_points(matches, here, tracking),
+                    measured_lines(matches, here, tracking),
+                    measured_rays(matches, here, tracking),
+                )
+            ]
+        )
+        information, pull = measured.information()
+        spread = np.linalg.inv(np.linalg.inv(self._motion_covariance) + information)
+        offsets = self._expected - here
+        offsets[:, 2] = np.arctan2(np.sin(offsets[:, 2]), np.cos(offsets[:, 2]))
+        rest = pull - offsets @ information
+        drawn = self._generator.standard_normal(offsets.shape) @ np.linalg.cholesky(spread).T
+        self.particles = here + offsets + rest @ spread + drawn
+        return np.asarray(
+            offsets @ pull
+            - 0.5 * ((offsets @ information) * offsets).sum(axis=1)
+            + 0.5 * ((rest @ spread) * rest).sum(axis=1)
+        )
 
     def _mean(self) -> NDArray[np.float64]:
         x, y = self.weights @ self.particles[:, :2]
@@ -225,6 +284,19 @@ class SplineFilter(SplineTracker):
             which = self._generator.permutation(len(self.particles))[:drawn]
             self.particles[which] = pose + box * self._generator.uniform(-1.0, 1.0, (drawn, 3))
             self._lost_steps = 0
+
+
+def _driven(poses: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses (n, 3) after a turn, a straight segment and a turn each, (n, 3) [rad, m, rad]."""
+    headings = poses[:, 2] + steps[:, 0]
+    return np.stack(
+        [
+            poses[:, 0] + steps[:, 1] * np.cos(headings),
+            poses[:, 1] + steps[:, 1] * np.sin(headings),
+            headings + steps[:, 2],
+        ],
+        axis=1,
+    )
 
 
 def _ray_likelihoods(sigma: float) -> NDArray[np.float64]:

@@ -30,6 +30,7 @@ from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.dead_reckoning.odometry import compounded
 from lidarium.mapping.localization.matching.scan_points import at_last_beam
+from lidarium.mapping.localization.matching.settings.graph import GraphSettings
 from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.on_splines.spline_matches import Matches, match
 from lidarium.mapping.localization.slam.mapped_path import MappedPath
@@ -38,6 +39,9 @@ from lidarium.mapping.splines.curves.settings import SplineSettings
 from lidarium.mapping.splines.features import Observation, observe
 from lidarium.mapping.splines.scan_points import scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
+
+_GRAPH = GraphSettings(deviation_m=0.004, deviation_per_metre=0.008, deviation_angle=math.radians(0.04))
+"""Curves follow walls a little closer than cells: chosen where true poses lie within the spread."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +98,7 @@ class TrackingSettings:
     still_turn: Turn = math.radians(0.1)
     map_distance: Positive = 0.1
     map_turn: Angle = math.radians(5.0)
-    path: SlamSettings = field(default_factory=SlamSettings)
+    path: SlamSettings = field(default_factory=lambda: SlamSettings(graph=_GRAPH))
 
     def __post_init__(self) -> None:
         check_settings(self, "tracking")
