@@ -171,8 +171,8 @@ def plan_tables(rows: Rows) -> str:
     return (
         "A drawn plan and a map of a robot, `--scale auto`: nobody knows the plan's metres a pixel. Scales "
         f"from {settings.least:g} to {settings.most:g} are tried. A pair is right within 1 m at the median "
-        "correspondence and 8 degrees, with the plan's pixels taken as 2 cm. Strangers are the plans with all "
-        "maps of other buildings, and every third pair of maps of different buildings. The bound of "
+        "correspondence and 8 degrees, with the plan's pixels taken as 2 cm. Strangers are the plans with "
+        "all maps of other buildings, and every third pair of maps of different buildings. The bound of "
         f"{settings.confidence:g} was set when all plans and 50 strangers had been seen.\n\n"
         + "\n".join(lines)
         + "\n\nThe same by the confidence from which maps are joined:\n\n"
