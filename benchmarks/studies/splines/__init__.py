@@ -1,1 +1,1 @@
-"""The study of spline maps: on worlds with a goal, and in buildings."""
+"""The study of spline maps on worlds with a goal, then of localizers on them in buildings."""

@@ -40,7 +40,7 @@ from lidarium.mapping.splines.features import Observation, observe
 from lidarium.mapping.splines.scan_points import scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
 
-_GRAPH = GraphSettings(deviation_m=0.004, deviation_per_metre=0.008, deviation_angle=math.radians(0.04))
+_GRAPH = GraphSettings(deviation_m=0.003, deviation_per_metre=0.006, deviation_angle=math.radians(0.03))
 """Curves follow walls a little closer than cells: chosen where true poses lie within the spread."""
 
 
