@@ -49,14 +49,16 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     for method in METHODS:
         for done in try_pairs(folder / "outcomes", maps, tested, method, workers):
             yield f"pairs, {method}", done, len(tested)
-    if not (folder / EXTRA_FILE).exists():
-        extra: dict[str, Any] = {}
-        for name, rows in shared_out(partial(_measured, folder, data), EXTRA, 1, is_apart=True):
-            if isinstance(rows, Exception):
-                raise rows
-            extra[name] = rows
-            yield "other experiments", len(extra), len(EXTRA)
-        write_json(folder / EXTRA_FILE, extra)
+    kept = folder / EXTRA_FILE
+    extra: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+    missing = [name for name in EXTRA if name not in extra]
+    for name, rows in shared_out(partial(_measured, folder, data), missing, 1, is_apart=True):
+        if isinstance(rows, Exception):
+            raise rows
+        extra[name] = rows
+        yield "other experiments", len(extra), len(EXTRA)
+    if missing:
+        write_json(kept, extra)
 
 
 def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]]:
