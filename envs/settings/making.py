@@ -80,7 +80,9 @@ def make_settings(settings: ExplorationSettings | None = None, **options: Any) -
     known = ExplorationSettings.__dataclass_fields__
     for name in options:
         if name not in known:
-            raise TypeError(unknown("option", name, sorted((*known, *SHORT_OPTIONS))))
+            # In Python's words, too: TorchRL tries options and reads in the error that they are none.
+            said = unknown("option", name, sorted((*known, *SHORT_OPTIONS)))
+            raise TypeError(f"got an unexpected keyword argument {name!r}: {said}")
     if isinstance(options.get("localizer"), Mapping):
         chosen = options.get("localization", base.localization)
         options["localizer"] = localizer_settings(chosen, options["localizer"])
