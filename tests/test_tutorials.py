@@ -58,3 +58,19 @@ def test_the_furnished_apartment_is_mapped_as_the_tutorial_says(capsys):
     text = (TUTORIALS / name).read_text(encoding="utf-8")
     shown = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
     assert capsys.readouterr().out == "".join(shown)
+
+
+@pytest.mark.filterwarnings("ignore")  # of stable-baselines3, about rows that it reads only
+def test_the_explorer_of_the_tutorial_is_trained_and_compared(capsys):
+    pytest.importorskip("sb3_contrib", reason='sb3-contrib is not installed: pip install "lidarium[rl]"')
+    code = code_of("train_an_explorer.md").replace("set:train:64", "scene_room").replace("2_000", "100")
+    exec(compile(code.replace('"validation:8"', '"validation:2"'), "train_an_explorer.md", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in lines] == ["untrained", "after a minute"]
+    assert all(0.0 < float(line.split(": ")[1].split()[0]) < 100.0 for line in lines)
+
+
+def test_the_rewards_of_the_tutorial_have_the_terms_that_it_shows(capsys):
+    exec(compile(code_of("shape_a_reward.md"), "shape_a_reward.md", "exec"), {})
+    text = (TUTORIALS / "shape_a_reward.md").read_text(encoding="utf-8")
+    assert capsys.readouterr().out == re.search(r"```text\n(.*?)```", text, re.DOTALL)[1]

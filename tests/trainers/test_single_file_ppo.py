@@ -20,9 +20,10 @@ def one_thread():
 def test_ppo_in_one_file_trains(more):
     module = script("ppo", "torch", "rl")
     settings = module.Settings(updates=2, episodes=3, rollout=6, minibatch=8)
-    earned = list(module.train({**ROOM, "robots": 1, **more}, settings))
-    assert len(earned) == 2
-    assert all(math.isfinite(each) for each in earned)
+    reports = [report for report, _ in module.train({**ROOM, "robots": 1, **more}, settings)]
+    assert len(reports) == 2
+    assert all(math.isfinite(report.earned) for report in reports)
+    assert 0.0 < reports[-1].coverage <= 1.0
 
 
 def played_once(module, rollout):

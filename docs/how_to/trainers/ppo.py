@@ -1,4 +1,4 @@
-"""PPO in one file, in the manner of CleanRL: many robots choose frontiers, one small network scores these.
+"""PPO in one file, in the manner of CleanRL: many robots choose frontiers, and one network scores these.
 
 Usage: python docs/how_to/trainers/ppo.py
 """
@@ -38,6 +38,11 @@ class Settings:
     clip: float = 0.2
     entropy: float = 0.01
     seed: int = 0
+
+    @property
+    def decisions(self) -> int:
+        """Decisions of all robots in an update, one robot an episode."""
+        return self.episodes * self.rollout
 
 
 class Frontiers(nn.Module):
@@ -86,6 +91,13 @@ class Rollout(NamedTuple):
     is_idle: Tensor
 
 
+class Report(NamedTuple):
+    """Of an update: the mean reward of a decision, and the mean coverage of episodes that ended."""
+
+    earned: float
+    coverage: float
+
+
 def as_tensors(observations: dict[str, Any]) -> tuple[Tensor, ...]:
     """Return frontiers, time left and masks of all rows."""
     names = ("frontiers", "time_left", "action_mask")
@@ -101,11 +113,12 @@ class Learner:
         self.optimiser = torch.optim.Adam(self.network.parameters(), settings.learning_rate)
         self.seen = as_tensors(env.reset(seed=settings.seed)[0])
         self.is_idle = torch.zeros(env.num_envs, dtype=torch.bool)
+        self.coverages: list[float] = []
 
     @torch.no_grad()
     def play(self) -> tuple[Rollout, Tensor]:
         """Play for some decisions; return what came of it, and the value of what is seen at the end."""
-        steps = []
+        steps, self.coverages = [], []
         for _ in range(self.settings.rollout):
             choices, values = self.network(*self.seen)
             actions = choices.sample()
@@ -115,6 +128,7 @@ class Learner:
             log_probabilities = choices.log_prob(actions)
             gone = torch.as_tensor(terminated)
             steps.append((self.seen, actions, log_probabilities, values, got, gone, ended, self.is_idle))
+            self.coverages += infos["truth"]["coverage"][terminated | truncated].tolist()
             self.seen = as_tensors(observations)
             # An episode that is over begins in the next step, whatever the action.
             self.is_idle = ended | ~torch.as_tensor(np.array(infos["active"]))
@@ -155,17 +169,18 @@ class Learner:
                 self.optimiser.step()
 
 
-def train(options: dict[str, Any], settings: Settings) -> Iterator[float]:
-    """Train; yield the mean reward of a decision in each update."""
+def train(options: dict[str, Any], settings: Settings) -> Iterator[tuple[Report, Scorer]]:
+    """Train; yield a report of each update, and the network as it then is."""
     env = lidarium.vector_env(settings.episodes, **{**ROBOT, **options})
     learner = Learner(env, settings)
     for _ in range(settings.updates):
         played, last = learner.play()
         learner.improve(played, learner.advantages(played, last))
-        yield float(played.rewards[~played.is_idle].mean())
+        earned = float(played.rewards[~played.is_idle].mean())
+        yield Report(earned, float(np.mean(learner.coverages or [np.nan]))), learner.network
 
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    for update, earned in enumerate(train({"floor": "set:train"}, Settings())):
-        print(f"update {update}: {earned:.3f} a decision")
+    for update, (report, _) in enumerate(train({"floor": "set:train"}, Settings())):
+        print(f"update {update}: {report.earned:.3f} a decision, coverage {report.coverage:.2f}")

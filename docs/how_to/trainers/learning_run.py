@@ -1,0 +1,190 @@
+"""Train explorers from several seeds, and compare them on floors that they have not seen.
+
+Usage: python docs/how_to/trainers/learning_run.py --out docs/results
+"""
+
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import tyro
+from numpy.typing import NDArray
+from ppo import ROBOT, Report, Scorer, Settings, as_tensors, train
+
+import lidarium
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.floors.catalogue.names import set_floors
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.episodes.output import write_json, write_text
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.statistics.means import mean_interval, paired_difference
+
+LEARNED, UNTRAINED = "learned", "untrained network"
+CLASSIC = ("random_walk", "nearest_frontier")
+
+PAGE = """# A run that learns
+
+{seeds} networks learn to choose frontiers, each from a seed of its own: {decisions:,} decisions on
+{train_floors:,} generated floors. They are compared on {floors} floors that none of them has seen, by the
+share of the floor that one robot has seen after {horizon_s:.0f} s. Networks draw their choices as they do in
+training; before the first update they draw almost evenly.
+
+![Coverage at the end of training episodes]({name}.png)
+
+| | coverage after {horizon_s:.0f} s, mean and 95 % interval | learned less this, on the same floors |
+|---|---:|---:|
+{table}
+
+The coverage of networks on a floor is the mean over the seeds; intervals are over floors. By seed the learned
+ones reach {by_seed}. Training and evaluation took {minutes:.0f} minutes with {workers} processes.
+
+Made with `python docs/how_to/trainers/learning_run.py`, lidarium {version}.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Train explorers and compare them on unseen floors."""
+
+    seeds: int = 5
+    """how many networks"""
+    updates: int = 120
+    """updates of each, of 1,024 decisions"""
+    train_floors: str = "set:train:1000"
+    """what they learn on"""
+    floors: str = "set:validation:50"
+    """what they are compared on"""
+    horizon_s: float = 60.0
+    """simulated time of an episode [s]"""
+    workers: int = 2
+    """processes"""
+    out: Path = Path("docs/results")
+    """folder for the page, its picture and its numbers"""
+
+
+def final_coverage(network: Scorer, floors: tuple[str, ...], options: dict[str, Any]) -> NDArray[np.float64]:
+    """Return the coverage that a network reaches on each floor, by choices that it draws."""
+    torch.manual_seed(0)
+    env = lidarium.vector_env(len(floors), **{**ROBOT, **options, "floor": floors[0]}, copy=False)
+    observations, infos = env.reset(seed=0, options={"floor": list(floors)})
+    reached, is_over = infos["truth"]["coverage"].copy(), np.zeros(len(floors), np.bool_)
+    while not is_over.all():
+        with torch.no_grad():
+            choices, _ = network(*as_tensors(observations))
+        observations, _, terminated, truncated, infos = env.step(choices.sample().numpy())
+        reached[~is_over] = infos["truth"]["coverage"][~is_over]
+        is_over |= terminated | truncated
+    return np.asarray(reached, np.float64)
+
+
+def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
+    """Train a network; return its curve, and what it reached on the unseen floors before and after."""
+    torch.set_num_threads(1)
+    options = {"robots": 1, "horizon_s": plan.horizon_s, "threads": 1}
+    floors = set_floors(plan.floors)
+    torch.manual_seed(seed)
+    untrained = final_coverage(Scorer(), floors, options)
+    curve: list[Report] = []
+    network = Scorer()
+    for report, trained in train(
+        {"floor": plan.train_floors, **options}, Settings(updates=plan.updates, seed=seed)
+    ):
+        curve.append(report)
+        network = trained
+    return {
+        "curve": [report.coverage for report in curve],
+        UNTRAINED: untrained.tolist(),
+        LEARNED: final_coverage(network, floors, options).tolist(),
+    }
+
+
+def run_classic(plan: Plan, name: str) -> list[float]:
+    """Return what a policy of the package reaches on each of the unseen floors."""
+    reached = []
+    for floor in set_floors(plan.floors):
+        env = ExplorationEnv(floor, make_settings(robots=1, horizon_s=plan.horizon_s, starts="drawn"))
+        run_episode(lidarium.policy(name), env, seed=0)
+        reached.append(env.scorer.coverage)
+    return reached
+
+
+def run(plan: Plan) -> dict[str, Any]:
+    """Run all seeds and policies, side by side; return the numbers of the page."""
+    with ProcessPoolExecutor(plan.workers, get_context("spawn")) as pool:
+        seeds = list(pool.map(partial(run_seed, plan), range(plan.seeds)))
+        classic = dict(zip(CLASSIC, pool.map(partial(run_classic, plan), CLASSIC), strict=True))
+    networks = {
+        name: np.mean([seed[name] for seed in seeds], axis=0).tolist() for name in (UNTRAINED, LEARNED)
+    }
+    return {
+        "curves": [seed["curve"] for seed in seeds],
+        "by_seed": [float(np.mean(seed[LEARNED])) for seed in seeds],
+        "coverage": {**classic, **networks},
+    }
+
+
+def table(coverage: dict[str, list[float]]) -> str:
+    """Return the lines of the table, the least coverage first."""
+    lines = []
+    for name, reached in sorted(coverage.items(), key=lambda each: float(np.mean(each[1]))):
+        found = mean_interval(reached)
+        less = "-"
+        if name != LEARNED:
+            gap = paired_difference(coverage[LEARNED], reached)
+            less = f"{100 * gap.estimate:+.1f} ({100 * gap.low:+.1f} to {100 * gap.high:+.1f}) %"
+        share = f"{100 * found.estimate:.1f} ({100 * found.low:.1f} to {100 * found.high:.1f}) %"
+        lines.append(f"| `{name}` | {share} | {less} |")
+    return "\n".join(lines)
+
+
+def draw(curves: dict[str, list[list[float]]], decisions: int, path: Path) -> None:
+    """Draw coverage over decisions, so many an update: the mean of the seeds, and each seed."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(6.4, 3.6), layout="constrained")
+    for name, seeds in curves.items():
+        values = 100.0 * np.array(seeds)
+        over = decisions * np.arange(1, values.shape[1] + 1)
+        (line,) = axes.plot(over, np.nanmean(values, axis=0), label=name)
+        axes.plot(over, values.T, color=line.get_color(), alpha=0.25, linewidth=0.8)
+    axes.set(xlabel="decisions", ylabel="coverage at the end [%]")
+    axes.legend()
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
+
+
+def main(plan: Plan, name: str = "training") -> None:
+    """Run the plan, and write the page."""
+    began = time.monotonic()
+    numbers = run(plan)
+    minutes = (time.monotonic() - began) / 60.0
+    draw({LEARNED: numbers["curves"]}, Settings().decisions, plan.out / f"{name}.png")
+    write_json(plan.out / f"{name}.json", numbers)
+    page = PAGE.format(
+        seeds=plan.seeds,
+        decisions=plan.updates * Settings().decisions,
+        train_floors=len(set_floors(plan.train_floors)),
+        floors=len(set_floors(plan.floors)),
+        horizon_s=plan.horizon_s,
+        name=name,
+        table=table(numbers["coverage"]),
+        by_seed=", ".join(f"{100 * each:.1f} %" for each in numbers["by_seed"]),
+        minutes=minutes,
+        workers=plan.workers,
+        version=lidarium.__version__,
+    )
+    write_text(plan.out / f"{name}.md", page)
+    print(f"{plan.out / name}.md is written")
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Plan))
