@@ -31,7 +31,7 @@ class AgentCommands:
 
     def __init__(self, settings: ExplorationSettings, operating: Operating) -> None:
         self._operating = operating
-        self._limits = np.array([settings.robot.max_speed, settings.robot.max_turn_rate])
+        self._limits = settings.speed_limits.ravel()
         self._rows = {agent: row for row, agent in enumerate(settings.agents)}
         self.values = np.zeros((settings.robots, 2))
 

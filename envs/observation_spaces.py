@@ -47,11 +47,11 @@ def observation_space(settings: ExplorationSettings, has_goal: bool) -> spaces.D
 
 def boxes_of(settings: ExplorationSettings) -> dict[str, spaces.Box]:
     """Return the space of everything that can be observed."""
-    robot, cells, own_cells = settings.robot, settings.map_cells, settings.egocentric_cells
+    cells, own_cells = settings.map_cells, settings.egocentric_cells
     pose_limit = np.array([FARTHEST, FARTHEST, math.pi], np.float32)
     # The largest float32 angle that is wrapped from float64 may round up to the float32 above pi.
     pose_limit[2] = np.nextafter(np.float32(math.pi), np.float32(4.0))
-    velocity_limit = np.array([robot.max_speed, robot.max_turn_rate], np.float32)
+    velocity_limit = settings.speed_limits.max(axis=0).astype(np.float32)
     return {
         "scan": spaces.Box(0.0, np.float32(settings.lidar.range_max), (settings.lidar.beams,), np.float32),
         "pose": spaces.Box(-pose_limit, pose_limit, dtype=np.float32),

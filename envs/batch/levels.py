@@ -119,7 +119,7 @@ class VelocityLevel:
 
     def __init__(self, settings: ExplorationSettings) -> None:
         self.action_space: spaces.Space[Any] = action_space()
-        self._limits = np.array([settings.robot.max_speed, settings.robot.max_turn_rate])
+        self._limits = settings.speed_limits.ravel()
         self.drives = no_drives(1)
         self.following = Following(
             settings.lidar.unit_vectors,

@@ -34,8 +34,8 @@ def settings_of(options: dict[str, Any]) -> ExplorationSettings:
     """
     if "randomize" in options:
         raise ValueError(
-            f"randomize is {shown(options['randomize'])}; leave it out: all episodes of a batch have the "
-            "same settings, use lidarium.parallel_env or several batches"
+            f"randomize is {shown(options['randomize'])}; leave it out: the episodes here have "
+            "the same settings; use lidarium.vector_env or lidarium.parallel_env"
         )
     names_threads = "threads" in options or options.get("settings") is not None
     return make_settings(**(options if names_threads else {**options, "threads": available_threads()}))
@@ -118,6 +118,12 @@ def options_of(
 
 _KNOWN = {"floor": 0, "starts": 2, "goal": 1}
 """Known options, and the number of axes that one episode's has."""
+
+
+def option_of(options: dict[str, Any] | None, episode: int, episodes: int) -> dict[str, Any]:
+    """Return the options of one episode, as ``reset`` of a single team takes them."""
+    given = options or {}
+    return {name: _entry(name, given[name], episode, episodes) for name in _KNOWN if name in given}
 
 
 def _entry(name: str, value: Any, episode: int, episodes: int) -> Any:  # noqa: ANN401

@@ -148,17 +148,18 @@ def draw_robots(
     frame: Frame,
     view: View,
     poses: NDArray[np.float64],
-    radius: float,
+    radius: float | Sequence[float],
     has_ended: Sequence[bool],
     colours: Sequence[Colour],
 ) -> None:
-    """Draw robots of a radius [m] with their headings.
+    """Draw robots of a radius, or of one each [m], with their headings.
 
     Poses are (robots, 3) [m, rad]; robots that have ended are paler.
     """
     fixed = 1 << SHIFT
-    shown = max(radius * view.scale, 6.0)
-    for (x, y, theta), colour, is_over in zip(poses, colours, has_ended, strict=True):
+    radii = np.broadcast_to(radius, len(poses))
+    for (x, y, theta), size, colour, is_over in zip(poses, radii, colours, has_ended, strict=True):
+        shown = max(float(size) * view.scale, 6.0)
         ahead = np.array([math.cos(theta), math.sin(theta)]) * (shown / view.scale)
         centre, tip = view.pixels(np.stack([(x, y), (x + ahead[0], y + ahead[1])]))
         place = (int(centre[0]), int(centre[1]))

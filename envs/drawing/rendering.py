@@ -128,7 +128,8 @@ def draw_frame(
     colours = team_colours(scene.settings.robots)
     _draw_fans(frame, scene, view, colours)
     draw_paths(frame, view, np.stack([poses[:, :2] for poses in (*scene.track, scene.poses)]), colours)
-    draw_robots(frame, view, scene.poses, scene.settings.robot.radius, scene.has_ended, colours)
+    radii = [robot.radius for robot in scene.settings.team]
+    draw_robots(frame, view, scene.poses, radii, scene.has_ended, colours)
     if draw_over is not None:
         draw_over(frame, view)
     simulation, episode = scene.simulation, scene.episode

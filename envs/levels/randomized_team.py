@@ -4,7 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
 
+from lidarium.envs.levels.team_sizes import fits_into, largest_team, padded
+from lidarium.envs.outcome.team_state import ROBOT_NUMBERS
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import set_values
 from lidarium.envs.settings.reset_options import checked_seed
@@ -16,6 +20,9 @@ Distribution = Callable[[np.random.Generator], Any] | tuple[float, float] | list
 
 Distributions = Mapping[str, Distribution]
 """By the names of settings, such as ``lidar.noise_floor``."""
+
+ROBOTS = "robots"
+"""The setting by which teams differ in size."""
 
 SETTINGS_STREAM = 77
 """Separates the draws of settings from those of floors, starts and noise."""
@@ -32,6 +39,12 @@ class RandomizedTeam(TeamWrapper):
         What is not drawn.
     distributions : mapping
         From names of settings to `Distribution`.
+
+    Notes
+    -----
+    Where ``robots`` is drawn, ``possible_agents`` are those of the largest team, and ``agents`` those of the
+    episode. Observations of teammates have rows for the largest team, zeros behind those of the episode, and
+    so has the state.
 
     Attributes
     ----------
@@ -55,14 +68,41 @@ class RandomizedTeam(TeamWrapper):
         self._make, self._fixed, self._distributions = make, settings, dict(distributions)
         self._generator = np.random.default_rng(0)
         self._episode, self.drawn = 0, dict[str, Any]()
-        super().__init__(self._next(0))
+        first = self._next(0)
+        super().__init__(first)
+        largest = first
+        if ROBOTS in distributions:
+            self.drawn[ROBOTS] = largest_team(distributions[ROBOTS])
+            largest = self._made(0)
+            self.possible_agents = largest.possible_agents
         agent = self.possible_agents[0]
-        self._spaces = (self.env.observation_space(agent), self.env.action_space(agent))
+        self._spaces: tuple[spaces.Space[Any], spaces.Space[Any]] = (
+            largest.observation_space(agent),
+            largest.action_space(agent),
+        )
+        self._state_space = largest.state_space
         self._has_begun = False
 
     def _next(self, episode: int) -> Any:  # noqa: ANN401
         self.drawn = {name: draw(each, self._generator) for name, each in self._distributions.items()}
+        return self._made(episode)
+
+    def _made(self, episode: int) -> Any:  # noqa: ANN401
         return self._make(set_values(self._fixed, self.drawn), episode)
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's observations, that of the largest team."""
+        self._check_agent(agent)
+        return self._spaces[0]
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's actions."""
+        self._check_agent(agent)
+        return self._spaces[1]
+
+    def _check_agent(self, agent: str) -> None:
+        if agent not in self.possible_agents:
+            raise ValueError(f"{agent!r} is not among the agents {self.possible_agents}")
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -75,7 +115,8 @@ class RandomizedTeam(TeamWrapper):
             self._generator = np.random.default_rng()
         made = self._next(self._episode)
         agent = self.possible_agents[0]
-        if (made.observation_space(agent), made.action_space(agent)) != self._spaces:
+        fits = fits_into(made.observation_space(agent), self._spaces[0])
+        if not fits or made.action_space(agent) != self._spaces[1]:
             raise ValueError(
                 f"settings drawn are {self.drawn}; want some that leave the spaces of observations and "
                 "actions as they are: learners have one for all episodes"
@@ -83,9 +124,32 @@ class RandomizedTeam(TeamWrapper):
         self.env.close()
         self.env, self.settings, self._has_begun = made, made.settings, True
         own = int(self._generator.integers(2**31)) if seed is None else seed
-        outcome = super().reset(own, options)
+        observations, infos = super().reset(own, options)
         self._episode += 1
-        return outcome
+        return self._padded(observations), infos
+
+    def step(self, actions: Any) -> Any:  # noqa: ANN401
+        """Take a step or a decision."""
+        observations, *others = super().step(actions)
+        return (self._padded(observations), *others)
+
+    def _padded(self, observations: dict[str, Any]) -> dict[str, Any]:
+        if ROBOTS not in self._distributions:
+            return observations
+        return {agent: padded(each, self._spaces[0]) for agent, each in observations.items()}
+
+    @property
+    def state_space(self) -> spaces.Box:
+        """The space of ``state``, that of the largest team."""
+        space: spaces.Box = self._state_space
+        return space
+
+    def state(self) -> NDArray[np.float32]:
+        """Return the true state of the team, zeros for robots that it lacks."""
+        state = super().state()
+        own = self.settings.robots * len(ROBOT_NUMBERS)
+        lacking = np.zeros(len(self._state_space.low) - len(state), np.float32)
+        return np.concatenate([state[:own], lacking, state[own:]])
 
 
 def check_distributions(distributions: Any) -> None:  # noqa: ANN401

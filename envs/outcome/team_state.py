@@ -57,7 +57,7 @@ def team_state(
     side = block * cells * settings.occupancy.resolution
     rows = slice(episode * settings.robots, (episode + 1) * settings.robots)
     poses, velocities = world.poses[rows], world.velocities[rows]
-    limits = (settings.robot.max_speed, settings.robot.max_turn_rate)
+    limits = settings.speed_limits
     corner = simulation.frames[episode, [FRAME_X, FRAME_Y]]
     robots = np.column_stack(
         [

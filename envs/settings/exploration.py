@@ -5,8 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass
 from typing import Annotated, Any, get_args, get_type_hints
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lidarium.envs.settings.battery import BATTERIES, Battery
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
+from lidarium.envs.settings.kinds import envelope_of, kinds_of
 from lidarium.envs.settings.lidar import LIDARS, Lidar
 from lidarium.envs.settings.limits import OBSERVABLES as OBSERVABLES
 from lidarium.envs.settings.limits import check_workload, egocentric_scales_of, observed_names
@@ -68,7 +72,11 @@ class ExplorationSettings:
     robots : int
         Number of robots, 1 to 64.
     robot : Robot
-        The body of each.
+        The body of each; with ``kinds`` a body with room for all of them and the limits of the slowest, by
+        which paths are planned.
+    kinds : tuple of str
+        Names of the robots of a mixed team, in order, from the front again where these are too few; empty
+        where all are ``robot``.
     lidar : Lidar
         The laser of each.
     camera : DepthCamera or None
@@ -147,6 +155,7 @@ class ExplorationSettings:
 
     robots: Annotated[int, within(1, MAX_ROBOTS)] = 3
     robot: Robot = field(default_factory=lambda: ROBOTS["kobuki"])
+    kinds: tuple[str, ...] = ()
     lidar: Lidar = field(default_factory=lambda: LIDARS["urg"])
     camera: DepthCamera | None = None
     occupancy: Annotated[OccupancySettings, OCCUPANCY] = field(default_factory=OccupancySettings)
@@ -192,6 +201,9 @@ class ExplorationSettings:
                     f"{', or None' if name in OPTIONAL_PARTS else ''}"
                 )
         check_settings(self)
+        object.__setattr__(self, "kinds", kinds_of(self.kinds))
+        if self.kinds:
+            object.__setattr__(self, "robot", envelope_of(self.team))
         if self.localization not in localizations():
             raise ValueError(
                 f"localization is {self.localization!r}; want one of {', '.join(localizations())}"
@@ -261,6 +273,18 @@ class ExplorationSettings:
         """Whether a robot can die, or take itself to be beyond its map."""
         has_forces = self.backend != "kinematic"
         return has_forces or self.localization != "truth" or self.faults != NO_FAULTS
+
+    @property
+    def team(self) -> list[Robot]:
+        """The body of each robot."""
+        if not self.kinds:
+            return [self.robot] * self.robots
+        return [ROBOTS[self.kinds[k % len(self.kinds)]] for k in range(self.robots)]
+
+    @property
+    def speed_limits(self) -> NDArray[np.float64]:
+        """Greatest speed and turn rate of each robot, (robots, 2) [m/s, rad/s]."""
+        return np.array([(robot.max_speed, robot.max_turn_rate) for robot in self.team])
 
     @property
     def agents(self) -> list[str]:

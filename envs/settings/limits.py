@@ -59,7 +59,9 @@ class Product:
 
 def _pieces(settings: Any) -> float:  # noqa: ANN401
     """Pieces of a quarter of a cell that a robot can drive in a step."""
-    return float(settings.robot.max_speed * settings.time_step / settings.raster_resolution) * 4.0 + 1.0
+    return (
+        float(settings.speed_limits[:, 0].max() * settings.time_step / settings.raster_resolution) * 4.0 + 1.0
+    )
 
 
 def _drive(settings: Any) -> float:  # noqa: ANN401

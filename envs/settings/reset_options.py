@@ -106,6 +106,11 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
     return array if np.isfinite(array).all() else None
 
 
+def of_number(curriculum: Curriculum | None, number: int) -> Mapping[str, Any]:
+    """Return the options that a curriculum has for an episode; none where there is no curriculum."""
+    return {} if curriculum is None else curriculum(number)
+
+
 def of_curriculum(
     curriculum: Curriculum | None, number: int, chosen: ResetOptions, robots: int
 ) -> ResetOptions:

@@ -17,7 +17,7 @@ BACKENDS: Registry[Callable[[ExplorationSettings, int], Simulation]] = Registry(
 def kinematic_world(settings: ExplorationSettings, episodes: int = 1) -> KinematicWorld:
     """Return the kinematic world of so many episodes."""
     return KinematicWorld(
-        [settings.robot] * settings.robots,
+        settings.team,
         settings.lidar,
         settings.time_step,
         episodes,

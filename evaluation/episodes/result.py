@@ -254,6 +254,7 @@ def realism_of(settings: ExplorationSettings) -> str:
 
 
 LATER = (
+    "kinds",
     "localizer",
     "camera",
     "starts",

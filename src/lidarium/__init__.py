@@ -43,15 +43,13 @@ class _MovedModules:
 if not any(getattr(finder, "__name__", "") == _MovedModules.__name__ for finder in sys.meta_path):
     sys.meta_path.append(_MovedModules)
 
+_SEES = ("scan", "pose", "velocity", "bumper", "map")
+
 _IDS: dict[str, dict[str, Any]] = {
-    "Exploration": {"level": "velocity"},
-    "WaypointExploration": {"level": "waypoint"},
-    "FrontierExploration": {"level": "frontier"},
-    "Exploration3D": {
-        "level": "velocity",
-        "camera": "xtion",
-        "observe": ("scan", "pose", "velocity", "bumper", "map", "depth"),
-    },
+    "Exploration": {"level": "velocity", "observe": _SEES},
+    "WaypointExploration": {"level": "waypoint", "observe": _SEES},
+    "FrontierExploration": {"level": "frontier", "observe": _SEES},
+    "Exploration3D": {"level": "velocity", "camera": "xtion", "observe": (*_SEES, "depth")},
 }
 """What each id means; options of the maker go before."""
 
@@ -60,6 +58,9 @@ _VERSIONS: dict[int, dict[str, Any]] = {
     1: {"starts": "drawn"},
 }
 """Options of each version of the ids: those whose defaults have changed since, or that a seed needs."""
+
+_UNSEEN: dict[int, tuple[str, ...]] = {0: (), 1: ("pose",)}
+"""What each version shows only where ``observe`` asks for it: learners overfit to places."""
 
 
 def _register(name: str, version: int, options: dict[str, Any]) -> None:
@@ -82,7 +83,8 @@ def _register(name: str, version: int, options: dict[str, Any]) -> None:
 
 for _name, _options in _IDS.items():
     for _version, _more in _VERSIONS.items():
-        _register(_name, _version, {**_options, **_more})
+        _sees = tuple(each for each in _options["observe"] if each not in _UNSEEN[_version])
+        _register(_name, _version, {**_options, **_more, "observe": _sees})
 
 
 def parallel_env(
@@ -164,13 +166,19 @@ def vector_env(
         As for ``parallel_env``; of a set such as ``set:train``, each beginning draws one.
     **options
         ``level``, ``image_resolution`` and the options of ``parallel_env``; ``copy=False`` for observations
-        in two sets of arrays that take turns.
+        in two sets of arrays that take turns; with ``randomize`` each episode is a batch of its own.
 
     Raises
     ------
     ValueError, TypeError, FileNotFoundError
         Where an option or the floor cannot be used.
     """
+    if options.get("randomize") is not None:
+        from lidarium.envs.batch.randomized_rows import RandomizedVectorEnv
+
+        # It has the same rows, and a batch for each episode.
+        randomized: Any = RandomizedVectorEnv(episodes, floor=floor, **options)
+        return randomized  # type: ignore[no-any-return]
     from lidarium.envs.batch.vector_env import ExplorationVectorEnv
 
     return ExplorationVectorEnv(episodes, floor, **options)

@@ -28,6 +28,12 @@ from lidarium.evaluation.statistics.means import mean_interval, paired_differenc
 LEARNED, UNTRAINED = "learned", "untrained network"
 CLASSIC = ("random_walk", "nearest_frontier")
 
+SEEDS_APART = 1000
+"""Episodes of a batch have seeds that follow each other; those of networks share none."""
+
+SMOOTHED = 4
+"""Updates over which curves are averaged: each has few episodes, and floors differ."""
+
 PAGE = """# A run that learns
 
 {seeds} networks learn to choose frontiers, each from a seed of its own: {decisions:,} decisions on
@@ -93,7 +99,7 @@ def run_seed(plan: Plan, seed: int) -> dict[str, Any]:
     curve: list[Report] = []
     network = Scorer()
     for report, trained in train(
-        {"floor": plan.train_floors, **options}, Settings(updates=plan.updates, seed=seed)
+        {"floor": plan.train_floors, **options}, Settings(updates=plan.updates, seed=SEEDS_APART * seed)
     ):
         curve.append(report)
         network = trained
@@ -143,6 +149,12 @@ def table(coverage: dict[str, list[float]]) -> str:
     return "\n".join(lines)
 
 
+def smoothed(curve: list[float]) -> NDArray[np.float64]:
+    """Return means over the last `SMOOTHED` updates, of those in which episodes ended."""
+    windows = [curve[max(k - SMOOTHED + 1, 0) : k + 1] for k in range(len(curve))]
+    return np.array([np.nanmean(each) if np.isfinite(each).any() else np.nan for each in windows])
+
+
 def draw(curves: dict[str, list[list[float]]], decisions: int, path: Path) -> None:
     """Draw coverage over decisions, so many an update: the mean of the seeds, and each seed."""
     import matplotlib
@@ -152,7 +164,7 @@ def draw(curves: dict[str, list[list[float]]], decisions: int, path: Path) -> No
 
     figure, axes = pyplot.subplots(figsize=(6.4, 3.6), layout="constrained")
     for name, seeds in curves.items():
-        values = 100.0 * np.array(seeds)
+        values = 100.0 * np.array([smoothed(curve) for curve in seeds])
         over = decisions * np.arange(1, values.shape[1] + 1)
         (line,) = axes.plot(over, np.nanmean(values, axis=0), label=name)
         axes.plot(over, values.T, color=line.get_color(), alpha=0.25, linewidth=0.8)

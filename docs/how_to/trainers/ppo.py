@@ -14,12 +14,7 @@ from torch.distributions import Categorical
 
 import lidarium
 
-ROBOT = {
-    "level": "frontier",
-    "observe": ["frontiers", "time_left"],
-    "horizon_s": 60.0,
-    "reward": {"area": 0.0, "more": {"floor_share": 10.0}},  # returns within [0, 10] on every floor
-}
+ROBOT = {"level": "frontier", "observe": ["frontiers", "time_left"], "horizon_s": 60.0}
 SCALES = torch.tensor([10.0, 10.0, 10.0, 3.0])
 
 

@@ -9,7 +9,7 @@ from lidarium.envs.simulation.simulation import Simulation
 def make_bullet(settings: ExplorationSettings, episodes: int = 1) -> Simulation:
     """Return the simulation of a world of PyBullet."""
     world = BulletWorld(
-        [settings.robot] * settings.robots,
+        settings.team,
         settings.lidar,
         settings.time_step,
         episodes,

@@ -5,6 +5,7 @@ import pickle
 import gymnasium
 import numpy as np
 import pytest
+from pettingzoo.test import parallel_api_test
 
 import lidarium
 
@@ -117,6 +118,60 @@ def test_draws_that_change_the_spaces_are_refused():
         [env.reset(seed=seed) for seed in range(20)]
 
 
-def test_batches_have_one_choice_of_settings():
-    with pytest.raises(ValueError, match=r"randomize is .*; leave it out: all episodes of a batch"):
-        lidarium.vector_env(2, "scene_room", randomize={"reward.time": (0.0, 1.0)}, **SMALL)
+def test_rows_of_stable_baselines_have_one_choice_of_settings():
+    pytest.importorskip("stable_baselines3")
+    with pytest.raises(ValueError, match=r"randomize is .*; leave it out: the episodes here"):
+        lidarium.sb3_vec_env(2, "scene_room", randomize={"reward.time": (0.0, 1.0)}, **SMALL)
+
+
+def test_the_size_of_the_team_is_drawn_for_each_episode():
+    options = {**SMALL, "observe": ["bumper", "teammates"], "horizon_s": 3.0}
+    env = lidarium.parallel_env("scene_room", randomize={"robots": (2, 4)}, **options)
+    assert env.possible_agents == ["robot_0", "robot_1", "robot_2", "robot_3"]
+    sizes = set()
+    for seed in range(8):
+        observations, infos = env.reset(seed=seed)
+        size = env.settings.robots
+        sizes.add(size)
+        assert list(observations) == list(infos) == env.agents == env.possible_agents[:size]
+        for agent, observation in observations.items():
+            assert env.observation_space(agent).contains(observation)
+            assert not observation["teammates"][size - 1 :].any()
+        plain = lidarium.parallel_env("scene_room", **{**options, "robots": size})
+        wanted, _ = plain.reset(seed=seed)
+        assert np.array_equal(
+            observations["robot_0"]["teammates"][: size - 1], wanted["robot_0"]["teammates"]
+        )
+        state, plain_state = env.state(), plain.state()
+        assert env.state_space.contains(state)
+        assert np.array_equal(state[: 7 * size], plain_state[: 7 * size])
+        assert np.array_equal(state[28:], plain_state[7 * size :])
+        assert not state[7 * size : 28].any()
+    assert sizes == {2, 3, 4}
+
+
+# PettingZoo's test warns where agents have never been there, which its interface allows.
+@pytest.mark.filterwarnings("ignore:No agents present:UserWarning")
+@pytest.mark.parametrize("level", ["velocity", "frontier"])
+def test_teams_of_drawn_sizes_pass_the_test_of_pettingzoo(level):
+    options = {**SMALL, "observe": ["bumper"], "level": level, "horizon_s": 3.0, "infos": "flat"}
+    parallel_api_test(
+        lidarium.parallel_env("scene_room", randomize={"robots": [1, 3]}, **options), num_cycles=30
+    )
+
+
+def test_sizes_of_which_the_largest_is_unknown_are_refused():
+    with pytest.raises(ValueError, match=r"distribution of robots is .*; want .*largest team is known"):
+        lidarium.parallel_env("scene_room", randomize={"robots": lambda generator: 2}, **SMALL)
+
+
+def test_flat_observations_of_teammates_want_teams_of_one_size():
+    env = lidarium.parallel_env(
+        "scene_room",
+        randomize={"robots": [2, 3]},
+        observation="flat",
+        observe=["bumper", "teammates"],
+        **SMALL,
+    )
+    with pytest.raises(ValueError, match="want some that leave the spaces"):
+        [env.reset(seed=seed) for seed in range(20)]
