@@ -60,7 +60,7 @@ class Plan:
 
     seeds: int = 5
     """how many networks"""
-    updates: int = 120
+    updates: int = 200
     """updates of each, of 1,024 decisions"""
     train_floors: str = "set:train:1000"
     """what they learn on"""
