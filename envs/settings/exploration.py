@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from lidarium.envs.settings.battery import BATTERIES, Battery
 from lidarium.envs.settings.faults import NO_FAULTS, FaultSettings
-from lidarium.envs.settings.kinds import envelope_of, kinds_of
 from lidarium.envs.settings.lidar import LIDARS, Lidar
 from lidarium.envs.settings.limits import OBSERVABLES as OBSERVABLES
 from lidarium.envs.settings.limits import check_workload, egocentric_scales_of, observed_names
 from lidarium.envs.settings.odometry import ODOMETRY, OdometrySettings
 from lidarium.envs.settings.radio import RADIO, RadioSettings
 from lidarium.envs.settings.rewards import RewardSettings
-from lidarium.envs.settings.robots import ROBOTS, Robot
+from lidarium.envs.settings.robots import ROBOTS, Robot, envelope_of, kinds_of
 from lidarium.envs.settings.sensors.cameras import CAMERAS as CAMERAS
 from lidarium.envs.settings.sensors.cameras import DepthCamera
 from lidarium.envs.settings.sensors.observables import check_sensed

@@ -6,14 +6,15 @@ Pioneer P3-DX: data sheet of Adept MobileRobots. Kobuki: user guide of Yujin Rob
 """
 
 import math
-from dataclasses import dataclass, field
-from typing import Annotated
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import above, check_settings, shown, within
-from lidarium.registry import Registry
+from lidarium.registry import Registry, unknown
 
 Mass = Annotated[float, above(0.0, 1e4)]
 """A mass [kg]."""
@@ -246,3 +247,36 @@ ROBOTS.register(
     ),
     "almost a point that follows commands at once; for tests and bounds",
 )
+
+LARGEST = ("radius", "height", "length", "width")
+"""Of a mixed team the largest counts."""
+
+SMALLEST = ("cruise_speed", "max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration")
+"""Of a mixed team the smallest counts."""
+
+
+def kinds_of(names: Any) -> tuple[str, ...]:  # noqa: ANN401
+    """Return names of robots as a tuple, checked.
+
+    Raises
+    ------
+    ValueError
+        Where they are no names, or one is unknown.
+    """
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise ValueError(f"kinds is {shown(names)}; want names of robots ({', '.join(ROBOTS)}) in a list")
+    chosen = tuple(names)
+    for name in chosen:
+        if not isinstance(name, str) or name not in ROBOTS:
+            raise ValueError(f"kinds has an {unknown('robot', name, ROBOTS)}")
+    return chosen
+
+
+def envelope_of(team: Sequence[Robot]) -> Robot:
+    """Return a body with room for all of a team, with the limits of the slowest.
+
+    What is planned for it can be driven by each.
+    """
+    largest = {name: max(getattr(robot, name) for robot in team) for name in LARGEST}
+    smallest = {name: min(getattr(robot, name) for robot in team) for name in SMALLEST}
+    return replace(team[0], **largest, **smallest)
