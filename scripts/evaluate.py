@@ -61,6 +61,8 @@ class Evaluate(TeamCommand):
     """metres per pixel, where floors are plain images"""
     workers: int = 0
     """processes that run episodes; 0 for as many as there are cores"""
+    bounds: bool = False
+    """set each episode beside how soon a team that knew the floor could have seen it (extra `bounds`)"""
     records: bool = True
     """keep a record of every episode, for replays and for the pictures of the report"""
 
@@ -120,6 +122,7 @@ def _suite(command: Evaluate) -> "Suite":
         robots=command.robots,
         seeds=seeds,
         variants={DEFAULT_VARIANT: settings},
+        bounds=command.bounds,
         image_resolution=command.resolution,
     )
 

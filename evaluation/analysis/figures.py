@@ -64,6 +64,9 @@ VALUES = (
 COMPARED = ("coverage_percent", "path_m", "overlap_percent")
 """Values in the table of comparisons, beside the times."""
 
+MAY_LACK = ("bound_s", "t99_over_bound")
+"""Figures beside times that are null where something was not reached."""
+
 _NOT_FIGURES = ("robots", "seed", "horizon_s", "coverage_final", "overlap", "collisions", *TIMES)
 
 
@@ -244,4 +247,6 @@ def _tested(
 
 def _is_figure(key: str, value: Any) -> bool:  # noqa: ANN401
     is_time = key.startswith("t") and key.endswith("_s") and key[1:-2].isdigit()
-    return (value is None and is_time) or (isinstance(value, int | float) and not isinstance(value, bool))
+    return (value is None and (is_time or key in MAY_LACK)) or (
+        isinstance(value, int | float) and not isinstance(value, bool)
+    )

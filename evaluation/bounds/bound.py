@@ -122,12 +122,12 @@ def known_floor_bound(
     if len(starts) != settings.robots:
         raise ValueError(f"there are {len(starts)} starts; want one for each of {settings.robots} robots")
     loaded = load_floor(floor) if isinstance(floor, str) else floor
-    key = _key(loaded, settings, starts, rounds, seed)
+    team = _team_of(settings)
+    key = _key(loaded, team, starts, rounds, seed)
     kept = floor_store().load(key)
     if kept is not None:
         return _unpacked(kept)
-    graph = graph_of(loaded, settings, starts)
-    team = replace(settings, horizon_s=None, localization="truth")
+    graph = graph_of(loaded, team, starts)
     best = _planned_and_driven(graph, loaded, team, starts, (rounds, seed))
     floor_store().save(key, _packed(best))
     return best
@@ -199,6 +199,29 @@ def _looks(
         left &= ~bits_of(numbers[is_seen] if is_seen.any() else numbers, len(left))
         found[robot, at] = heading
     return found
+
+
+def _team_of(settings: ExplorationSettings) -> ExplorationSettings:
+    """Return what of some settings says how soon a floor can be seen, in a world without noise.
+
+    Raises
+    ------
+    ValueError
+        Where the robots are of different kinds.
+    """
+    if settings.kinds:
+        raise ValueError(f"kinds is {list(settings.kinds)}; bounds are for teams of robots of one kind")
+    return ExplorationSettings(
+        robots=settings.robots,
+        robot=settings.robot,
+        lidar=replace(settings.lidar, noise_floor=0.0, noise_share=0.0),
+        occupancy=settings.occupancy,
+        stop_coverage=settings.stop_coverage,
+        raster_resolution=settings.raster_resolution,
+        time_step=settings.time_step,
+        decision_period_s=settings.decision_period_s,
+        horizon_s=None,
+    )
 
 
 def _key(

@@ -16,14 +16,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import lidarium
 from lidarium.agents.policy import settings_for
-from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.evaluation.episodes.output import clear_unfinished, write_json
+from lidarium.evaluation.suites.bounds import beside_bound
 from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
+from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.suites.suite import Suite, Trial
 from lidarium.evaluation.suites.workers import shared_out
 from lidarium.mapping.files.guarded_reading import read_text, reason
@@ -153,9 +152,11 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     where = [[round(float(number), 6) for number in start] for start in env.world.starts]
     record = None if records is None else f"{RECORDS_FOLDER}/{trial.file_name}.npz"
     about = {KEY: trial.key, "variant": trial.variant, "starts": where, "record": record}
+    known = beside_bound(trial, settings, {**about, **result}, image_resolution) if suite.bounds else {}
     return {
         **about,
         **result,
+        **known,
         "decisions": len(episode.decision_seconds),
         "wall_s": round(time.perf_counter() - began, 4),
     }
@@ -172,41 +173,6 @@ def _keep_record(path: Path, record: "EpisodeRecord") -> None:
             f"{error.strerror or error}; the episodes before are kept, the same command goes on from there",
             str(path),
         ) from error
-
-
-def drawn_starts(
-    floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
-) -> list[list[float]] | None:
-    """Draw where robots start on a floor that has starts of its own.
-
-    None on others, where a reset draws by the seed.
-
-    Returns
-    -------
-    list or None
-        x, y, theta of each robot [m, rad].
-    """
-    from lidarium.envs.floors.catalogue.names import load_floor
-    from lidarium.envs.floors.starts import draw_starts
-    from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-
-    loaded = load_floor(floor, image_resolution)
-    if not len(loaded.starts):
-        return None
-    tables = floor_tables(loaded, settings.raster_resolution, settings.lidar.height, settings.robot.height)
-    drawn = draw_starts(tables.body, settings.robot.radius, settings.robots, np.random.default_rng(seed))
-    return [[float(number) for number in start] for start in drawn]
-
-
-def starts_in(
-    floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
-) -> list[list[float]]:
-    """Return where a reset with a seed lets robots start on a floor, x, y, theta of each [m, rad]."""
-    from lidarium.envs.exploration import ExplorationEnv
-
-    env = ExplorationEnv(floor, settings, image_resolution=image_resolution)
-    env.reset(seed=seed)
-    return [[float(number) for number in start] for start in env.world.starts]
 
 
 def check_same(episodes: list[dict[str, Any]], suite: Suite, folder: Path) -> None:

@@ -102,6 +102,8 @@ class Suite:
     draws_starts : bool
         Whether the seed draws starts also on floors that have starts of their own; these would be the same
         for every seed.
+    bounds : bool
+        Whether each episode is set beside how soon a team that knew the floor could have seen it.
     stop : dict or None
         When episodes end beside what the settings say, as ``StopRule``.
     image_resolution : float or None
@@ -124,6 +126,7 @@ class Suite:
     variants: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: {DEFAULT_VARIANT: {}})
     starts: Mapping[str, Sequence[Starts]] = field(default_factory=dict)
     draws_starts: bool = True
+    bounds: bool = False
     stop: Mapping[str, Any] | None = None
     image_resolution: float | None = None
     policy_settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -247,7 +250,7 @@ def suite_of(content: Mapping[str, Any]) -> Suite:
     ----------
     content : mapping
         ``policies``, ``floors``, ``robots``, ``seeds`` (a list, or how many from 0 on), ``settings`` (for all
-        variants), ``variants``, ``starts``, ``draws_starts``, ``stop``, ``image_resolution``,
+        variants), ``variants``, ``starts``, ``draws_starts``, ``bounds``, ``stop``, ``image_resolution``,
         ``policy_settings``.
 
     Raises
@@ -263,10 +266,11 @@ def suite_of(content: Mapping[str, Any]) -> Suite:
         if name not in content:
             raise ValueError(f"the suite has no {name}; want a list of names")
     common, draws = content.get("settings", {}), content.get("draws_starts", True)
-    if not isinstance(common, Mapping) or not isinstance(draws, bool):
+    bounds = content.get("bounds", False)
+    if not (isinstance(common, Mapping) and isinstance(draws, bool) and isinstance(bounds, bool)):
         raise ValueError(
-            f"settings of the suite is {shown(common)} and draws_starts {shown(draws)}; want tables, as in "
-            "[settings], and true or false"
+            f"settings of the suite is {shown(common)}, draws_starts {shown(draws)} and bounds "
+            f"{shown(bounds)}; want tables, as in [settings], and true or false"
         )
     variants = tables_of(content.get("variants", {DEFAULT_VARIANT: {}}), "variants")
     return Suite(
@@ -277,6 +281,7 @@ def suite_of(content: Mapping[str, Any]) -> Suite:
         variants={name: {**common, **variant} for name, variant in variants.items()},
         starts=starts_of(content.get("starts", {})),
         draws_starts=draws,
+        bounds=bounds,
         stop=content.get("stop"),
         image_resolution=content.get("image_resolution"),
         policy_settings=tables_of(content.get("policy_settings", {}), "policy_settings"),

@@ -38,9 +38,9 @@ def execute(command: Bound) -> Answer:
     from lidarium.envs.floors.catalogue.names import load_floor
     from lidarium.envs.settings.making import make_settings
     from lidarium.evaluation.bounds.bound import known_floor_bound
-    from lidarium.evaluation.bounds.picture import save_bound_picture
+    from lidarium.evaluation.drawing.maps.bound_picture import save_bound_picture
     from lidarium.evaluation.episodes.output import check_writable, write_json
-    from lidarium.evaluation.suites.campaign import drawn_starts, starts_in
+    from lidarium.evaluation.suites.starts import drawn_starts, starts_in
 
     if command.out is not None:
         check_writable(command.out)

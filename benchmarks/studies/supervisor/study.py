@@ -35,8 +35,9 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.supervision import decision_lines
-from lidarium.evaluation.suites.campaign import Campaign, drawn_starts
+from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.episodes_file import KEY
+from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.suites.suite import Suite, Trial
 
 __all__ = ["page", "suites", "work"]

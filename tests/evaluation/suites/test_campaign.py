@@ -190,3 +190,18 @@ def test_a_rule_stops_an_episode_and_says_so():
 def test_rules_that_are_not_clear_are_refused(rule, message):
     with pytest.raises(ValueError, match=message):
         suite(stop=rule)
+
+
+def test_episodes_are_set_beside_what_a_team_that_knew_the_floor_needs(tmp_path):
+    pytest.importorskip("ortools", reason="OR-Tools is not installed")
+    suite = Suite(
+        policies=("nearest_frontier", "tour_frontier"),
+        floors=("apartment:3",),
+        variants={"default": {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": 600.0}},
+        bounds=True,
+    )
+    lines = list(Campaign(suite, tmp_path / "out", records=False).run())
+    assert len({line["bound_s"] for line in lines}) == 1
+    for line in lines:
+        assert line["t99_over_bound"] == pytest.approx(line["t99_s"] / line["bound_s"], rel=1e-5)
+        assert line["t99_over_bound"] > 1.0

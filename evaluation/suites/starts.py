@@ -1,0 +1,40 @@
+"""Where the robots of a trial start."""
+
+import numpy as np
+
+from lidarium.envs.settings.exploration import ExplorationSettings
+
+
+def drawn_starts(
+    floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
+) -> list[list[float]] | None:
+    """Draw where robots start on a floor that has starts of its own.
+
+    None on others, where a reset draws by the seed.
+
+    Returns
+    -------
+    list or None
+        x, y, theta of each robot [m, rad].
+    """
+    from lidarium.envs.floors.catalogue.names import load_floor
+    from lidarium.envs.floors.starts import draw_starts
+    from lidarium.envs.simulation.kernels.floor_cache import floor_tables
+
+    loaded = load_floor(floor, image_resolution)
+    if not len(loaded.starts):
+        return None
+    tables = floor_tables(loaded, settings.raster_resolution, settings.lidar.height, settings.robot.height)
+    drawn = draw_starts(tables.body, settings.robot.radius, settings.robots, np.random.default_rng(seed))
+    return [[float(number) for number in start] for start in drawn]
+
+
+def starts_in(
+    floor: str, settings: ExplorationSettings, seed: int, image_resolution: float | None = None
+) -> list[list[float]]:
+    """Return where a reset with a seed lets robots start on a floor, x, y, theta of each [m, rad]."""
+    from lidarium.envs.exploration import ExplorationEnv
+
+    env = ExplorationEnv(floor, settings, image_resolution=image_resolution)
+    env.reset(seed=seed)
+    return [[float(number) for number in start] for start in env.world.starts]
