@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.report import GivenUp, PolicyReport
+from lidarium.agents.report import GivenUp, PolicyReport, TeamMaps
 from lidarium.envs.exploration import Observation
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.radio.messages import DriveState, OperatingState, Order, Route, Target
@@ -128,6 +128,10 @@ class Policy(ABC):
     def report(self) -> PolicyReport:
         """Return what there is to report of the episode."""
         return PolicyReport(self.given_up)
+
+    def team_maps(self) -> TeamMaps | None:
+        """Return how a station has joined the robots' maps; None where there is no station."""
+        return None
 
 
 def check_observed(policy: Policy, name: str, observe: Sequence[str]) -> None:

@@ -1,11 +1,13 @@
 """What a policy reports of an episode."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from lidarium.envs.radio.messages import OrderKind
 from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.merging.fusion import FusedMap
+from lidarium.mapping.merging.pair_result import PairResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +126,45 @@ class Supervision:
     figures: Mapping[str, Any] | None = None
     tick_seconds: Sequence[float] = ()
     merge_seconds: Sequence[float] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JoinedGroup:
+    """Robots whose maps are joined.
+
+    Attributes
+    ----------
+    frames : mapping of str to Transform
+        Of each robot's map frame in that of the group's first robot.
+    fused : FusedMap or None
+        Their merged map in that frame; None where nobody has merged it.
+    """
+
+    frames: Mapping[str, Transform]
+    fused: FusedMap | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TeamMaps:
+    """How the maps of a team lie, as far as is known in the end.
+
+    Attributes
+    ----------
+    groups : sequence of JoinedGroup
+        Each robot is in one; who is joined with nobody is alone in it.
+    pairs : mapping of (str, str) to PairResult
+        What came of the pairs of maps that were tried last, between the maps' lower left corners.
+    corners : mapping of str to Transform
+        Of these lower left corners in the robots' map frames.
+    used, dropped : frozenset of (str, str)
+        The pairs by which the groups are joined, and those that contradict stronger ones.
+    """
+
+    groups: Sequence[JoinedGroup]
+    pairs: Mapping[tuple[str, str], PairResult] = field(default_factory=dict)
+    corners: Mapping[str, Transform] = field(default_factory=dict)
+    used: frozenset[tuple[str, str]] = frozenset()
+    dropped: frozenset[tuple[str, str]] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,6 +83,11 @@ class TeamCommand(Command):
     set: tuple[str, ...] = ()
     """any other settings as NAME=VALUE, such as reward.time=0.02 or localizer.particles=400; `lidarium show
     settings` lists them"""
+    supervisor: tuple[str, ...] = ()
+    """settings of the supervisor as KEY=VALUE; --supervisor.KEY VALUE is the same.
+
+    `lidarium show supervisor` lists them
+    """
 
     @property
     def team_options(self) -> dict[str, Any]:

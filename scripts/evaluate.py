@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import Positional
 
 from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, notify, table
+from lidarium.scripts.options.supervisor import check_supervised, is_supervised, supervisor_options
 from lidarium.scripts.process import first_start
 
 if TYPE_CHECKING:
@@ -102,6 +103,11 @@ def execute(command: Evaluate) -> Answer:
 def _suite(command: Evaluate) -> "Suite":
     from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite, read_suite
 
+    if command.supervisor and (command.suite is not None or command.preset is not None):
+        raise ValueError(
+            "settings of the supervisor are given beside a suite or a preset; want them in its "
+            "policy_settings"
+        )
     if command.suite is not None:
         return read_suite(command.suite)
     if command.seeds < 1:
@@ -124,7 +130,19 @@ def _suite(command: Evaluate) -> "Suite":
         variants={DEFAULT_VARIANT: settings},
         bounds=command.bounds,
         image_resolution=command.resolution,
+        policy_settings=_policy_settings(command),
     )
+
+
+def _policy_settings(command: Evaluate) -> dict[str, dict[str, Any]]:
+    """Return what the supervised policies are made with."""
+    options = supervisor_options(command.supervisor)
+    if not options:
+        return {}
+    led = [name for name in command.policies if is_supervised(name)]
+    if not led:
+        check_supervised(command.policies[0])
+    return dict.fromkeys(led, options)
 
 
 def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:

@@ -40,6 +40,7 @@ from lidarium.scripts.common import (
 from lidarium.scripts.evaluate import Evaluate
 from lidarium.scripts.floors import Floors
 from lidarium.scripts.merge import Merge
+from lidarium.scripts.options.supervisor import gathered
 from lidarium.scripts.process.signals import (
     code_of,
     end_all_workers,
@@ -180,6 +181,7 @@ def _command(arguments: Sequence[str] | None) -> Command:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if tuple(words[:2]) in _IN_TWO_WORDS:
         words[:2] = [_IN_TWO_WORDS[words[0], words[1]]]
+    words = gathered(words)
     config = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
     description = (
         "Teams of lidar robots explore unknown floors. Begin with `lidarium run`; "

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tyro.conf import Positional
 
 from lidarium.scripts.common import DONE, NO, Answer, Command, file_name, table
+from lidarium.scripts.output.transforms import PlacedMaps, transforms
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,16 +22,12 @@ if TYPE_CHECKING:
     from lidarium.mapping.merging.bend.deforming import Deformation
     from lidarium.mapping.merging.fusion import FusedMap
     from lidarium.mapping.merging.merger import Merged
-    from lidarium.mapping.merging.pair_result import PairResult
     from lidarium.mapping.merging.settings import MergeSettings
 
 DEFAULT_FOLDER = Path("merged")
 
 LEAST_SCALE = 0.01
 """Least scale that can be given, and one over the greatest."""
-
-MOST_ALTERNATIVES = 5
-"""Most hypotheses of a pair that are written."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +112,7 @@ def execute(command: Merge) -> Answer:
     if command.mode == "default":
         settings = replace(settings, confidence=TOLERANCES[command.tolerance])
     merged, images, scale = _merged(command, images, settings)
-    result = _result(merged, images)
+    result = transforms(_placed(merged, images))
     second = result["maps"][list(images)[1]]
     if command.scale != "fixed" and second is not None:
         second["scale"] = round(scale, 5)
@@ -209,69 +206,24 @@ def _corner(image: "MapImage") -> "Transform":
     return Transform(*image.origin)
 
 
-def _result(merged: "Merged", images: "dict[str, MapImage]") -> dict[str, Any]:
-    """Return what transforms.json holds: transforms between the maps' ROS frames."""
-    groups = merged.groups()
-    world = groups[0][0]
-    maps: dict[str, dict[str, Any] | None] = dict.fromkeys(images)
-    for number, group in enumerate(groups):
-        if len(group) > 1:
-            root = _corner(images[group[0]])
-            for name in group:
-                transform = merged.tree.lookup(group[0], name)
-                assert transform is not None
-                maps[name] = {**_numbers(root @ transform @ _corner(images[name]).inverse()), "group": number}
-    used = {(edge.a, edge.b) for edge in merged.tree.edges}
-    pairs = [
-        _pair(pair, found, pair in used, (_corner(images[pair[0]]), _corner(images[pair[1]])))
-        for pair, found in merged.pairs.items()
-    ]
-    return {"world": world, "maps": maps, "pairs": pairs}
-
-
-def _pair(
-    names: tuple[str, str], found: "PairResult", is_used: bool, corners: "tuple[Transform, Transform]"
-) -> dict[str, Any]:
-    """Return what is said of a pair."""
-    first, second = corners
-
-    def between(a_from_b: "Transform | None") -> dict[str, float | None]:
-        return _numbers(None if a_from_b is None else first @ a_from_b @ second.inverse())
-
-    agreement = found.agreement
-    bend = found.ranked[0].bend if found.ranked and found.ranked[0].bend.is_held else None
-    return {
-        "a": names[0],
-        "b": names[1],
-        "accepted": is_used,
-        "reason": "contradicts stronger pairs of the group"
-        if found.is_accepted and not is_used
-        else found.reason,
-        **between(found.a_from_b),
-        "found_by": found.found_by,
-        "matches": found.matches,
-        "inliers": found.inliers,
-        "score": round(found.score, 6),
-        "overlap_m2": round(agreement.overlap_m2, 3),
-        "agreeing_m": round(agreement.agreeing_m, 3),
-        "contradiction_m": round(agreement.contradicting_m, 3),
-        "hit_rate": round(agreement.hit_rate, 4),
-        "confidence": round(found.confidence, 4),
-        "bend_m": None if bend is None else round(bend.bend_m, 4),
-        "strain": None if bend is None else round(bend.strain, 5),
-        "scale": None if bend is None else round(bend.scale, 5),
-        "covariance": None if bend is None else [[float(f"{v:.3g}") for v in row] for row in bend.covariance],
-        "alternatives": [
-            {
-                **between(one.bend.a_from_b),
-                "evidence_m": round(one.evidence_m, 3),
-                "agreeing_m": round(one.agreement.agreeing_m, 3),
-                "contradiction_m": round(one.agreement.contradicting_m, 3),
-            }
-            for one in found.ranked[:MOST_ALTERNATIVES]
-        ],
-        "time_ms": round(found.time_ms, 3),
-    }
+def _placed(merged: "Merged", images: "dict[str, MapImage]") -> PlacedMaps:
+    """Return how the maps lie, between their ROS frames."""
+    corners = {name: _corner(image) for name, image in images.items()}
+    groups = []
+    for group in merged.groups():
+        frames = {}
+        for name in group:
+            transform = merged.tree.lookup(group[0], name)
+            assert transform is not None
+            frames[name] = corners[group[0]] @ transform @ corners[name].inverse()
+        groups.append(frames)
+    return PlacedMaps(
+        groups,
+        merged.pairs,
+        corners,
+        {(edge.a, edge.b) for edge in merged.tree.edges},
+        {(edge.a, edge.b) for edge in merged.tree.dropped},
+    )
 
 
 def _deformation(found: "Deformation | None") -> dict[str, float] | None:
@@ -283,12 +235,6 @@ def _deformation(found: "Deformation | None") -> dict[str, float] | None:
         "most_m": round(found.most_m, 4),
         "strain": round(found.bend.strain, 5),
     }
-
-
-def _numbers(transform: "Transform | None") -> dict[str, float | None]:
-    if transform is None:
-        return {"x": None, "y": None, "theta": None}
-    return {"x": round(transform.x, 6), "y": round(transform.y, 6), "theta": round(transform.theta, 8)}
 
 
 def _write(

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name
+from lidarium.scripts.options.supervisor import check_supervised, supervisor_options
 from lidarium.scripts.output.run_files import write_run
 from lidarium.scripts.output.run_summary import run_summary
 from lidarium.scripts.process import first_start
@@ -104,7 +105,8 @@ def execute(command: Run) -> Answer:
 
     check_writable(command.out or DEFAULT_FOLDER)
     command = _completed(command)
-    policy = lidarium.policy(command.chosen_policy)
+    options = _policy_options(command)
+    policy = lidarium.policy(command.chosen_policy, **options)
     if "depth" in policy.observes and command.camera is None:
         command = replace(command, camera=CAMERA)
     recorder = _recorder(command)
@@ -117,6 +119,8 @@ def execute(command: Run) -> Answer:
     from lidarium.evaluation.episodes.result import result_of
 
     result = result_of(episode, command.chosen_policy, history)
+    if options:
+        result["policy_settings"] = options
     files = write_run(folder, episode, result, recorder, command.chosen_policy, has_film=command.video)
     return Answer(
         result,
@@ -141,6 +145,15 @@ def _completed(command: Run) -> Run:
         getattr(command, name) is not None for name in TEAM_WORLD
     )
     return team if is_world_given else replace(team, **TEAM_WORLD)
+
+
+def _policy_options(command: Run) -> dict[str, Any]:
+    """Return what the policy is made with."""
+    if not command.supervisor:
+        return {}
+    options = supervisor_options(command.supervisor)
+    check_supervised(command.chosen_policy)
+    return options
 
 
 def _settings(command: Run, policy: "Policy") -> "ExplorationSettings":

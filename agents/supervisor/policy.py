@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.policy import Action, Policy, Stop, Team
-from lidarium.agents.report import GivenOrder, GivenUp, Join, LogEntry, PolicyReport, Supervision
+from lidarium.agents.report import GivenOrder, GivenUp, Join, LogEntry, PolicyReport, Supervision, TeamMaps
 from lidarium.agents.supervisor.errands import Errands
 from lidarium.agents.supervisor.knowledge.station import MergeStation
 from lidarium.agents.supervisor.led_team import LedTeam
@@ -110,6 +110,10 @@ class Supervised(Policy):
             self.given_up,
             Supervision(self.joins, orders, log, self._figures(), self.tick_seconds, self.merge_seconds),
         )
+
+    def team_maps(self) -> TeamMaps | None:
+        """Return how the station has joined the robots' maps; None before an episode."""
+        return self._supervisor.station.team_maps() if self.has_begun else None
 
     def _figures(self) -> dict[str, Any]:
         """Return how much was decided, and of what kind."""

@@ -138,7 +138,7 @@ def assign(settings: ExplorationSettings, assignments: Iterable[str]) -> Explora
             settings = replace(settings, localizer=localizer_settings(settings.localization, {}))
         if path[0] in OPTIONAL_PARTS and len(path) > 1 and getattr(settings, path[0]) is None:
             settings = replace(settings, **{path[0]: PARTS[path[0]]()})
-        settings = _replaced(settings, path, _value(text.strip()), name.strip())
+        settings = _replaced(settings, path, value_of(text.strip()), name.strip())
     return settings
 
 
@@ -173,7 +173,8 @@ def _replaced(part: Any, path: list[str], value: Any, name: str) -> Any:  # noqa
         raise ValueError(f"{name} cannot be {shown(value)}: {error}") from error
 
 
-def _value(text: str) -> Any:  # noqa: ANN401
+def value_of(text: str) -> Any:  # noqa: ANN401
+    """Return the value that a text stands for: as in TOML, ``none`` for None, else the text itself."""
     if text.lower() == "none":
         return None
     try:

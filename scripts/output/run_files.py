@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lidarium.scripts.output.team_files import write_team
+
 if TYPE_CHECKING:
     from lidarium.evaluation.episodes.runner import Episode
     from lidarium.evaluation.record import Recorder
@@ -57,7 +59,7 @@ def write_run(
     log_odds, (x, y) = team_log_odds(env)
     write_ros_map(folder, "map", three_levels(log_odds), (x, y, 0.0), env.settings.occupancy.resolution)
     save_run_picture(folder / "run.png", episode, policy)
-    files = ["result.json", "map.yaml", "map.pgm", "run.png"]
+    files = ["result.json", "map.yaml", "map.pgm", "run.png", *write_team(folder, episode)]
     if env.settings.camera is not None:
         _save_view(folder / "view.png", episode)
         files += ["view.png", *_write_sparse_maps(folder, episode)]

@@ -1,5 +1,6 @@
 """What ``lidarium run`` prints of an episode."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,9 @@ NAMED_GIVEN_UP = 5
 
 Result.json has all.
 """
+
+NAMED_JOINS = 10
+"""How many joins are listed in the summary."""
 
 
 def run_summary(
@@ -52,7 +56,49 @@ def run_summary(
     ]
     how = " (interrupted)" if episode.is_interrupted else ""
     title = f"{result['floor']}: {policy}, seed {result['seed']}, realism {result['realism']}{how}"
-    return "\n".join([title, table(facts), "", table(ended, ("robot", "ended because", "drove", "saw"))])
+    parts = [title, table([*facts, *_of_station(result)])]
+    parts += ["", table(ended, ("robot", "ended because", "drove", "saw"))]
+    if episode.merges:
+        parts += ["", table(_joined(episode), ("joined", "at [s]", "off by [m]", "[deg]"))]
+    return "\n".join(parts)
+
+
+def _of_station(result: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return what a station merged and ordered; nothing without one."""
+    known, merges = result["supervisor"], result["merges"]
+    if known is None:
+        return []
+    rules = ", ".join(f"{count} by rule {rule}" for rule, count in known["by_rule"].items() if rule != "0")
+    return [
+        (
+            "merges",
+            f"{known['joined']} joined, {known['dropped']} dropped, {merges['wrong']} wrong by the truth",
+        ),
+        (
+            "orders",
+            f"{known['redirections']} redirections and {known['stops']} stops of {known['decisions']} "
+            f"decisions{f'; {rules}' if rules else ''}",
+        ),
+    ]
+
+
+def _joined(episode: "Episode") -> list[tuple[str, ...]]:
+    """Return when robots were joined, and how far off by their true starts."""
+    from lidarium.evaluation.metrics.merges import transform_error
+
+    rows = []
+    for one in episode.merges[:NAMED_JOINS]:
+        distance, angle = transform_error(one.found, one.true, one.at)
+        rows.append(
+            (
+                f"{one.a} + {one.b}",
+                f"{one.time_s:.1f}",
+                f"{distance:.3f}",
+                f"{math.degrees(angle):.2f}",
+            )
+        )
+    left = len(episode.merges) - len(rows)
+    return [*rows, *([(f"and {left} more",)] if left else [])]
 
 
 def _given_up(entries: list[dict[str, Any]]) -> str:

@@ -118,7 +118,12 @@ def test_a_run_writes_its_figures_map_and_picture(floor, tmp_path, capsys):
         "map.pgm",
         "map.yaml",
         "result.json",
+        "robot_0.pgm",
+        "robot_0.yaml",
+        "robot_1.pgm",
+        "robot_1.yaml",
         "run.png",
+        "transforms.json",
     ]
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     assert result["coverage_final"] >= 0.99
@@ -466,7 +471,8 @@ def test_an_interrupted_run_keeps_its_finished_parts(tmp_path):
     assert result == json.loads((folder / "result.json").read_text())
     assert result["interrupted"] is True
     assert result["ended_because"] == {"robot_0": None}
-    assert sorted(path.name for path in folder.iterdir()) == ["map.pgm", "map.yaml", "result.json", "run.png"]
+    names = ["map.pgm", "map.yaml", "result.json", "robot_0.pgm", "robot_0.yaml", "run.png"]
+    assert sorted(path.name for path in folder.iterdir()) == names
     assert "Traceback" not in errors
 
 

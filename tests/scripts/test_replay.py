@@ -77,6 +77,8 @@ def test_a_run_writes_its_record_beside_its_result(record):
         "map.pgm",
         "map.yaml",
         "result.json",
+        "robot_0.pgm",
+        "robot_0.yaml",
         "run.png",
     }
 

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.agents.report import Join
+from lidarium.agents.report import Join, JoinedGroup, TeamMaps
 from lidarium.agents.supervisor.knowledge.received_reports import ReceivedReports
 from lidarium.agents.supervisor.knowledge.trails import without_bodies, without_own_trail
 from lidarium.agents.supervisor.log import StationEvent
@@ -90,6 +90,7 @@ class MergeStation:
         )
         self._merge = merge
         self._tree: FrameTree[str] = FrameTree(merge.cycle_distance_m, merge.cycle_angle)
+        self._merged: Merged | None = None
         self._found: set[Pair] = set()
         self._joined: set[Pair] = set()
         self._middles: dict[Pair, tuple[float, float]] = {}
@@ -155,7 +156,7 @@ class MergeStation:
             merged = self._merger.update(
                 {agent: self._own_map(agent) for agent in used}, may_search=may_search
             )
-            self._tree = merged.tree
+            self._tree, self._merged = merged.tree, merged
             self._middles = {
                 pair: self._middle(pair, result)
                 for pair, result in merged.pairs.items()
@@ -205,6 +206,29 @@ class MergeStation:
         maps = [self._map_without_bodies(agent) for agent in frames]
         places = [frame @ placed(one.origin) for one, frame in zip(maps, frames.values(), strict=True)]
         return fuse([one.levels for one in maps], places, self.resolution)
+
+    def team_maps(self) -> TeamMaps:
+        """Return how the maps of all robots lie, with the merged map of each group."""
+        grouped = self.groups()
+        grouped += [[agent] for agent in self.agents if not any(agent in group for group in grouped)]
+        groups = [
+            JoinedGroup(
+                {agent: frame for agent in group if (frame := self.lookup(group[0], agent)) is not None},
+                self.fused(group, group[0]) if len(group) > 1 else None,
+            )
+            for group in grouped
+        ]
+        if self._merged is None:
+            return TeamMaps(groups)
+        return TeamMaps(
+            groups,
+            self._merged.pairs,
+            {name: placed(origin) for name, origin in self._merged.origins.items()},
+            *(
+                frozenset((edge.a, edge.b) for edge in edges)
+                for edges in (self._tree.edges, self._tree.dropped)
+            ),
+        )
 
     def _own_map(self, agent: str) -> GrowingMap:
         """Return a robot's map as it is compared with others."""

@@ -1,0 +1,1 @@
+"""Options of commands that stand for settings of a part."""
