@@ -6,6 +6,7 @@ They are its periods, what the thesis leaves open, and what goes beyond it.
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
+from lidarium.envs.station.joining import GROWTH_M2, OWN_M2, WALL_M
 from lidarium.mapping.geometry.bounds import Count, Distance, FromZero, Length, above, check_settings
 
 Assignment = Literal["pairs", "hungarian", "utility"]
@@ -31,6 +32,9 @@ class SupervisorSettings:
         Two maps are joined only when they were found twice, the second time when they know so much more [m2].
     confirmation_own_m2 : float
         When two maps of little overlap are joined, each knows so much more than that [m2].
+    confirmation_wall_m : float
+        When two maps are joined, the walls that agree measure at most so much each in the mean, or the
+        overlap is large; 0 for any length [m].
     same_goal_m : float
         Goals that lie nearer to each other than this are one [m].
     least_frontier_m : float
@@ -75,10 +79,11 @@ class SupervisorSettings:
 
     period_s: Period = 10.0
     merge_period_s: Period = 2.0
-    searches_per_merge: Count = 1
+    searches_per_merge: Count = 2
     merge_resolution_m: Distance = 0.05
-    confirmation_growth_m2: FromZero = 2.0
-    confirmation_own_m2: FromZero = 6.0
+    confirmation_growth_m2: FromZero = GROWTH_M2
+    confirmation_own_m2: FromZero = OWN_M2
+    confirmation_wall_m: FromZero = WALL_M
     same_goal_m: Distance = 1.0
     least_frontier_m: Distance = 0.5
     least_left_m: Distance = 0.5

@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.onboard.perception import Perception
+from lidarium.envs.station.joining import GROWTH_M2, team_confirmation
 from lidarium.envs.station.reports import known_map
+from lidarium.envs.station.trails import without_own_trail
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging.agreement.confirmation import Confirmation
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.growing_maps import GrowingMap
 from lidarium.mapping.merging.incremental import IncrementalMerger
@@ -77,6 +80,8 @@ class TeamMapping:
         How maps are merged.
     episode : int
         Of which episode.
+    confirms : bool
+        Whether maps are joined only as `joining` says; else by the first finding.
 
     Attributes
     ----------
@@ -91,6 +96,8 @@ class TeamMapping:
     received: dict[tuple[str, str], TeammateMap] = field(default_factory=dict)
     fused: dict[str, FusedMap] = field(default_factory=dict)
     episode: int = 0
+    confirms: bool = True
+    _trails: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     _merger: IncrementalMerger = field(init=False)
 
     def __post_init__(self) -> None:
@@ -98,8 +105,13 @@ class TeamMapping:
 
     def start(self) -> None:
         """Forget the last episode."""
-        self.received, self.fused = {}, {}
-        self._merger = IncrementalMerger(self.perception.settings.occupancy.resolution, self.settings)
+        self.received, self.fused, self._trails = {}, {}, {}
+        self._merger = IncrementalMerger(
+            self.perception.settings.occupancy.resolution,
+            self.settings,
+            confirmation_growth_m2=GROWTH_M2 if self.confirms else None,
+            confirmation=team_confirmation() if self.confirms else Confirmation(),
+        )
 
     def exchange(
         self, clusters: list[list[str]], time_s: float, frames: Frames | None = None
@@ -135,6 +147,8 @@ class TeamMapping:
             if any(a in cluster and b in cluster for cluster in clusters)
         ]
         places = {agent: (pose.x, pose.y) for agent, pose in poses.items()}
+        for agent, place in places.items():
+            self._trails.setdefault(agent, []).append(place)
         if frames is None:
             joined = self._merged(maps, places, pairs)
         else:
@@ -151,7 +165,9 @@ class TeamMapping:
         places: dict[str, tuple[float, float]],
         pairs: list[tuple[str, str]],
     ) -> dict[tuple[str, str], Joined]:
-        merged = self._merger.update(maps, frozenset(pairs))
+        merged = self._merger.update(
+            {agent: self._compared(agent, one) for agent, one in maps.items()}, frozenset(pairs)
+        )
         joined = {}
         for a, b in pairs:
             transform = merged.tree.lookup(a, b)
@@ -167,6 +183,15 @@ class TeamMapping:
                     transform, (float(centre[0]), float(centre[1])), merged.tree.has_edge(a, b)
                 )
         return joined
+
+    def _compared(self, agent: str, one: GrowingMap) -> GrowingMap:
+        """Return a robot's map as it is compared with others.
+
+        It claims nothing of where the robot was: others may have drawn its body there.
+        """
+        settings = self.perception.settings
+        trail = np.array(self._trails[agent], np.float64)
+        return without_own_trail(one, trail, settings.robot.radius, settings.occupancy.resolution)
 
     def _fused(self, agent: str, own: GrowingMap) -> FusedMap:
         got = [received for (to, _), received in self.received.items() if to == agent]

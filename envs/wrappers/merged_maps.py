@@ -17,7 +17,6 @@ from lidarium.envs.station.team_mapping import Frames, TeamMapping
 from lidarium.envs.team_wrapper import TeamWrapper
 from lidarium.envs.wrappers.contacts import CanTalk
 from lidarium.envs.wrappers.sparse_planning import SparsePlanning
-from lidarium.envs.wrappers.team_exchange import TEAM_VALIDATION as TEAM_VALIDATION
 from lidarium.envs.wrappers.team_exchange import (
     MergeEvent,
     MergingSettings,

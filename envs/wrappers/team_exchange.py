@@ -15,16 +15,7 @@ from lidarium.envs.station.team_mapping import Frames, TeamMapping, crop_around
 from lidarium.envs.wrappers.contacts import CanTalk, check_links, clusters_of
 from lidarium.mapping.geometry.bounds import above, check_settings
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.settings import MergeSettings
-
-TEAM_VALIDATION = ValidationSettings(
-    most_contradiction_m=1.0, plenty_of_overlap_m2=0.0, plenty_of_wall_m=10.0, contradiction_share=0.1
-)
-"""Validation of merges where robots map their teammates' bodies as walls.
-
-They do not know where the others are, so more may contradict than in maps of robots alone.
-"""
 
 OLDEST_S = 3600.0
 """Bound of the age of what was received, in observations [s]."""
@@ -41,12 +32,16 @@ class MergingSettings:
     known_starts : bool
         Whether the robots know how their frames lie, for comparison; nothing is searched for then.
     merge : MergeSettings
-        How maps are merged; by default with `TEAM_VALIDATION`.
+        How maps are merged; by default as `lidarium merge` does.
+    confirms : bool
+        Whether two robots are joined only when their maps were found twice to be of one place and convince,
+        as a station joins them; else by the first finding.
     """
 
     period_s: Annotated[float, above(0.0, 1e7)] = 1.0
     known_starts: bool = False
-    merge: MergeSettings = field(default_factory=lambda: MergeSettings(validation=TEAM_VALIDATION))
+    merge: MergeSettings = field(default_factory=MergeSettings)
+    confirms: bool = True
 
     def __post_init__(self) -> None:
         check_settings(self, "merging")
@@ -122,7 +117,7 @@ class TeamExchange:
         self._perception, self._merging, self._can_talk = perception, merging, can_talk
         self._episode, self._first = episode, episode * settings.robots
         self._agents = settings.agents
-        self.team = TeamMapping(perception, merging.merge, episode=episode)
+        self.team = TeamMapping(perception, merging.merge, episode=episode, confirms=merging.confirms)
         self.events: list[MergeEvent] = []
         self._joined: set[tuple[str, str]] = set()
         self._steps = max(round(merging.period_s / settings.time_step), 1)

@@ -14,15 +14,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.agreement.validation import ValidationSettings, why_refused
+from lidarium.mapping.merging.agreement.confirmation import Confirmation
 from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.growing_maps import DescribedMaps, GrowingMap
 from lidarium.mapping.merging.merger import Merged, joined_tree, placed
 from lidarium.mapping.merging.pair import PairResult, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
-
-PLENTY_M2 = 30.0
-"""From this overlap on, maps need know nothing else [m2]."""
 
 CONFIRMED_M, CONFIRMED_ANGLE = 0.1, math.radians(1.0)
 """By how much two findings of one transform may differ [m, rad]."""
@@ -71,13 +68,9 @@ class IncrementalMerger:
     confirmation_growth_m2 : float or None
         A pair that was found joins its maps only when it is found once more, once they know so much more
         [m2]; at once where None.
-    confirmation : ValidationSettings or None
-        What the maps must say of a pair beside that when it joins them; what its settings ask of every pair
-        where None.
-    confirmation_own_m2 : float
-        When two maps are joined, each knows so much that the other one does not [m2], or both know
-        `PLENTY_M2`: of what a map knows beyond the overlap nothing has contradicted, though in rooms that
-        merely seem alike something would have.
+    confirmation : Confirmation
+        What the maps must say of a pair beside that when it joins them; by default what the settings ask of
+        every pair.
     searches_per_update : int or None
         Most pairs that an update searches for, those first that wait to be confirmed, then those whose turn
         was longest ago; pairs that others join are only verified then. All where None. Verifying costs
@@ -93,8 +86,7 @@ class IncrementalMerger:
     settings: MergeSettings = field(default_factory=MergeSettings)
     search_growth_m2: float = 2.0
     confirmation_growth_m2: float | None = None
-    confirmation: ValidationSettings | None = None
-    confirmation_own_m2: float = 0.0
+    confirmation: Confirmation = field(default_factory=Confirmation)
     searches_per_update: int | None = None
     searched: int = 0
     verified: int = 0
@@ -167,15 +159,21 @@ class IncrementalMerger:
         """Return the pairs whose turn it is to be verified or searched for."""
         due = [pair for pair in pairs if self._has_grown(pair)]
         if self.searches_per_update is not None:
-            due.sort(
-                key=lambda pair: (not self._waits(pair), self._pairs[pair].at if pair in self._pairs else 0)
-            )
+            due.sort(key=lambda pair: (not self._waits(pair), self._last_try(pair)))
         return due
 
     def _waits(self, pair: tuple[str, str]) -> bool:
-        """Whether a pair was found and is to be found once more."""
+        """Whether what was found of a pair convinces, and is to be found once more."""
         before = self._pairs.get(pair)
-        return before is not None and before.frames is not None and not before.is_confirmed
+        return (
+            before is not None
+            and before.frames is not None
+            and not before.is_confirmed
+            and self._convinces(pair, before.result)
+        )
+
+    def _last_try(self, pair: tuple[str, str]) -> int:
+        return self._pairs[pair].at if pair in self._pairs else 0
 
     def _has_grown(self, pair: tuple[str, str]) -> bool:
         """Whether maps have changed enough since a pair was last tried to retry it."""
@@ -224,28 +222,14 @@ class IncrementalMerger:
 
         Search where there is none, or it is refused by now. None where that has to wait.
         """
-        a, b = (self._described.features[name] for name in pair)
         first, second = (placed(self._described.maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
         if before is not None and before.frames is not None:
-            result = verify_pair(a, b, first.inverse() @ before.frames @ second, self.settings)
-            has_grown = known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
-            is_due = not before.is_confirmed and has_grown and self._convinces(pair, result)
-            if result.is_accepted and result.a_from_b is not None and not (is_due and may_search):
-                self.verified += 1
-                refined = first @ result.a_from_b @ second.inverse()
-                # A confirmation that has to wait is due whether maps grow any more or not.
-                return _Tried(
-                    result,
-                    refined,
-                    before.known_m2,
-                    before.is_confirmed,
-                    before.at if is_due else self._updates,
-                    first,
-                )
-            if not result.is_accepted and not may_search:
-                return _Tried(result, None, -math.inf, False, before.at, first)
+            kept = self._verified(pair, before, before.frames, may_search)
+            if kept is not None:
+                return kept
         elif (implied := self._implied(pair)) is not None:
+            a, b = (self._described.features[name] for name in pair)
             # Others join these maps: where they agree so, they join each other as well, more exactly than a
             # chain of transforms.
             result = verify_pair(a, b, first.inverse() @ implied @ second, self.settings)
@@ -258,17 +242,47 @@ class IncrementalMerger:
                 return None
             if before is not None and known_m2 < before.known_m2 + self.search_growth_m2:
                 return None
-        if not may_search:
+        return self._searched(pair, before) if may_search else None
+
+    def _verified(
+        self, pair: tuple[str, str], before: _Tried, frames: Transform, may_search: bool
+    ) -> _Tried | None:
+        """Verify what was found; None where it is searched for once more."""
+        a, b = (self._described.features[name] for name in pair)
+        first, second = (placed(self._described.maps[name].origin) for name in pair)
+        known_m2 = self._known_of(pair)
+        result = verify_pair(a, b, first.inverse() @ frames @ second, self.settings)
+        if not result.is_accepted or result.a_from_b is None:
+            return None if may_search else _Tried(result, None, -math.inf, False, before.at, first)
+        is_due = not before.is_confirmed and self._may_be_better(pair, before, result, known_m2)
+        if is_due and may_search:
             return None
+        self.verified += 1
+        refined = first @ result.a_from_b @ second.inverse()
+        # A search that has to wait is due whether maps grow any more or not.
+        at = before.at if is_due else self._updates
+        return _Tried(result, refined, before.known_m2, before.is_confirmed, at, first)
+
+    def _may_be_better(
+        self, pair: tuple[str, str], before: _Tried, result: PairResult, known_m2: float
+    ) -> bool:
+        """Whether a search may confirm what was found, or find what convinces where that does not."""
+        if self._convinces(pair, result):
+            return known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
+        return known_m2 >= before.known_m2 + self.search_growth_m2
+
+    def _searched(self, pair: tuple[str, str], before: _Tried | None) -> _Tried:
+        """Search for the transform of a pair."""
+        a, b = (self._described.features[name] for name in pair)
+        first, second = (placed(self._described.maps[name].origin) for name in pair)
         self.searched += 1
         result = merge_pair(a, b, self.settings)
         is_found = result.is_accepted and result.a_from_b is not None
         frames = (
             first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
         )
-        return _Tried(
-            result, frames, known_m2, self._confirms(pair, before, frames, result), self._updates, first
-        )
+        is_confirmed = self._confirms(pair, before, frames, result)
+        return _Tried(result, frames, self._known_of(pair), is_confirmed, self._updates, first)
 
     def _confirms(
         self, pair: tuple[str, str], before: _Tried | None, frames: Transform | None, result: PairResult
@@ -290,7 +304,6 @@ class IncrementalMerger:
 
     def _convinces(self, pair: tuple[str, str], result: PairResult) -> bool:
         """Whether a pair may be confirmed."""
-        own_m2 = min(self._described.known_m2[name] for name in pair) - result.agreement.overlap_m2
-        if own_m2 < self.confirmation_own_m2 and result.agreement.overlap_m2 < PLENTY_M2:
-            return False
-        return self.confirmation is None or why_refused(result.agreement, self.confirmation) is None
+        a, b = (self._described.features[name] for name in pair)
+        least_known_m2 = min(self._described.known_m2[name] for name in pair)
+        return self.confirmation.convinces((a, b), least_known_m2, result.a_from_b, result.agreement)

@@ -24,7 +24,8 @@ MOVED: dict[str, tuple[str, ...]] = {
     "agents.srt.tour": ("mapping.planning.tours",),
     "agents.supervisor.station": ("agents.supervisor.knowledge.station",),
     "agents.supervisor.survey": ("agents.supervisor.knowledge.survey", "agents.supervisor.knowledge.goals"),
-    "agents.supervisor.trails": ("agents.supervisor.knowledge.trails",),
+    "agents.supervisor.knowledge.trails": ("envs.station.trails",),
+    "agents.supervisor.trails": ("envs.station.trails",),
     "envs.batch.endings": ("envs.outcome.endings",),
     "envs.coverage": (
         "envs.scoring.coverage",

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from lidarium.agents.report import Join, JoinedGroup, TeamMaps
 from lidarium.agents.supervisor.knowledge.received_reports import ReceivedReports
-from lidarium.agents.supervisor.knowledge.trails import without_bodies, without_own_trail
 from lidarium.agents.supervisor.log import StationEvent
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.envs.radio.messages import OperatingState
+from lidarium.envs.station.joining import TEAM_CONFIRMATION, team_confirmation
 from lidarium.envs.station.reports import Report
-from lidarium.envs.wrappers.merged_maps import TEAM_VALIDATION
+from lidarium.envs.station.trails import without_bodies, without_own_trail
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.description.described_map import resampled
@@ -29,14 +29,6 @@ from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
 
 Pair = tuple[str, str]
-
-TEAM_CONFIRMATION = ValidationSettings(
-    most_contradiction_m=0.3, least_across_share=0.2, least_evidence_per_m2=0.3
-)
-"""Validation settings for merges by which robots are led.
-
-Rooms of one plan, corridors and halls agree well enough to be found, but hardly ever so well.
-"""
 
 
 class MergeStation:
@@ -53,7 +45,7 @@ class MergeStation:
     settings : SupervisorSettings
         How maps are joined.
     merge : MergeSettings or None
-        How maps are merged; by default with the bounds for teams whose robots map each other's bodies.
+        How maps are merged; by default as `lidarium merge` does.
     confirmation : ValidationSettings or None
         What must hold when maps are joined; `TEAM_CONFIRMATION` where neither this nor ``merge`` is given.
 
@@ -78,14 +70,15 @@ class MergeStation:
     ) -> None:
         self.agents, self.resolution, self.settings, self._radius = list(agents), resolution, settings, radius
         if merge is None:
-            merge, confirmation = MergeSettings(validation=TEAM_VALIDATION), confirmation or TEAM_CONFIRMATION
+            merge, confirmation = MergeSettings(), confirmation or TEAM_CONFIRMATION
         self._merge_resolution = max(resolution, settings.merge_resolution_m)
         self._merger = IncrementalMerger(
             self._merge_resolution,
             merge,
             confirmation_growth_m2=settings.confirmation_growth_m2,
-            confirmation=confirmation,
-            confirmation_own_m2=settings.confirmation_own_m2,
+            confirmation=team_confirmation(
+                settings.confirmation_own_m2, settings.confirmation_wall_m, confirmation
+            ),
             searches_per_update=settings.searches_per_merge,
         )
         self._merge = merge

@@ -129,10 +129,12 @@ def test_every_level_of_decision_can_be_wrapped_and_repeats_itself(level):
             np.testing.assert_array_equal(value, told[1][agent][name])
 
 
-def test_robots_that_start_in_one_room_find_each_other():
-    env = team(horizon_s=8.0, noise="datasheet", resolution=0.025, map_cells=256, observe=["pose"])
+@pytest.mark.parametrize(("confirms", "horizon_s"), [(False, 8.0), (True, 30.0)])
+def test_robots_that_start_in_one_room_find_each_other(confirms, horizon_s):
+    env = team(horizon_s=horizon_s, noise="datasheet", resolution=0.025, map_cells=256, observe=["pose"])
     starts = {"starts": STARTS}
-    episode = run_episode(lidarium.policy("nearest_frontier"), env, 2, starts, merging=MergingSettings())
+    merging = MergingSettings(confirms=confirms)
+    episode = run_episode(lidarium.policy("nearest_frontier"), env, 2, starts, merging=merging)
     figures = result_of(episode)["merges"]
     assert figures["false"] == 0
     assert figures["accepted"] == figures["correct"] >= 1

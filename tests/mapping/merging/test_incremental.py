@@ -6,6 +6,7 @@ from drawn_maps import RESOLUTION, about_middle, apartment, blank, kept, moved, 
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging import pair
+from lidarium.mapping.merging.agreement.confirmation import Confirmation
 from lidarium.mapping.merging.agreement.validation import ValidationSettings
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.growing_maps import GrowingMap
@@ -112,13 +113,18 @@ def test_a_pair_that_wants_confirmation_joins_when_grown_maps_are_found_to_lie_t
 
 def test_a_pair_waits_for_as_long_as_the_maps_do_not_convince():
     merger = IncrementalMerger(
-        RESOLUTION, confirmation_growth_m2=2.0, confirmation=ValidationSettings(least_evidence_m=40.0)
+        RESOLUTION,
+        confirmation_growth_m2=2.0,
+        confirmation=Confirmation(validation=ValidationSettings(least_evidence_m=40.0)),
     )
     maps = {"a": GrowingMap(part(slice(0, 120), FIRST)), "b": GrowingMap(part(slice(60, 220), SECOND, 1))}
     merger.update(maps)
     waiting = merger.update({**maps, "a": GrowingMap(part(slice(0, 150), FIRST))})
     assert waiting.pairs["a", "b"].is_accepted
     assert waiting.pairs["a", "b"].agreement.evidence_m < 40.0
+    # What does not convince may be of the wrong place: another is searched for once the maps have grown.
+    assert (merger.searched, merger.verified) == (1, 0)
+    merger.update({**maps, "a": GrowingMap(part(slice(0, 151), FIRST))})
     assert (merger.searched, merger.verified) == (0, 1)
     assert waiting.groups() == [["a"], ["b"]]
     convinced = merger.update({**maps, "a": GrowingMap(part(slice(0, 220), FIRST))})
@@ -129,15 +135,17 @@ def test_a_pair_waits_for_as_long_as_the_maps_do_not_convince():
 
 
 def test_a_map_that_knows_nothing_of_its_own_joins_none_yet():
-    """The first map knows 24 m2, of which the other one knows all: nothing beyond could have contradicted."""
-    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=0.0, confirmation_own_m2=6.0)
-    maps = {"a": GrowingMap(part(slice(0, 80), FIRST)), "b": GrowingMap(part(slice(0, 120), SECOND, 1))}
+    """Both know one room of a few walls alone: nothing beyond it could have contradicted."""
+    merger = IncrementalMerger(RESOLUTION, confirmation_growth_m2=0.0, confirmation=Confirmation(own_m2=6.0))
+    levels = room(room(blank(200, 200), 60, 60, 60, 84), 100, 146, 40, 24)
+    levels[100:120, 142:148] = 255
+    maps = {name: GrowingMap(moved(levels, pose)) for name, pose in (("a", FIRST), ("b", SECOND))}
     merger.update(maps)
-    again = merger.update({**maps, "b": GrowingMap(part(slice(0, 121), SECOND, 1))})
+    again = merger.update({**maps, "b": GrowingMap(noisy(moved(levels, SECOND), 1))})
     assert again.pairs["a", "b"].is_accepted
     assert again.groups() == [["a"], ["b"]]
     maps = {"a": GrowingMap(part(slice(0, 160), FIRST)), "b": GrowingMap(part(slice(60, 180), SECOND, 1))}
-    other = IncrementalMerger(RESOLUTION, confirmation_growth_m2=0.0, confirmation_own_m2=6.0)
+    other = IncrementalMerger(RESOLUTION, confirmation_growth_m2=0.0, confirmation=Confirmation(own_m2=6.0))
     other.update(maps)
     assert other.update({**maps, "b": GrowingMap(part(slice(60, 220), SECOND, 1))}).groups() == [["a", "b"]]
 
