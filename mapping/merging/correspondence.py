@@ -17,6 +17,7 @@ from lidarium.mapping.merging.description.corners import Corners
 from lidarium.mapping.merging.description.descriptors import Descriptors
 
 METHODS = ("descriptors", "distances", "triplets")
+MEASURES = ("correlation", "difference")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +29,12 @@ class CorrespondenceSettings:
     method : str
         ``descriptors``, ``distances`` (pairs of corners equally far apart in both maps) or ``triplets``
         (corners whose two nearest neighbours form the same triangle).
+    measure : str
+        How descriptors are compared: ``correlation``, normalised; ``difference``, 1 less half the mean square
+        of the difference of their samples over their mean square.
+    excludes_opposite : bool
+        Whether a match is left out whose corners are as similar turned by 180 degrees: along a straight wall
+        either is as good.
     threshold : float
         Similarity of two descriptors from which they match, 1 for equal ones.
     margin : float
@@ -49,6 +56,8 @@ class CorrespondenceSettings:
     """
 
     method: str = "descriptors"
+    measure: str = "correlation"
+    excludes_opposite: bool = False
     threshold: Annotated[float, within(-1.0, 1.0)] = 0.55
     margin: Annotated[float, within(0.0, 2.0)] = 0.10
     per_corner: Count = 5
@@ -62,6 +71,10 @@ class CorrespondenceSettings:
         check_settings(self, "correspondence")
         if self.method not in METHODS:
             raise ValueError(f"method of correspondence is {self.method!r}; want one of {', '.join(METHODS)}")
+        if self.measure not in MEASURES:
+            raise ValueError(
+                f"measure of correspondence is {self.measure!r}; want one of {', '.join(MEASURES)}"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,17 +172,36 @@ def compare_descriptors(
         second_energy = _correlation(first.known, second.values**2)
         known = _correlation(first.known, second.known)
         is_comparable = known >= settings.least_known * first.values.shape[1] * columns
-        energy = np.maximum(first_energy * second_energy, 1e-12)
-        similarity = np.where(is_comparable, product / np.sqrt(energy), -1.0)
-    else:
+        energy = _energy(first_energy, second_energy, settings.measure)
+        similarity = np.where(is_comparable, product / np.maximum(energy, 1e-6), -1.0)
+    elif settings.measure == "correlation":
         similarity = _correlation(_standardised(first.values), _standardised(second.values))
+    else:
+        energies = ((one.values**2).sum(axis=(1, 2)) for one in (first, second))
+        left, right = next(energies)[:, None, None], next(energies)[None, :, None]
+        product = _correlation(first.values, second.values)
+        similarity = product / np.maximum(_energy(left, right, settings.measure), 1e-6)
     reach = min(int(settings.shift_window / (2.0 * math.pi / columns) + 1e-9), columns // 2 - 1)
     shifts = np.arange(-reach, reach + 1)
     window = similarity[:, :, shifts % columns]
     best = window.argmax(axis=2)
     peak = np.take_along_axis(window, best[:, :, None], axis=2)[:, :, 0]
     angle = shifts[best] * (2.0 * math.pi / columns)
+    if settings.excludes_opposite:
+        turned = (shifts[best] + columns // 2) % columns
+        opposite = np.take_along_axis(similarity, turned[:, :, None], axis=2)[:, :, 0]
+        peak = np.where(opposite >= peak - settings.margin, np.float32(-1.0), peak)
     return np.asarray(peak, np.float32), np.asarray(angle, np.float32)
+
+
+def _energy(first: NDArray[np.floating], second: NDArray[np.floating], measure: str) -> NDArray[np.floating]:
+    """Return what products of samples are divided by: their geometric mean square, or their mean square.
+
+    The product over the mean square is 1 less half the square of the difference over it.
+    """
+    if measure == "correlation":
+        return np.asarray(np.sqrt(np.maximum(first * second, 1e-12)))
+    return np.asarray(0.5 * (first + second))
 
 
 def _standardised(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -1,0 +1,78 @@
+"""Variants of matching: by difference, and without what is as similar turned by 180 degrees."""
+
+import math
+
+import numpy as np
+import pytest
+from drawn_maps import RESOLUTION, about_middle, apartment, moved
+
+from lidarium.mapping.merging.correspondence import CorrespondenceSettings, compare_descriptors, match_corners
+from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.description.descriptors import Descriptors
+
+TRUTH = about_middle(0.5 * math.pi, apartment())
+
+
+@pytest.fixture(scope="module")
+def maps():
+    return describe_map(apartment(), RESOLUTION), describe_map(moved(apartment(), TRUTH), RESOLUTION)
+
+
+def plain(first, second, shift):
+    """1 less half the mean square of the difference over the mean square, by its definition."""
+    turned = np.roll(second, shift, axis=1)
+    return 1.0 - 0.5 * float(((first - turned) ** 2).sum()) / (0.5 * float((first**2 + second**2).sum()))
+
+
+@pytest.mark.parametrize("measure", ["correlation", "difference"])
+def test_equal_descriptors_are_alike_by_every_measure(maps, measure):
+    one = maps[0].descriptors
+    settings = CorrespondenceSettings(measure=measure, is_known_only=False)
+    similarity, shift = compare_descriptors(one, one, settings)
+    np.testing.assert_allclose(np.diag(similarity), 1.0, atol=1e-4)
+    np.testing.assert_allclose(np.diag(shift), 0.0, atol=1e-6)
+
+
+def test_the_difference_is_that_of_its_definition():
+    generator = np.random.default_rng(1)
+    values = generator.normal(size=(2, 3, 16)).astype(np.float32)
+    one = Descriptors(values, np.ones_like(values))
+    settings = CorrespondenceSettings(measure="difference", is_known_only=False, shift_window=math.pi)
+    similarity, shift = compare_descriptors(one, one, settings)
+    columns = round(float(shift[0, 1]) / (2.0 * math.pi / 16))
+    assert similarity[0, 1] == pytest.approx(plain(values[0], values[1], columns), abs=1e-4)
+    assert similarity[0, 1] <= 1.0
+
+
+def test_a_louder_copy_correlates_and_differs():
+    values = np.random.default_rng(2).normal(size=(1, 3, 16)).astype(np.float32)
+    one, loud = (Descriptors(factor * values, np.ones_like(values)) for factor in (1.0, 3.0))
+    alike, _ = compare_descriptors(one, loud, CorrespondenceSettings())
+    differs, _ = compare_descriptors(one, loud, CorrespondenceSettings(measure="difference"))
+    assert alike[0, 0] == pytest.approx(1.0, abs=1e-4)
+    assert differs[0, 0] == pytest.approx(0.6, abs=1e-4)
+
+
+@pytest.mark.parametrize("options", [{"measure": "difference"}, {"excludes_opposite": True}])
+def test_variants_find_corners_of_one_place(maps, options):
+    a, b = maps
+    settings = CorrespondenceSettings(**options)
+    matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, settings)
+    apart = np.linalg.norm(
+        TRUTH.apply(a.corners.points[matches.first]) - b.corners.points[matches.second], axis=1
+    )
+    assert np.count_nonzero(apart < 0.15) >= 10
+
+
+def test_what_is_as_similar_from_behind_is_no_match():
+    column = np.cos(4.0 * math.pi * np.arange(16) / 16)
+    values = np.tile(column, (1, 3, 1)).astype(np.float32)
+    one = Descriptors(values, np.ones_like(values))
+    for excludes, expected in ((False, 1.0), (True, -1.0)):
+        similarity, _ = compare_descriptors(one, one, CorrespondenceSettings(excludes_opposite=excludes))
+        assert similarity[0, 0] == pytest.approx(expected, abs=1e-4)
+
+
+def test_an_unknown_measure_is_refused():
+    with pytest.raises(ValueError, match="measure of correspondence is 'sum'"):
+        CorrespondenceSettings(measure="sum")
