@@ -17,6 +17,9 @@ from lidarium.envs.radio.messages import Target
 LEAST_WAY_M = 1.0
 """What a metre costs a battery is estimated after a path of this length [m]."""
 
+EXPLAINED_PAUSES = frozenset({"contact", "blocked"})
+"""Causes of pauses that a robot has seen or felt, and backs out of."""
+
 
 @dataclass(slots=True)
 class Judged:
@@ -86,7 +89,8 @@ class Judge:
         """
         inputs = self._inputs(agent, survey.known_area_m2)
         if agent not in workers:
-            return self._decide(Case(inputs))
+            is_explained = self._station.reports[agent].pause_cause in EXPLAINED_PAUSES
+            return self._decide(Case(inputs, is_pause_explained=is_explained))
         row, rival = workers.index(agent), self._rival(agent, workers, survey)
         if agent in self._standing_by and rival is not None:
             # It has no path of its own; what counts is its way to the goal of the other.

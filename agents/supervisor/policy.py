@@ -258,6 +258,8 @@ class Supervised(Policy):
             self._errands.cancel(agent)
             if agent not in self._supervisor.standing_by or self.settings.is_stop_final:
                 stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == 5 else "stopped")
+        elif command.kind is OrderKind.RESUME:
+            stops[agent] = Order(OrderKind.RESUME, reason=f"rule {command.rule}: {command.why}")
         else:
             self._errands.begin(command)
 

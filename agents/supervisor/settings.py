@@ -67,6 +67,9 @@ class SupervisorSettings:
     battery_margin : float
         A robot turns back when what its battery holds is less than this many times what the way home costs; 0
         for never.
+    resumes_paused : bool
+        Whether a robot that has paused by itself, and says what it has touched or what blocks it, is ordered
+        to go on.
     trusts_starts : bool
         Whether robots that know how their frames lie in a common one are joined by that; nothing is searched
         for then.
@@ -98,6 +101,7 @@ class SupervisorSettings:
     rendezvous_m: Distance = 3.0
     returns_home: bool = False
     battery_margin: FromZero = 0.0
+    resumes_paused: bool = False
     trusts_starts: bool = False
 
     def __post_init__(self) -> None:

@@ -39,7 +39,7 @@ class Command:
     agent : str
         The robot.
     kind : OrderKind
-        ``STOP`` or ``GO_TO``.
+        ``STOP``, ``GO_TO`` or ``RESUME``.
     rule : int
         The rule behind it.
     why : str

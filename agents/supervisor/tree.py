@@ -15,7 +15,7 @@ numbers:
 
 Beyond the thesis, each only where it is switched on: 6. all robots of a group get goals at once; 7. robots
 that would meet are separated; 8. robots drive home when the work is done; 9. a robot turns back before its
-battery is too low for that.
+battery is too low for that; 10. a robot that has paused by itself, and knows why, is ordered to go on.
 """
 
 from collections.abc import Callable, Iterator
@@ -76,6 +76,8 @@ class Case:
         Whether it has mapped little on a long way.
     is_battery_low : bool
         Whether its battery would soon not bring it home.
+    is_pause_explained : bool
+        Whether it has paused by itself, and says what it has touched or what blocks it.
     """
 
     robot: RobotInputs
@@ -87,6 +89,7 @@ class Case:
     is_behind: bool = False
     is_enclosed: bool = False
     is_battery_low: bool = False
+    is_pause_explained: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +134,11 @@ def _keeps_before(robot: RobotInputs, other: RobotInputs | None) -> bool:
 FAILED = Question("failed", "has it failed?", lambda case: case.robot.state is OperatingState.FAILED)
 OPERATING = Question(
     "operating", "does it operate?", lambda case: case.robot.state is OperatingState.OPERATING
+)
+EXPLAINED = Question(
+    "explained",
+    "has it paused for something that it touched or that blocks it?",
+    lambda case: case.is_pause_explained,
 )
 FRONTIER = Question(
     "frontier", "does the merged map have a frontier left in reach?", lambda case: case.has_frontier
@@ -194,7 +202,12 @@ def decision_tree(settings: SupervisorSettings) -> Node:
         work = Node(
             LOW_BATTERY, Leaf(9, OrderKind.GO_TO, "its battery is just enough to get home", HOME), work
         )
-    operating = Node(OPERATING, work, Leaf(2, None, "its map is merged, it gets no order"))
+    idle: Node | Leaf = Leaf(2, None, "its map is merged, it gets no order")
+    if settings.resumes_paused:
+        idle = Node(
+            EXPLAINED, Leaf(10, OrderKind.RESUME, "it backs out of what stopped it and goes on"), idle
+        )
+    operating = Node(OPERATING, work, idle)
     return Node(FAILED, Leaf(1, None, "it has failed and is left out"), operating)
 
 

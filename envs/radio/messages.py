@@ -176,6 +176,8 @@ class Status:
         How far it has come by its own odometry [m].
     energy_left_j : float or None
         What is left in its battery; None where it has no limit [J].
+    pause_cause : str
+        Why it is paused: ``order``, ``contact`` or ``blocked``; empty where it is not.
     """
 
     pose: Transform
@@ -185,6 +187,7 @@ class Status:
     path_left_m: float
     travelled_m: float
     energy_left_j: float | None
+    pause_cause: str = ""
 
 
 class Orders(NamedTuple):

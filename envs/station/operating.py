@@ -151,6 +151,10 @@ class Operating:
         """
         return row in self._addressed
 
+    def pause_cause(self, row: int) -> str:
+        """Return why a robot is paused, empty where it is not."""
+        return self._why_paused[row] if self.states[row] is OperatingState.PAUSED else ""
+
     @property
     def sent(self) -> dict[int, Target]:
         """Targets that robots were ordered to since ``take_sent`` was last called.

@@ -170,7 +170,14 @@ class Station:
         drive, target, path_left_m = self._drive(row)
         state, meters = self.operating.states[row], self._meters
         return Status(
-            self._pose(row), state, drive, target, path_left_m, meters.travelled_m(row), meters.left_j(row)
+            self._pose(row),
+            state,
+            drive,
+            target,
+            path_left_m,
+            meters.travelled_m(row),
+            meters.left_j(row),
+            self.operating.pause_cause(row),
         )
 
     def _drive(self, row: int) -> tuple[DriveState, Target | None, float]:

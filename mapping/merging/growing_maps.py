@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.description.described_map import DescribedMap
-from lidarium.mapping.merging.pair import described
+from lidarium.mapping.merging.pair import PairResult, described
 from lidarium.mapping.merging.settings import MergeSettings
 
 
@@ -83,3 +84,31 @@ class DescribedMaps:
 
 def _is_same(before: GrowingMap | None, now: GrowingMap) -> bool:
     return before is not None and before.origin == now.origin and np.array_equal(before.levels, now.levels)
+
+
+@dataclass(slots=True)
+class TriedPair:
+    """What is known of a pair.
+
+    Attributes
+    ----------
+    result : PairResult
+        What came of the last try.
+    frames : Transform or None
+        The robots' transform, if it is verified.
+    known_m2 : float
+        What the maps knew when it was searched for [m2].
+    is_confirmed : bool
+        Whether it has been found as often as is wanted.
+    at : int
+        The number of the update that tried it last.
+    corner : Transform
+        Where the lower left corner of the first map was in its frame then.
+    """
+
+    result: PairResult
+    frames: Transform | None
+    known_m2: float
+    is_confirmed: bool = False
+    at: int = 0
+    corner: Transform = field(default_factory=Transform)

@@ -16,41 +16,13 @@ from dataclasses import dataclass, field, replace
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.confirmation import Confirmation
 from lidarium.mapping.merging.frame_tree import FrameTree
-from lidarium.mapping.merging.growing_maps import DescribedMaps, GrowingMap
+from lidarium.mapping.merging.growing_maps import DescribedMaps, GrowingMap, TriedPair
 from lidarium.mapping.merging.merger import Merged, joined_tree, placed
 from lidarium.mapping.merging.pair import PairResult, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
 
 CONFIRMED_M, CONFIRMED_ANGLE = 0.1, math.radians(1.0)
 """By how much two findings of one transform may differ [m, rad]."""
-
-
-@dataclass(slots=True)
-class _Tried:
-    """What is known of a pair.
-
-    Attributes
-    ----------
-    result : PairResult
-        What came of the last try.
-    frames : Transform or None
-        The robots' transform, if it is verified.
-    known_m2 : float
-        What the maps knew when it was searched for [m2].
-    is_confirmed : bool
-        Whether it has been found as often as is wanted.
-    at : int
-        The number of the update that tried it last.
-    corner : Transform
-        Where the lower left corner of the first map was in its frame then.
-    """
-
-    result: PairResult
-    frames: Transform | None
-    known_m2: float
-    is_confirmed: bool = False
-    at: int = 0
-    corner: Transform = field(default_factory=Transform)
 
 
 @dataclass(slots=True)
@@ -91,7 +63,7 @@ class IncrementalMerger:
     searched: int = 0
     verified: int = 0
     _described: DescribedMaps = field(default_factory=DescribedMaps)
-    _pairs: dict[tuple[str, str], _Tried] = field(default_factory=dict)
+    _pairs: dict[tuple[str, str], TriedPair] = field(default_factory=dict)
     _tree: FrameTree[str] | None = None
     _updates: int = 0
 
@@ -134,7 +106,7 @@ class IncrementalMerger:
         self.searched = self.verified = 0
         every = list(itertools.combinations(maps, 2))
         most = self.searches_per_update if may_search else 0
-        tried_now: dict[tuple[str, str], _Tried] = {}
+        tried_now: dict[tuple[str, str], TriedPair] = {}
         for pair in self._due([pair for pair in every if may_try is None or pair in may_try]):
             tried = self._tried(pair, self._pairs.get(pair), most is None or self.searched < most)
             if tried is not None:
@@ -194,7 +166,7 @@ class IncrementalMerger:
     def _known_of(self, pair: tuple[str, str]) -> float:
         return sum(self._described.known_m2[name] for name in pair)
 
-    def _kept(self, pair: tuple[str, str]) -> _Tried | None:
+    def _kept(self, pair: tuple[str, str]) -> TriedPair | None:
         """Return the known result of a pair that is not tried now.
 
         It refers to the corners that the maps have now.
@@ -217,7 +189,7 @@ class IncrementalMerger:
             before, result=replace(before.result, a_from_b=a_from_b, agreement=agreement), corner=first
         )
 
-    def _tried(self, pair: tuple[str, str], before: _Tried | None, may_search: bool) -> _Tried | None:
+    def _tried(self, pair: tuple[str, str], before: TriedPair | None, may_search: bool) -> TriedPair | None:
         """Verify the transform of a pair.
 
         Search where there is none, or it is refused by now. None where that has to wait.
@@ -235,7 +207,7 @@ class IncrementalMerger:
             result = verify_pair(a, b, first.inverse() @ implied @ second, self.settings)
             if result.is_accepted and result.a_from_b is not None and self._convinces(pair, result):
                 self.verified += 1
-                return _Tried(
+                return TriedPair(
                     result, first @ result.a_from_b @ second.inverse(), known_m2, True, self._updates, first
                 )
             if self.searches_per_update is not None:
@@ -245,15 +217,15 @@ class IncrementalMerger:
         return self._searched(pair, before) if may_search else None
 
     def _verified(
-        self, pair: tuple[str, str], before: _Tried, frames: Transform, may_search: bool
-    ) -> _Tried | None:
+        self, pair: tuple[str, str], before: TriedPair, frames: Transform, may_search: bool
+    ) -> TriedPair | None:
         """Verify what was found; None where it is searched for once more."""
         a, b = (self._described.features[name] for name in pair)
         first, second = (placed(self._described.maps[name].origin) for name in pair)
         known_m2 = self._known_of(pair)
         result = verify_pair(a, b, first.inverse() @ frames @ second, self.settings)
         if not result.is_accepted or result.a_from_b is None:
-            return None if may_search else _Tried(result, None, -math.inf, False, before.at, first)
+            return None if may_search else TriedPair(result, None, -math.inf, False, before.at, first)
         is_due = not before.is_confirmed and self._may_be_better(pair, before, result, known_m2)
         if is_due and may_search:
             return None
@@ -261,17 +233,17 @@ class IncrementalMerger:
         refined = first @ result.a_from_b @ second.inverse()
         # A search that has to wait is due whether maps grow any more or not.
         at = before.at if is_due else self._updates
-        return _Tried(result, refined, before.known_m2, before.is_confirmed, at, first)
+        return TriedPair(result, refined, before.known_m2, before.is_confirmed, at, first)
 
     def _may_be_better(
-        self, pair: tuple[str, str], before: _Tried, result: PairResult, known_m2: float
+        self, pair: tuple[str, str], before: TriedPair, result: PairResult, known_m2: float
     ) -> bool:
         """Whether a search may confirm what was found, or find what convinces where that does not."""
         if self._convinces(pair, result):
             return known_m2 >= before.known_m2 + (self.confirmation_growth_m2 or 0.0)
         return known_m2 >= before.known_m2 + self.search_growth_m2
 
-    def _searched(self, pair: tuple[str, str], before: _Tried | None) -> _Tried:
+    def _searched(self, pair: tuple[str, str], before: TriedPair | None) -> TriedPair:
         """Search for the transform of a pair."""
         a, b = (self._described.features[name] for name in pair)
         first, second = (placed(self._described.maps[name].origin) for name in pair)
@@ -282,10 +254,10 @@ class IncrementalMerger:
             first @ result.a_from_b @ second.inverse() if is_found and result.a_from_b is not None else None
         )
         is_confirmed = self._confirms(pair, before, frames, result)
-        return _Tried(result, frames, self._known_of(pair), is_confirmed, self._updates, first)
+        return TriedPair(result, frames, self._known_of(pair), is_confirmed, self._updates, first)
 
     def _confirms(
-        self, pair: tuple[str, str], before: _Tried | None, frames: Transform | None, result: PairResult
+        self, pair: tuple[str, str], before: TriedPair | None, frames: Transform | None, result: PairResult
     ) -> bool:
         """Whether what was searched for and found is believed from now on."""
         if self.confirmation_growth_m2 is None:

@@ -1,7 +1,4 @@
-"""The station, which collects reports and merges the robots' maps.
-
-It knows how the frames of the maps that it has joined lie.
-"""
+"""The station, which collects reports, merges the robots' maps, and knows how they lie."""
 
 from collections.abc import Mapping
 from itertools import combinations

@@ -106,6 +106,41 @@ def test_a_supervisor_leads_policies_that_choose_among_frontiers_too():
     assert {decision.rule for decision in policy.decisions} & {5, 6}
 
 
+@pytest.mark.parametrize("resumes", [False, True])
+def test_robots_that_touch_something_go_on_by_order_alone(resumes):
+    """The thesis's experiment with the bumper: a paused robot stays, and resumes off what it met."""
+    env = lidarium.parallel_env(
+        "apartment",
+        robots=2,
+        known_starts=False,
+        horizon_s=60.0,
+        stop_coverage=None,
+        pauses_when_blocked=True,
+    )
+    env.reset(seed=0)
+    policy = supervised(resumes_paused=resumes, period_s=4.0)
+
+    class Pressed(type(policy)):
+        """Presses the first robot's bumper once, at 10 s."""
+
+        is_pressed = False
+
+        def act(self, observations):
+            operating = env.unwrapped.operating
+            if not self.is_pressed and self._team.time_s >= 10.0:
+                self.is_pressed = True
+                operating._pause(0, "contact")
+            return super().act(observations)
+
+    policy.__class__ = Pressed
+    run_episode(policy, env, seed=0)
+    orders = [decision.order for decision in policy.decisions if decision.agent == "robot_0"]
+    assert ("resume" in orders) == resumes
+    states = [e.what for e in env.unwrapped.operating.events if e.agent == "robot_0" and e.kind == "state"]
+    assert states[0] == "paused"
+    assert ("operating" in states) == resumes
+
+
 def test_with_known_starts_there_is_nothing_to_search_for():
     env = lidarium.parallel_env("apartment", robots=2, horizon_s=20.0)
     policy = supervised()

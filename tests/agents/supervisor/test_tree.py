@@ -57,6 +57,17 @@ def test_whatever_states_robots_are_in_only_those_that_operate_get_orders(robots
                 assert (rule, order) == (3, OrderKind.GO_TO)
 
 
+def test_a_robot_that_knows_why_it_paused_is_ordered_to_go_on_where_that_is_asked_for():
+    resuming = decision_tree(SupervisorSettings(resumes_paused=True))
+    paused = Case(robot(state=OperatingState.PAUSED))
+    known = replace(paused, is_pause_explained=True)
+    assert outcome(known, resuming)[:2] == (10, OrderKind.RESUME)
+    assert outcome(paused, resuming)[:2] == (2, None)
+    assert outcome(known)[:2] == (2, None)
+    stopped = replace(known, robot=robot(state=OperatingState.FAILED))
+    assert outcome(stopped, resuming)[:2] == (1, None)
+
+
 def test_the_nearer_of_two_robots_keeps_the_goal_and_the_other_gets_another_or_is_stopped():
     near, far = robot("robot_0", 0.4), robot("robot_1", 0.7)
     assert outcome(Case(near, rival=far)) == (3, None, "")
