@@ -79,7 +79,10 @@ def test_a_run_writes_its_record_beside_its_result(record):
         "result.json",
         "robot_0.pgm",
         "robot_0.yaml",
+        "robot_1.pgm",
+        "robot_1.yaml",
         "run.png",
+        "transforms.json",
     }
 
 
