@@ -33,7 +33,7 @@ def test_a_run_without_a_policy_that_maps_writes_no_sparse_map(tmp_path, capsys)
     assert main([*arguments, "--camera", "depth_64x48", "--horizon-s", "3", "--out", str(out)]) == 0
     names = {path.name for path in out.iterdir()}
     assert "view.png" in names
-    assert not [name for name in names if name.startswith("robot_")]
+    assert not [name for name in names if name.endswith(".smap")]
 
 
 def test_policies_of_both_kinds_are_evaluated_with_the_same_camera(tmp_path):
