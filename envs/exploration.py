@@ -335,7 +335,8 @@ class ExplorationEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
 
         The result is an image (rows, columns, 3), or the window.
         """
-        from lidarium.envs.drawing.rendering import FrameWindow, draw_frame
+        from lidarium.envs.drawing.frame_window import FrameWindow
+        from lidarium.envs.drawing.rendering import draw_frame
 
         if self.render_mode is None:
             return None

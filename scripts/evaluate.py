@@ -101,7 +101,8 @@ def execute(command: Evaluate) -> Answer:
 
 
 def _suite(command: Evaluate) -> "Suite":
-    from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite, read_suite
+    from lidarium.evaluation.suites.suite import Suite, read_suite
+    from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
     if command.supervisor and (command.suite is not None or command.preset is not None):
         raise ValueError(

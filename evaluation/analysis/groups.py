@@ -14,7 +14,7 @@ from lidarium.envs.floors.catalogue.names import GENERATORS, SETS, floor_names
 from lidarium.evaluation.analysis.episodes import Row, pair_key_of, variant_of
 from lidarium.evaluation.statistics import CensoredTimes
 from lidarium.evaluation.suites.episodes_file import TIMINGS
-from lidarium.evaluation.suites.suite import DEFAULT_VARIANT
+from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 _NAMES = ("seed", "key", "record")
 """What identifies a run, without saying what came of it."""

@@ -3,9 +3,6 @@
 The format is in docs/reference/files.md.
 """
 
-import hashlib
-import json
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,13 +12,11 @@ from lidarium.agents.report import GivenUp
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.outcome.scorer import THRESHOLDS
 from lidarium.envs.scoring.coverage import unpack_bits
-from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.envs.settings.making import make_settings
-from lidarium.envs.settings.realism import REALISM
 from lidarium.evaluation import metrics
 from lidarium.evaluation.episodes.events import in_floor_frame, operating_events
 from lidarium.evaluation.episodes.history import WHOLE, History
 from lidarium.evaluation.episodes.runner import Episode
+from lidarium.evaluation.episodes.settings_identity import realism_of, settings_sha256
 from lidarium.evaluation.episodes.supervision import tick_percentiles
 from lidarium.evaluation.metrics.merges import Trajectories, merge_figures
 from lidarium.evaluation.truth.beliefs import free_as_held, maps_on_floor
@@ -240,53 +235,6 @@ def others_coverage(env: ExplorationEnv) -> float | None:
         if not failed
     ]
     return metrics.free_coverage(np.any(seen, axis=0), left)
-
-
-def realism_of(settings: ExplorationSettings) -> str:
-    """Return the name of the preset of realism that the settings are of.
-
-    It is ``custom`` where they are of none.
-    """
-    for name in REALISM:
-        if make_settings(settings, realism=name) == settings:
-            return name
-    return "custom"
-
-
-LATER = (
-    "kinds",
-    "localizer",
-    "camera",
-    "starts",
-    "frontiers",
-    "least_frontier",
-    "frontiers_by_size",
-    "state_cells",
-    "pyramid_cells",
-    "pyramid_levels",
-)
-"""Settings that older records do not have."""
-
-
-def settings_sha256(settings: ExplorationSettings) -> str:
-    """Return a hash of all settings that can change a result.
-
-    It is of their JSON with sorted keys, without ``threads``, and without what older records do not have
-    where it is not used: `LATER` settings at their defaults, more rewards, the build of robots without
-    forces, sparse maps of robots without cameras.
-    """
-    values, plain = asdict(settings), ExplorationSettings()
-    del values["threads"]
-    if values["camera"] is None:
-        del values["sparse_map"]
-    for name in LATER:
-        if name in values and getattr(settings, name) == getattr(plain, name):
-            del values[name]
-    if not values["reward"]["more"]:
-        del values["reward"]["more"]
-    if values["backend"] == "kinematic":
-        del values["robot"]["build"]
-    return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def _entry(env: ExplorationEnv, given_up: GivenUp) -> dict[str, Any]:

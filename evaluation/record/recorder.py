@@ -14,7 +14,7 @@ from lidarium.agents.report import GivenUp
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.radio.messages import Orders
 from lidarium.evaluation.episodes.events import operating_events, place_of
-from lidarium.evaluation.episodes.result import settings_sha256
+from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.record.display import DisplayTrack
 from lidarium.evaluation.record.episode_record import FORMAT, EpisodeRecord

@@ -19,7 +19,7 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
-from lidarium.evaluation.episodes.result import settings_sha256
+from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.evaluation.record.state import state_sha256

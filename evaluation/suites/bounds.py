@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from lidarium.envs.settings.exploration import ExplorationSettings
-from lidarium.evaluation.suites.suite import Trial
+from lidarium.evaluation.suites.trial import Trial
 
 BOUND_COVERAGE = 0.99
 """Share of the floor that bounds are computed for."""

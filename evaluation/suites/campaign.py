@@ -23,7 +23,8 @@ from lidarium.evaluation.suites.bounds import beside_bound
 from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
 from lidarium.evaluation.suites.starts import drawn_starts
-from lidarium.evaluation.suites.suite import Suite, Trial
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import Trial
 from lidarium.evaluation.suites.workers import shared_out
 from lidarium.mapping.files.guarded_reading import read_text, reason
 

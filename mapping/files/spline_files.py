@@ -22,7 +22,8 @@ from lidarium.mapping.splines.curve import make_curve
 from lidarium.mapping.splines.curves.basis import ORDER
 from lidarium.mapping.splines.curves.bspline import Spline
 from lidarium.mapping.splines.curves.settings import SplineSettings
-from lidarium.mapping.splines.spline_map import Landmarks, SplineMap
+from lidarium.mapping.splines.landmarks import Landmarks
+from lidarium.mapping.splines.spline_map import SplineMap
 
 VERSION = 1
 SEEN = Rule(float, bounds=within(0.0, 2.0**53))

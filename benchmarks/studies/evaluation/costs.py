@@ -24,7 +24,8 @@ from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder
 from lidarium.evaluation.suites.campaign import EPISODES_FILE, run_trial
 from lidarium.evaluation.suites.episodes_file import EpisodesFile
-from lidarium.evaluation.suites.suite import Suite, Trial
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import Trial
 
 SETTINGS = {"resolution": 0.025, "stop_coverage": 0.99, "horizon_s": 900.0}
 FLOORS = ("apartment", "building:17", "building:3000001")

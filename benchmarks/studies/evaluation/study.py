@@ -12,7 +12,8 @@ from lidarium.benchmarks.studies.evaluation.costs import TEAM, cost_of, cost_sui
 from lidarium.benchmarks.studies.evaluation.programs import gain_of_workers, kills
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.study import Study
-from lidarium.evaluation.suites.suite import Suite, Trial
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import Trial
 
 ROUNDS = 3
 """Repeats of every measurement of cost."""

@@ -13,7 +13,8 @@ import lidarium
 from lidarium.benchmarks.studies.shared.real_floors import real_floors
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.report import write_report
-from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 POLICIES = (
     "nearest_frontier",

@@ -15,7 +15,8 @@ from lidarium.benchmarks.studies.srt.ablations import FollowedWay, measure_varia
 from lidarium.benchmarks.studies.srt.goal_runs import MODES, WORLDS, GoalRun, measure_goal_run
 from lidarium.benchmarks.studies.srt.pictures import draw_coverage, draw_world
 from lidarium.evaluation.suites.episodes_file import read_episodes
-from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 SEEDS, STARTS, FOLLOWED = range(200, 230), range(100, 105), range(200, 203)
 """Seeds of the runs, of the starts, and of the paths of variants.

@@ -38,7 +38,8 @@ from lidarium.evaluation.episodes.supervision import decision_lines
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.episodes_file import KEY
 from lidarium.evaluation.suites.starts import drawn_starts
-from lidarium.evaluation.suites.suite import Suite, Trial
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import Trial
 
 __all__ = ["page", "suites", "work"]
 

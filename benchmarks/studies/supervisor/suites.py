@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from lidarium.envs.floors.catalogue.names import load_floor
-from lidarium.evaluation.suites.suite import DEFAULT_VARIANT, Suite
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
 POLICIES = ("supervised", "independent", "oracle_starts")
 ALONE = "independent"

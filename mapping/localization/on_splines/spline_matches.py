@@ -12,7 +12,8 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.splines.curve_lookup import CurveLookup
 from lidarium.mapping.splines.curves.settings import AssociationSettings
 from lidarium.mapping.splines.features import Observation, match_points
-from lidarium.mapping.splines.spline_map import Landmarks, SplineMap
+from lidarium.mapping.splines.landmarks import Landmarks
+from lidarium.mapping.splines.spline_map import SplineMap
 
 
 @dataclass(frozen=True, slots=True, eq=False)

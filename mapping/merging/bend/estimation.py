@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.bounds import Count, Distance, FromZero, check_settings, within
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.merging.bend.equations import add_springs, add_walls, find_gaps
 from lidarium.mapping.merging.bend.offset_field import OffsetField, bilinear
 from lidarium.mapping.merging.description.described_map import DescribedMap
-from lidarium.mapping.merging.wall_alignment import gap_to_wall, wall_sample
+from lidarium.mapping.merging.wall_alignment import wall_sample
 
 INDEPENDENT_M = 0.5
 """Length of wall that errs alike [m]."""
@@ -135,14 +135,14 @@ def estimate_bend(a: DescribedMap, b: DescribedMap, a_from_b: Transform, setting
         reach = settings.reach_m * (settings.last_reach_m / settings.reach_m) ** share
         reach = max(reach, 2.0 * a.resolution)
         places = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
-        _find_gaps(a.levels, a.distance, a.resolution, places, normals, reach, gaps, found)
+        find_gaps(a.levels, a.distance, a.resolution, places, normals, reach, gaps, found)
         if found.sum() < 3:
             break
         offsets = _solved(
             nodes, weights, normals, offsets, (gaps, found, reach), (columns, settings.stiffness)
         )
     places = start + (weights[..., None] * offsets[nodes]).sum(axis=1)
-    _find_gaps(a.levels, a.distance, a.resolution, places, normals, settings.last_reach_m, gaps, found)
+    find_gaps(a.levels, a.distance, a.resolution, places, normals, settings.last_reach_m, gaps, found)
     field = OffsetField(corner, spacing, offsets.reshape(rows, columns, 2))
     wall_m = b.resolution * len(b.walls) / max(len(sample), 1)
     return _described(a_from_b, field, (walls, normals, gaps), found, wall_m)
@@ -169,10 +169,10 @@ def _solved(
     # Large gaps count less: they may lead to another wall.
     trust = np.where(found, 1.0 / (1.0 + (2.0 * gaps / reach) ** 2), 0.0)
     band, right = np.zeros((2 * columns + 4, 2 * count)), np.zeros(2 * count)
-    _add_walls(nodes, weights, normals, offsets, gaps, trust, band, right)
+    add_walls(nodes, weights, normals, offsets, gaps, trust, band, right)
     # The springs are as strong as the walls of a node.
     strength = trust.sum() / count
-    _add_springs(columns, stiffness * strength, band)
+    add_springs(columns, stiffness * strength, band)
     band[0] += ANCHOR * strength
     return np.asarray(scipy.linalg.solveh_banded(band, right, lower=True).reshape(count, 2))
 
@@ -226,81 +226,3 @@ def _covariance(
     rows = np.column_stack([normals, turns])
     information = rows.T @ rows * (wall_m / INDEPENDENT_M / variance)
     return np.asarray(np.linalg.inv(information + 1e-6 * np.eye(3)))
-
-
-@kernel
-def _find_gaps(
-    levels: Array,
-    distance: Array,
-    side: float,
-    places: Array,
-    normals: Array,
-    reach: float,
-    gaps: Array,
-    found: Array,
-) -> None:
-    """Write the gap along the normal from each place to a wall [m], and whether there is one in reach."""
-    steps = int(reach / side)
-    for i in range(places.shape[0]):
-        gap = gap_to_wall(
-            levels,
-            distance,
-            side,
-            places[i, 0] / side,
-            places[i, 1] / side,
-            normals[i, 0],
-            normals[i, 1],
-            steps,
-        )
-        found[i] = gap <= steps
-        gaps[i] = gap * side if found[i] else 0.0
-
-
-@kernel
-def _add_walls(
-    nodes: Array,
-    weights: Array,
-    normals: Array,
-    offsets: Array,
-    gaps: Array,
-    trust: Array,
-    band: Array,
-    right: Array,
-) -> None:
-    """Add to normal equations that the offsets along each wall's normal shall close its gap.
-
-    The band holds the lower triangle: entry (i, j) is at (i - j, j).
-    """
-    for i in range(nodes.shape[0]):
-        if trust[i] == 0.0:
-            continue
-        wanted = gaps[i]
-        for j in range(4):
-            for axis in range(2):
-                wanted += weights[i, j] * normals[i, axis] * offsets[nodes[i, j], axis]
-        for j in range(4):
-            for axis in range(2):
-                row = 2 * nodes[i, j] + axis
-                left = trust[i] * weights[i, j] * normals[i, axis]
-                right[row] += left * wanted
-                for k in range(4):
-                    for other in range(2):
-                        column = 2 * nodes[i, k] + other
-                        if column <= row:
-                            band[row - column, column] += left * weights[i, k] * normals[i, other]
-
-
-@kernel
-def _add_springs(columns: int, strength: float, band: Array) -> None:
-    """Add springs between the neighbouring nodes of a grid of so many columns to a band."""
-    count = band.shape[1] // 2
-    for node in range(count):
-        for step in (1, columns):
-            other = node + step
-            if other < count and (step > 1 or columns == 1 or other % columns != 0):
-                for axis in range(2):
-                    band[0, 2 * node + axis] += strength
-                    band[0, 2 * other + axis] += strength
-                    band[2 * step, 2 * node + axis] -= strength
-            if columns == 1:
-                break

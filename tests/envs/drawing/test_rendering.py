@@ -6,7 +6,8 @@ import pytest
 from matplotlib import pyplot
 
 import lidarium
-from lidarium.envs.drawing.rendering import EXPLORED, PALETTE, FrameWindow, classify, draw_frame, team_colours
+from lidarium.envs.drawing.frame_window import FrameWindow
+from lidarium.envs.drawing.rendering import EXPLORED, PALETTE, classify, draw_frame, team_colours
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.envs.settings.making import make_settings

@@ -7,7 +7,7 @@ import pytest
 
 from lidarium.envs.settings import ExplorationSettings, make_settings
 from lidarium.envs.settings.making import assign
-from lidarium.evaluation.episodes.result import settings_sha256
+from lidarium.evaluation.episodes.settings_identity import settings_sha256
 from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 
 

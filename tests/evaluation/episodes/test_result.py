@@ -9,8 +9,9 @@ from lidarium.envs.settings.exploration import ExplorationSettings
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.events import in_floor_frame
 from lidarium.evaluation.episodes.history import History
-from lidarium.evaluation.episodes.result import realism_of, result_of, settings_sha256
+from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.settings_identity import realism_of, settings_sha256
 from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.metrics import path_lengths
 from lidarium.evaluation.suites.episodes_file import TIMINGS

@@ -1,0 +1,56 @@
+"""What results say of settings: a preset's name, and a hash."""
+
+import hashlib
+import json
+from dataclasses import asdict
+
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
+from lidarium.envs.settings.realism import REALISM
+
+
+def realism_of(settings: ExplorationSettings) -> str:
+    """Return the name of the preset of realism that the settings are of.
+
+    It is ``custom`` where they are of none.
+    """
+    for name in REALISM:
+        if make_settings(settings, realism=name) == settings:
+            return name
+    return "custom"
+
+
+LATER = (
+    "kinds",
+    "localizer",
+    "camera",
+    "starts",
+    "frontiers",
+    "least_frontier",
+    "frontiers_by_size",
+    "state_cells",
+    "pyramid_cells",
+    "pyramid_levels",
+)
+"""Settings that older records do not have."""
+
+
+def settings_sha256(settings: ExplorationSettings) -> str:
+    """Return a hash of all settings that can change a result.
+
+    It is of their JSON with sorted keys, without ``threads``, and without what older records do not have
+    where it is not used: `LATER` settings at their defaults, more rewards, the build of robots without
+    forces, sparse maps of robots without cameras.
+    """
+    values, plain = asdict(settings), ExplorationSettings()
+    del values["threads"]
+    if values["camera"] is None:
+        del values["sparse_map"]
+    for name in LATER:
+        if name in values and getattr(settings, name) == getattr(plain, name):
+            del values[name]
+    if not values["reward"]["more"]:
+        del values["reward"]["more"]
+    if values["backend"] == "kinematic":
+        del values["robot"]["build"]
+    return hashlib.sha256(json.dumps(values, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
