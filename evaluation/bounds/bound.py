@@ -121,7 +121,8 @@ def known_floor_bound(
         raise ValueError("stop_coverage is None; want the share that has to be seen, such as 0.99")
     if len(starts) != settings.robots:
         raise ValueError(f"there are {len(starts)} starts; want one for each of {settings.robots} robots")
-    loaded = load_floor(floor) if isinstance(floor, str) else floor
+    # All of the floor has to be seen: nobody ends at its goal.
+    loaded = replace(load_floor(floor) if isinstance(floor, str) else floor, goal=None)
     team = _team_of(settings)
     key = _key(loaded, team, starts, rounds, seed)
     kept = floor_store().load(key)
@@ -143,15 +144,15 @@ def _planned_and_driven(
     """Plan and drive until enough is seen; ``effort`` is the number of rounds and the seed.
 
     A plan takes lasers to see all around. Where a drive passed something unseen, the robot turns to it in the
-    next drive.
+    next drive. Where no drive sees enough, that which saw most is returned.
     """
-    bound = KnownFloorBound(math.inf, math.inf, math.inf, 0.0, [])
+    driven: list[KnownFloorBound] = []
     for margin in MARGINS:
         plan = plan_tours(graph, min((team.stop_coverage or 1.0) + margin, 1.0), *effort)
-        bound = _driven(graph, plan, floor, team, starts)
-        if math.isfinite(bound.time_s):
-            break
-    return bound
+        driven += _driven(graph, plan, floor, team, starts)
+        if math.isfinite(driven[-1].time_s):
+            return driven[-1]
+    return max(driven, key=lambda bound: bound.share)
 
 
 def _driven(
@@ -160,20 +161,21 @@ def _driven(
     floor: Floor,
     team: ExplorationSettings,
     starts: Sequence[Sequence[float]],
-) -> KnownFloorBound:
+) -> list[KnownFloorBound]:
     """Drive a plan until enough is seen, each time with more places at which robots turn."""
     looks: dict[tuple[int, int], float] = {}
+    driven = []
     for _ in range(TRIALS):
         walks = walks_of(graph, plan, looks)
         time_s, share, poses = drive(floor, team, starts, walks)
         lengths = plan.lengths
-        bound = KnownFloorBound(time_s, float(lengths.max()), float(lengths.sum()), share, walks)
+        driven.append(KnownFloorBound(time_s, float(lengths.max()), float(lengths.sum()), share, walks))
         if math.isfinite(time_s):
             break
         seen = seen_on_track(graph, poses, team.lidar.range_max, team.lidar.field_of_view)
         passed = [place for walk in plan.walks for place in walk]
         looks |= _looks(graph, plan, graph.seen(passed) & ~seen, team.lidar.field_of_view)
-    return bound
+    return driven
 
 
 def _looks(

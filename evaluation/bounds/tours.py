@@ -22,6 +22,9 @@ MOST_TAKEN = 5
 LONGER = 0.05
 """Tours that are longer by up to this share may be gone on from at first."""
 
+MOST_S = 30
+"""Stops are ordered for so long at most; descents end before on all but the largest floors [s]."""
+
 Stops = list[list[int]]
 
 
@@ -183,7 +186,7 @@ def _seen_count(graph: ViewGraph, stops: Stops) -> int:
     return int(count(np.bitwise_or.reduce([graph.seen(walk) for walk in walks], axis=0)))
 
 
-def ordered(graph: ViewGraph, stops: Stops, seconds: int = 1) -> Stops:
+def ordered(graph: ViewGraph, stops: Stops) -> Stops:
     """Return the same stops as the best open tours that OR-Tools finds.
 
     Raises
@@ -214,7 +217,7 @@ def ordered(graph: ViewGraph, stops: Stops, seconds: int = 1) -> Stops:
     wanted = pywrapcp.DefaultRoutingSearchParameters()
     wanted.first_solution_strategy = routing_enums_pb2.FirstSolutionStrategy.PATH_CHEAPEST_ARC
     wanted.local_search_metaheuristic = routing_enums_pb2.LocalSearchMetaheuristic.GREEDY_DESCENT
-    wanted.time_limit.seconds = 30 * seconds
+    wanted.time_limit.seconds = MOST_S
     found = routing.SolveWithParameters(wanted)
     if found is None:
         return stops

@@ -52,7 +52,7 @@ def execute(command: Bound) -> Answer:
         command.floor, settings, command.seed
     )
     floor = load_floor(command.floor)
-    found = known_floor_bound(floor, settings, starts, command.rounds)
+    found = known_floor_bound(floor, settings, starts, command.rounds, command.seed)
     is_found = math.isfinite(found.time_s)
     result: dict[str, Any] = {
         "floor": command.floor,

@@ -1,6 +1,7 @@
 """What a team that knows the floor needs, on floors where that is known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,7 +57,6 @@ def test_the_second_room_is_seen_once_its_corners_are():
 @pytest.mark.parametrize("robots", [1, 2])
 def test_no_explorer_is_faster(robots):
     settings = settings_of(robots, horizon_s=600.0)
-    starts = [[1.5, 1.5, 0.3], [2.0, 1.5, 0.3]][:robots]
     env = lidarium.parallel_env("building:4", settings=settings)
     env.reset(seed=0)
     starts = env.world.starts.tolist()
@@ -64,6 +64,27 @@ def test_no_explorer_is_faster(robots):
     assert math.isfinite(bound.time_s)
     run_episode(lidarium.policy("tour_frontier"), env, 0, {"starts": starts})
     assert bound.time_s <= env.scorer.time
+
+
+def test_robots_drive_on_past_a_goal():
+    with_goal = replace(TWO_ROOMS, goal=(1.4, 2.0))
+    bounds = [
+        known_floor_bound(floor, settings_of(), TWO_ROOMS.starts[:1], rounds=20)
+        for floor in (TWO_ROOMS, with_goal)
+    ]
+    assert bounds[1].share >= 0.99
+    assert bounds[0].time_s == bounds[1].time_s
+
+
+def test_where_no_plan_sees_enough_the_drive_that_saw_most_is_returned(monkeypatch):
+    shares = iter([0.3, 0.8, 0.5] * 3)
+
+    def drive(floor, team, starts, walks):
+        return math.inf, next(shares), np.asarray(starts)
+
+    monkeypatch.setattr("lidarium.evaluation.bounds.bound.drive", drive)
+    bound = known_floor_bound(TWO_ROOMS, settings_of(), TWO_ROOMS.starts[:1], rounds=0)
+    assert (bound.time_s, bound.share) == (math.inf, 0.8)
 
 
 def test_a_bound_is_kept_and_the_same_again(monkeypatch, tmp_path):

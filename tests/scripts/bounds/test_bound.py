@@ -26,3 +26,15 @@ def test_without_the_extra_the_message_names_it(monkeypatch, capsys, tmp_path):
     assert main(["bound", "apartment:3", "--map-resolution", "0.05", "--rounds", "0", "--out", str(out)]) == 2
     assert 'pip install "lidarium[bounds]"' in capsys.readouterr().err
     assert not out.exists() or not list(out.iterdir())
+
+
+def test_draws_come_from_the_seed(monkeypatch):
+    seeds = []
+
+    def known_floor_bound(floor, settings, starts, rounds, seed):
+        seeds.append(seed)
+        raise ValueError("nothing is planned")
+
+    monkeypatch.setattr("lidarium.evaluation.bounds.bound.known_floor_bound", known_floor_bound)
+    assert main(["bound", "apartment:3", "--map-resolution", "0.05", "--seed", "5"]) == 2
+    assert seeds == [5]
