@@ -16,6 +16,7 @@ from lidarium.envs.batch.batch_run import BatchRun
 from lidarium.envs.batch.beginnings import Beginnings
 from lidarium.envs.batch.levels import make_level
 from lidarium.envs.batch.observation_buffers import Arrays, ObservationBuffers
+from lidarium.envs.batch.requests import count_of_episodes
 from lidarium.envs.batch.row_infos import RowInfos
 from lidarium.envs.batch.running import SENSES, STEPS, WAITS
 from lidarium.envs.episode_start import EpisodeStart, goal_of_robots, make_simulation, map_frames
@@ -95,9 +96,7 @@ class EpisodeBatch:
         copy: bool = True,
         curriculum: Curriculum | None = None,
     ) -> None:
-        if isinstance(episodes, bool) or not isinstance(episodes, int | np.integer) or episodes < 1:
-            raise ValueError(f"the number of episodes is {episodes!r}; want a whole number of at least 1")
-        self.episodes, self.robots, self.settings = int(episodes), settings.robots, settings
+        self.episodes, self.robots, self.settings = count_of_episodes(episodes), settings.robots, settings
         self.rows = self.episodes * self.robots
         if settings.battery.is_limited or settings.pauses_when_blocked:
             raise ValueError(

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from lidarium.envs.batch.requests import episodes_of, option_of, seeds_of
+from lidarium.envs.batch.requests import count_of_episodes, episodes_of, option_of, seeds_of
 from lidarium.envs.batch.vector_env import ExplorationVectorEnv, Step
 from lidarium.envs.conventions.conventions import split_options
 from lidarium.envs.levels.randomized_team import (
@@ -70,6 +70,7 @@ class RandomizedVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
                 "randomize has 'robots'; leave it out: teams of a batch have one size, use "
                 "lidarium.parallel_env to draw it"
             )
+        episodes = count_of_episodes(episodes)
         of_batch = {name: options.pop(name) for name in OF_BATCH if name in options}
         others = split_options(options)[1]
         self._forms = {name: options[name] for name in options if name not in others}

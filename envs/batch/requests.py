@@ -41,6 +41,19 @@ def settings_of(options: dict[str, Any]) -> ExplorationSettings:
     return make_settings(**(options if names_threads else {**options, "threads": available_threads()}))
 
 
+def count_of_episodes(episodes: Any) -> int:  # noqa: ANN401
+    """Return the number of episodes, checked.
+
+    Raises
+    ------
+    ValueError
+        Where it is no whole number of at least 1.
+    """
+    if isinstance(episodes, bool) or not isinstance(episodes, int | np.integer) or episodes < 1:
+        raise ValueError(f"the number of episodes is {episodes!r}; want a whole number of at least 1")
+    return int(episodes)
+
+
 def seeds_of(
     seed: int | Sequence[int | None] | NDArray[np.integer] | None, episodes: int
 ) -> list[int | None]:

@@ -68,11 +68,12 @@ class RandomizedTeam(TeamWrapper):
         self._make, self._fixed, self._distributions = make, settings, dict(distributions)
         self._generator = np.random.default_rng(0)
         self._episode, self.drawn = 0, dict[str, Any]()
+        most = largest_team(distributions[ROBOTS]) if ROBOTS in distributions else None
         first = self._next(0)
         super().__init__(first)
         largest = first
-        if ROBOTS in distributions:
-            self.drawn[ROBOTS] = largest_team(distributions[ROBOTS])
+        if most is not None:
+            self.drawn[ROBOTS] = most
             largest = self._made(0)
             self.possible_agents = largest.possible_agents
         agent = self.possible_agents[0]

@@ -17,14 +17,18 @@ def largest_team(distribution: Any) -> int:  # noqa: ANN401
     Raises
     ------
     ValueError
-        Where it cannot be known.
+        Where it cannot be known, or some draw is no number of robots.
     """
-    if isinstance(distribution, tuple | list) and all(isinstance(each, int) for each in distribution):
+    if isinstance(distribution, tuple | list) and all(_is_size(each) for each in distribution):
         return int(max(distribution))
     raise ValueError(
         f"the distribution of robots is {shown(distribution)}; want (least, most) or a list of whole "
-        "numbers, so that the largest team is known"
+        "numbers of 1 or more, so that the largest team is known"
     )
+
+
+def _is_size(value: Any) -> bool:  # noqa: ANN401
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 1
 
 
 def fits_into(space: spaces.Space[Any], largest: spaces.Space[Any], key: str = "") -> bool:

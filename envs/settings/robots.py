@@ -6,7 +6,7 @@ Pioneer P3-DX: data sheet of Adept MobileRobots. Kobuki: user guide of Yujin Rob
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 
@@ -263,7 +263,7 @@ def kinds_of(names: Any) -> tuple[str, ...]:  # noqa: ANN401
     ValueError
         Where they are no names, or one is unknown.
     """
-    if isinstance(names, str) or not isinstance(names, Iterable):
+    if not isinstance(names, list | tuple):
         raise ValueError(f"kinds is {shown(names)}; want names of robots ({', '.join(ROBOTS)}) in a list")
     chosen = tuple(names)
     for name in chosen:

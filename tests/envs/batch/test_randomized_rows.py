@@ -111,3 +111,5 @@ def test_what_cannot_be_drawn_in_batches_is_refused():
         rows.step(np.zeros((3, 2)))
     with pytest.raises(TypeError, match="unknown option 'horizon'"):
         make(2, horizon=3)
+    with pytest.raises(ValueError, match="the number of episodes is 0; want"):
+        make(0)

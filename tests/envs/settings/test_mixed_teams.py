@@ -40,6 +40,7 @@ def test_a_team_of_one_kind_is_that_of_the_robot():
         ("kobuki", "kinds is 'kobuki'; want names of robots"),
         (["kobuky"], "kinds has an unknown robot 'kobuky'; did you mean 'kobuki'"),
         ([3], "kinds has an unknown robot 3"),
+        ({"kobuki": 2, "service": 1}, "kinds is {'kobuki': 2, 'service': 1}; want names of robots"),
     ],
 )
 def test_bad_kinds_are_refused(kinds, message):
