@@ -11,6 +11,9 @@ KEPT = 1.0
 KEPT_NEAR = 0.5
 """What lies this near to what a robot goes for is still the same [m]."""
 
+MOST_RETURNS = 10
+"""More returns than these change nothing: no tour is shorter by a kilometre."""
+
 
 class Intent:
     """What a robot goes for.
@@ -33,7 +36,7 @@ class Intent:
     @property
     def kept(self) -> float:
         """A tour has to be shorter by this for the robot to go for something else [m]."""
-        return KEPT * 2.0**self._returns
+        return KEPT * 2.0 ** min(self._returns, MOST_RETURNS)
 
     def go_for(self, focus: NDArray[np.float64] | None) -> None:
         """Go for something, or for nothing."""
@@ -43,7 +46,7 @@ class Intent:
         self.latest = focus
 
     def settle(self) -> None:
-        """Have come to it, or have seen it through: what was left before counts no more."""
+        """Forget what was left before, as the robot has seen what it went for."""
         self._left.clear()
         self._returns = 0
 

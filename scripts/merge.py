@@ -124,7 +124,11 @@ def execute(command: Merge) -> Answer:
     fused = [bent.fused for bent in deformed] or [merged.fused(group) for group in joined]
     files = _write(merged, fused, images, result, out)
     is_whole = len(merged.groups()) == 1
-    return Answer(result, _summary(merged, files, out), DONE if is_whole else NO)
+    return Answer(
+        result,
+        _summary(merged, files, out, None if command.scale == "fixed" else scale),
+        DONE if is_whole else NO,
+    )
 
 
 def _merged(
@@ -267,7 +271,8 @@ def _write(
     return files
 
 
-def _summary(merged: "Merged", files: list[str], out: Path) -> str:
+def _summary(merged: "Merged", files: list[str], out: Path, scale: float | None) -> str:
+    """Return what is printed; ``scale`` is by how much the second map has grown, None where it may not."""
     lines = [
         f"joined: {', '.join(group)}" if len(group) > 1 else f"alone:  {group[0]}"
         for group in merged.groups()
@@ -283,17 +288,11 @@ def _summary(merged: "Merged", files: list[str], out: Path) -> str:
                 f"{found.reason}: {agreement.agreeing_m:.1f} m of walls agree, {agreement.overlap_m2:.0f} m2 "
                 "known in both"
             )
+            if scale is not None:
+                reason += f", {b} grown {scale:.3f} times"
             if found.found_by == "bend":
                 reason += f", bent by {found.ranked[0].bend.bend_m:.2f} m"
         else:
             reason = f"refused: {found.reason}"
         rows.append((a, b, reason))
-    return "\n".join(
-        [
-            *lines,
-            "",
-            table(rows),
-            "",
-            f"written to {out}: {', '.join(files)}",
-        ]
-    )
+    return "\n".join([*lines, "", table(rows), "", f"written to {out}: {', '.join(files)}"])

@@ -308,8 +308,9 @@ def scaled_maps(folder):
 @pytest.mark.parametrize("scale", ["auto", "1.25"])
 def test_a_plan_of_another_scale_is_joined(scale, tmp_path, capsys):
     paths, truth = scaled_maps(tmp_path / "in")
-    assert main(["merge", *paths, "--out", str(tmp_path / "out"), "--scale", scale, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["maps"]["plan"]
+    assert main(["merge", *paths, "--out", str(tmp_path / "out"), "--scale", scale]) == 0
+    found = json.loads((tmp_path / "out" / "transforms.json").read_text())["maps"]["plan"]
+    assert f"plan grown {found['scale']:.3f} times" in capsys.readouterr().out
     assert found["scale"] == pytest.approx(1.25, rel=0.01)
     place = truth.inverse().apply((8.0, 5.0))
     # A point p of the plan lies at scale * R p + t.
