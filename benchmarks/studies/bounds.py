@@ -153,9 +153,12 @@ def table(lines: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for robots in TEAMS:
         members = [line for line in lines if line["robots"] == robots and line["known_s"] is not None]
-        known = statistics.median(line["known_s"] for line in members)
-        cells = [f"{statistics.median(_multiples(members, name)):.2f}" for name in POLICIES]
-        rows.append(f"| {robots} | {known:.0f} | " + " | ".join(cells) + " |")
+        if members:
+            known = f"{statistics.median(line['known_s'] for line in members):.0f}"
+            cells = [f"{statistics.median(_multiples(members, name)):.2f}" for name in POLICIES]
+        else:
+            known, cells = "-", ["-"] * len(POLICIES)
+        rows.append(f"| {robots} | {known} | " + " | ".join(cells) + " |")
     return "\n".join(rows)
 
 
