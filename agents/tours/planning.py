@@ -135,9 +135,14 @@ def plan_legs(
 
 
 def first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
-    """Return the first place of each robot's tour in a sequence of ``team_tours``, None where it has none.
+    """Return the first place of each robot's tour, None where it has none.
 
-    ``count`` is the number of places.
+    Parameters
+    ----------
+    sequence : (count + robots - 1,) int64
+        What ``team_tours`` returns.
+    count : int
+        Number of places.
     """
     firsts: list[int | None] = [None]
     for number in sequence:

@@ -157,7 +157,10 @@ class TourFrontier(FrontierExplorer):
         return clusters if vain is None else clusters.without(vain, least)
 
     def _give_up_around(self, agent: str, choice: Choice, reason: str) -> None:
-        """Drop what a leg led to from the tours; what was gone to by itself is given up for good."""
+        """Drop what a leg led to from the tours.
+
+        What was gone to by itself is given up for good.
+        """
         leg = self._legs.get(choice)
         if leg is None:
             super()._give_up_around(agent, choice, reason)
@@ -172,7 +175,10 @@ class TourFrontier(FrontierExplorer):
         vain[cells[:, 0], cells[:, 1]] = True
 
     def _heading(self, agent: str, choice: Choice) -> float:
-        """Return the heading nearest to that of arrival from which the robot sees what it came for."""
+        """Return the heading at which a robot sees what it came for.
+
+        Of these it is the one nearest to the heading of arrival.
+        """
         leg = self._legs.get(choice)
         if leg is None:
             return super()._heading(agent, choice)

@@ -26,7 +26,7 @@ from lidarium.envs.settings.reset_options import Curriculum, of_number
 
 
 class RandomizedVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
-    """Teams that explore floors, each episode with settings drawn as it begins (Gymnasium).
+    """Episodes of teams, each with settings drawn as it begins (Gymnasium).
 
     Rows, seeds, resets and infos are those of ``ExplorationVectorEnv``; an episode is that of a
     ``RandomizedTeam`` with the same seed, to the bit. Kernels have one choice of settings, so each episode is

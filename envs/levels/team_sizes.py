@@ -32,7 +32,7 @@ def _is_size(value: Any) -> bool:  # noqa: ANN401
 
 
 def fits_into(space: spaces.Space[Any], largest: spaces.Space[Any], key: str = "") -> bool:
-    """Whether observations of a team are those of the largest one, but for rows of teammates."""
+    """Whether observations fit those of the largest team but for rows of teammates."""
     if isinstance(space, spaces.Dict) and isinstance(largest, spaces.Dict):
         return space.keys() == largest.keys() and all(
             fits_into(part, largest[name], name) for name, part in space.items()
@@ -43,7 +43,7 @@ def fits_into(space: spaces.Space[Any], largest: spaces.Space[Any], key: str = "
 
 
 def padded(observation: Any, space: spaces.Space[Any]) -> Any:  # noqa: ANN401
-    """Return an observation with zeros for the teammates that the largest team has more."""
+    """Return an observation with zeros for the teammates that a team lacks."""
     if isinstance(space, spaces.Dict):
         return {name: padded(observation[name], part) for name, part in space.items()}
     if observation.shape == space.shape:

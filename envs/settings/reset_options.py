@@ -107,7 +107,7 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:  # noqa: ANN401
 
 
 def of_number(curriculum: Curriculum | None, number: int) -> Mapping[str, Any]:
-    """Return the options that a curriculum has for an episode; none where there is no curriculum."""
+    """Return a curriculum's options for an episode; none without a curriculum."""
     return {} if curriculum is None else curriculum(number)
 
 

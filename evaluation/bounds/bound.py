@@ -141,7 +141,7 @@ def _planned_and_driven(
     starts: Sequence[Sequence[float]],
     effort: tuple[int, int],
 ) -> KnownFloorBound:
-    """Plan and drive until enough is seen; ``effort`` is the number of rounds and the seed.
+    """Plan and drive until enough is seen; ``effort`` is rounds and seed.
 
     A plan takes lasers to see all around. Where a drive passed something unseen, the robot turns to it in the
     next drive. Where no drive sees enough, that which saw most is returned.
@@ -162,7 +162,7 @@ def _driven(
     team: ExplorationSettings,
     starts: Sequence[Sequence[float]],
 ) -> list[KnownFloorBound]:
-    """Drive a plan until enough is seen, each time with more places at which robots turn."""
+    """Drive a plan until enough is seen, each time with more turns; return all."""
     looks: dict[tuple[int, int], float] = {}
     driven = []
     for _ in range(TRIALS):
@@ -181,7 +181,7 @@ def _driven(
 def _looks(
     graph: ViewGraph, plan: TourPlan, missed: NDArray[np.uint64], field_of_view: float
 ) -> dict[tuple[int, int], float]:
-    """Return where robots turn, and to what, to see what they missed; most of it at each place."""
+    """Return where robots turn, and to what, to see most of what they missed."""
     found: dict[tuple[int, int], float] = {}
     origin, resolution = np.asarray(graph.laser.origin), graph.laser.resolution
     left = missed.copy()
@@ -204,7 +204,7 @@ def _looks(
 
 
 def _team_of(settings: ExplorationSettings) -> ExplorationSettings:
-    """Return what of some settings says how soon a floor can be seen, in a world without noise.
+    """Return what of settings says how soon a floor is seen in a world without noise.
 
     Raises
     ------

@@ -87,7 +87,10 @@ class WalkPolicy(Policy):
 
 
 def _pieces(walk: Walk, offset: NDArray[np.float64]) -> list[Route]:
-    """Return a walk as routes, which end where the robot turns, and have no more points than routes may."""
+    """Return a walk as routes.
+
+    They end where the robot turns, and have no more points than routes may.
+    """
     pieces, start, last = [], 0, len(walk.points) - 1
     for at in range(last + 1):
         heading = float(walk.headings[at])

@@ -52,7 +52,7 @@ class Relaxation:
 
 @dataclass(frozen=True, slots=True)
 class _Program:
-    """The links of a graph with all starts in place 0, and which groups of points each place sees."""
+    """Links of a graph with all starts in place 0, and what each place sees."""
 
     first: NDArray[np.int64]
     second: NDArray[np.int64]
@@ -141,7 +141,7 @@ def _program(graph: ViewGraph, share: float) -> _Program:
 def _rows(
     program: _Program, cuts: list[Cut], columns: int
 ) -> tuple[csr_array, NDArray[np.float64], NDArray[np.float64]]:
-    """Return the rows of all cuts, of what has to be seen, and of the ends; with their low and high sides."""
+    """Return rows of all cuts, of what has to be seen, of the ends; and their sides."""
     links, places, groups = len(program.lengths), program.places, len(program.weights)
     row: list[NDArray[np.int64]] = []
     column: list[NDArray[np.int64]] = []
@@ -187,7 +187,10 @@ def _solved(program: _Program, cuts: list[Cut]) -> OptimizeResult:
 
 
 def _solved_whole(program: _Program, cuts: list[Cut], seconds: float) -> OptimizeResult:
-    """Return the best whole crossings under the cuts so far; each place is entered as often as left."""
+    """Return the best whole crossings under the cuts so far.
+
+    Each place is entered as often as left.
+    """
     links, places, most = len(program.lengths), program.places, _most(program)
     columns = len(most) + places
     matrix, low, high = _rows(program, cuts, columns)
@@ -214,7 +217,7 @@ def _solved_whole(program: _Program, cuts: list[Cut], seconds: float) -> Optimiz
 
 
 def _broken(program: _Program, x: NDArray[np.float64]) -> list[Cut]:
-    """Return the cuts that crossings break: sets of places (places,) bool, and the group seen from within."""
+    """Return the cuts that crossings break."""
     links, places = len(program.lengths), program.places
     crossed, ends, seen = x[:links], x[links : links + places], x[links + places :][: len(program.weights)]
     used = crossed > 1e-9
@@ -241,7 +244,7 @@ def _broken(program: _Program, x: NDArray[np.float64]) -> list[Cut]:
 def _least_cuts(
     begin: NDArray[np.int64], end: NDArray[np.int64], room: NDArray[np.int64], sink: int
 ) -> list[NDArray[np.bool_]]:
-    """Return the places (sink,) bool on the far side of least cuts between place 0 and the sink.
+    """Return the places (sink,) bool beyond least cuts between place 0 and the sink.
 
     The first one lies nearest to place 0, the second one nearest to the sink.
     """

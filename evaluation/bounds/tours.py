@@ -117,7 +117,10 @@ def cost_of(graph: ViewGraph, stops: Stops) -> float:
 
 
 def covered(graph: ViewGraph, stops: Stops, wanted: int) -> Stops:
-    """Add stops to tours until so many points are seen; each time the one that shows most for its way."""
+    """Add stops to tours until so many points are seen.
+
+    It is each time the one that shows most for its way.
+    """
     tours = [list(tour) for tour in stops]
     by_robot = [graph.seen(walk_of(graph, robot, tour)) for robot, tour in enumerate(tours)]
     lengths = lengths_of(graph, tours)
@@ -142,7 +145,7 @@ def covered(graph: ViewGraph, stops: Stops, wanted: int) -> Stops:
 def _cheapest_insertions(
     graph: ViewGraph, tours: Stops, lengths: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return by how much tours get dearer with each place as a stop, and where it is inserted.
+    """Return what each place costs as a stop, and where it is inserted.
 
     (N,) [m], and (N, 2) of robot and position.
     """

@@ -152,7 +152,7 @@ def view_graph(
 def _places(
     raster: Raster, radius: float, starts: NDArray[np.float64], side: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the starts' cells (row, column) and those of all places, and their clearance [m]."""
+    """Return the cells of starts and all places, and their clearance [m]."""
     found = components(raster, radius)
     begin = np.array([cell_of(raster, start) for start in starts], np.int64)
     near = [_labels_near(found.labels, cell) for cell in begin]
@@ -169,7 +169,7 @@ def _places(
 
 
 def _roomiest(wanted: NDArray[np.bool_], distance: NDArray[np.float64], side: float) -> NDArray[np.int64]:
-    """Return of each square, with a side in cells, the wanted cell (row, column) with most room."""
+    """Return the wanted cell (row, column) with most room of each square."""
     step = max(round(side), 1)
     rows, columns = np.nonzero(wanted)
     if not len(rows):
@@ -219,9 +219,18 @@ def _views(
 def seen_on_track(
     graph: ViewGraph, poses: NDArray[np.float64], range_max: float, field_of_view: float
 ) -> NDArray[np.uint64]:
-    """Return which points robots see from poses (n, 3) in the floor's frame, (words,) uint64.
+    """Return which points robots see from any of some poses, (words,) uint64.
 
-    ``range_max`` [m] and ``field_of_view`` [rad] are those of their lasers.
+    Parameters
+    ----------
+    graph : ViewGraph
+        The floor.
+    poses : (n, 3) float64
+        x, y, theta in the floor's frame [m, rad].
+    range_max : float
+        How far their lasers see [m].
+    field_of_view : float
+        Angle in which they see [rad].
     """
     cells = np.array([cell_of(graph.laser, pose) for pose in poses], np.int64)
     headings = np.ascontiguousarray(poses[:, 2])
@@ -236,7 +245,7 @@ def _seen_bits(
     points: NDArray[np.int64],
     reach: tuple[float, float],
 ) -> NDArray[np.uint64]:
-    """Return which points are seen from each cell with a heading, (cells, words) uint64.
+    """Return the points seen from each cell with a heading, (cells, words) uint64.
 
     ``reach`` is the range [m] and the field of view [rad].
     """

@@ -102,7 +102,7 @@ class Merged:
         )
 
     def deformed(self, group: list[str], settings: BendSettings | None = None) -> Deformed:
-        """Return the map of a group whose maps are bent to agree, in the frame of its first.
+        """Return the map of a group bent to agree, in the frame of its first map.
 
         Parameters
         ----------

@@ -65,7 +65,7 @@ class Clusters:
         return self.cells[self.starts[k] : self.starts[k + 1]]
 
     def without(self, left_out: NDArray[np.bool_], minimum_cells: int = 1) -> "Clusters":
-        """Return what is left of the clusters without some cells of the map, (rows, columns) bool.
+        """Return the clusters without some cells of the map, (rows, columns) bool.
 
         Clusters of which fewer cells are left are dropped.
         """

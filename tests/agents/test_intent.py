@@ -24,7 +24,7 @@ def test_each_return_to_what_was_left_doubles_the_gain():
 def test_what_is_near_is_the_same():
     intent = Intent()
     for step in range(4):
-        intent.go_for(LEFT + (0.9 * KEPT_NEAR * (step % 2), 0.0))
+        intent.go_for(LEFT + np.array([0.9 * KEPT_NEAR * (step % 2), 0.0]))
     assert intent.kept == KEPT
 
 

@@ -27,7 +27,7 @@ LOOK_M = 0.5
 def save_bound_picture(
     path: Path, floor: Floor, settings: ExplorationSettings, bound: KnownFloorBound, name: str
 ) -> None:
-    """Draw a floor and the tours of a team that knows it, with arrows where robots turn to something.
+    """Draw a floor and tours of a team, with arrows where robots turn to something.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ def deform(
 
 
 def bent_map(one: DescribedMap, bend: Bend, corner: Transform) -> Laid:
-    """Return a bent map in cells of its own along the axes of the map onto which it is bent.
+    """Return a bent map in cells along the axes of the map onto which it is bent.
 
     Parameters
     ----------

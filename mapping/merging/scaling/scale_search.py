@@ -94,7 +94,7 @@ class Placement(NamedTuple):
 
 
 def wall_axis(described: DescribedMap) -> float:
-    """Return in which direction the walls of a map run, from 0 to a quarter turn [rad].
+    """Return the direction of a map's walls, from 0 to a quarter turn [rad].
 
     It is that across which walls fall into the fewest bins of a histogram: the sum of the squared counts,
     over both axes, is greatest.
@@ -108,7 +108,7 @@ def wall_axis(described: DescribedMap) -> float:
 
 
 def _sharpness(walls: NDArray[np.float64], angle: float, bin_m: float) -> float:
-    """Return the sum of squared counts of walls (n, 2) in bins along two axes at an angle [rad, m]."""
+    """Return the sum of squared counts of walls (n, 2) in bins along two axes."""
     turned = Transform(0.0, 0.0, -angle).apply(walls) / bin_m
     bins = np.floor(turned - turned.min(axis=0)).astype(np.int64)
     return float(sum((np.bincount(bins[:, axis]).astype(np.float64) ** 2).sum() for axis in (0, 1)))
@@ -142,7 +142,15 @@ def placements(a: DescribedMap, b: DescribedMap, settings: ScaleSettings) -> lis
 
 
 def grown_levels(levels: NDArray[np.uint8], resolution: float, wanted: float) -> NDArray[np.uint8]:
-    """Return a three-level map (rows, columns) in coarser or finer cells, from the same corner [m]."""
+    """Return a three-level map in cells of another side, from the same corner.
+
+    Parameters
+    ----------
+    levels : (rows, columns) uint8
+        The map.
+    resolution, wanted : float
+        Side of its cells, and of those that are returned [m].
+    """
     if resolution <= wanted:
         return resampled(levels, resolution, wanted)
     rows, columns = (max(round(side * resolution / wanted), 1) for side in levels.shape)

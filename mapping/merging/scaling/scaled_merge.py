@@ -129,9 +129,10 @@ def merge_scaled(
 
 
 def structure(described: DescribedMap) -> float:
-    """Return how much structure a map has, whatever its scale: squared length of its walls over its area.
+    """Return how much structure a map has, whatever its scale.
 
-    The map with less is laid on that with more: a plan of many rooms holds a place for each part of it.
+    It is the squared length of its walls over its area. The map with less is laid on that with more: a
+    plan of many rooms holds a place for each part of it.
     """
     known = int((described.levels != UNKNOWN).sum())
     return len(described.walls) ** 2 / max(known, 1)
@@ -140,7 +141,7 @@ def structure(described: DescribedMap) -> float:
 def _turned_round(
     a: DescribedMap, found: Grown, grid: tuple[NDArray[np.uint8], float], settings: MergeSettings
 ) -> Grown | None:
-    """Return the hypothesis of the second map on the first, of that of the first on the second."""
+    """Return the hypothesis of the second map on the first, from its inverse."""
     back = found.hypothesis.bend.a_from_b.inverse()
     start = Transform(back.x / found.scale, back.y / found.scale, back.theta)
     return _refined(a, grid, Placement(1.0 / found.scale, start, 0.0), settings, 1)
@@ -158,7 +159,7 @@ def _checked(name: str, grid: ArrayLike, resolution: float, settings: MergeSetti
 def _ranked(
     a: DescribedMap, grid: tuple[NDArray[np.uint8], float], settings: MergeSettings, scaling: ScaleSettings
 ) -> list[Grown]:
-    """Return hypotheses of how a map lies at some scale, that with most evidence first."""
+    """Return hypotheses of how a map lies at some scale, the best first."""
     b = describe_map(grown_levels(*grid, a.resolution), a.resolution)
     if len(a.walls) == 0 or len(b.walls) == 0:
         return []
@@ -173,7 +174,7 @@ def _refined(
     settings: MergeSettings,
     rounds: int,
 ) -> Grown | None:
-    """Return the hypothesis near a placement, its scale refined by the bend; None without walls."""
+    """Return the hypothesis near a placement, scale refined; None without walls."""
     scale, a_from_b = start.scale, start.a_from_b
     while True:
         rounds -= 1

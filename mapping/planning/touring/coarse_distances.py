@@ -57,7 +57,7 @@ class CoarseGrid(NamedTuple):
     most: int
 
     def cell_of(self, cell: tuple[int, int]) -> tuple[int, int]:
-        """Return the coarse cell that holds a cell of the map, the nearest one where none does."""
+        """Return the coarse cell of a cell of the map, the nearest where it has none."""
         rows, columns = self.is_open.shape
         row, column = (int(cell[0]) - self.row) // self.factor, (int(cell[1]) - self.column) // self.factor
         return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
@@ -89,7 +89,19 @@ def coarse_grid(
 def place_in(
     grid: CoarseGrid, log_odds: NDArray[np.int8], clearance: ClearanceField, cell: tuple[int, int]
 ) -> tuple[int, int]:
-    """Return the cell (row, column) of the map, within a coarse cell that is open, with most clearance."""
+    """Return the map's cell (row, column) with most clearance in an open coarse cell.
+
+    Parameters
+    ----------
+    grid : CoarseGrid
+        Where a body may stand.
+    log_odds : (rows, columns) int8
+        The map: < 0 free.
+    clearance : ClearanceField
+        Its clearance.
+    cell : (row, column)
+        The coarse cell.
+    """
     row, column = grid.row + cell[0] * grid.factor, grid.column + cell[1] * grid.factor
     part = np.s_[row : row + grid.factor, column : column + grid.factor]
     closeness = np.where(log_odds[part] < 0, clearance.closeness[part].astype(np.int64), 1 << 20)
@@ -129,7 +141,7 @@ def nearest_places(
     starts: NDArray[np.int64],
     reach: float,
 ) -> NDArray[np.int64]:
-    """Return the coarse cell beside each group of the map's cells to which the path is shortest.
+    """Return the coarse cell with the shortest path beside each group of cells.
 
     Parameters
     ----------
@@ -173,7 +185,7 @@ def _beside(
 
 @kernel
 def _opened(log_odds: Array, closeness: Array, most: int, factor: int) -> tuple[NDArray[np.bool_], int, int]:
-    """Return which coarse cells hold a cell to stand in, cut to those around what is known."""
+    """Return which coarse cells are open, cut to those around what is known."""
     rows, columns = log_odds.shape
     row_low, row_high, column_low, column_high = rows, 0, columns, 0
     for row in range(rows):

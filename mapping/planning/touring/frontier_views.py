@@ -108,7 +108,7 @@ def views_of(
 def gain_at(
     log_odds: NDArray[np.int8], resolution: float, cell: tuple[int, int], rules: ViewRules
 ) -> tuple[float, float]:
-    """Return the unknown area in view of a cell of the map [m2], and the mean direction to it [rad].
+    """Return the unknown area in view of a cell, and the direction to it [m2, rad].
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def _gain(
 def _view_all(
     log_odds: Array, lengths: Array, cells: Array, starts: Array, rays: Array, frame: _Frame
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return the view of each cluster, what it shows [m2] and the length of the path to it."""
+    """Return each cluster's view, what it shows [m2] and its path's length."""
     count = len(starts) - 1
     views = np.full((count, 2), -1, np.int64)
     gains, found = np.zeros(count), np.full(count, UNREACHED, np.int64)
@@ -206,7 +206,7 @@ def _view_all(
 def _tried(
     log_odds: Array, lengths: Array, cells: Array, rays: Array, frame: _Frame, tried: Array, number: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the coarse cells around a cluster from which it is in sight, and what each shows [m2]."""
+    """Return the coarse cells that see a cluster, and what each shows [m2]."""
     rows, columns = lengths.shape
     places, shown = np.empty((512, 2), np.int64), np.empty(512)
     count = 0

@@ -157,7 +157,7 @@ def _move_pieces(
     weights: TourWeights,
     cost: float,
 ) -> float:
-    """Move every short piece to where it makes the tours better; return what they cost."""
+    """Move short pieces to where tours get better; return what they cost."""
     trial, rest = scratch
     size = sequence.shape[0]
     for length in range(1, min(_LONGEST_PIECE, size - 1) + 1):
