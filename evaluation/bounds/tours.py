@@ -50,9 +50,7 @@ class TourPlan:
     share: float
 
 
-def plan_tours(
-    graph: ViewGraph, share: float, rounds: int, seed: int = 0, begin: Stops | None = None
-) -> TourPlan:
+def plan_tours(graph: ViewGraph, share: float, rounds: int, seed: int = 0) -> TourPlan:
     """Plan short tours from which a share of a floor is seen.
 
     Parameters
@@ -65,14 +63,12 @@ def plan_tours(
         How often stops are taken out and covered again.
     seed : int
         Where draws come from.
-    begin : list of list of int, optional
-        Stops to begin with.
     """
     seen_at_all = np.bitwise_or.reduce(graph.views[reached(graph)], axis=0)
     wanted = math.ceil(share * int(count(seen_at_all)) - 1e-9)
     generator = np.random.default_rng(seed)
     none: Stops = [[] for _ in range(graph.robots)]
-    stops = covered(graph, ordered(graph, covered(graph, begin or none, wanted)), wanted)
+    stops = covered(graph, ordered(graph, covered(graph, none, wanted)), wanted)
     cost = cost_of(graph, stops)
     current, at = stops, cost
     for left in range(rounds, 0, -1):

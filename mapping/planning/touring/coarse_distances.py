@@ -134,55 +134,6 @@ def distances_from(
     return lengths
 
 
-def nearest_places(
-    grid: CoarseGrid,
-    lengths: NDArray[np.int32],
-    cells: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    reach: float,
-) -> NDArray[np.int64]:
-    """Return the coarse cell with the shortest path beside each group of cells.
-
-    Parameters
-    ----------
-    grid : CoarseGrid
-        Where a body may stand.
-    lengths : (rows, columns) int32
-        Lengths of the paths to all coarse cells.
-    cells, starts : (N, 2), (K + 1,) int64
-        Cells (row, column) of the map; group k has ``cells[starts[k]:starts[k + 1]]``.
-    reach : float
-        How far from a cell of the group its place may be, along rows and along columns [m].
-
-    Returns
-    -------
-    (K, 2) int64
-        Coarse cells (row, column); -1 where none within reach can be come to.
-    """
-    return np.asarray(
-        _beside(lengths, cells, starts, (grid.row, grid.column, grid.factor), math.ceil(reach / grid.side))
-    )
-
-
-@kernel
-def _beside(
-    lengths: Array, cells: Array, starts: Array, frame: tuple[int, int, int], reach: int
-) -> NDArray[np.int64]:
-    rows, columns = lengths.shape
-    count = len(starts) - 1
-    places = np.full((count, 2), -1, np.int64)
-    for k in range(count):
-        least = UNREACHED
-        for i in range(starts[k], starts[k + 1]):
-            row, column = (cells[i, 0] - frame[0]) // frame[2], (cells[i, 1] - frame[1]) // frame[2]
-            for other in range(max(row - reach, 0), min(row + reach + 1, rows)):
-                for another in range(max(column - reach, 0), min(column + reach + 1, columns)):
-                    if lengths[other, another] < least:
-                        least = lengths[other, another]
-                        places[k, 0], places[k, 1] = other, another
-    return places
-
-
 @kernel
 def _opened(log_odds: Array, closeness: Array, most: int, factor: int) -> tuple[NDArray[np.bool_], int, int]:
     """Return which coarse cells are open, cut to those around what is known."""
