@@ -25,6 +25,8 @@ class Bound(TeamCommand):
     """share of the floor that has to be seen"""
     rounds: int = 300
     """how often the tours are changed to be shorter"""
+    resolution: float | None = None
+    """metres per pixel, where the floor is a plain image"""
 
 
 def execute(command: Bound) -> Answer:
@@ -48,10 +50,9 @@ def execute(command: Bound) -> Answer:
         raise ValueError(f"rounds is {command.rounds}; want zero or more")
     options = {**command.team_options, "robots": command.robots, "stop_coverage": command.coverage}
     settings = make_settings(**options)
-    starts = drawn_starts(command.floor, settings, command.seed) or starts_in(
-        command.floor, settings, command.seed
-    )
-    floor = load_floor(command.floor)
+    where = command.floor, settings, command.seed, command.resolution
+    starts = drawn_starts(*where) or starts_in(*where)
+    floor = load_floor(command.floor, command.resolution)
     found = known_floor_bound(floor, settings, starts, command.rounds, command.seed)
     is_found = math.isfinite(found.time_s)
     result: dict[str, Any] = {

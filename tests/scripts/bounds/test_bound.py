@@ -3,6 +3,8 @@
 import json
 import sys
 
+import cv2
+import numpy as np
 import pytest
 
 from lidarium.scripts.main import main
@@ -38,3 +40,16 @@ def test_draws_come_from_the_seed(monkeypatch):
     monkeypatch.setattr("lidarium.evaluation.bounds.bound.known_floor_bound", known_floor_bound)
     assert main(["bound", "apartment:3", "--map-resolution", "0.05", "--seed", "5"]) == 2
     assert seeds == [5]
+
+
+def test_a_plain_image_is_a_floor_with_a_resolution(tmp_path, capsys):
+    pytest.importorskip("ortools", reason="OR-Tools is not installed")
+    room = np.zeros((40, 40), np.uint8)
+    room[2:38, 2:38] = 255
+    path = tmp_path / "room.png"
+    cv2.imwrite(str(path), room)
+    arguments = ["bound", str(path), "--map-resolution", "0.05", "--rounds", "1", "--json"]
+    assert main(arguments) == 2
+    assert "pass --resolution" in capsys.readouterr().err
+    assert main([*arguments, "--resolution", "0.1"]) == 0
+    assert json.loads(capsys.readouterr().out)["seen"] >= 0.99
