@@ -106,7 +106,7 @@ class FloorTables:
     def nbytes(self) -> int:
         """How much memory the arrays take, and what episodes have made the rasters keep."""
         rasters = [self.body] if self.laser is self.body else [self.body, self.laser]
-        tables = [self.rays.squares, self.rays.faces, self.rays.face_starts, self.bound]
+        tables: list[NDArray[Any]] = [self.rays.squares, self.rays.faces, self.rays.face_starts, self.bound]
         return sum(raster.nbytes for raster in rasters) + sum(array.nbytes for array in tables)
 
     def _frozen(self) -> "FloorTables":

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.ray_groups import BEHIND
 
 TILE = 128
 """Side of the square tiles that group the faces [cells]."""
@@ -88,7 +89,9 @@ class RayTables:
         if not all(side.all() for side in border):
             raise ValueError("the outermost ring of the raster is not all solid; a ray could leave the floor")
         self.rows, self.columns = solid.shape
-        self.squares = np.empty((4, *solid.shape), np.uint8)
+        # Rays that travel in lanes read whole words, a little further than the last square.
+        room = np.zeros(4 * solid.size + BEHIND, np.uint8)
+        self.squares: NDArray[np.uint8] = room[: 4 * solid.size].reshape(4, *solid.shape)
         _fill_squares(solid, self.squares)
         tile_rows, self.tile_columns = -(-self.rows // TILE), -(-self.columns // TILE)
         found = [_faces(solid, direction, self.tile_columns) for direction in range(4)]

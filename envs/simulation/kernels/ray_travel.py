@@ -1,17 +1,25 @@
-"""Laser scans by travelling through the empty squares of a floor."""
+"""Laser scans by travelling through the empty squares of a floor.
+
+Where the processor has wide registers, 32 beams travel at once; elsewhere one by one. Both do the same
+arithmetic for each beam, and give the same to the bit.
+"""
+
+import numpy as np
 
 from lidarium.mapping.grids.scan_geometry import Beams
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.ray_groups import FLOAT, GROUP, HAS_GATHERS, RAYS
+from lidarium.mapping.kernels.lanes.ray_lanes import travel_bundles, travel_rays
+from lidarium.mapping.kernels.views import scratch_grid, scratch_vector
 
-BUNDLE, INNER_BUNDLE = 32, 8
-"""Numbers of neighbouring beams that travel together, outer and inner.
-
-They do so for as long as free squares hold them all, first the larger bundle, then the smaller.
-"""
-
+BUNDLE = GROUP
+"""Number of neighbouring beams that travel together as long as free squares hold them all."""
 
 INSIDE = 1e-7
 """Beams that travel together stop this far before the border of a square [cells]."""
+
+MOST_PLACES = 2**31
+"""Squares of a table that numbers of 32 bits count."""
 
 
 @kernel(inline=True, borrowing=True)
@@ -65,12 +73,10 @@ def _travel(squares: Array, offset: int, columns: int, beams: Beams, beam: int, 
 
 
 @kernel(inline=True, borrowing=True)
-def _travel_together(
-    squares: Array, offset: int, columns: int, beams: Beams, first: int, last: int, distance: float
-) -> float:
+def _travel_together(squares: Array, offset: int, columns: int, beams: Beams, first: int, last: int) -> float:
     """Return the distance up to which beams run through squares that hold them all.
 
-    The beams ``first`` to ``last``, of one quadrant, begin at a given distance.
+    The beams are those from ``first`` to ``last``, of one quadrant.
 
     The beams between the two outer ones lie within the box of these two at every distance. A square that
     opens from the box's nearest corner and holds the box is free for all, up to where the first of the outer
@@ -84,6 +90,7 @@ def _travel_together(
     forward_x, forward_y = (1 + step_x) // 2, (1 + step_y) // 2
     inverse_x = min(abs(directions[2, first]), abs(directions[2, last])) * step_x
     inverse_y = min(abs(directions[3, first]), abs(directions[3, last])) * step_y
+    distance = 0.0
     while True:
         column_a, column_b = int(x + distance * first_x), int(x + distance * last_x)
         row_a, row_b = int(y + distance * first_y), int(y + distance * last_y)
@@ -95,7 +102,7 @@ def _travel_together(
         border_x = column + forward_x + step_x * (side - 1)
         border_y = row + forward_y + step_y * (side - 1)
         # A little less than the exit, so that every beam is inside the square for certain.
-        leaving = min((border_x - x) * inverse_x, (border_y - y) * inverse_y) - INSIDE
+        leaving: float = min((border_x - x) * inverse_x, (border_y - y) * inverse_y) - INSIDE
         if leaving <= distance + 1.0:
             return distance
         distance = leaving
@@ -103,30 +110,91 @@ def _travel_together(
             return distance
 
 
+@kernel(inline=True, borrowing=True)
+def _is_bundle(directions: Array, first: int, last: int) -> bool:
+    """Whether the beams from the first to the last are of one quadrant."""
+    quadrant = _quadrant(directions, first)
+    middle, end = _quadrant(directions, (first + last) // 2), _quadrant(directions, last)
+    is_one: bool = quadrant == middle and quadrant == end
+    return is_one
+
+
 @kernel(borrowing=True)
-def cast_by_squares(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
-    """Fill ``ranges`` [cells] with the distance to the first solid cell, or the reach."""
-    plane, directions, reach = rows * columns, beams.directions, beams.reach
+def cast_one_by_one(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
+    """Fill ``ranges`` as ``cast_by_squares`` does, beam by beam."""
+    plane, directions = rows * columns, beams.directions
     for first in range(0, ranges.shape[0], BUNDLE):
         last = min(first + BUNDLE, ranges.shape[0]) - 1
         together = 0.0
-        quadrant = _quadrant(directions, first)
-        is_bundle = quadrant == _quadrant(directions, last) and quadrant == _quadrant(
-            directions, (first + last) // 2
-        )
-        if is_bundle:
-            together = _travel_together(squares, quadrant * plane, columns, beams, first, last, 0.0)
-        for inner in range(first, last + 1, INNER_BUNDLE):
-            inner_last = min(inner + INNER_BUNDLE - 1, last)
-            distance = together
-            if is_bundle and distance < reach:
-                distance = _travel_together(
-                    squares, quadrant * plane, columns, beams, inner, inner_last, together
+        if _is_bundle(directions, first, last):
+            offset = _quadrant(directions, first) * plane
+            together = _travel_together(squares, offset, columns, beams, first, last)
+        for beam in range(first, last + 1):
+            if together >= beams.reach:
+                ranges[beam] = beams.reach
+            else:
+                offset = _quadrant(directions, beam) * plane
+                ranges[beam] = _travel(squares, offset, columns, beams, beam, together)
+
+
+@kernel(inline=True, borrowing=True)
+def _list_bundles(beams: Beams, count: int, listed: Array) -> None:
+    """List what ``travel_bundles`` takes of each bundle of a scan of so many beams.
+
+    Bundles that are none stay where they begin: a border at no distance is the next for them.
+    """
+    directions = beams.directions
+    for bundle in range(listed.shape[1]):
+        first, last = bundle * BUNDLE, min(bundle * BUNDLE + BUNDLE, count) - 1
+        if first < count and _is_bundle(directions, first, last):
+            for axis in range(2):
+                step = -1 if directions[axis, first] < 0.0 else 1
+                listed[axis, bundle], listed[2 + axis, bundle] = (
+                    directions[axis, first],
+                    directions[axis, last],
                 )
-            for beam in range(inner, inner_last + 1):
-                if distance >= reach:
-                    ranges[beam] = reach
-                    continue
-                if not is_bundle:
-                    quadrant = _quadrant(directions, beam)
-                ranges[beam] = _travel(squares, quadrant * plane, columns, beams, beam, distance)
+                inverse = min(abs(directions[2 + axis, first]), abs(directions[2 + axis, last]))
+                listed[4 + axis, bundle] = inverse * step
+        else:
+            for row in range(6):
+                listed[row, bundle] = 0.0
+
+
+@kernel(borrowing=True)
+def cast_in_lanes(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
+    """Fill ``ranges`` as ``cast_by_squares`` does, 32 beams at once: at least so many."""
+    count, table, shape = ranges.shape[0], squares.ctypes.data, (rows * columns, columns)
+    origin = (beams.x, beams.y, beams.reach)
+    width = (count + BUNDLE * RAYS - 1) // (BUNDLE * RAYS) * RAYS
+    bundles = scratch_grid(7, width, np.float64)
+    _list_bundles(beams, count, bundles)
+    for first in range(0, width, RAYS):
+        address = bundles.ctypes.data + FLOAT * first
+        travel_bundles(table, shape, origin, INSIDE, address, FLOAT * width)
+    together, whole = bundles.ctypes.data + 6 * FLOAT * width, count // RAYS * RAYS
+    directions, ranges_at = beams.directions.ctypes.data, ranges.ctypes.data
+    for first in range(0, whole, RAYS):
+        offset = FLOAT * first
+        starts = together + offset // BUNDLE
+        travel_rays(table, shape, origin, starts, directions + offset, FLOAT * count, ranges_at + offset)
+    if whole == count:
+        return
+    # The last beams get lanes of their own, filled up with the very last.
+    others, ends = scratch_grid(4, RAYS, np.float64), scratch_vector(RAYS, np.float64)
+    for lane in range(RAYS):
+        beam = min(whole + lane, count - 1)
+        for row in range(4):
+            others[row, lane] = beams.directions[row, beam]
+    starts = together + FLOAT * (whole // BUNDLE)
+    travel_rays(table, shape, origin, starts, others.ctypes.data, FLOAT * RAYS, ends.ctypes.data)
+    for beam in range(whole, count):
+        ranges[beam] = ends[beam - whole]
+
+
+@kernel(borrowing=True)
+def cast_by_squares(squares: Array, rows: int, columns: int, beams: Beams, ranges: Array) -> None:
+    """Fill ``ranges`` [cells] with the distance to the first solid cell, or the reach."""
+    if HAS_GATHERS and ranges.shape[0] >= RAYS and squares.shape[0] < MOST_PLACES:
+        cast_in_lanes(squares, rows, columns, beams, ranges)
+    else:
+        cast_one_by_one(squares, rows, columns, beams, ranges)

@@ -129,3 +129,61 @@ def nearest_codes(
         is_nearer = square < nearest
         nearest, chosen = np.where(is_nearer, square, nearest), np.where(is_nearer, number, chosen)
     return nearest.astype(np.float32), chosen.astype(np.int32)
+
+
+def end_of_ray(
+    squares: Array, origin: tuple[float, float, float], direction: list[float], distance: float
+) -> float:
+    """Return where a ray that is free up to a distance enters a solid cell, or the reach.
+
+    The squares (4, rows, columns) open from each cell into each quadrant. All in cells: the origin is x, y
+    and the reach; the direction is x, y and their inverses.
+    """
+    *start, reach = origin
+    along, inverse = direction[:2], direction[2:]
+    step = [-1 if each < 0.0 else 1 for each in along]
+    table = squares[(step[0] < 0) + 2 * (step[1] < 0)]
+    cell = [int(start[k] + distance * along[k]) for k in range(2)]
+    while distance < reach:
+        side = int(table[cell[1], cell[0]])
+        if side == 0:
+            break
+        last = [cell[k] + step[k] * (side - 1) for k in range(2)]
+        borders = [(last[k] + (step[k] > 0) - start[k]) * inverse[k] for k in range(2)]
+        left, crossed = (0, 1) if borders[0] <= borders[1] else (1, 0)
+        distance = max(distance, borders[left])
+        if distance < reach:
+            place = int(start[crossed] + distance * along[crossed])
+            low, high = sorted((cell[crossed], last[crossed]))
+            cell[left], cell[crossed] = last[left] + step[left], min(max(place, low), high)
+    return min(distance, reach)
+
+
+def end_of_bundle(
+    squares: Array, origin: tuple[float, float, float], outer: list[float], inside: float
+) -> float:
+    """Return how far the rays between two outer ones run through squares that hold them all.
+
+    ``outer`` holds the direction x, y of the first and the last ray, and their least inverses, signed. They
+    stop ``inside`` before the border of a square. All in cells.
+    """
+    *start, reach = origin
+    step = [-1 if each < 0.0 else 1 for each in outer[:2]]
+    table = squares[(step[0] < 0) + 2 * (step[1] < 0)]
+    distance = 0.0
+    while True:
+        cells = [
+            sorted((int(start[k] + distance * outer[k]), int(start[k] + distance * outer[2 + k])))
+            for k in range(2)
+        ]
+        near = [cells[k][0 if step[k] > 0 else 1] for k in range(2)]
+        side = int(table[near[1], near[0]])
+        borders = [
+            (near[k] + step[k] * (side - 1) + (step[k] > 0) - start[k]) * outer[4 + k] for k in range(2)
+        ]
+        leaving = min(borders) - inside
+        if side <= max(high - low for low, high in cells) or leaving <= distance + 1.0:
+            return distance
+        distance = leaving
+        if distance >= reach:
+            return distance

@@ -16,6 +16,8 @@ BLOCK = 64
 HALF_BLOCK = 32
 LANES = 8
 PIXEL_LANES = 16
+GROUP = 16
+RAYS = 32
 
 
 def _bytes(address: int, count: int = BLOCK) -> NDArray[Any]:
@@ -149,6 +151,44 @@ def lower_lanes(
         array_at(address, (LANES,), np.float64) for address in (ranges, inverses, directions)
     )
     lanes[:] = plain.lower_ranges(lanes, along, across, distance, (run, low, high))
+
+
+def travel_rays(
+    squares: int,
+    shape: tuple[int, int],
+    origin: tuple[float, float, float],
+    together: int,
+    directions: int,
+    stride: int,
+    ranges: int,
+) -> None:
+    """Write where rays that are free up to a distance enter a solid cell."""
+    table, found = _squares(squares, shape), array_at(ranges, (RAYS,), np.float64)
+    rows = np.array([array_at(directions + k * stride, (RAYS,), np.float64) for k in range(4)])
+    starts = array_at(together, (RAYS // GROUP,), np.float64)
+    for ray in range(RAYS):
+        found[ray] = plain.end_of_ray(table, origin, rows[:, ray].tolist(), float(starts[ray // GROUP]))
+
+
+def travel_bundles(
+    squares: int,
+    shape: tuple[int, int],
+    origin: tuple[float, float, float],
+    inside: float,
+    bundles: int,
+    stride: int,
+) -> None:
+    """Find how far bundles of rays run through squares that hold them all."""
+    table = _squares(squares, shape)
+    rows = [array_at(bundles + k * stride, (RAYS,), np.float64) for k in range(7)]
+    for bundle in range(RAYS):
+        outer = [float(row[bundle]) for row in rows[:6]]
+        rows[6][bundle] = plain.end_of_bundle(table, origin, outer, inside)
+
+
+def _squares(address: int, shape: tuple[int, int]) -> NDArray[np.uint8]:
+    plane, columns = shape
+    return array_at(address, (4, plane // columns, columns), np.uint8)
 
 
 def raise_lanes(address: int, start: float, slope: float, first: int, last: int) -> None:

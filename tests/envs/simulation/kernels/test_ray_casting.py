@@ -12,7 +12,7 @@ from lidarium.envs.settings.lidar import Lidar
 from lidarium.envs.simulation.kernels.face_casting import FaceTable, cast_by_faces
 from lidarium.envs.simulation.kernels.ray_casting import cast_scan, cast_scans, cut_by_disc
 from lidarium.envs.simulation.kernels.ray_tables import RayTables
-from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares
+from lidarium.envs.simulation.kernels.ray_travel import cast_by_squares, cast_in_lanes, cast_one_by_one
 from lidarium.mapping.grids.scan_geometry import MOST_BEAMS, Beams, ScanGeometry, beam_directions
 
 TENTH_OF_A_MILLIMETRE = 1e-4 / 0.025
@@ -303,6 +303,30 @@ def test_the_casters_agree_with_each_other_on_real_sizes():
         )
         assert np.abs(squares - faces).max() < 1e-6
         assert np.abs(squares - chosen).max() < 1e-6
+
+
+@pytest.mark.parametrize("kind", FLOORS)
+@pytest.mark.parametrize("beams", [32, 33, 48, 63, 121, 720])
+@pytest.mark.parametrize("view", [0.3, math.radians(240.0), 2.0 * math.pi])
+def test_beams_in_lanes_are_those_cast_one_by_one_to_the_bit(kind, beams, view):
+    generator = np.random.default_rng([beams, len(kind)])
+    tables = RayTables(FLOORS[kind](generator))
+    geometry = ScanGeometry(beams=beams, field_of_view=view)
+    free = np.argwhere(tables.squares[0] > 0)
+    for reach in (3.0, 40.0, 300.0):
+        row, column = generator.choice(free)
+        for x, y, heading in [
+            (column + generator.random(), row + generator.random(), generator.uniform(-4.0, 4.0)),
+            (column + 0.5, row + 0.5, math.pi / 4),
+            (float(column), float(row), math.pi / 2),
+        ]:
+            cast = beams_of(x, y, heading, geometry, directions_of(geometry, heading), reach)
+            both = []
+            for caster in (cast_in_lanes, cast_one_by_one):
+                ranges = np.full(beams, np.nan)
+                caster(tables.squares.ravel(), tables.rows, tables.columns, cast, ranges)
+                both.append(ranges.tolist())
+            assert both[0] == both[1]
 
 
 def test_nothing_in_reach_gives_the_reach_itself():
