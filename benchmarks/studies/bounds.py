@@ -169,19 +169,20 @@ def _multiples(lines: Sequence[Mapping[str, Any]], policy: str) -> list[float]:
 def _tight_row(line: Mapping[str, Any]) -> str:
     optimum = "-" if line["optimum_m"] is None else f"{line['optimum_m']:.2f}"
     plan, lower = line["plan_m"], line["lower_m"]
-    cells = (line["floor"], line["places"], f"{plan:.2f}", f"{lower:.2f}", f"{plan / lower:.3f}", optimum)
+    ratio = f"{plan / lower:.3f}" if lower > 0.0 else "-"
+    cells = (line["floor"], line["places"], f"{plan:.2f}", f"{lower:.2f}", ratio, optimum)
     return "| " + " | ".join(str(each) for each in cells) + " |"
 
 
 def page(folder: Path, command: str) -> str:
     """Return the results as markdown."""
     tight, teams = kept_lines(folder / TIGHT_FILE), kept_lines(folder / FLOORS_FILE)
-    ratios = [line["plan_m"] / line["lower_m"] for line in tight]
+    ratios = [line["plan_m"] / line["lower_m"] for line in tight if line["lower_m"] > 0.0]
     solved = [line for line in tight if line["optimum_m"] is not None]
     exact = f"Solved to the optimum within {EXACT_S:.0f} s: {len(solved)} of {len(tight)}."
-    if solved:
-        gaps = [line["optimum_m"] / line["lower_m"] for line in solved]
-        plans = [line["plan_m"] / line["optimum_m"] for line in solved]
+    if any(line["lower_m"] > 0.0 for line in solved):
+        gaps = [line["optimum_m"] / line["lower_m"] for line in solved if line["lower_m"] > 0.0]
+        plans = [line["plan_m"] / line["optimum_m"] for line in solved if line["lower_m"] > 0.0]
         exact += (
             f" There the optimum is {statistics.mean(gaps):.3f} times the lower bound, and the plan "
             f"{statistics.mean(plans):.3f} times the optimum, in the mean."

@@ -43,10 +43,11 @@ SIGHT_MARGIN = 0.1
 """What is this far within the edges of a laser's field of view is seen for certain [rad]."""
 
 MADE_BY = (
-    "evaluation/bounds/bound.py",
-    "evaluation/bounds/driving.py",
-    "evaluation/bounds/tours.py",
-    "evaluation/bounds/view_graph.py",
+    "envs",
+    "evaluation/bounds",
+    "evaluation/episodes/runner.py",
+    "mapping/grids",
+    "mapping/kernels",
 )
 
 
