@@ -7,7 +7,16 @@ from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.scripts.main import main
 
 NAMES = (
-    *("evaluation", "floor_cache", "floors", "interval_coverage", "leaderboard", "merging", "merging_tuning"),
+    *(
+        "bounds",
+        "evaluation",
+        "floor_cache",
+        "floors",
+        "interval_coverage",
+        "leaderboard",
+        "merging",
+        "merging_tuning",
+    ),
     *("parity", "policies", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
 )
 
