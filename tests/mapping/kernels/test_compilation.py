@@ -150,6 +150,7 @@ def test_the_cache_key_changes_with_kernels_and_what_they_import_and_only_then(t
 
 def test_a_start_tells_a_first_one_from_later_ones_by_the_cache(tmp_path, monkeypatch):
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(compilation, "_CHOSEN_BY_USER", False)
     monkeypatch.setattr(compilation, "_FOLDER", tmp_path)
     assert compilation.is_cache_empty()
     (tmp_path / "parallel" / "mapping").mkdir(parents=True)
