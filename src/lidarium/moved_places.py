@@ -248,6 +248,8 @@ MOVED_NAMES: dict[str, tuple[str, ...]] = {
     "mapping.localization.slam": ("mapping.localization.slam.localizer",),
     "scripts.floors": ("scripts.output.floor_files",),
     "scripts.run": ("scripts.output.run_summary",),
+    "envs.drawing.rendering": ("envs.drawing.frame_window",),
+    "mapping.splines.spline_map": ("mapping.splines.landmarks",),
 }
 """Where the names of modules have gone that are there still, or are packages now."""
 
