@@ -1,4 +1,4 @@
-"""The tours of robots past the frontiers of one map, and the first leg of each."""
+"""What robots on one map may drive to, the tours past all of it, and the first leg of each."""
 
 import math
 from collections.abc import Sequence
@@ -76,15 +76,60 @@ class Leg:
     direction: float
 
 
-def plan_legs(
+@dataclass(frozen=True, slots=True)
+class TourOptions:
+    """What robots on one map may drive to: n views of its frontiers, and what getting there takes.
+
+    Attributes
+    ----------
+    grid : CoarseGrid
+        Where the bodies may stand.
+    places : (n, 2) int64
+        Coarse cells (row, column) of the views, the nearest to any robot first.
+    numbers : (n,) int64
+        Numbers of their clusters.
+    gains : (n,) float64
+        Unknown area in view [m2].
+    lengths : (robots, n) float64
+        Lengths of the paths; ``NO_PATH`` where there is none [m].
+    turns : (robots, n) float64
+        By how much each robot turns to set out [rad].
+    is_kept : (robots, n) bool
+        What each robot drives to already.
+    first : (robots, n) float64
+        What setting out costs, turns and what is kept included [m].
+    between : (n, n) float64
+        Lengths of the paths from view to view [m].
+    sequence : (n + robots - 1,) int64
+        The tours, as ``team_tours`` returns them.
+    """
+
+    grid: CoarseGrid
+    places: NDArray[np.int64]
+    numbers: NDArray[np.int64]
+    gains: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+    turns: NDArray[np.float64]
+    is_kept: NDArray[np.bool_]
+    first: NDArray[np.float64]
+    between: NDArray[np.float64]
+    sequence: NDArray[np.int64]
+
+    @property
+    def is_reached(self) -> NDArray[np.bool_]:
+        """What each robot has a path to, (robots, n) bool."""
+        return self.lengths < NO_PATH
+
+
+def tour_options(
     navigation: NavigationMap,
     clusters: Clusters,
     robots: Sequence[Tourist],
     radius: float,
     settings: TourSettings,
     rules: ViewRules,
-) -> list[Leg | None]:
-    """Return the first leg of each robot's tour past the frontiers of a map.
+) -> TourOptions | None:
+    """Return what robots on one map may drive to, None where nothing is left for any.
 
     Parameters
     ----------
@@ -100,14 +145,9 @@ def plan_legs(
         How tours are planned.
     rules : ViewRules
         How views are measured.
-
-    Returns
-    -------
-    list of Leg or None
-        One for each robot; None where nothing is left for it.
     """
     if not len(clusters):
-        return [None] * len(robots)
+        return None
     resolution = navigation.resolution
     grid = coarse_grid(navigation.log_odds, navigation.clearance, radius)
     starts = np.array([grid.cell_of(_cell_at(robot.pose, resolution)) for robot in robots])
@@ -116,26 +156,36 @@ def plan_legs(
     views = views_of(navigation.log_odds, resolution, grid, lengths.min(axis=0), groups, rules)
     chosen = _nearest(views, settings)
     if not len(chosen):
-        return [None] * len(robots)
+        return None
     places = views.cells[chosen]
-    first = _metres(lengths[:, places[:, 0], places[:, 1]], grid)
+    paths = _metres(lengths[:, places[:, 0], places[:, 1]], grid)
     fields = distances_from(grid, places)
     between = _metres(fields[:, places[:, 0], places[:, 1]], grid)
-    is_reached = first < NO_PATH
-    for k, robot in enumerate(robots):
-        first[k] += settings.turn_length * _turns(robot.pose, starts[k], fields, grid, resolution)
-        first[k] -= robot.kept * _are_kept(robot, clusters, chosen, resolution)
-    sequence = team_tours(first, between, views.gains[chosen], settings.weights)
+    turns = np.stack(
+        [
+            _turns(robot.pose, start, fields, grid, resolution)
+            for robot, start in zip(robots, starts, strict=True)
+        ]
+    )
+    is_kept = np.stack([_are_kept(robot, clusters, chosen, resolution) for robot in robots])
+    kept = np.array([[robot.kept] for robot in robots])
+    first = paths + settings.turn_length * turns - kept * is_kept
+    gains = views.gains[chosen]
+    sequence = team_tours(first, between, gains, settings.weights)
+    return TourOptions(grid, places, chosen, gains, paths, turns, is_kept, first, between, sequence)
+
+
+def first_options(options: TourOptions) -> list[int | None]:
+    """Return the option at which each robot's tour begins, None where there is none that it reaches."""
+    firsts = first_places(options.sequence, len(options.numbers))
     return [
-        _leg(navigation, grid, places[number], clusters.of(int(chosen[number])), rules)
-        if number is not None and is_reached[k, number]
-        else None
-        for k, number in enumerate(first_places(sequence, len(chosen)))
+        number if number is not None and options.is_reached[k, number] else None
+        for k, number in enumerate(firsts)
     ]
 
 
 def first_places(sequence: NDArray[np.int64], count: int) -> list[int | None]:
-    """Return the first place of each robot's tour, None where it has none.
+    """Return the number of the first place of each robot's tour, None where it has none.
 
     Parameters
     ----------
@@ -200,15 +250,23 @@ def _are_kept(
     return np.array([np.abs(clusters.of(int(k)) - at).max(axis=1).min() < reach for k in chosen])
 
 
-def _leg(
-    navigation: NavigationMap,
-    grid: CoarseGrid,
-    place: NDArray[np.int64],
-    cells: NDArray[np.int64],
-    rules: ViewRules,
+def leg_to(
+    option: int, options: TourOptions, navigation: NavigationMap, clusters: Clusters, rules: ViewRules
 ) -> Leg:
-    log_odds = navigation.log_odds
-    cell = place_in(grid, log_odds, navigation.clearance, (int(place[0]), int(place[1])))
+    """Return the leg that ends at an option.
+
+    Parameters
+    ----------
+    option : int
+        Its number, 0 to n - 1.
+    options : TourOptions
+        All of them.
+    navigation, clusters, rules
+        As in ``tour_options``.
+    """
+    log_odds, place = navigation.log_odds, options.places[option]
+    cells = clusters.of(int(options.numbers[option]))
+    cell = place_in(options.grid, log_odds, navigation.clearance, (int(place[0]), int(place[1])))
     nearest = cells[int(np.argmin(np.hypot(*(cells - np.asarray(cell)).T)))]
     gain, direction = gain_at(log_odds, navigation.resolution, cell, rules)
     return Leg(cell, (int(nearest[0]), int(nearest[1])), cells, gain, direction)

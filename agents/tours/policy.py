@@ -22,7 +22,7 @@ from lidarium.agents.frontier import FrontierExplorer
 from lidarium.agents.frontier_reach import Choice
 from lidarium.agents.intent import Intent
 from lidarium.agents.policy import Team
-from lidarium.agents.tours.planning import Leg, Tourist, plan_legs
+from lidarium.agents.tours.planning import Leg, Tourist, TourOptions, first_options, leg_to, tour_options
 from lidarium.agents.tours.settings import TourSettings
 from lidarium.envs.onboard.belief import Belief
 from lidarium.envs.onboard.navigation import NavigationMap
@@ -99,11 +99,32 @@ class TourFrontier(FrontierExplorer):
         least = max(math.ceil(self.settings.minimum_size / navigation.resolution - 1e-9), 1)
         clusters = self._without_vain(navigation, least)
         robots = [self._tourist(agent, agent) for agent in agents] + self._others(agents)
-        legs = plan_legs(navigation, clusters, robots, self.footprint.radius, self.settings, self._rules)
-        chosen = {agent: self._begun(agent, leg) for agent, leg in zip(agents, legs, strict=False)}
-        if any(chosen.values()):
-            return chosen
+        options = tour_options(
+            navigation, clusters, robots, self.footprint.radius, self.settings, self._rules
+        )
+        if options is not None:
+            wanted = self.pick(agents, options, clusters)
+            legs = [
+                None if k is None else leg_to(k, options, navigation, clusters, self._rules) for k in wanted
+            ]
+            chosen = {agent: self._begun(agent, leg) for agent, leg in zip(agents, legs, strict=True)}
+            if any(chosen.values()):
+                return chosen
         return {agent: self.current(agent) or self._nearest(agent) for agent in agents}
+
+    def pick(self, agents: list[str], options: TourOptions, clusters: Clusters) -> list[int | None]:
+        """Return which option each robot on one map drives to: the first of its tour.
+
+        Parameters
+        ----------
+        agents : list of str
+            The robots; they are the first ones of the options.
+        options : TourOptions
+            What they may drive to.
+        clusters : Clusters
+            The frontiers that the options show.
+        """
+        return first_options(options)[: len(agents)]
 
     def _begun(self, agent: str, leg: Leg | None) -> Choice | None:
         """Return the choice of a robot that begins a leg."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarium.agents.tours.planning import Tourist, first_places, plan_legs
+from lidarium.agents.tours.planning import Tourist, first_options, first_places, leg_to, tour_options
 from lidarium.agents.tours.settings import TourSettings
 from lidarium.envs.onboard.navigation import NavigationMap
 
@@ -22,7 +22,12 @@ def corridor():
 def legs_of(navigation, robots, **settings):
     chosen = TourSettings(**settings)
     clusters = navigation.frontiers.clusters(minimum_cells=6)
-    return plan_legs(navigation, clusters, robots, 0.18, chosen, chosen.rules(5.6))
+    rules = chosen.rules(5.6)
+    options = tour_options(navigation, clusters, robots, 0.18, chosen, rules)
+    if options is None:
+        return [None] * len(robots)
+    firsts = first_options(options)
+    return [None if k is None else leg_to(k, options, navigation, clusters, rules) for k in firsts]
 
 
 def robot(x, y=1.0, heading=0.0, **kept):
