@@ -11,7 +11,7 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
-FOLDERS = ("envs", "agents", "mapping", "evaluation", "benchmarks", "scripts")
+FOLDERS = ("envs", "agents", "mapping", "evaluation", "training", "benchmarks", "scripts")
 COMMAND = "lidarium_command"
 ROOT = Path(__file__).resolve().parent
 

@@ -47,6 +47,11 @@ POLICIES.register(
     "the team shares out all frontiers as tours past places from which much is seen",
 )
 POLICIES.register(
+    "learned",
+    "lidarium.agents.learned.policy:Learned",
+    "tours of the team, of which a trained network chooses where each robot sets out",
+)
+POLICIES.register(
     "sparse_frontier",
     "lidarium.agents.sparse_frontier:SparseFrontier",
     "robots see all ground with depth cameras, and plan on sparse maps of boxes",

@@ -55,6 +55,7 @@ from lidarium.scripts.run import Run
 from lidarium.scripts.show import Show
 from lidarium.scripts.slam import Slam
 from lidarium.scripts.sparse import edit_map, plan, sparse_map
+from lidarium.scripts.training import train
 
 Choice = (
     Annotated[Run, subcommand("run")]
@@ -69,6 +70,7 @@ Choice = (
     | Annotated[edit_map.EditSparseMap, subcommand("sparse-map-edit")]
     | Annotated[plan.Plan, subcommand("plan")]
     | Annotated[bound.Bound, subcommand("bound")]
+    | Annotated[train.Train, subcommand("train")]
     | Annotated[Floors, subcommand("floors")]
     | Annotated[Bench, subcommand("bench")]
     | Annotated[Show, subcommand("show")]
@@ -87,6 +89,7 @@ _EXECUTE: dict[type, Callable[[Any], Answer]] = {
     edit_map.EditSparseMap: edit_map.execute,
     plan.Plan: plan.execute,
     bound.Bound: bound.execute,
+    train.Train: train.execute,
     floors.List: floors.list_floors,
     floors.Show: floors.show_floor,
     floors.Generate: floors.generate_floor,
@@ -110,6 +113,7 @@ _WITH_KERNELS = (
     edit_map.EditSparseMap,
     plan.Plan,
     bound.Bound,
+    train.Train,
     floors.Prepare,
     Bench,
 )

@@ -17,7 +17,7 @@ import pytest
 import lidarium
 
 ROOT = Path(__file__).resolve().parents[1]
-FOLDERS = ("mapping", "envs", "agents", "evaluation", "benchmarks", "scripts")
+FOLDERS = ("mapping", "envs", "agents", "evaluation", "training", "benchmarks", "scripts")
 SOURCES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
     for folder in FOLDERS

@@ -82,6 +82,10 @@ class TourOptions:
 
     Attributes
     ----------
+    robots : sequence of Tourist
+        Who visits them.
+    clusters : Clusters
+        The frontiers that may be visited.
     grid : CoarseGrid
         Where the bodies may stand.
     places : (n, 2) int64
@@ -104,6 +108,8 @@ class TourOptions:
         The tours, as ``team_tours`` returns them.
     """
 
+    robots: Sequence[Tourist]
+    clusters: Clusters
     grid: CoarseGrid
     places: NDArray[np.int64]
     numbers: NDArray[np.int64]
@@ -114,6 +120,10 @@ class TourOptions:
     first: NDArray[np.float64]
     between: NDArray[np.float64]
     sequence: NDArray[np.int64]
+
+    def cells_of(self, option: int) -> NDArray[np.int64]:
+        """Return the cells (row, column) of the frontier that an option shows, (m, 2) int64."""
+        return self.clusters.of(int(self.numbers[option]))
 
     @property
     def is_reached(self) -> NDArray[np.bool_]:
@@ -172,7 +182,9 @@ def tour_options(
     first = paths + settings.turn_length * turns - kept * is_kept
     gains = views.gains[chosen]
     sequence = team_tours(first, between, gains, settings.weights)
-    return TourOptions(grid, places, chosen, gains, paths, turns, is_kept, first, between, sequence)
+    return TourOptions(
+        robots, clusters, grid, places, chosen, gains, paths, turns, is_kept, first, between, sequence
+    )
 
 
 def first_options(options: TourOptions) -> list[int | None]:
@@ -250,9 +262,7 @@ def _are_kept(
     return np.array([np.abs(clusters.of(int(k)) - at).max(axis=1).min() < reach for k in chosen])
 
 
-def leg_to(
-    option: int, options: TourOptions, navigation: NavigationMap, clusters: Clusters, rules: ViewRules
-) -> Leg:
+def leg_to(option: int, options: TourOptions, navigation: NavigationMap, rules: ViewRules) -> Leg:
     """Return the leg that ends at an option.
 
     Parameters
@@ -261,11 +271,11 @@ def leg_to(
         Its number, 0 to n - 1.
     options : TourOptions
         All of them.
-    navigation, clusters, rules
+    navigation, rules
         As in ``tour_options``.
     """
     log_odds, place = navigation.log_odds, options.places[option]
-    cells = clusters.of(int(options.numbers[option]))
+    cells = options.cells_of(option)
     cell = place_in(options.grid, log_odds, navigation.clearance, (int(place[0]), int(place[1])))
     nearest = cells[int(np.argmin(np.hypot(*(cells - np.asarray(cell)).T)))]
     gain, direction = gain_at(log_odds, navigation.resolution, cell, rules)

@@ -103,16 +103,14 @@ class TourFrontier(FrontierExplorer):
             navigation, clusters, robots, self.footprint.radius, self.settings, self._rules
         )
         if options is not None:
-            wanted = self.pick(agents, options, clusters)
-            legs = [
-                None if k is None else leg_to(k, options, navigation, clusters, self._rules) for k in wanted
-            ]
+            wanted = self.pick(agents, options)
+            legs = [None if k is None else leg_to(k, options, navigation, self._rules) for k in wanted]
             chosen = {agent: self._begun(agent, leg) for agent, leg in zip(agents, legs, strict=True)}
             if any(chosen.values()):
                 return chosen
         return {agent: self.current(agent) or self._nearest(agent) for agent in agents}
 
-    def pick(self, agents: list[str], options: TourOptions, clusters: Clusters) -> list[int | None]:
+    def pick(self, agents: list[str], options: TourOptions) -> list[int | None]:
         """Return which option each robot on one map drives to: the first of its tour.
 
         Parameters
@@ -121,8 +119,6 @@ class TourFrontier(FrontierExplorer):
             The robots; they are the first ones of the options.
         options : TourOptions
             What they may drive to.
-        clusters : Clusters
-            The frontiers that the options show.
         """
         return first_options(options)[: len(agents)]
 

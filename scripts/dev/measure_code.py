@@ -7,7 +7,7 @@ import ast
 import sys
 from pathlib import Path
 
-LAYERS = ("envs", "agents", "mapping", "evaluation", "scripts")
+LAYERS = ("envs", "agents", "mapping", "evaluation", "training", "scripts")
 SKIPS = "fmt: " + "skip"
 LONG_FILE, LONG_FUNCTION, MANY_PARAMETERS, LONG_LINE = 300, 60, 8, 110
 

@@ -80,6 +80,65 @@ def team_tours(
 
 
 @kernel
+def costs_of_firsts(
+    sequence: NDArray[np.int64],
+    robot: int,
+    first: NDArray[np.float64],
+    between: NDArray[np.float64],
+    worth: NDArray[np.float64],
+    weights: TourWeights,
+) -> NDArray[np.float64]:
+    """Return by how much tours cost more where a robot visits each place first, (n,).
+
+    All else keeps its order. Where places are equal, or tours are not the best ones, it may be 0 or less.
+
+    Parameters
+    ----------
+    sequence : (n + robots - 1,) int64
+        The tours, as ``team_tours`` returns them.
+    robot : int
+        Whose tour begins with the place.
+    first, between, worth, weights
+        As in ``team_tours``.
+    """
+    count, size = first.shape[1], sequence.shape[0]
+    costs = np.empty(count)
+    base = _cost(sequence, size, first, between, worth, weights)
+    for place in range(count):
+        changed = with_first(sequence, robot, place, count)
+        costs[place] = _cost(changed, size, first, between, worth, weights) - base
+    return costs
+
+
+@kernel
+def with_first(sequence: NDArray[np.int64], robot: int, place: int, count: int) -> NDArray[np.int64]:
+    """Return tours past ``count`` places in which a robot visits one of them first; the rest keeps its order.
+
+    Parameters
+    ----------
+    sequence : (count + robots - 1,) int64
+        The tours, as ``team_tours`` returns them.
+    robot, place, count : int
+        Which robot, which place, and how many places there are.
+    """
+    changed = np.empty_like(sequence)
+    size, tour = 0, 0
+    if robot == 0:
+        changed[0], size = place, 1
+    for number in sequence:
+        if number == place:
+            continue
+        changed[size] = number
+        size += 1
+        if number >= count:
+            tour += 1
+            if tour == robot:
+                changed[size] = place
+                size += 1
+    return changed
+
+
+@kernel
 def _cost(
     sequence: Array, size: int, first: Array, between: Array, worth: Array, weights: TourWeights
 ) -> float:

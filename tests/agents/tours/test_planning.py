@@ -27,7 +27,7 @@ def legs_of(navigation, robots, **settings):
     if options is None:
         return [None] * len(robots)
     firsts = first_options(options)
-    return [None if k is None else leg_to(k, options, navigation, clusters, rules) for k in firsts]
+    return [None if k is None else leg_to(k, options, navigation, rules) for k in firsts]
 
 
 def robot(x, y=1.0, heading=0.0, **kept):

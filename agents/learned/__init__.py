@@ -1,0 +1,1 @@
+"""Explorers that were trained: what they see, and how they prefer one frontier to another."""

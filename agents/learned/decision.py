@@ -1,0 +1,239 @@
+"""A decision of one robot: what it may drive to, what it sees of that, and how classic tours rank it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.learned.features import (
+    OPTION_FEATURES,
+    SITUATION_FEATURES,
+    TEAMMATE_FEATURES,
+    far_gains,
+    option_features,
+    table_of,
+    teammate_features,
+)
+from lidarium.agents.tours.planning import NO_PATH, TourOptions
+from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.planning.grid_planning import centres_of
+from lidarium.mapping.planning.touring.coarse_distances import place_in
+from lidarium.mapping.planning.touring.map_crops import OCCUPIED, UNKNOWN, map_crops
+from lidarium.mapping.planning.touring.team_tours import TourWeights, costs_of_firsts
+
+CROP_SIDE, CROP_STEP = 24, 0.25
+"""Squares a side of the crop around each option, and the side of a square [m]."""
+
+LEAST_DETOUR = 0.01
+"""What tours do not begin with counts as so much longer at least [m]."""
+
+MOST_DETOUR = 50.0
+"""Tours that are longer than this are all alike [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What one robot may drive to, n options, and what it sees.
+
+    Attributes
+    ----------
+    options : (n, len(OPTION_FEATURES)) float32
+        What it sees of each option.
+    crops : (n, CROP_SIDE, CROP_SIDE) int8
+        The map around each option, see ``map_crops``.
+    teammates : (m, len(TEAMMATE_FEATURES)) float32
+        What it sees of each teammate.
+    situation : (len(SITUATION_FEATURES),) float32
+        What it sees beside.
+    scores : (n,) float32
+        How classic tours rank the options: minus what they cost more [m], 0 for what they begin with.
+    mask : (n,) bool
+        What it may drive to: what it reaches, and what no robot has picked just before.
+    """
+
+    options: NDArray[np.float32]
+    crops: NDArray[np.int8]
+    teammates: NDArray[np.float32]
+    situation: NDArray[np.float32]
+    scores: NDArray[np.float32]
+    mask: NDArray[np.bool_]
+
+    @property
+    def classic(self) -> int:
+        """The option with which classic tours begin."""
+        return int(np.argmax(np.where(self.mask, self.scores, -np.inf)))
+
+
+class Chooser(Protocol):
+    """Chooses an option."""
+
+    def __call__(self, decision: Decision) -> int:
+        """Return the number of an option that the mask allows."""
+        ...
+
+
+def choose_classic(decision: Decision) -> int:
+    """Choose what classic tours begin with."""
+    return decision.classic
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What the decisions of all robots on one map have in common.
+
+    Attributes
+    ----------
+    options : TourOptions
+        What the robots may drive to.
+    resolution : float
+        Side of the map's cells [m].
+    crops : (n, CROP_SIDE, CROP_SIDE) int8
+        The map around each option.
+    views : (n, 2), (n,) float64
+        Places of the views [m], and the directions to what they show [rad].
+    shared : dict of (n,) float64
+        Features of the options that are the same for all robots.
+    situation : dict of float
+        Features of the situation that are.
+    weights : TourWeights
+        What tours are weighed by.
+    """
+
+    options: TourOptions
+    resolution: float
+    crops: NDArray[np.int8]
+    views: tuple[NDArray[np.float64], NDArray[np.float64]]
+    shared: dict[str, NDArray[np.float64]]
+    situation: dict[str, float]
+    weights: TourWeights
+
+
+def scene_of(
+    options: TourOptions,
+    navigation: NavigationMap,
+    reach: float,
+    weights: TourWeights,
+    progress: dict[str, float],
+) -> Scene:
+    """Return what the decisions of all robots on one map have in common.
+
+    Parameters
+    ----------
+    options : TourOptions
+        What they may drive to.
+    navigation : NavigationMap
+        The map.
+    reach : float
+        How far the lasers see [m].
+    weights : TourWeights
+        What tours are weighed by.
+    progress : dict of float
+        ``time``, ``known`` and ``rate``, see ``SITUATION_FEATURES``.
+    """
+    log_odds, resolution = navigation.log_odds, navigation.resolution
+    cells = np.array(
+        [
+            place_in(options.grid, log_odds, navigation.clearance, (int(row), int(column)))
+            for row, column in options.places
+        ],
+        np.int64,
+    )
+    gains, directions = far_gains(log_odds, resolution, cells, reach)
+    crops = map_crops(log_odds, resolution, cells, directions, CROP_SIDE, CROP_STEP)
+    places = np.asarray(centres_of(cells, (0.0, 0.0), resolution), np.float64)
+    sizes = [len(options.cells_of(k)) * resolution for k in range(len(cells))]
+    rows, columns = options.grid.is_open.shape
+    rim = np.minimum(options.places, np.array([rows, columns]) - 1 - options.places).min(axis=1)
+    shared = {
+        "far_gain": gains,
+        "size": np.array(sizes),
+        "unknown": (crops == UNKNOWN).mean(axis=(1, 2)),
+        "occupied": (crops == OCCUPIED).mean(axis=(1, 2)),
+        "rim": rim * options.grid.side,
+    }
+    situation = {
+        **progress,
+        "options": float(len(cells)),
+        "gain": float(options.gains.sum()),
+        "robots": float(len(options.robots)),
+    }
+    return Scene(options, resolution, crops, (places, directions), shared, situation, weights)
+
+
+def decision_of(
+    scene: Scene, robot: int, sequence: NDArray[np.int64], picks: Sequence[int | None]
+) -> Decision | None:
+    """Return the decision of a robot, None where its tour is empty.
+
+    Parameters
+    ----------
+    scene : Scene
+        What it has in common with the others'.
+    robot : int
+        Which robot.
+    sequence : (n + robots - 1,) int64
+        The tours, given what others have picked.
+    picks : sequence of int or None
+        What the robots before it have picked.
+    """
+    options = scene.options
+    tours = tours_in(sequence, len(options.numbers))
+    if not tours[robot] or not options.is_reached[robot, tours[robot][0]]:
+        return None
+    first = tours[robot][0]
+    costs = costs_of_firsts(sequence, robot, options.first, options.between, options.gains, scene.weights)
+    costs = np.clip(costs, LEAST_DETOUR, MOST_DETOUR)
+    costs[first] = 0.0
+    mask = options.is_reached[robot].copy()
+    mask[[pick for pick in picks if pick is not None]] = False
+    own = option_features(options, robot, costs, tours[robot], scene.views)
+    lengths = [_length(options, k, tour) for k, tour in enumerate(tours)]
+    situation = {
+        **scene.situation,
+        "own_tour": lengths[robot],
+        "all_tours": sum(lengths),
+        "picked": float(len(picks)),
+    }
+    others = [
+        (other, _target_of(scene, k, picks), k < len(picks))
+        for k, other in enumerate(options.robots)
+        if k != robot
+    ]
+    return Decision(
+        table_of({**scene.shared, **own}, OPTION_FEATURES),
+        scene.crops,
+        table_of(teammate_features(others, options.robots[robot].pose), TEAMMATE_FEATURES),
+        table_of({name: np.array(value) for name, value in situation.items()}, SITUATION_FEATURES),
+        (-costs).astype(np.float32),
+        mask,
+    )
+
+
+def tours_in(sequence: NDArray[np.int64], count: int) -> list[list[int]]:
+    """Return each robot's tour of a sequence past ``count`` places, see ``team_tours``."""
+    tours: list[list[int]] = [[]]
+    for number in sequence:
+        if number >= count:
+            tours.append([])
+        else:
+            tours[-1].append(int(number))
+    return tours
+
+
+def _length(options: TourOptions, robot: int, tour: list[int]) -> float:
+    """Return the length of a tour, as far as there are paths [m]."""
+    if not tour:
+        return 0.0
+    legs = [options.lengths[robot, tour[0]], *options.between[tour[:-1], tour[1:]]]
+    return float(sum(leg for leg in legs if leg < NO_PATH))
+
+
+def _target_of(scene: Scene, robot: int, picks: Sequence[int | None]) -> NDArray[np.float64] | None:
+    """Return what a robot has picked, or else drives to [m]."""
+    pick = picks[robot] if robot < len(picks) else None
+    if pick is not None:
+        return np.asarray(scene.views[0][pick])
+    kept = scene.options.robots[robot].kept_cell
+    return None if kept is None else (np.array([kept[1], kept[0]]) + 0.5) * scene.resolution

@@ -1,0 +1,98 @@
+"""Learned: robots share out the frontiers of a map as tours, and a network chooses where each sets out.
+
+All but the choice is that of ``tour_frontier``: views, driving, what is given up. A network that corrects
+nothing makes the same decisions to the bit.
+"""
+
+from collections import deque
+from pathlib import Path
+
+from lidarium.agents.learned.decision import Chooser, Decision, decision_of, scene_of
+from lidarium.agents.learned.network import Network
+from lidarium.agents.learned.weights import load_weights
+from lidarium.agents.policy import Team
+from lidarium.agents.tours.planning import TourOptions
+from lidarium.agents.tours.policy import TourFrontier
+from lidarium.envs.onboard.navigation import NavigationMap
+from lidarium.mapping.planning.touring.team_tours import with_first
+
+RATE_S = 20.0
+"""The rate of exploration is that of so long [s]."""
+
+
+class ChosenTours(TourFrontier):
+    """Explorers on tours of which somebody chooses the first leg.
+
+    Parameters
+    ----------
+    choose : callable
+        Gets a ``Decision``, returns the number of an option.
+    shares_map : bool
+        Whether robots explore on the team's map.
+    **settings
+        Any attribute of ``TourSettings``.
+    """
+
+    def __init__(self, choose: Chooser, shares_map: bool = True, **settings: float) -> None:
+        super().__init__(shares_map, **settings)
+        self.choose_option = choose
+
+    def reset(self, team: Team, seed: int) -> None:
+        """Begin an episode."""
+        super().reset(team, seed)
+        self._known: dict[int, deque[tuple[float, float]]] = {}
+
+    def pick(self, agents: list[str], options: TourOptions) -> list[int | None]:
+        """Return which option each robot on one map drives to, robot after robot.
+
+        Each knows what those before it have picked; its options are ranked by the tours that are left.
+        """
+        navigation = self.navigation(agents[0])
+        reach = self.team.belief(agents[0]).lidar.range_max
+        scene = scene_of(options, navigation, reach, self.settings.weights, self._progress(navigation))
+        sequence, picks = options.sequence, list[int | None]()
+        for robot in range(len(agents)):
+            decision = decision_of(scene, robot, sequence, picks)
+            pick = None if decision is None else self._choose_among(decision)
+            if pick is not None:
+                sequence = with_first(sequence, robot, pick, len(options.numbers))
+            picks.append(pick)
+        return picks
+
+    def _choose_among(self, decision: Decision) -> int:
+        """Return the option that is chosen; where there is but one, nobody is asked."""
+        if decision.mask.sum() == 1:
+            return int(decision.mask.argmax())
+        return self.choose_option(decision)
+
+    def _progress(self, navigation: NavigationMap) -> dict[str, float]:
+        """Return the time [s], the free area that is known [m2] and how fast it grows [m2/s]."""
+        known = float((navigation.log_odds < 0).sum()) * navigation.resolution**2
+        past = self._known.setdefault(id(navigation), deque([(0.0, 0.0)]))
+        while len(past) > 1 and past[1][0] <= self.team.time_s - RATE_S:
+            past.popleft()
+        rate = (known - past[0][1]) / max(self.team.time_s - past[0][0], 1.0)
+        past.append((self.team.time_s, known))
+        return {"time": self.team.time_s, "known": known, "rate": rate}
+
+
+class Learned(ChosenTours):
+    """Explorers that were trained.
+
+    Parameters
+    ----------
+    weights : str or Path
+        A file of weights that a training has written; those that the package ships where empty.
+    shares_map : bool
+        Whether robots explore on the team's map.
+    **settings
+        Any attribute of ``TourSettings``; the weights were trained with their defaults.
+
+    Raises
+    ------
+    ValueError
+        Where the file is none of weights for this network.
+    """
+
+    def __init__(self, weights: str | Path = "", shares_map: bool = True, **settings: float) -> None:
+        super().__init__(Network(load_weights(weights)), shares_map, **settings)

@@ -1,0 +1,56 @@
+"""Where the episodes of a training take place: floors of the training set alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lidarium.envs.floors.catalogue.names import SETS
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.training.settings import Round, TrainingSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where an episode takes place.
+
+    Attributes
+    ----------
+    floor : str
+        Name of the floor.
+    settings : ExplorationSettings
+        The team; it ends at ``stop_coverage``.
+    seed : int
+        Of the episode.
+    """
+
+    floor: str
+    settings: ExplorationSettings
+    seed: int
+
+
+def place_of(training: TrainingSettings, stage: Round, number: int) -> Place:
+    """Return where the n-th episode of a training takes place.
+
+    Seeds of floors are those of the training set, from the first on, and begin again behind the last; a floor
+    of another kind with such a seed is in no other set.
+
+    Parameters
+    ----------
+    training : TrainingSettings
+        What is asked for.
+    stage : Round
+        Which kinds of floors, and which teams.
+    number : int
+        Number of the episode.
+    """
+    generator = np.random.default_rng([training.seed, 3, number])
+    first, count = SETS["train"]
+    often = np.array(list(stage.kinds.values()), np.float64)
+    kind = generator.choice(list(stage.kinds), p=often / often.sum())
+    robots = int(generator.choice(stage.robots))
+    return Place(f"{kind}:{first + number % count}", training.team(robots), number)
+
+
+def first_number(training: TrainingSettings, number: int) -> int:
+    """Return the number of the first episode of a round, or of what comes behind all rounds."""
+    return sum(each.floors for each in training.rounds[:number])

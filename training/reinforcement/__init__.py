@@ -1,0 +1,1 @@
+"""Learning from rewards, by proximal policy optimization."""

@@ -1,0 +1,141 @@
+"""Checkpoints of a training by rewards: weights, the optimizer, and how far it has come. No pickle."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+from torch import nn
+
+from lidarium.agents.learned.weights import load_weights, save_weights
+from lidarium.evaluation.episodes.output import write_json
+from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading
+from lidarium.mapping.files.output import write_whole
+from lidarium.training.torch_network import ExplorerNetwork
+
+MOMENTS = ("exp_avg", "exp_avg_sq")
+"""What Adam keeps of each parameter, beside how often it was changed."""
+
+MOST_STATE = 1 << 16
+"""Files that say how far a training has come are no larger."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """A checkpoint of a training by rewards.
+
+    Attributes
+    ----------
+    decisions : int
+        How many were made.
+    curve : list of (int, float)
+        Mean reward of the episodes that ended, by the number of decisions.
+    """
+
+    decisions: int
+    curve: list[tuple[int, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Learner:
+    """What learns, beside the network.
+
+    Attributes
+    ----------
+    critic : Module
+        What estimates how well an episode goes on.
+    optimizer : Adam
+        Of network and critic.
+    """
+
+    critic: nn.Module
+    optimizer: torch.optim.Optimizer
+
+
+def write_checkpoint(
+    folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, learner: Learner
+) -> None:
+    """Write a checkpoint; the file that makes it one is written last."""
+    name = _name(checkpoint.decisions)
+    save_weights(folder / f"{name}.safetensors", network.weights())
+    write_whole(folder / f"{name}.learner.safetensors", save(_state_of(learner)))
+    write_json(folder / f"{name}.json", {"decisions": checkpoint.decisions, "curve": checkpoint.curve})
+    for old in sorted(folder.glob("decisions-*.json"))[:-2]:
+        for path in (old, *(old.with_suffix(end) for end in (".safetensors", ".learner.safetensors"))):
+            path.unlink(missing_ok=True)
+
+
+def latest_checkpoint(folder: Path) -> Checkpoint | None:
+    """Return the latest checkpoint of a folder, None where there is none.
+
+    Raises
+    ------
+    ValueError
+        Where a file is damaged; the message names it.
+    """
+    found = sorted(folder.glob("decisions-*.json"))
+    if not found:
+        return None
+    with reading(found[-1], "how far a training has come"):
+        content = json.loads(read_text(found[-1], MOST_STATE))
+        curve = [(int(number), float(reward)) for number, reward in content["curve"]]
+        return Checkpoint(int(content["decisions"]), curve)
+
+
+def restore(folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, learner: Learner) -> None:
+    """Bring network and learner to where they were at a checkpoint.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        Where a file is damaged or missing, or is of another network.
+    """
+    name = _name(checkpoint.decisions)
+    network.set_weights(load_weights(folder / f"{name}.safetensors"))
+    path = folder / f"{name}.learner.safetensors"
+    try:
+        arrays = load(read_bytes(path))
+        _set_state(learner, arrays)
+    except (SafetensorError, ValueError, KeyError, RuntimeError) as error:
+        raise ValueError(
+            f"{path} is damaged, or of another network: {error}; remove this checkpoint to go on before it"
+        ) from error
+
+
+def weights_of(folder: Path, checkpoint: Checkpoint) -> Path:
+    """Return the file of a checkpoint's weights."""
+    return folder / f"{_name(checkpoint.decisions)}.safetensors"
+
+
+def _name(decisions: int) -> str:
+    return f"decisions-{decisions:09d}"
+
+
+def _parameters(optimizer: torch.optim.Optimizer) -> list[torch.Tensor]:
+    return [each for group in optimizer.param_groups for each in group["params"]]
+
+
+def _state_of(learner: Learner) -> dict[str, NDArray[np.float32]]:
+    arrays = {f"critic.{name}": array.numpy() for name, array in learner.critic.state_dict().items()}
+    for k, parameter in enumerate(_parameters(learner.optimizer)):
+        state = learner.optimizer.state[parameter]
+        if state:
+            arrays |= {f"{k}.{moment}": state[moment].numpy() for moment in MOMENTS}
+            arrays[f"{k}.step"] = np.array([float(state["step"])], np.float32)
+    return arrays
+
+
+def _set_state(learner: Learner, arrays: dict[str, NDArray[np.float32]]) -> None:
+    tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
+    learner.critic.load_state_dict(
+        {name.removeprefix("critic."): tensor for name, tensor in tensors.items() if "critic." in name}
+    )
+    for k, parameter in enumerate(_parameters(learner.optimizer)):
+        if f"{k}.step" not in tensors:
+            continue
+        moments = {moment: tensors[f"{k}.{moment}"].reshape(parameter.shape) for moment in MOMENTS}
+        learner.optimizer.state[parameter] = {"step": tensors[f"{k}.step"][0], **moments}

@@ -1,0 +1,1 @@
+"""Learning from episodes that are run again with one decision changed."""

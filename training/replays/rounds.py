@@ -1,0 +1,137 @@
+"""A round: the episodes of some floors are replayed, and a network is fitted to all replays so far."""
+
+import os
+from collections.abc import Generator
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+
+import torch
+
+from lidarium.agents.learned.network import Network
+from lidarium.agents.learned.weights import load_weights, save_weights
+from lidarium.evaluation.episodes.output import write_json
+from lidarium.evaluation.suites.workers import shared_out
+from lidarium.training.places import first_number, place_of
+from lidarium.training.progress import Progress
+from lidarium.training.replays.fitting import Fit, fit
+from lidarium.training.replays.replaying import classic_preferences, replays_of
+from lidarium.training.replays.samples import Samples, read_samples, write_samples
+from lidarium.training.settings import TrainingSettings
+from lidarium.training.torch_network import ExplorerNetwork
+
+REPLAYS, WEIGHTS, FIT, WITHOUT = "replays", "weights.safetensors", "fit.json", ".none"
+
+
+@dataclass(frozen=True, slots=True)
+class RoundFolder:
+    """Where a round is kept.
+
+    Attributes
+    ----------
+    training : Path
+        The folder of the training.
+    number : int
+        Number of the round.
+    """
+
+    training: Path
+    number: int
+
+    @property
+    def path(self) -> Path:
+        """The round's own folder."""
+        return self.training / f"round-{self.number}"
+
+    @property
+    def weights(self) -> Path:
+        """What was fitted in it."""
+        return self.path / WEIGHTS
+
+    @property
+    def before(self) -> Path | None:
+        """The weights that decide in it, None where classic tours do."""
+        return RoundFolder(self.training, self.number - 1).weights if self.number else None
+
+    def replays(self, number: int) -> Path:
+        """Return the file of the replays of an episode."""
+        return self.path / REPLAYS / f"{number:06d}.npz"
+
+
+def run_round(
+    training: TrainingSettings, folder: RoundFolder, workers: int
+) -> Generator[Progress, None, None]:
+    """Do what is missing of a round, floor by floor; what is finished is on the disk.
+
+    Parameters
+    ----------
+    training : TrainingSettings
+        What is asked for.
+    folder : RoundFolder
+        Where the round is kept; the one before has ended.
+    workers : int
+        How many processes replay; they change nothing in what is found.
+    """
+    if folder.weights.exists():
+        return
+    stage = training.rounds[folder.number]
+    begin = first_number(training, folder.number)
+    numbers = range(begin, begin + stage.floors)
+    missing = [number for number in numbers if not _is_done(folder.replays(number))]
+    name = f"round {folder.number}: replays"
+    done = stage.floors - len(missing)
+    folder.replays(0).parent.mkdir(parents=True, exist_ok=True)
+    yield Progress(name, done, stage.floors)
+    for number, result in shared_out(partial(_replay, training, folder), missing, workers):
+        if isinstance(result, Exception):
+            raise result
+        done += 1
+        yield Progress(name, done, stage.floors, {"floor": float(number), "samples": float(result)})
+    yield from _fit(training, folder)
+
+
+def _is_done(path: Path) -> bool:
+    return path.exists() or path.with_suffix(WITHOUT).exists()
+
+
+def _replay(training: TrainingSettings, folder: RoundFolder, number: int) -> int:
+    """Replay the episode of a floor into its file; return how many samples it has."""
+    preferences = (
+        classic_preferences if folder.before is None else Network(load_weights(folder.before)).preferences
+    )
+    stage = training.rounds[folder.number]
+    samples = replays_of(place_of(training, stage, number), preferences, stage.replays)
+    path = folder.replays(number)
+    if samples is None or not len(samples):
+        path.with_suffix(WITHOUT).touch()
+        return 0
+    write_samples(path, samples)
+    return len(samples)
+
+
+def _fit(training: TrainingSettings, folder: RoundFolder) -> Generator[Progress, None, None]:
+    """Fit a network to the replays of this round and all before it."""
+    torch.manual_seed(training.seed + folder.number)
+    network = ExplorerNetwork()
+    if folder.before is not None:
+        network.set_weights(load_weights(folder.before))
+    floors: list[Samples] = []
+    for number in range(folder.number + 1):
+        part = RoundFolder(folder.training, number).path / REPLAYS
+        floors += [read_samples(path) for path in sorted(part.glob("*.npz"))]
+    course: list[Fit] = []
+    name = f"round {folder.number}: fit"
+    for each in fit(network, floors, training.fit, training.seed + folder.number):
+        course.append(each)
+        yield Progress(name, len(course), training.fit.epochs, asdict(each))
+    samples = sum(len(each) for each in floors)
+    write_json(
+        folder.path / FIT, {"floors": len(floors), "samples": samples, "epochs": [asdict(e) for e in course]}
+    )
+    # Last: where it is, the round has ended.
+    save_weights(folder.weights, network.weights())
+
+
+def threads_for(workers: int) -> int:
+    """Return how many threads PyTorch uses: as many as there are workers, and cores."""
+    return max(min(workers, os.cpu_count() or 1), 1)

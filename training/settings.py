@@ -1,0 +1,240 @@
+"""What a training is asked for, and how it is read from a TOML file."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from lidarium.envs.floors.generation.buildings import KINDS
+from lidarium.envs.settings.exploration import ExplorationSettings
+from lidarium.envs.settings.making import make_settings
+from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.mapping.geometry.bounds import above, check_settings, share, shown, within
+
+MOST_BYTES = 1 << 20
+"""Files of settings are no larger."""
+
+FLOOR_KINDS = ("building", *KINDS)
+"""Kinds of generated floors to train on."""
+
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Round:
+    """Floors whose episodes are replayed, after which the network is fitted; a curriculum has several.
+
+    Attributes
+    ----------
+    floors : int
+        How many.
+    kinds : dict of float
+        How often each kind of floor comes, beside the others.
+    robots : tuple of int
+        Sizes of teams; each comes as often as it stands here.
+    replays : int
+        How often an episode is replayed; less often where that takes long.
+    """
+
+    floors: Annotated[int, within(2, 10_000)] = 400
+    kinds: Mapping[str, float] = field(default_factory=lambda: {"building": 1.0})
+    robots: tuple[int, ...] = (1, 1, 2, 3)
+    replays: Annotated[int, within(1, 1000)] = 24
+
+    def __post_init__(self) -> None:
+        check_settings(self, "a round")
+        for kind, often in self.kinds.items():
+            if kind not in FLOOR_KINDS:
+                raise ValueError(f"kinds has {shown(kind)}; want some of {', '.join(FLOOR_KINDS)}")
+            if isinstance(often, bool) or not isinstance(often, int | float) or not 0.0 <= often <= 1e6:
+                raise ValueError(f"kinds.{kind} is {shown(often)}; want a number of 0 or more")
+        if not sum(self.kinds.values()) > 0.0:
+            raise ValueError(f"kinds is {shown(dict(self.kinds))}; want at least one above 0")
+        if not self.robots or not all(type(size) is int and 1 <= size <= 100 for size in self.robots):
+            raise ValueError(f"robots is {shown(self.robots)}; want sizes of teams, as in [1, 1, 2, 3]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitSettings:
+    """How a network is fitted to replays.
+
+    Attributes
+    ----------
+    epochs : int
+        How often it sees all samples.
+    batch : int
+        Samples of an update.
+    learning_rate, weight_decay : float
+        Of AdamW.
+    full_share : float
+        Savings and losses of this share of an episode's time or more are all alike.
+    held_out : float
+        Share of the floors that are not fitted; the epoch that is best on them is kept.
+    correction_cost : float
+        Cost of the square of a correction [1/m2]: without evidence tours remain as they are.
+    """
+
+    epochs: Annotated[int, within(1, 10_000)] = 30
+    batch: Annotated[int, within(1, 100_000)] = 256
+    learning_rate: Annotated[float, above(0.0, 1.0)] = 3e-4
+    weight_decay: Annotated[float, within(0.0, 10.0)] = 0.01
+    full_share: Annotated[float, above(0.0, 1.0)] = 0.1
+    held_out: Annotated[float, share()] = 0.1
+    correction_cost: Annotated[float, within(0.0, 10.0)] = 0.001
+
+    def __post_init__(self) -> None:
+        check_settings(self, "fit")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PpoSettings:
+    """How a network goes on by proximal policy optimization with masks; see sb3-contrib's MaskablePPO.
+
+    Attributes
+    ----------
+    decisions : int
+        How many; 0 for none.
+    checkpoint : int
+        So many decisions lie between two checkpoints; episodes begin afresh behind each.
+    environments : int
+        Episodes side by side, each in a process of its own.
+    steps : int
+        Decisions of each environment between two updates.
+    batch, epochs : int
+        Decisions of a step of gradients, and how often an update sees all.
+    learning_rate, clip, entropy, discount, trace : float
+        Rate of Adam, greatest change of a ratio, weight of the entropy, gamma and lambda.
+    """
+
+    decisions: Annotated[int, within(0, 100_000_000)] = 0
+    checkpoint: Annotated[int, within(1, 10_000_000)] = 8192
+    environments: Annotated[int, within(1, 256)] = 4
+    steps: Annotated[int, within(2, 100_000)] = 512
+    batch: Annotated[int, within(2, 100_000)] = 256
+    epochs: Annotated[int, within(1, 100)] = 4
+    learning_rate: Annotated[float, above(0.0, 1.0)] = 1e-4
+    clip: Annotated[float, above(0.0, 1.0)] = 0.1
+    entropy: Annotated[float, within(0.0, 1.0)] = 0.001
+    discount: Annotated[float, above(0.0, 1.0)] = 1.0
+    trace: Annotated[float, share()] = 0.95
+
+    def __post_init__(self) -> None:
+        check_settings(self, "ppo")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValidationSettings:
+    """On what networks are compared with classic tours.
+
+    Attributes
+    ----------
+    floors : tuple of str
+        Floors as for `lidarium evaluate`.
+    robots : tuple of int
+        Sizes of teams.
+    """
+
+    floors: tuple[str, ...] = ("set:validation:40",)
+    robots: tuple[int, ...] = (1, 2, 3)
+
+    def __post_init__(self) -> None:
+        check_settings(self, "validation")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainingSettings:
+    """What a training is asked for.
+
+    Attributes
+    ----------
+    seed : int
+        Where all draws come from.
+    settings : dict
+        Options of the environment, as in a suite.
+    rounds : tuple of Round
+        What is replayed; the network is fitted after each, and decides in the next.
+    fit, ppo, validation
+        How the network is fitted, how it goes on, and on what it is compared.
+    """
+
+    seed: Annotated[int, within(0, 2**31 - 1)] = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    rounds: tuple[Round, ...] = (Round(),)
+    fit: FitSettings = field(default_factory=FitSettings)
+    ppo: PpoSettings = field(default_factory=PpoSettings)
+    validation: ValidationSettings = field(default_factory=ValidationSettings)
+
+    def __post_init__(self) -> None:
+        self.team(1)
+
+    def team(self, robots: int) -> ExplorationSettings:
+        """Return the settings of a team; it ends where 0.99 of the floor is seen, or as ``settings`` says.
+
+        Raises
+        ------
+        ValueError
+            Where a setting cannot be used.
+        """
+        options = {"stop_coverage": 0.99, "horizon_s": 1800.0, **self.settings}
+        try:
+            return make_settings(**{**options, "robots": robots})
+        except (TypeError, AttributeError) as error:
+            raise ValueError(f"settings of the training cannot be used: {error}") from error
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what JSON can hold of it."""
+        return asdict(self)
+
+
+def read_training(path: Path) -> TrainingSettings:
+    """Read what a training is asked for from a TOML file.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        Where there is no such file, or what it holds cannot be used; the message names it.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"no training {path}; want a TOML file, as docs/tutorials/train.md shows one")
+    text = read_text(path, MOST_BYTES)
+    with reading(path, "TOML"):
+        content = tomllib.loads(text)
+    with reading(path, "a training that can be used"):
+        return training_of(content)
+
+
+def training_of(content: Mapping[str, Any]) -> TrainingSettings:
+    """Make settings of what a TOML file holds.
+
+    Raises
+    ------
+    ValueError
+        Where a key is unknown, or a value cannot be used.
+    """
+    parts: dict[str, Any] = dict(content)
+    rounds = parts.get("rounds", [{}])
+    if not isinstance(rounds, list) or not rounds:
+        raise ValueError(f"rounds is {shown(rounds)}; want one or more tables [[rounds]]")
+    parts["rounds"] = tuple(_made(Round, each, "a round") for each in rounds)
+    for name, kind in (("fit", FitSettings), ("ppo", PpoSettings), ("validation", ValidationSettings)):
+        parts[name] = _made(kind, parts.get(name, {}), name)
+    if not isinstance(parts.get("settings", {}), dict):
+        raise ValueError(f"settings is {shown(parts['settings'])}; want a table [settings]")
+    return _made(TrainingSettings, parts, "a training")
+
+
+def _made(kind: type[Part], content: Any, name: str) -> Part:  # noqa: ANN401
+    """Return a part made of a table; lists become tuples."""
+    if not isinstance(content, Mapping):
+        raise ValueError(f"{name} is {shown(content)}; want a table")
+    known = [each.name for each in fields(kind)]  # type: ignore[arg-type]
+    unknown = sorted(set(content) - set(known))
+    if unknown:
+        raise ValueError(f"{name} has no {shown(unknown[0])}; it has {', '.join(known)}")
+    values = {key: tuple(value) if isinstance(value, list) else value for key, value in content.items()}
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise ValueError(f"{name} cannot be used: {error}") from error

@@ -1,0 +1,196 @@
+"""A whole training in a folder: rounds of replays, then rewards; what is best beside classic tours is kept.
+
+What is finished is on the disk. The same call goes on where an earlier one was broken off.
+"""
+
+import json
+import time
+from collections.abc import Generator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+
+import lidarium
+from lidarium.agents.learned.weights import load_weights, save_weights
+from lidarium.evaluation.episodes.output import write_json
+from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.training.progress import Progress
+from lidarium.training.replays.rounds import FIT, RoundFolder, run_round
+from lidarium.training.settings import MOST_BYTES, TrainingSettings
+from lidarium.training.validation import Validated, compared, validate
+
+TRAINING_FILE, HOURS_FILE, WEIGHTS_FILE, CARD_FILE = (
+    "training.json",
+    "hours.json",
+    "weights.safetensors",
+    "card.json",
+)
+REWARDS, VALIDATION, TENSORBOARD = "rewards", "validation", "tensorboard"
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """A training that runs into a folder.
+
+    Parameters
+    ----------
+    settings : TrainingSettings
+        What is asked for.
+    folder : Path
+        Where to. A folder of an earlier call with the same settings and version goes on.
+    workers : int
+        How many processes; they change nothing in what is found.
+    """
+
+    settings: TrainingSettings
+    folder: Path
+    workers: int = 1
+
+    def run(self) -> Generator[Progress, None, None]:
+        """Run what is missing, and yield each step when it is on the disk.
+
+        Raises
+        ------
+        ValueError
+            Where the folder holds another training or other files, or ``workers`` is less than 1.
+        OSError
+            Where the folder cannot be written to.
+        """
+        if self.workers < 1:
+            raise ValueError(f"workers is {self.workers}; want at least 1")
+        self._begin()
+        torch.set_num_threads(1)
+        clock = time.monotonic()
+        for step in self._steps():
+            yield step
+            clock = self._count_hours(clock)
+
+    def _steps(self) -> Generator[Progress, None, None]:
+        candidates: dict[str, Path] = {}
+        for number in range(len(self.settings.rounds)):
+            folder = RoundFolder(self.folder, number)
+            for step in run_round(self.settings, folder, self.workers):
+                self._log(step)
+                yield step
+            candidates[f"round-{number}"] = folder.weights
+            yield from validate(self.settings, self.folder / VALIDATION, candidates, self.workers)
+        begin = candidates[self._best(candidates)]
+        if self.settings.ppo.decisions:
+            candidates[REWARDS] = yield from self._learn(begin)
+            yield from validate(self.settings, self.folder / VALIDATION, candidates, self.workers)
+        self._keep_best(candidates)
+        yield Progress("done", 1, 1)
+
+    def _learn(self, begin: Path) -> Generator[Progress, None, Path]:
+        """Go on by rewards; return the file of the weights."""
+        from lidarium.training.reinforcement.checkpoints import latest_checkpoint, weights_of
+        from lidarium.training.reinforcement.learning import learn
+
+        folder = self.folder / REWARDS
+        yield from learn(self.settings, folder, begin, self.workers, self.folder / TENSORBOARD)
+        last = latest_checkpoint(folder)
+        if last is None:
+            raise ValueError(f"{folder} has no checkpoint; run the training again")
+        return weights_of(folder, last)
+
+    def _begin(self) -> None:
+        """Check that the folder is this training's, or new.
+
+        Raises
+        ------
+        ValueError
+            Where it is not; the message says what differs.
+        """
+        path, asked = self.folder / TRAINING_FILE, self._asked()
+        if not path.exists():
+            if self.folder.exists() and any(self.folder.iterdir()):
+                raise ValueError(
+                    f"{self.folder} has files, and no training has written them; choose another folder"
+                )
+            write_json(path, asked)
+            return
+        with reading(path, "what a training was asked for"):
+            kept = dict(json.loads(read_text(path, MOST_BYTES)))
+        for name in sorted({*kept, *asked}):
+            if kept.get(name) != asked.get(name):
+                raise ValueError(
+                    f"{self.folder} holds a training with {name} = {kept.get(name)!r}, this one has "
+                    f"{asked.get(name)!r}; choose another folder"[:480]
+                )
+
+    def _asked(self) -> dict[str, Any]:
+        content: dict[str, Any] = json.loads(json.dumps(self.settings.as_dict()))
+        return {"version": lidarium.__version__, **content}
+
+    def _best(self, candidates: dict[str, Path]) -> str:
+        """Return the name of what took least time on the floors of the validation."""
+        return min(candidates, key=lambda name: self._validated(name).ratio)
+
+    def _validated(self, name: str) -> Validated:
+        return compared(self.folder / VALIDATION, name, self.settings)
+
+    def _keep_best(self, candidates: dict[str, Path]) -> None:
+        """Write the best weights, and the card that says where they come from."""
+        best = self._best(candidates)
+        digest = save_weights(self.folder / WEIGHTS_FILE, load_weights(candidates[best]))
+        fits = {
+            f"round-{number}": _fitted(RoundFolder(self.folder, number))
+            for number in range(len(self.settings.rounds))
+        }
+        card = {
+            "sha256": digest,
+            "best": best,
+            "hours": self._hours(),
+            "workers": self.workers,
+            "versions": {"lidarium": lidarium.__version__, "torch": torch.__version__},
+            "training": self._asked(),
+            "validation": {name: asdict(self._validated(name)) for name in candidates},
+            "fits": fits,
+            "rewards": self._curve(),
+        }
+        write_json(self.folder / CARD_FILE, card)
+
+    def _curve(self) -> list[tuple[int, float]]:
+        if not self.settings.ppo.decisions:
+            return []
+        from lidarium.training.reinforcement.checkpoints import latest_checkpoint
+
+        last = latest_checkpoint(self.folder / REWARDS)
+        return [] if last is None else last.curve
+
+    def _hours(self) -> float:
+        path = self.folder / HOURS_FILE
+        if not path.exists():
+            return 0.0
+        with reading(path, "the hours of a training"):
+            return float(json.loads(read_text(path, MOST_BYTES))["hours"])
+
+    def _count_hours(self, since: float) -> float:
+        """Add what has passed to the hours of the training, from time to time; return since when to count."""
+        now = time.monotonic()
+        if now - since < COUNT_PERIOD_S:
+            return since
+        write_json(self.folder / HOURS_FILE, {"hours": self._hours() + (now - since) / 3600.0})
+        return now
+
+    def _log(self, step: Progress) -> None:
+        """Write the figures of a fit for TensorBoard."""
+        if not step.part.endswith("fit"):
+            return
+        from torch.utils.tensorboard import SummaryWriter
+
+        with SummaryWriter(str(self.folder / TENSORBOARD)) as writer:
+            for name, figure in step.figures.items():
+                writer.add_scalar(f"{step.part}/{name}", figure, step.done)
+
+
+COUNT_PERIOD_S = 5.0
+"""The hours of a training are written so often [s]."""
+
+
+def _fitted(folder: RoundFolder) -> dict[str, Any]:
+    path = folder.path / FIT
+    with reading(path, "how a fit went"):
+        return dict(json.loads(read_text(path, MOST_BYTES)))

@@ -1,0 +1,132 @@
+"""Networks beside classic tours, paired, on floors that are not trained on."""
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lidarium.evaluation.suites.campaign import EPISODES_FILE, Campaign
+from lidarium.evaluation.suites.episodes_file import read_episodes
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
+from lidarium.training.progress import Progress
+from lidarium.training.settings import TrainingSettings
+
+CLASSIC = "tour_frontier"
+"""What networks are compared with, and correct."""
+
+
+@dataclass(frozen=True, slots=True)
+class Validated:
+    """How a network does beside classic tours.
+
+    Attributes
+    ----------
+    ratio : float
+        Geometric mean of its times over those of classic tours, episode by episode.
+    better : float
+        Share of the episodes in which it was faster.
+    ended, classic_ended : int
+        Episodes that saw enough.
+    episodes : int
+        Pairs.
+    by_robots : dict of float
+        The ratio by size of team.
+    """
+
+    ratio: float
+    better: float
+    ended: int
+    classic_ended: int
+    episodes: int
+    by_robots: Mapping[str, float]
+
+
+def validate(
+    training: TrainingSettings, folder: Path, candidates: Mapping[str, Path], workers: int
+) -> Generator[Progress, None, None]:
+    """Run what is missing of classic tours and of networks on the floors of the validation.
+
+    Parameters
+    ----------
+    training : TrainingSettings
+        What is asked for.
+    folder : Path
+        Where episodes are kept.
+    candidates : mapping of str to Path
+        Files of weights by name.
+    workers : int
+        How many processes.
+
+    Raises
+    ------
+    Exception
+        What an episode has raised.
+    """
+    settings = {"stop_coverage": 0.99, "horizon_s": 1800.0, **training.settings}
+    suite = Suite(
+        policies=(CLASSIC, *candidates),
+        floors=training.validation.floors,
+        robots=training.validation.robots,
+        seeds=(0,),
+        variants={DEFAULT_VARIANT: settings},
+        policy_settings={
+            name: {"policy": "learned", "weights": str(path.absolute())} for name, path in candidates.items()
+        },
+    )
+    campaign = Campaign(suite, folder, workers, records=False)
+    total = sum(1 for _ in suite.trials())
+    for _ in campaign.run():
+        yield Progress("validation", campaign.done, total)
+    if campaign.failures:
+        raise campaign.failures[0][1]
+
+
+def compared(folder: Path, name: str, training: TrainingSettings) -> Validated:
+    """Return how a network did beside classic tours.
+
+    Parameters
+    ----------
+    folder : Path
+        Where episodes are kept.
+    name : str
+        Which network.
+    training : TrainingSettings
+        What is asked for.
+
+    Raises
+    ------
+    ValueError
+        Where there is no pair of episodes.
+    """
+    horizon = training.team(1).horizon_s or 0.0
+    times: dict[str, dict[tuple[Any, ...], float | None]] = {CLASSIC: {}, name: {}}
+    for episode in read_episodes(folder / EPISODES_FILE):
+        if episode["policy"] in times:
+            key = (episode["robots"], episode["floor"], episode["seed"])
+            times[episode["policy"]][key] = episode["t99_s"]
+    pairs = sorted(set(times[CLASSIC]) & set(times[name]))
+    if not pairs:
+        raise ValueError(f"{folder} has no episodes of {name} beside {CLASSIC}; run the training again")
+    ours = np.array([_time(times[name][pair], horizon) for pair in pairs])
+    theirs = np.array([_time(times[CLASSIC][pair], horizon) for pair in pairs])
+    ratios, robots = ours / theirs, np.array([pair[0] for pair in pairs])
+    return Validated(
+        _mean(ratios),
+        float((ours < theirs).mean()),
+        sum(times[name][pair] is not None for pair in pairs),
+        sum(times[CLASSIC][pair] is not None for pair in pairs),
+        len(pairs),
+        {str(size): _mean(ratios[robots == size]) for size in np.unique(robots)},
+    )
+
+
+def _time(found: float | None, horizon: float) -> float:
+    return horizon if found is None else found
+
+
+def _mean(ratios: "np.typing.NDArray[np.float64]") -> float:
+    """Return the geometric mean."""
+    return float(np.exp(np.log(ratios).mean()))
