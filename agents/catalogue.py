@@ -112,9 +112,13 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
         Where the name is unknown; the message suggests the nearest one. Where there is no such module or
         class, or it makes no policy.
     """
-    if not isinstance(name, str) or ":" not in name:
-        return POLICIES[name](**settings)
-    policy = maker_at(name)(**settings)
+    maker = POLICIES[name] if not isinstance(name, str) or ":" not in name else maker_at(name)
+    try:
+        policy = maker(**settings)
+    except TypeError as error:
+        if "unexpected keyword argument" not in str(error):
+            raise
+        raise ValueError(f"policy {name!r} has no such setting: {error}; leave it out") from error
     if not isinstance(policy, Policy):
         raise ValueError(f"policy {name!r} makes {type(policy).__name__}; want a subclass of Policy")
     return policy

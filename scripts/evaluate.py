@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import Positional
 
 from lidarium.scripts.common import DEFECT, INTERRUPTED, Answer, TeamCommand, counted, notify, table
+from lidarium.scripts.options.policy import options_by_policy
 from lidarium.scripts.options.supervisor import check_supervised, is_supervised, supervisor_options
 from lidarium.scripts.process import first_start
 
@@ -42,6 +43,8 @@ class Evaluate(TeamCommand):
     """folder of real floors, for presets"""
     policies: tuple[str, ...] = ("nearest_frontier", "utility_frontier", "explore_lite")
     """who decides; `lidarium show policies` lists them; module:Class for your own"""
+    policy_set: tuple[str, ...] = ()
+    """settings of policies as POLICY.KEY=VALUE, such as learned.weights=FILE"""
     floors: tuple[str, ...] = ()
     """floors as for `lidarium run`, apartment where left out.
 
@@ -104,11 +107,13 @@ def _suite(command: Evaluate) -> "Suite":
     from lidarium.evaluation.suites.suite import Suite, read_suite
     from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
-    if command.supervisor and (command.suite is not None or command.preset is not None):
-        raise ValueError(
-            "settings of the supervisor are given beside a suite or a preset; want them in its "
-            "policy_settings"
-        )
+    if command.suite is not None or command.preset is not None:
+        for given, what in ((command.supervisor, "the supervisor"), (command.policy_set, "policies")):
+            if given:
+                raise ValueError(
+                    f"settings of {what} are given beside a suite or a preset; want them in its "
+                    "policy_settings"
+                )
     if command.suite is not None:
         return read_suite(command.suite)
     if command.seeds < 1:
@@ -136,14 +141,13 @@ def _suite(command: Evaluate) -> "Suite":
 
 
 def _policy_settings(command: Evaluate) -> dict[str, dict[str, Any]]:
-    """Return what the supervised policies are made with."""
+    """Return what the policies are made with."""
+    given = options_by_policy(command.policy_set, command.policies)
     options = supervisor_options(command.supervisor)
-    if not options:
-        return {}
-    led = [name for name in command.policies if is_supervised(name)]
-    if not led:
+    led = [name for name in command.policies if is_supervised(name)] if options else []
+    if options and not led:
         check_supervised(command.policies[0])
-    return dict.fromkeys(led, options)
+    return given | {name: options | given.get(name, {}) for name in led}
 
 
 def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name
+from lidarium.scripts.options.policy import policy_options
 from lidarium.scripts.options.supervisor import check_supervised, supervisor_options
 from lidarium.scripts.output.run_files import write_run
 from lidarium.scripts.output.run_summary import run_summary
@@ -58,6 +59,8 @@ class Run(TeamCommand):
     Left out, a team is supervised: it does not know its starts, localizes by SLAM, and merges its maps.
     One robot, or robots with a goal, drive to the nearest frontier as the options say.
     """
+    policy_set: tuple[str, ...] = ()
+    """settings of the policy as KEY=VALUE, such as weights=FILE of `learned`"""
     resolution: float | None = None
     """metres per pixel, where the floor is a plain image"""
     horizon_s: float | None = None
@@ -149,10 +152,10 @@ def _completed(command: Run) -> Run:
 
 def _policy_options(command: Run) -> dict[str, Any]:
     """Return what the policy is made with."""
-    if not command.supervisor:
-        return {}
-    options = supervisor_options(command.supervisor)
-    check_supervised(command.chosen_policy)
+    options = policy_options(command.policy_set)
+    if command.supervisor:
+        options |= supervisor_options(command.supervisor)
+        check_supervised(command.chosen_policy)
     return options
 
 

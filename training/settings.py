@@ -166,6 +166,7 @@ class TrainingSettings:
     validation: ValidationSettings = field(default_factory=ValidationSettings)
 
     def __post_init__(self) -> None:
+        check_settings(self, "training")
         self.team(1)
 
     def team(self, robots: int) -> ExplorationSettings:

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from lidarium.mapping.planning.touring.team_tours import TourWeights, team_tours
+from lidarium.mapping.planning.touring.team_tours import TourWeights, costs_of_firsts, team_tours, with_first
 
 
 def cost_of(sequence, first, between, worth, weights):
@@ -66,3 +66,33 @@ def test_robots_share_places_on_either_side():
 def test_no_places_leave_empty_tours():
     found = team_tours(np.zeros((3, 0)), np.zeros((0, 0)), np.zeros(0), TourWeights(1.0, 0.1, 0.0))
     assert found.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("robots", [1, 2, 3])
+def test_costs_of_firsts_are_those_of_the_tours_that_begin_so(robots):
+    generator = np.random.default_rng(robots)
+    weights = TourWeights(1.0, 0.1, 0.05)
+    first, between, worth = drawn(generator, robots, 6)
+    sequence = team_tours(first, between, worth, weights)
+    base = cost_of(sequence, first, between, worth, weights)
+    for robot in range(robots):
+        costs = costs_of_firsts(sequence, robot, first, between, worth, weights)
+        for place in range(6):
+            changed = with_first(sequence, robot, place, 6)
+            assert sorted(changed) == sorted(sequence)
+            tours = np.split(changed, np.flatnonzero(changed >= 6))
+            assert next(number for number in tours[robot] if number < 6) == place
+            rest = [number for number in changed if number != place]
+            assert rest == [number for number in sequence if number != place]
+            assert costs[place] == pytest.approx(cost_of(changed, first, between, worth, weights) - base)
+
+
+def test_what_comes_first_already_costs_nothing_more():
+    first, between, worth = drawn(np.random.default_rng(5), 2, 5)
+    weights = TourWeights(1.0, 0.1, 0.05)
+    sequence = team_tours(first, between, worth, weights)
+    for robot, tour in enumerate(np.split(sequence, np.flatnonzero(sequence >= 5))):
+        numbers = tour[tour < 5]
+        if len(numbers):
+            costs = costs_of_firsts(sequence, robot, first, between, worth, weights)
+            assert costs[numbers[0]] == 0.0

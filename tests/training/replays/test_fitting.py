@@ -1,0 +1,82 @@
+"""Networks fitted to replays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from drawn_decisions import drawn_decision
+
+from lidarium.agents.learned.features import OPTION_FEATURES, TEAMMATE_FEATURES
+from lidarium.training.decisions import stacked
+from lidarium.training.replays.fitting import evaluate, fit, losses_of, mirrored
+from lidarium.training.replays.samples import SHARES, Samples
+from lidarium.training.settings import FitSettings
+from lidarium.training.torch_network import ExplorerNetwork
+
+GAIN = list(OPTION_FEATURES).index("gain")
+
+
+def floor_of(seed, count=40):
+    """Return samples in which options of greater gain save time, whatever classic tours say."""
+    generator = np.random.default_rng(seed)
+    decisions = stacked([drawn_decision(generator, 2, 1) for _ in range(count)])
+    other = np.zeros(count, np.int64)
+    more = decisions.options[:, 0, GAIN] - decisions.options[:, 1, GAIN]
+    times = np.full((count, len(SHARES)), 100.0)
+    return Samples(decisions, np.ones(count, np.int64), other, times, times - 8.0 * np.sign(more)[:, None])
+
+
+def test_what_saves_time_is_learned_and_holds_on_other_floors():
+    torch.manual_seed(0)
+    network, settings = ExplorerNetwork(), FitSettings(epochs=25, batch=64, learning_rate=2e-3)
+    unseen = floor_of(1000, 400)
+    assert evaluate(network, unseen, settings) == 0.0
+    course = list(fit(network, [floor_of(seed) for seed in range(20)], settings, 0))
+    assert len(course) == 25
+    # 0.4 is the best: half of the options save 8 % of the time, of which 10 % count fully.
+    assert evaluate(network, unseen, settings) < -0.25
+
+
+def test_the_best_epoch_on_what_is_held_out_is_kept():
+    torch.manual_seed(0)
+    network, settings = ExplorerNetwork(), FitSettings(epochs=6, batch=16, learning_rate=1e-3, held_out=0.5)
+    floors = [floor_of(seed, 20) for seed in range(4)]
+    course = list(fit(network, floors, settings, 3))
+    order = np.random.default_rng(3).permutation(4)[:2]
+    held = [evaluate(network, floors[k], settings) for k in order]
+    assert np.mean(held) == pytest.approx(min(0.0, *(each.held_out for each in course)), abs=1e-6)
+
+
+def test_losses_are_bounded_shares_of_the_time():
+    samples = floor_of(0, 4)
+    samples.replayed[:, -1] = [50.0, 99.0, 105.0, np.inf]
+    np.testing.assert_allclose(losses_of(samples, 0.1), [-1.0, -0.1, 0.5, 1.0], atol=1e-6)
+
+
+def test_the_same_seed_gives_the_same_weights():
+    found = []
+    for _ in range(2):
+        torch.manual_seed(5)
+        network = ExplorerNetwork()
+        list(fit(network, [floor_of(0), floor_of(1)], FitSettings(epochs=2, batch=32), 1))
+        found.append(network.weights())
+    for name, array in found[0].items():
+        np.testing.assert_array_equal(array, found[1][name])
+
+
+def test_mirrored_twice_is_as_before():
+    decisions = floor_of(0, 5).decisions
+    once = mirrored(decisions)
+    left = list(OPTION_FEATURES).index("left")
+    np.testing.assert_array_equal(once.options[..., left], -decisions.options[..., left])
+    sine = list(TEAMMATE_FEATURES).index("sine")
+    np.testing.assert_array_equal(once.teammates[..., sine], -decisions.teammates[..., sine])
+    np.testing.assert_array_equal(once.crops[0, 0, :, 0], decisions.crops[0, 0, :, -1])
+    for name in ("options", "crops", "teammates"):
+        np.testing.assert_array_equal(getattr(mirrored(once), name), getattr(decisions, name))
+
+
+def test_one_floor_is_too_few():
+    with pytest.raises(ValueError, match="2 at least"):
+        list(fit(ExplorerNetwork(), [replace(floor_of(0))], FitSettings(), 0))

@@ -1,0 +1,57 @@
+"""Samples of replays in files."""
+
+import numpy as np
+import pytest
+from drawn_decisions import drawn_decision
+
+from lidarium.training.decisions import MOST_TEAMMATES, stacked
+from lidarium.training.replays.samples import SHARES, Samples, joined, read_samples, write_samples
+
+
+def drawn(count, seed=0):
+    generator = np.random.default_rng(seed)
+    return Samples(
+        stacked([drawn_decision(generator, 4, 2) for _ in range(count)]),
+        np.full(count, 1),
+        np.full(count, 2),
+        generator.uniform(10, 20, (count, len(SHARES))),
+        generator.uniform(10, 20, (count, len(SHARES))),
+    )
+
+
+def test_what_was_written_is_read(tmp_path):
+    samples = drawn(3)
+    samples.replayed[1] = np.inf
+    path = tmp_path / "a.npz"
+    write_samples(path, samples)
+    found = read_samples(path)
+    for name in ("options", "crops", "teammates", "situation", "scores", "mask", "counts"):
+        first, second = getattr(samples.decisions, name), getattr(found.decisions, name)
+        np.testing.assert_array_equal(first, second)
+        assert first.dtype == second.dtype
+    np.testing.assert_array_equal(found.replayed, samples.replayed)
+    assert len(found) == 3
+
+
+@pytest.mark.parametrize("length", [0, 10, 1000])
+def test_damaged_files_are_named(tmp_path, length):
+    path = tmp_path / "a.npz"
+    write_samples(path, drawn(2))
+    path.write_bytes(path.read_bytes()[:length])
+    with pytest.raises(ValueError, match=r"a\.npz"):
+        read_samples(path)
+
+
+def test_parts_are_joined():
+    whole = joined([drawn(2, 0), drawn(3, 1)])
+    assert len(whole) == 5
+    np.testing.assert_array_equal(whole.decisions.options[2:], drawn(3, 1).decisions.options)
+    with pytest.raises(ValueError, match="no samples"):
+        joined([])
+
+
+def test_of_many_teammates_the_first_are_kept():
+    decision = drawn_decision(np.random.default_rng(0), 3, 20)
+    table = stacked([decision])
+    assert table.counts.tolist() == [[3, MOST_TEAMMATES]]
+    np.testing.assert_array_equal(table.teammates[0], decision.teammates[:MOST_TEAMMATES])

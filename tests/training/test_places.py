@@ -1,0 +1,43 @@
+"""Where trainings take place."""
+
+from collections import Counter
+
+from lidarium.envs.floors.catalogue.names import SETS
+from lidarium.training.places import first_number, place_of
+from lidarium.training.settings import Round, TrainingSettings
+
+
+def test_floors_are_those_of_the_training_set_alone():
+    training = TrainingSettings(seed=1, rounds=(Round(kinds={"building": 1.0, "office": 1.0}),))
+    first, count = SETS["train"]
+    for number in (0, 5, 9_999, 10_000, 123_456):
+        place = place_of(training, training.rounds[0], number)
+        kind, seed = place.floor.split(":")
+        assert kind in ("building", "office")
+        assert first <= int(seed) < first + count
+        assert place.seed == number
+
+
+def test_kinds_and_teams_come_as_often_as_is_asked():
+    stage = Round(kinds={"apartment": 3.0, "office": 1.0, "corridors": 0.0}, robots=(1, 1, 3))
+    training = TrainingSettings(rounds=(stage,))
+    places = [place_of(training, stage, number) for number in range(600)]
+    kinds = Counter(place.floor.split(":")[0] for place in places)
+    assert set(kinds) == {"apartment", "office"}
+    assert 0.7 < kinds["apartment"] / 600 < 0.8
+    robots = Counter(place.settings.robots for place in places)
+    assert 0.6 < robots[1] / 600 < 0.73
+    assert set(robots) == {1, 3}
+
+
+def test_a_place_depends_on_its_number_and_the_seed_alone():
+    stage = Round(kinds={"apartment": 1.0, "office": 1.0}, robots=(1, 2, 3))
+    training, other = TrainingSettings(seed=1, rounds=(stage,)), TrainingSettings(seed=2, rounds=(stage,))
+    places = [place_of(training, stage, number) for number in range(30)]
+    assert places == [place_of(training, stage, number) for number in range(30)]
+    assert places != [place_of(other, stage, number) for number in range(30)]
+
+
+def test_rounds_follow_each_other():
+    training = TrainingSettings(rounds=(Round(floors=5), Round(floors=7)))
+    assert [first_number(training, number) for number in range(3)] == [0, 5, 12]

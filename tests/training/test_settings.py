@@ -1,0 +1,81 @@
+"""What a training is asked for."""
+
+import pytest
+
+from lidarium.training.settings import TrainingSettings, read_training, training_of
+
+WHOLE = """
+seed = 3
+[settings]
+resolution = 0.05
+[[rounds]]
+floors = 4
+kinds = { apartment = 1.0, office = 0.5 }
+robots = [1, 2]
+replays = 2
+[[rounds]]
+floors = 3
+[fit]
+epochs = 5
+[ppo]
+decisions = 100
+[validation]
+floors = ["apartment"]
+robots = [1]
+"""
+
+
+def test_a_file_says_what_to_train(tmp_path):
+    path = tmp_path / "training.toml"
+    path.write_text(WHOLE)
+    training = read_training(path)
+    assert training.seed == 3
+    assert [each.floors for each in training.rounds] == [4, 3]
+    assert training.rounds[0].kinds == {"apartment": 1.0, "office": 0.5}
+    assert training.fit.epochs == 5
+    assert training.ppo.decisions == 100
+    assert training.validation.floors == ("apartment",)
+    team = training.team(2)
+    assert (team.robots, team.occupancy.resolution, team.stop_coverage) == (2, 0.05, 0.99)
+
+
+def test_all_has_defaults():
+    assert training_of({}) == TrainingSettings()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("sed = 1", "a training has no 'sed'"),
+        ("[fit]\nepoch = 1", "fit has no 'epoch'"),
+        ("[fit]\nepochs = 0", "epochs"),
+        ("[fit]\nepochs = '3'", "epochs"),
+        ("[ppo]\ndecisions = -1", "decisions"),
+        ("[ppo]\ndiscount = 0.0", "discount"),
+        ("rounds = []", "one or more tables"),
+        ("rounds = 3", "one or more tables"),
+        ("[[rounds]]\nfloors = 1", "floors"),
+        ("[[rounds]]\nkinds = { castle = 1.0 }", "castle"),
+        ("[[rounds]]\nkinds = { office = 0.0 }", "at least one above 0"),
+        ("[[rounds]]\nkinds = { office = true }", "kinds.office is True"),
+        ("[[rounds]]\nrobots = []", "sizes of teams"),
+        ("[[rounds]]\nrobots = [0]", "sizes of teams"),
+        ("settings = 3", "want a table"),
+        ("[settings]\nresolutoin = 0.05", "resolutoin"),
+        ("[settings]\nresolution = -1.0", "resolution"),
+        ("seed = -1", "seed"),
+        ("fit = 3", "fit is 3; want a table"),
+        ("x = [", "TOML"),
+    ],
+)
+def test_what_cannot_be_used_is_named(tmp_path, change, message):
+    path = tmp_path / "training.toml"
+    path.write_text(change)
+    with pytest.raises(ValueError, match=message) as raised:
+        read_training(path)
+    assert str(path) in str(raised.value)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"nowhere\.toml"):
+        read_training(tmp_path / "nowhere.toml")
