@@ -16,6 +16,7 @@ from lidarium.mapping.planning.touring.coarse_distances import (
     UNREACHED,
     CoarseGrid,
     coarse_grid,
+    distances_among,
     distances_from,
     place_in,
 )
@@ -169,8 +170,8 @@ def tour_options(
         return None
     places = views.cells[chosen]
     paths = _metres(lengths[:, places[:, 0], places[:, 1]], grid)
-    fields = distances_from(grid, places)
-    between = _metres(fields[:, places[:, 0], places[:, 1]], grid)
+    between, fields = distances_among(grid, places, starts)
+    between = _metres(between, grid)
     turns = np.stack(
         [
             _turns(robot.pose, start, fields, grid, resolution)

@@ -130,8 +130,42 @@ def distances_from(
     """
     most = UNREACHED - _BUCKETS if math.isinf(maximum) else int(maximum / grid.side * STRAIGHT)
     lengths = np.full((len(starts), *grid.is_open.shape), UNREACHED, np.int32)
-    _spread(grid.is_open, np.ascontiguousarray(starts, np.int64), most, lengths)
+    no_targets = np.zeros((0, 2), np.int64)
+    _spread(grid.is_open, np.ascontiguousarray(starts, np.int64), no_targets, most, lengths)
     return lengths
+
+
+def distances_among(
+    grid: CoarseGrid, places: NDArray[np.int64], others: NDArray[np.int64]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return the lengths of the shortest paths among places, and from each around other cells.
+
+    Parameters
+    ----------
+    grid : CoarseGrid
+        Where a body may stand.
+    places : (n, 2) int64
+        Open coarse cells (row, column).
+    others : (m, 2) int64
+        Coarse cells.
+
+    Returns
+    -------
+    (n, n) int32
+        Lengths between places, as in ``distances_from``.
+    (n, rows, columns) int32
+        Lengths from each place, as far as they are no longer than those to ``others``; others may be
+        ``UNREACHED``.
+    """
+    lengths = np.full((len(places), *grid.is_open.shape), UNREACHED, np.int32)
+    places, others = np.ascontiguousarray(places, np.int64), np.ascontiguousarray(others, np.int64)
+    # Paths are as long there as back: each place has to reach but those behind it.
+    for k in range(len(places)):
+        targets = np.concatenate([others, places[k + 1 :]])
+        _spread(grid.is_open, places[k : k + 1], targets, UNREACHED - _BUCKETS, lengths[k : k + 1])
+    between = lengths[:, places[:, 0], places[:, 1]]
+    upper = np.triu(between)
+    return upper + np.triu(between, 1).T, lengths
 
 
 @kernel
@@ -164,20 +198,27 @@ def _opened(log_odds: Array, closeness: Array, most: int, factor: int) -> tuple[
 
 
 @kernel
-def _spread(is_open: Array, starts: Array, most: int, lengths: Array) -> None:
-    """Spread lengths from each start, the cells of equal length after each other."""
+def _spread(is_open: Array, starts: Array, targets: Array, most: int, lengths: Array) -> None:
+    """Spread lengths from each start, the cells of equal length after each other.
+
+    Where there are targets, it ends when all cells of the lengths up to the farthest target's are reached.
+    """
     rows, columns = is_open.shape
     # A bucket holds cells of one length, and none of them twice.
     queues = np.empty((_BUCKETS, rows * columns), np.int32)
     counts = np.zeros(_BUCKETS, np.int64)
+    is_target = np.zeros(rows * columns if len(targets) else 0, np.bool_)
+    for row, column in targets:
+        is_target[row * columns + column] = True
+    wanted = is_target.sum()
     for k in range(starts.shape[0]):
         length_of = lengths[k].reshape(-1)
         length_of[starts[k, 0] * columns + starts[k, 1]] = 0
         counts[:] = 0
         queues[0, 0] = starts[k, 0] * columns + starts[k, 1]
         counts[0] = 1
-        length, empty = 0, 0
-        while empty < _BUCKETS and length <= most:
+        length, empty, found = 0, 0, 0
+        while empty < _BUCKETS and length <= most and (wanted == 0 or found < wanted):
             bucket = length % _BUCKETS
             count = counts[bucket]
             counts[bucket] = 0
@@ -186,6 +227,8 @@ def _spread(is_open: Array, starts: Array, most: int, lengths: Array) -> None:
                 cell = queues[bucket, i]
                 if length_of[cell] != length:
                     continue
+                if wanted > 0 and is_target[cell]:
+                    found += 1
                 row, column = cell // columns, cell % columns
                 for rise, run, step in _STEPS:
                     at_row, at_column = row + rise, column + run

@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from lidarium.mapping.planning.clearance import ClearanceField
-from lidarium.mapping.planning.touring.coarse_distances import UNREACHED, coarse_grid, distances_from
+from lidarium.mapping.planning.touring.coarse_distances import (
+    UNREACHED,
+    coarse_grid,
+    distances_among,
+    distances_from,
+)
 
 
 def lengths_by_heap(is_open, start):
@@ -92,3 +97,20 @@ def test_a_map_without_anything_known_has_one_closed_cell():
     grid = coarse_grid(log_odds, ClearanceField(log_odds.shape, 0.05, 0.6), 0.18)
     assert not grid.is_open.any()
     assert math.isclose(grid.side, 0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_lengths_among_places_are_those_to_all(seed):
+    log_odds, field = drawn_map(seed)
+    grid = coarse_grid(log_odds, field, 0.18)
+    generator = np.random.default_rng(seed)
+    is_open = np.argwhere(grid.is_open)
+    places, others = generator.choice(is_open, 6, replace=False), generator.choice(is_open, 2, replace=False)
+    whole = distances_from(grid, places)
+    between, fields = distances_among(grid, places, others)
+    np.testing.assert_array_equal(between, whole[:, places[:, 0], places[:, 1]])
+    for k in range(6):
+        farthest = whole[k][others[:, 0], others[:, 1]].max()
+        near = whole[k] <= farthest
+        np.testing.assert_array_equal(fields[k][near], whole[k][near])
+        assert (fields[k] >= whole[k]).all()
