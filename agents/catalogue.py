@@ -67,6 +67,16 @@ POLICIES.register(
     "robots explore alone; a station merges their maps, and redirects and stops them by a tree of rules",
 )
 POLICIES.register(
+    "supervised_tours",
+    "lidarium.agents.supervisor.factories:supervised_tours",
+    "as supervised, with robots that explore by tours",
+)
+POLICIES.register(
+    "supervised_learned",
+    "lidarium.agents.supervisor.factories:supervised_learned",
+    "as supervised, with robots that were trained",
+)
+POLICIES.register(
     "independent",
     "lidarium.agents.supervisor.factories:independent",
     "each robot explores the whole floor alone; a bound for teams that merge their maps",

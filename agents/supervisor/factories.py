@@ -2,17 +2,38 @@
 
 from typing import Any
 
+from lidarium.agents.catalogue import make_policy
 from lidarium.agents.frontier_policies import NearestFrontier
 from lidarium.agents.policy import PerRobot
 from lidarium.agents.supervisor.policy import Supervised
 
 
-def supervised(**options: Any) -> Supervised:  # noqa: ANN401
-    """Return nearest-frontier explorers under a supervisor.
+def supervised(explorer: str = "nearest_frontier", **options: Any) -> Supervised:  # noqa: ANN401
+    """Return explorers under a supervisor.
 
-    Options are those of ``SupervisorSettings``.
+    Parameters
+    ----------
+    explorer : str
+        Name of the policy that each robot explores by.
+    **options
+        Those of ``SupervisorSettings``.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such policy, or it goes to no goals.
     """
-    return Supervised(NearestFrontier(), **options)
+    return Supervised(make_policy(explorer), **options)
+
+
+def supervised_tours(**options: Any) -> Supervised:  # noqa: ANN401
+    """Return tour explorers under a supervisor; options as for ``supervised``."""
+    return supervised("tour_frontier", **options)
+
+
+def supervised_learned(**options: Any) -> Supervised:  # noqa: ANN401
+    """Return explorers that were trained, under a supervisor; options as for ``supervised``."""
+    return supervised("learned", **options)
 
 
 def oracle_starts(**options: Any) -> Supervised:  # noqa: ANN401

@@ -72,6 +72,7 @@ class Supervised(Policy):
             )
         self.policy, self.settings = policy, settings or SupervisorSettings(**options)
         self.level, self.observes = policy.level, policy.observes
+        self.decision_period_s = policy.decision_period_s
         self.has_begun = False
         self.tick_seconds: list[float] = []
         self.merge_seconds: list[float] = []

@@ -160,8 +160,9 @@ def tour_options(
     if not len(clusters):
         return None
     resolution = navigation.resolution
-    grid = coarse_grid(navigation.log_odds, navigation.clearance, radius)
-    starts = np.array([grid.cell_of(_cell_at(robot.pose, resolution)) for robot in robots])
+    cells = np.array([_cell_at(robot.pose, resolution) for robot in robots])
+    grid = coarse_grid(navigation.log_odds, navigation.clearance, radius, starts=cells)
+    starts = np.array([grid.cell_of((int(row), int(column))) for row, column in cells])
     lengths = distances_from(grid, starts)
     groups = (clusters.cells, clusters.starts)
     views = views_of(navigation.log_odds, resolution, grid, lengths.min(axis=0), groups, rules)

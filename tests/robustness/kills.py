@@ -1,10 +1,10 @@
-"""Evaluations that are killed at random moments, they or their workers, and go on.
+"""Evaluations and trainings that are killed at random moments, they or their workers, and go on.
 
-``python -m robustness.kills --count 1000``
+``python -m robustness.kills --count 1000``, with ``--train`` for trainings
 
 Run it in the folder ``tests``. A folder is filled by one command, called again after each kill until it ends
-by itself. Then nothing may be lost or there twice: every episode and record is that of an evaluation that
-nobody disturbed, and what was on the disk once stays there.
+by itself. Then nothing may be lost or there twice: every episode, record, replay and weight is that of a
+command that nobody disturbed, and what was on the disk once stays there.
 """
 
 import argparse
@@ -19,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,6 +30,14 @@ VICTIMS = ("parent", "worker", "all")
 PROGRAM = "import sys; from lidarium.scripts.main import main; sys.exit(main())"
 TEAM = ("--floors", "srt_l_room", "--policies", "random_walk", "--robots", "1", "--workers", "2")
 SHORT = ("--horizon-s", "1", "--map-resolution", "0.1", "--lidar", "lidar_360_6m")
+TRAINING = """
+seed = 1
+settings = { resolution = 0.1, horizon_s = 600.0, stop_coverage = 0.9 }
+rounds = [{ floors = 3, kinds = { apartment = 1.0 }, robots = [1], replays = 2 }]
+fit = { epochs = 2, batch = 4 }
+ppo = { decisions = 24, checkpoint = 8, environments = 1, steps = 8, batch = 8, epochs = 1 }
+validation = { floors = ["srt_l_room"], robots = [1] }
+"""
 ENDS_S = 120.0
 """How long an evaluation may take to end when it is left alone [s]."""
 
@@ -67,10 +75,29 @@ def children_of(process: int) -> list[int]:
         return []
 
 
+@dataclass(frozen=True)
+class Work:
+    """What is killed.
+
+    Attributes
+    ----------
+    words : tuple of str
+        The command, but for where it writes.
+    found_in : callable
+        Returns what lies in its folder, without what differs between two runs.
+    kept_in : callable
+        Returns what may never go again.
+    """
+
+    words: tuple[str, ...]
+    found_in: Callable[[Path], dict[str, object]]
+    kept_in: Callable[[Path], set[object]]
+
+
 @contextmanager
-def evaluating(out: Path, episodes: int) -> Iterator["subprocess.Popen[bytes]"]:
+def working(work: Work, out: Path) -> Iterator["subprocess.Popen[bytes]"]:
     """Run the command in a group of processes of its own, all of which are gone at the end."""
-    command = [sys.executable, "-c", PROGRAM, "evaluate", *TEAM, *SHORT, "--seeds", str(episodes)]
+    command = [sys.executable, "-c", PROGRAM, *work.words]
     with open(out.with_suffix(".txt"), "ab") as told:
         process = subprocess.Popen(
             [*command, "--out", str(out)], stdout=told, stderr=told, start_new_session=True
@@ -83,10 +110,23 @@ def evaluating(out: Path, episodes: int) -> Iterator["subprocess.Popen[bytes]"]:
         process.wait()
 
 
-def kill(process: "subprocess.Popen[bytes]", victim: str, chance: random.Random) -> str:
-    """Kill an evaluation, one of its children or all; return who was killed.
+def evaluation(episodes: int) -> Work:
+    """Return an evaluation of so many episodes."""
+    words = ("evaluate", *TEAM, *SHORT, "--seeds", str(episodes))
+    return Work(words, found_in, lambda out: {line for line in lines_of(out) if line.endswith(b"\n")})
 
-    It is the evaluation itself where it has no children yet, and nobody where it has ended.
+
+def training(place: Path) -> Work:
+    """Return a training whose file lies in a folder."""
+    path = place / "training.toml"
+    path.write_text(TRAINING)
+    return Work(("train", str(path), "--workers", "2"), trained_in, replays_in)
+
+
+def kill(process: "subprocess.Popen[bytes]", victim: str, chance: random.Random) -> str:
+    """Kill a command, one of its children or all; return who was killed.
+
+    It is the command itself where it has no children yet, and nobody where it has ended.
     """
     children = children_of(process.pid)
     if process.poll() is not None:
@@ -118,6 +158,23 @@ def found_in(out: Path) -> dict[str, object]:
     return found
 
 
+def trained_in(out: Path) -> dict[str, object]:
+    """Return what a training leaves, without hours and times of the clock."""
+    found: dict[str, object] = {}
+    for path in sorted([*out.rglob("*.safetensors"), *out.rglob("replays/*"), *out.rglob("fit.json")]):
+        found[path.relative_to(out).as_posix()] = hashlib.sha256(path.read_bytes()).hexdigest()
+    if (out / "card.json").exists():
+        card = json.loads((out / "card.json").read_text())
+        found["card.json"] = {name: card[name] for name in ("best", "sha256", "validation", "rewards")}
+    found["validation"] = found_in(out / "validation")["episodes.jsonl"]
+    return found
+
+
+def replays_in(out: Path) -> set[object]:
+    """Return the replays and fitted weights of a training."""
+    return {path.relative_to(out).as_posix() for path in out.glob("round-*/**/*") if path.is_file()}
+
+
 def has_left(group: int) -> bool:
     """Whether no process of a group is left, after a while."""
     ends = time.monotonic() + LEAVES_S
@@ -130,16 +187,16 @@ def has_left(group: int) -> bool:
     return False
 
 
-def complete(out: Path, episodes: int) -> int:
+def complete(work: Work, out: Path) -> int:
     """Run the command until it ends; return its exit code."""
-    with evaluating(out, episodes) as process:
+    with working(work, out) as process:
         return process.wait(ENDS_S)
 
 
-def kill_some(out: Path, episodes: int, lasts_s: float, chance: random.Random, tally: Tally) -> bool:
+def kill_some(work: Work, out: Path, lasts_s: float, chance: random.Random, tally: Tally) -> bool:
     """Run the command and kill workers until its own turn comes; return whether it ended before."""
-    before = {line for line in lines_of(out) if line.endswith(b"\n")}
-    with evaluating(out, episodes) as process:
+    before = work.kept_in(out)
+    with working(work, out) as process:
         killed = "worker"
         while killed == "worker":  # the others go on without it
             with suppress(subprocess.TimeoutExpired):
@@ -149,38 +206,39 @@ def kill_some(out: Path, episodes: int, lasts_s: float, chance: random.Random, t
         process.wait(ENDS_S)
         if killed and not has_left(process.pid):
             tally.faults.append(f"{out.name}: workers outlive their parent")
-        if before - set(lines_of(out)):
-            tally.faults.append(f"{out.name}: lines that were on the disk are gone")
+        if before - work.kept_in(out):
+            tally.faults.append(f"{out.name}: what was on the disk is gone")
         return not killed
 
 
-def check(out: Path, episodes: int, expected: dict[str, object], tally: Tally) -> None:
-    """Complete an evaluation and compare what it leaves."""
-    code = complete(out, episodes)
+def check(work: Work, out: Path, expected: dict[str, object], tally: Tally) -> None:
+    """Complete a command and compare what it leaves."""
+    code = complete(work, out)
     tally.folders += 1
     if code != 0:
         tally.faults.append(f"{out.name}: exit code {code}")
-    found = found_in(out)
+    found = work.found_in(out)
     different = [name for name in {*expected, *found} if expected.get(name) != found.get(name)]
     if different:
         tally.faults.append(f"{out.name}: {sorted(different)[:5]} differ")
 
 
-def run_kills(count: int, seed: int = 0, episodes: int = 300) -> Tally:
+def run_kills(count: int, seed: int = 0, episodes: int = 300, *, trains: bool = False) -> Tally:
     """Kill so many times, folder after folder; return what came of it."""
     tally, number = Tally(), 0
     with tempfile.TemporaryDirectory() as kept:
         place = Path(kept)
-        if complete(place / "whole", episodes) != 0:
+        work = training(place) if trains else evaluation(episodes)
+        if complete(work, place / "whole") != 0:
             raise RuntimeError((place / "whole.txt").read_text())
-        began, expected = time.monotonic(), found_in(place / "whole")
-        complete(place / "few", 2)
+        began, expected = time.monotonic(), work.found_in(place / "whole")
+        complete(work if trains else evaluation(2), place / "few")
         lasts_s = time.monotonic() - began + WORKS_S
         while tally.kills.total() < count:
             chance, out = random.Random(f"{seed} {number}"), place / f"out{number}"
-            while tally.kills.total() < count and not kill_some(out, episodes, lasts_s, chance, tally):
+            while tally.kills.total() < count and not kill_some(work, out, lasts_s, chance, tally):
                 pass
-            check(out, episodes, expected, tally)
+            check(work, out, expected, tally)
             shutil.rmtree(out)
             number += 1
     return tally
@@ -192,12 +250,13 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--episodes", type=int, default=300)
+    parser.add_argument("--train", action="store_true")
     asked = parser.parse_args()
     began = time.monotonic()
-    tally = run_kills(asked.count, asked.seed, asked.episodes)
+    tally = run_kills(asked.count, asked.seed, asked.episodes, trains=asked.train)
     print(*tally.faults[:100], sep="\n")
     print(
-        f"{tally.kills.total()} kills {dict(+tally.kills)} of {tally.folders} evaluations in "
+        f"{tally.kills.total()} kills {dict(+tally.kills)} of {tally.folders} folders in "
         f"{time.monotonic() - began:.0f} s: {len(tally.faults)} faults"
     )
     return 1 if tally.faults else 0

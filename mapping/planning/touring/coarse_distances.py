@@ -7,6 +7,7 @@ where a body may stand anywhere in it; lengths are those over open cells, straig
 import math
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +16,9 @@ from lidarium.mapping.planning.clearance import ClearanceField, limit_of
 
 STRAIGHT, DIAGONAL = 5, 7
 """Lengths of the steps to the neighbours of a cell, in fifths of its side."""
+
+NEAR_START = 0.2
+"""Bodies set out from where they fit within this [m]."""
 
 _BUCKETS = DIAGONAL + 1
 
@@ -64,7 +68,11 @@ class CoarseGrid(NamedTuple):
 
 
 def coarse_grid(
-    log_odds: NDArray[np.int8], clearance: ClearanceField, radius: float, side: float = 0.1
+    log_odds: NDArray[np.int8],
+    clearance: ClearanceField,
+    radius: float,
+    side: float = 0.1,
+    starts: NDArray[np.int64] | None = None,
 ) -> CoarseGrid:
     """Return where a body of a radius may stand on a map.
 
@@ -79,10 +87,16 @@ def coarse_grid(
     side : float
         Side of a coarse cell [m], rounded to whole cells. As bodies keep their radius from both sides of a
         wall, coarse cells of less than half a body's width never join what the wall parts.
+    starts : (n, 2) int64, optional
+        The map's cells (row, column) from which bodies set out: what the map's own cells do not join to any
+        of them is left out. Coarse cells may join it where a gap is too narrow by less than their side.
     """
     factor = max(round(side / clearance.resolution), 1)
     most = clearance.limit - limit_of(radius, clearance.resolution)
-    is_open, row, column = _opened(log_odds, clearance.closeness, most, factor)
+    fits = (log_odds < 0) & (clearance.closeness <= most)
+    if starts is not None:
+        fits = _joined(fits, starts, math.ceil(NEAR_START / clearance.resolution))
+    is_open, row, column = _opened(log_odds, fits, factor)
     return CoarseGrid(is_open, factor, int(row), int(column), factor * clearance.resolution, most)
 
 
@@ -168,8 +182,19 @@ def distances_among(
     return upper + np.triu(between, 1).T, lengths
 
 
+def _joined(fits: NDArray[np.bool_], starts: NDArray[np.int64], reach: int) -> NDArray[np.bool_]:
+    """Return what is joined to what fits within so many cells of a start; all where nothing fits there."""
+    count, labels = cv2.connectedComponents(fits.astype(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    is_kept = np.zeros(count, np.bool_)
+    for row, column in starts:
+        part = labels[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1]
+        is_kept[np.unique(part)] = True
+    is_kept[0] = False
+    return np.asarray(is_kept[labels]) if is_kept.any() else fits
+
+
 @kernel
-def _opened(log_odds: Array, closeness: Array, most: int, factor: int) -> tuple[NDArray[np.bool_], int, int]:
+def _opened(log_odds: Array, fits: Array, factor: int) -> tuple[NDArray[np.bool_], int, int]:
     """Return which coarse cells are open, cut to those around what is known."""
     rows, columns = log_odds.shape
     row_low, row_high, column_low, column_high = rows, 0, columns, 0
@@ -192,7 +217,7 @@ def _opened(log_odds: Array, closeness: Array, most: int, factor: int) -> tuple[
     for row in range(row_low, row_high):
         opened = is_open[(row - row_low) // factor]
         for column in range(column_low, column_high):
-            if log_odds[row, column] < 0 and closeness[row, column] <= most:
+            if fits[row, column]:
                 opened[(column - column_low) // factor] = True
     return is_open, row_low, column_low
 

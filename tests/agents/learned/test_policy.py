@@ -24,7 +24,7 @@ def episode(policy, robots, seed=0, floor="apartment:7", **settings):
 def test_classic_choices_make_classic_tours_to_the_bit(robots):
     classic, chosen = episode(TourFrontier(), robots), episode(ChosenTours(choose_classic), robots)
     assert classic.scorer.time == chosen.scorer.time
-    np.testing.assert_array_equal(classic.simulation.poses, chosen.simulation.poses)
+    np.testing.assert_array_equal(classic.world.poses, chosen.world.poses)
 
 
 def test_decisions_show_what_there_is():

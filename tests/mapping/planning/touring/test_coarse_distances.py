@@ -114,3 +114,18 @@ def test_lengths_among_places_are_those_to_all(seed):
         near = whole[k] <= farthest
         np.testing.assert_array_equal(fields[k][near], whole[k][near])
         assert (fields[k] >= whole[k]).all()
+
+
+def test_what_the_fine_cells_do_not_join_is_left_out():
+    log_odds = np.full((60, 120), -20, np.int8)
+    log_odds[:, 60] = 20
+    field = ClearanceField(log_odds.shape, 0.05, 0.6)
+    field.update(log_odds)
+    both = coarse_grid(log_odds, field, 0.18)
+    left = coarse_grid(log_odds, field, 0.18, starts=np.array([[30, 20]]))
+    assert (left.is_open[:, :28] == both.is_open[:, :28]).all()
+    assert left.is_open[:, :28].any()
+    assert not left.is_open[:, 30:].any()
+    assert both.is_open[:, 30:].any()
+    # A start in a wall joins what fits beside it; far from all that fits nothing is left out.
+    assert coarse_grid(log_odds, field, 0.18, starts=np.array([[30, 60]])).is_open.sum() == both.is_open.sum()
