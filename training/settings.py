@@ -23,7 +23,7 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
-    """Floors whose episodes are replayed, after which the network is fitted; a curriculum has several.
+    """Floors on which robots are taught, after which the network is fitted; a curriculum has several.
 
     Attributes
     ----------
@@ -33,14 +33,14 @@ class Round:
         How often each kind of floor comes, beside the others.
     robots : tuple of int
         Sizes of teams; each comes as often as it stands here.
-    replays : int
-        How often an episode is replayed; less often where that takes long.
+    teaching_share : float
+        So often the teacher chooses, in place of classic tours or of the network of the round before.
     """
 
     floors: Annotated[int, within(2, 10_000)] = 400
     kinds: Mapping[str, float] = field(default_factory=lambda: {"building": 1.0})
     robots: tuple[int, ...] = (1, 1, 2, 3)
-    replays: Annotated[int, within(1, 1000)] = 24
+    teaching_share: Annotated[float, share()] = 0.3
 
     def __post_init__(self) -> None:
         check_settings(self, "a round")
@@ -57,7 +57,7 @@ class Round:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitSettings:
-    """How a network is fitted to replays.
+    """How a network is fitted to lessons.
 
     Attributes
     ----------
@@ -67,8 +67,8 @@ class FitSettings:
         Samples of an update.
     learning_rate, weight_decay : float
         Of AdamW.
-    full_share : float
-        Savings and losses of this share of an episode's time or more are all alike.
+    most_regret : float
+        Options that cost more than this are all alike [m].
     held_out : float
         Share of the floors that are not fitted; the epoch that is best on them is kept.
     correction_cost : float
@@ -79,7 +79,7 @@ class FitSettings:
     batch: Annotated[int, within(1, 100_000)] = 256
     learning_rate: Annotated[float, above(0.0, 1.0)] = 3e-4
     weight_decay: Annotated[float, within(0.0, 10.0)] = 0.01
-    full_share: Annotated[float, above(0.0, 1.0)] = 0.1
+    most_regret: Annotated[float, above(0.0, 1000.0)] = 10.0
     held_out: Annotated[float, share()] = 0.1
     correction_cost: Annotated[float, within(0.0, 10.0)] = 0.001
 
@@ -153,7 +153,7 @@ class TrainingSettings:
     settings : dict
         Options of the environment, as in a suite.
     rounds : tuple of Round
-        What is replayed; the network is fitted after each, and decides in the next.
+        On what robots are taught; the network is fitted after each, and decides in the next.
     fit, ppo, validation
         How the network is fitted, how it goes on, and on what it is compared.
     """

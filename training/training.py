@@ -1,4 +1,4 @@
-"""A whole training in a folder: rounds of replays, then rewards; what is best beside classic tours is kept.
+"""A whole training in a folder: rounds of lessons, then rewards; what is best beside classic tours is kept.
 
 What is finished is on the disk. The same call goes on where an earlier one was broken off.
 """
@@ -17,8 +17,8 @@ from lidarium.agents.learned.weights import load_weights, save_weights
 from lidarium.evaluation.episodes.output import write_json
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.training.progress import Progress
-from lidarium.training.replays.rounds import FIT, RoundFolder, run_round
 from lidarium.training.settings import MOST_BYTES, TrainingSettings
+from lidarium.training.teaching.rounds import FIT, RoundFolder, run_round
 from lidarium.training.validation import Validated, compared, validate
 
 TRAINING_FILE, HOURS_FILE, WEIGHTS_FILE, CARD_FILE = (

@@ -5,9 +5,10 @@ nothing makes the same decisions to the bit.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 
-from lidarium.agents.learned.decision import Chooser, Decision, decision_of, scene_of
+from lidarium.agents.learned.decision import Chooser, Decision, Scene, decision_of, scene_of
 from lidarium.agents.learned.network import Network
 from lidarium.agents.learned.weights import load_weights
 from lidarium.agents.policy import Team
@@ -53,16 +54,20 @@ class ChosenTours(TourFrontier):
         sequence, picks = options.sequence, list[int | None]()
         for robot in range(len(agents)):
             decision = decision_of(scene, robot, sequence, picks)
-            pick = None if decision is None else self._choose_among(decision)
+            pick = None if decision is None else self._choose(scene, robot, decision, picks)
             if pick is not None:
                 sequence = with_first(sequence, robot, pick, len(options.numbers))
             picks.append(pick)
         return picks
 
-    def _choose_among(self, decision: Decision) -> int:
+    def _choose(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
         """Return the option that is chosen; where there is but one, nobody is asked."""
         if decision.mask.sum() == 1:
             return int(decision.mask.argmax())
+        return self._choose_among(scene, robot, decision, picks)
+
+    def _choose_among(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
+        """Return the option that is chosen of several."""
         return self.choose_option(decision)
 
     def _progress(self, navigation: NavigationMap) -> dict[str, float]:

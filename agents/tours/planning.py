@@ -171,8 +171,8 @@ def tour_options(
         return None
     places = views.cells[chosen]
     paths = _metres(lengths[:, places[:, 0], places[:, 1]], grid)
-    between, fields = distances_among(grid, places, starts)
-    between = _metres(between, grid)
+    among, fields = distances_among(grid, places, starts)
+    between = _metres(among, grid)
     turns = np.stack(
         [
             _turns(robot.pose, start, fields, grid, resolution)

@@ -1,4 +1,4 @@
-"""`lidarium train`: trains explorers from replays and rewards, into a folder."""
+"""`lidarium train`: trains explorers by a teacher and by rewards, into a folder."""
 
 import importlib.util
 import os
@@ -26,8 +26,8 @@ EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
 class Train(Command):
     """Train explorers as a TOML file says.
 
-    Episodes are replayed with other choices, a network is fitted to what these would have saved, and goes on
-    by rewards. Finished parts are kept, and the same command goes on where it stopped. Weights and a card
+    A teacher that knows the floors says what each choice costs, a network is fitted to that, and goes on by
+    rewards. Finished parts are kept, and the same command goes on where it stopped. Weights and a card
     that says where they come from are written to the folder.
     """
 

@@ -80,6 +80,18 @@ def team_tours(
 
 
 @kernel
+def tours_cost(
+    sequence: NDArray[np.int64],
+    first: NDArray[np.float64],
+    between: NDArray[np.float64],
+    worth: NDArray[np.float64],
+    weights: TourWeights,
+) -> float:
+    """Return what tours cost [m]; parameters as in ``costs_of_firsts``."""
+    return float(_cost(sequence, sequence.shape[0], first, between, worth, weights))
+
+
+@kernel
 def costs_of_firsts(
     sequence: NDArray[np.int64],
     robot: int,

@@ -1,16 +1,15 @@
-"""Fits a network to samples of replays: options that would have saved time are preferred more."""
+"""Fits a network to lessons: what the teacher regrets less is preferred more."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from lidarium.agents.learned.features import OPTION_FEATURES, TEAMMATE_FEATURES
 from lidarium.training.decisions import Decisions
-from lidarium.training.replays.samples import Samples, joined
 from lidarium.training.settings import FitSettings
+from lidarium.training.teaching.samples import Samples, joined
 from lidarium.training.torch_network import ExplorerNetwork, Seen
 
 _MIRRORED_OPTION = tuple(list(OPTION_FEATURES).index(name) for name in ("left",))
@@ -24,18 +23,12 @@ class Fit:
     Attributes
     ----------
     fitted, held_out : float
-        Loss on what is fitted and on what is not: the expected loss of time, -1 to 1; 0 where no other option
-        is ever taken.
+        Mean regret on what is fitted, where options are drawn by their preferences, and on what is not, where
+        the preferred one is taken [m].
     """
 
     fitted: float
     held_out: float
-
-
-def losses_of(samples: Samples, full_share: float) -> NDArray[np.float32]:
-    """Return what each replay lost, from -1 (much time saved) to 1, (N,) float32."""
-    change = (samples.replayed[:, -1] - samples.times[:, -1]) / (full_share * samples.times[:, -1])
-    return np.clip(change, -1.0, 1.0).astype(np.float32)
 
 
 def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, seed: int) -> Iterator[Fit]:
@@ -63,7 +56,7 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
         Where there are not two floors.
     """
     if len(floors) < 2:
-        raise ValueError(f"there are replays of {len(floors)} floors; want 2 at least: one is held out")
+        raise ValueError(f"there are lessons of {len(floors)} floors; want 2 at least: one is held out")
     generator = np.random.default_rng(seed)
     order = generator.permutation(len(floors))
     count = min(max(round(settings.held_out * len(floors)), 1), len(floors) - 1)
@@ -83,14 +76,15 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
 
 
 def evaluate(network: ExplorerNetwork, samples: Samples, settings: FitSettings) -> float:
-    """Return the mean loss of taking the preferred one of the two options of each sample."""
-    losses = losses_of(samples, settings.full_share)
-    gaps = []
+    """Return the mean regret of taking what the network prefers [m]."""
+    regrets = np.minimum(samples.regrets, settings.most_regret)
+    found = []
     with torch.no_grad():
         for start in range(0, len(samples), 1024):
             rows = np.arange(start, min(start + 1024, len(samples)))
-            gaps.append(_gaps(network, samples, rows, is_mirrored=False)[0].numpy())
-    return float(np.where(np.concatenate(gaps) > 0.0, losses, 0.0).mean())
+            best = network(Seen(samples.decisions.take(rows)))[0].argmax(dim=1).numpy()
+            found.append(regrets[rows, best])
+    return float(np.concatenate(found).mean())
 
 
 def _epoch(
@@ -100,32 +94,22 @@ def _epoch(
     optimizer: torch.optim.Optimizer,
     generator: np.random.Generator,
 ) -> float:
-    """See all samples once, half of them mirrored; return the mean loss."""
-    losses = torch.from_numpy(losses_of(samples, settings.full_share))
+    """See all samples once, half of them mirrored; return the mean regret [m]."""
+    regrets = torch.from_numpy(np.minimum(samples.regrets, settings.most_regret))
     order, total = generator.permutation(len(samples)), 0.0
     for start in range(0, len(order), settings.batch):
         rows = order[start : start + settings.batch]
-        gaps, corrections = _gaps(network, samples, rows, is_mirrored=bool(generator.random() < 0.5))
-        loss = (torch.sigmoid(gaps) * losses[rows]).mean()
+        decisions = samples.decisions.take(rows)
+        seen = Seen(mirrored(decisions) if generator.random() < 0.5 else decisions)
+        preferences, _ = network(seen)
+        loss = (preferences.softmax(dim=1) * regrets[rows]).sum(dim=1).mean()
+        corrections = (preferences - network.steepness * seen.scores)[seen.mask].square().mean()
         optimizer.zero_grad()
-        (loss + settings.correction_cost * corrections).backward()  # type: ignore[no-untyped-call]
+        (loss + settings.correction_cost * corrections).backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimizer.step()
         total += loss.item() * len(rows)
     return total / len(order)
-
-
-def _gaps(
-    network: ExplorerNetwork, samples: Samples, rows: NDArray[np.int64], *, is_mirrored: bool
-) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return by how much each replay's option is preferred, and the mean square of the corrections."""
-    decisions = samples.decisions.take(rows)
-    seen = Seen(mirrored(decisions) if is_mirrored else decisions)
-    preferences, _ = network(seen)
-    at = torch.arange(len(rows))
-    gaps = preferences[at, samples.other[rows]] - preferences[at, samples.chosen[rows]]
-    corrections = (preferences - network.steepness * seen.scores)[seen.mask].square().mean()
-    return gaps, corrections
 
 
 def mirrored(decisions: Decisions) -> Decisions:

@@ -1,6 +1,5 @@
-"""A round: the episodes of some floors are replayed, and a network is fitted to all replays so far."""
+"""A round: robots are taught on some floors, and a network is fitted to all lessons so far."""
 
-import os
 from collections.abc import Generator
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -8,19 +7,23 @@ from pathlib import Path
 
 import torch
 
+from lidarium.agents.learned.decision import Chooser, choose_classic
 from lidarium.agents.learned.network import Network
 from lidarium.agents.learned.weights import load_weights, save_weights
+from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.episodes.output import write_json
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.suites.workers import shared_out
 from lidarium.training.places import first_number, place_of
 from lidarium.training.progress import Progress
-from lidarium.training.replays.fitting import Fit, fit
-from lidarium.training.replays.replaying import classic_preferences, replays_of
-from lidarium.training.replays.samples import Samples, read_samples, write_samples
 from lidarium.training.settings import TrainingSettings
+from lidarium.training.teaching.fitting import Fit, fit
+from lidarium.training.teaching.samples import Samples, read_samples, samples_of, write_samples
+from lidarium.training.teaching.teacher import TaughtTours
 from lidarium.training.torch_network import ExplorerNetwork
 
-REPLAYS, WEIGHTS, FIT, WITHOUT = "replays", "weights.safetensors", "fit.json", ".none"
+LESSONS, WEIGHTS, FIT, WITHOUT = "lessons", "weights.safetensors", "fit.json", ".none"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +56,9 @@ class RoundFolder:
         """The weights that decide in it, None where classic tours do."""
         return RoundFolder(self.training, self.number - 1).weights if self.number else None
 
-    def replays(self, number: int) -> Path:
-        """Return the file of the replays of an episode."""
-        return self.path / REPLAYS / f"{number:06d}.npz"
+    def lessons(self, number: int) -> Path:
+        """Return the file of the lessons of an episode."""
+        return self.path / LESSONS / f"{number:06d}.npz"
 
 
 def run_round(
@@ -70,19 +73,19 @@ def run_round(
     folder : RoundFolder
         Where the round is kept; the one before has ended.
     workers : int
-        How many processes replay; they change nothing in what is found.
+        How many processes teach; they change nothing in what is found.
     """
     if folder.weights.exists():
         return
     stage = training.rounds[folder.number]
     begin = first_number(training, folder.number)
     numbers = range(begin, begin + stage.floors)
-    missing = [number for number in numbers if not _is_done(folder.replays(number))]
-    name = f"round {folder.number}: replays"
+    missing = [number for number in numbers if not _is_done(folder.lessons(number))]
+    name = f"round {folder.number}: lessons"
     done = stage.floors - len(missing)
-    folder.replays(0).parent.mkdir(parents=True, exist_ok=True)
+    folder.lessons(0).parent.mkdir(parents=True, exist_ok=True)
     yield Progress(name, done, stage.floors)
-    for number, result in shared_out(partial(_replay, training, folder), missing, workers):
+    for number, result in shared_out(partial(_teach, training, folder), missing, workers):
         if isinstance(result, Exception):
             raise result
         done += 1
@@ -94,30 +97,32 @@ def _is_done(path: Path) -> bool:
     return path.exists() or path.with_suffix(WITHOUT).exists()
 
 
-def _replay(training: TrainingSettings, folder: RoundFolder, number: int) -> int:
-    """Replay the episode of a floor into its file; return how many samples it has."""
-    preferences = (
-        classic_preferences if folder.before is None else Network(load_weights(folder.before)).preferences
-    )
+def _teach(training: TrainingSettings, folder: RoundFolder, number: int) -> int:
+    """Teach robots on a floor, into the file of their lessons; return how many there are."""
+    choose: Chooser = choose_classic if folder.before is None else Network(load_weights(folder.before))
     stage = training.rounds[folder.number]
-    samples = replays_of(place_of(training, stage, number), preferences, stage.replays)
-    path = folder.replays(number)
-    if samples is None or not len(samples):
+    place = place_of(training, stage, number)
+    env = ExplorationEnv(place.floor, place.settings)
+    policy = TaughtTours(env, choose, stage.teaching_share, place.seed)
+    starts = drawn_starts(place.floor, place.settings, place.seed)
+    run_episode(policy, env, place.seed, None if starts is None else {"starts": starts})
+    path = folder.lessons(number)
+    if not policy.lessons:
         path.with_suffix(WITHOUT).touch()
         return 0
-    write_samples(path, samples)
-    return len(samples)
+    write_samples(path, samples_of(policy.lessons))
+    return len(policy.lessons)
 
 
 def _fit(training: TrainingSettings, folder: RoundFolder) -> Generator[Progress, None, None]:
-    """Fit a network to the replays of this round and all before it."""
+    """Fit a network to the lessons of this round and all before it."""
     torch.manual_seed(training.seed + folder.number)
     network = ExplorerNetwork()
     if folder.before is not None:
         network.set_weights(load_weights(folder.before))
     floors: list[Samples] = []
     for number in range(folder.number + 1):
-        part = RoundFolder(folder.training, number).path / REPLAYS
+        part = RoundFolder(folder.training, number).path / LESSONS
         floors += [read_samples(path) for path in sorted(part.glob("*.npz"))]
     course: list[Fit] = []
     name = f"round {folder.number}: fit"
@@ -130,8 +135,3 @@ def _fit(training: TrainingSettings, folder: RoundFolder) -> Generator[Progress,
     )
     # Last: where it is, the round has ended.
     save_weights(folder.weights, network.weights())
-
-
-def threads_for(workers: int) -> int:
-    """Return how many threads PyTorch uses: as many as there are workers, and cores."""
-    return max(min(workers, os.cpu_count() or 1), 1)

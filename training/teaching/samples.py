@@ -1,4 +1,4 @@
-"""Samples of replays: a decision, what was chosen, another option, and how long either episode took."""
+"""Lessons as arrays, in files."""
 
 import io
 from collections.abc import Sequence
@@ -11,36 +11,35 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.guarded_arrays import GuardedArchive
 from lidarium.mapping.files.guarded_reading import read_bytes, reading
 from lidarium.mapping.files.output import write_whole
-from lidarium.training.decisions import Decisions
-
-SHARES = (0.8, 0.9, 0.95, 0.99)
-"""Times are those at which these shares of a floor are seen."""
+from lidarium.training.decisions import MOST_OPTIONS, Decisions, stacked
+from lidarium.training.teaching.teacher import Lesson
 
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """N decisions, each replayed with another option.
+    """N decisions, and what the teacher says of them.
 
     Attributes
     ----------
     decisions : Decisions
         What robots saw.
-    chosen, other : (N,) int64
-        The option that was chosen, and that of the replay.
-    times : (N, len(SHARES)) float64
-        When the episode had seen each share [s].
-    replayed : (N, len(SHARES)) float64
-        When the replay had; inf where it had not by the time it was given up [s].
+    regrets : (N, MOST_OPTIONS) float32
+        By how much each option costs more than the best [m].
     """
 
     decisions: Decisions
-    chosen: NDArray[np.int64]
-    other: NDArray[np.int64]
-    times: NDArray[np.float64]
-    replayed: NDArray[np.float64]
+    regrets: NDArray[np.float32]
 
     def __len__(self) -> int:
-        return len(self.chosen)
+        return len(self.regrets)
+
+
+def samples_of(lessons: Sequence[Lesson]) -> Samples:
+    """Return lessons as arrays."""
+    regrets = np.zeros((len(lessons), MOST_OPTIONS), np.float32)
+    for k, lesson in enumerate(lessons):
+        regrets[k, : len(lesson.regrets)] = lesson.regrets
+    return Samples(stacked([lesson.decision for lesson in lessons]), regrets)
 
 
 def joined(parts: Sequence[Samples]) -> Samples:
@@ -52,27 +51,20 @@ def joined(parts: Sequence[Samples]) -> Samples:
         Where there is no part.
     """
     if not parts:
-        raise ValueError("there are no samples to train on; want replays of at least one floor")
+        raise ValueError("there are no lessons to learn from; want those of at least one floor")
     decisions = Decisions(
         *(
             np.concatenate([getattr(part.decisions, field.name) for part in parts])
             for field in fields(Decisions)
         )
     )
-    return Samples(
-        decisions,
-        np.concatenate([part.chosen for part in parts]),
-        np.concatenate([part.other for part in parts]),
-        np.concatenate([part.times for part in parts]),
-        np.concatenate([part.replayed for part in parts]),
-    )
+    return Samples(decisions, np.concatenate([part.regrets for part in parts]))
 
 
 def write_samples(path: Path, samples: Samples) -> None:
     """Write samples to a file, whole or not at all."""
     arrays = {field.name: getattr(samples.decisions, field.name) for field in fields(Decisions)}
-    for name in ("chosen", "other", "times", "replayed"):
-        arrays[name] = getattr(samples, name)
+    arrays["regrets"] = samples.regrets
     content = io.BytesIO()
     np.savez_compressed(content, allow_pickle=False, **arrays)
     write_whole(path, content.getvalue())
@@ -86,7 +78,7 @@ def read_samples(path: Path) -> Samples:
     ValueError
         Where the file holds something else.
     """
-    with reading(path, "samples of replays"):
+    with reading(path, "lessons of a training"):
         archive = GuardedArchive(read_bytes(path))
         decisions = Decisions(*(archive.array(field.name) for field in fields(Decisions)))
-        return Samples(decisions, *(archive.array(name) for name in ("chosen", "other", "times", "replayed")))
+        return Samples(decisions, archive.array("regrets"))

@@ -1,1 +1,0 @@
-"""Learning from episodes that are run again with one decision changed."""

@@ -1,0 +1,1 @@
+"""Learning from a teacher that knows the floor."""
