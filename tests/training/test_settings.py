@@ -12,7 +12,7 @@ resolution = 0.05
 floors = 4
 kinds = { apartment = 1.0, office = 0.5 }
 robots = [1, 2]
-replays = 2
+teaching_share = 0.5
 [[rounds]]
 floors = 3
 [fit]
@@ -55,6 +55,7 @@ def test_all_has_defaults():
         ("rounds = []", "one or more tables"),
         ("rounds = 3", "one or more tables"),
         ("[[rounds]]\nfloors = 1", "floors"),
+        ("[[rounds]]\nteaching_share = 2.0", "teaching_share"),
         ("[[rounds]]\nkinds = { castle = 1.0 }", "castle"),
         ("[[rounds]]\nkinds = { office = 0.0 }", "at least one above 0"),
         ("[[rounds]]\nkinds = { office = true }", "kinds.office is True"),

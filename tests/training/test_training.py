@@ -13,8 +13,8 @@ SMALL = {
     "seed": 1,
     "settings": {"resolution": 0.05},
     "rounds": [
-        {"floors": 2, "kinds": {"apartment": 1.0}, "robots": [1, 2], "replays": 3},
-        {"floors": 2, "kinds": {"apartment": 1.0}, "robots": [1], "replays": 2},
+        {"floors": 2, "kinds": {"apartment": 1.0}, "robots": [1, 2]},
+        {"floors": 2, "kinds": {"apartment": 1.0}, "robots": [1]},
     ],
     "fit": {"epochs": 2, "batch": 8},
     "ppo": {"decisions": 48, "checkpoint": 16, "environments": 1, "steps": 16, "batch": 8, "epochs": 1},

@@ -1,27 +1,22 @@
-"""Samples of replays in files."""
+"""Lessons in files."""
 
 import numpy as np
 import pytest
 from drawn_decisions import drawn_decision
 
-from lidarium.training.decisions import MOST_TEAMMATES, stacked
-from lidarium.training.replays.samples import SHARES, Samples, joined, read_samples, write_samples
+from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, stacked
+from lidarium.training.teaching.samples import joined, read_samples, samples_of, write_samples
+from lidarium.training.teaching.teacher import Lesson
 
 
 def drawn(count, seed=0):
     generator = np.random.default_rng(seed)
-    return Samples(
-        stacked([drawn_decision(generator, 4, 2) for _ in range(count)]),
-        np.full(count, 1),
-        np.full(count, 2),
-        generator.uniform(10, 20, (count, len(SHARES))),
-        generator.uniform(10, 20, (count, len(SHARES))),
-    )
+    lessons = [Lesson(drawn_decision(generator, 4, 2), generator.uniform(0, 9, 4)) for _ in range(count)]
+    return samples_of(lessons)
 
 
 def test_what_was_written_is_read(tmp_path):
     samples = drawn(3)
-    samples.replayed[1] = np.inf
     path = tmp_path / "a.npz"
     write_samples(path, samples)
     found = read_samples(path)
@@ -29,8 +24,10 @@ def test_what_was_written_is_read(tmp_path):
         first, second = getattr(samples.decisions, name), getattr(found.decisions, name)
         np.testing.assert_array_equal(first, second)
         assert first.dtype == second.dtype
-    np.testing.assert_array_equal(found.replayed, samples.replayed)
+    np.testing.assert_array_equal(found.regrets, samples.regrets)
     assert len(found) == 3
+    assert found.regrets.shape == (3, MOST_OPTIONS)
+    assert (found.regrets[:, 4:] == 0.0).all()
 
 
 @pytest.mark.parametrize("length", [0, 10, 1000])
@@ -46,7 +43,7 @@ def test_parts_are_joined():
     whole = joined([drawn(2, 0), drawn(3, 1)])
     assert len(whole) == 5
     np.testing.assert_array_equal(whole.decisions.options[2:], drawn(3, 1).decisions.options)
-    with pytest.raises(ValueError, match="no samples"):
+    with pytest.raises(ValueError, match="no lessons"):
         joined([])
 
 
