@@ -38,6 +38,11 @@ class Replay(Command):
 
     Works for records of other versions too
     """
+    html: Path | None = None
+    """write a page that replays the record in a browser, as one HTML file without network.
+
+    Works for records of other versions too, with less to be seen
+    """
     video_speed: float = 10.0
     """simulated seconds per second of the film"""
 
@@ -53,15 +58,12 @@ def execute(command: Replay) -> Answer:
     from lidarium.evaluation.episodes.output import check_writable, write_json
     from lidarium.evaluation.record import read_record
 
-    for folder in (
-        command.out,
-        *(path.parent for path in (command.picture, command.video) if path is not None),
-    ):
+    drawn = [path for path in (command.picture, command.video, command.html) if path is not None]
+    for folder in (command.out, *(path.parent for path in drawn)):
         if folder is not None:
             check_writable(folder)
     record = read_record(command.file)
-    is_drawn = command.picture is not None or command.video is not None
-    answer = _drawn(command, record) if is_drawn else _run_again(command, record)
+    answer = _drawn(command, record) if drawn else _run_again(command, record)
     if command.out is not None:
         write_json(command.out / "replay.json", answer.result)
     return answer
@@ -86,6 +88,9 @@ def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
         notify(f"filming {record.display.times[-1]:.0f} s")
         save_track_film(command.video, record, command.video_speed, floor=_floor_of_camera(command, record))
         files.append(str(command.video))
+    if command.html is not None:
+        _write_page(command.html, command, record)
+        files.append(str(command.html))
     display = record.display
     result = {
         **_about(command, record),
@@ -101,6 +106,15 @@ def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
         ("files", ", ".join(files)),
     ]
     return Answer(result, "\n".join([_title(result), table(facts)]))
+
+
+def _write_page(path: Path, command: Replay, record: "EpisodeRecord") -> None:
+    from lidarium.evaluation.report.page import replay_of, write_replay_page
+
+    replay = replay_of(record, command.floor)
+    if replay.lacks:
+        notify(f"the page is without scans, true walls and the robots' own maps: {replay.lacks}")
+    write_replay_page(path, replay)
 
 
 def _floor_of_camera(command: Replay, record: "EpisodeRecord") -> "Floor | None":

@@ -1,22 +1,26 @@
-"""`lidarium report`: tables and plots of episodes.
+"""`lidarium report`: a page, tables and plots of episodes.
 
 The episodes are those that `lidarium evaluate` wrote.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import Answer, Command, table
+from lidarium.scripts.common import Answer, Command, counted, table
+
+if TYPE_CHECKING:
+    from lidarium.evaluation.analysis.episodes import Row
 
 
 @dataclass(frozen=True, kw_only=True)
 class Report(Command):
     """Compare policies over the episodes of a directory.
 
-    Writes report.md, report.json and plots to --out, or to DIR/report.
+    Writes report.html, report.md, report.json and plots to --out, or to DIR/report.
     """
 
     directory: Positional[Path]
@@ -26,6 +30,8 @@ class Report(Command):
 
     Nearest_frontier where it is there, else the first of the alphabet
     """
+    replays: int = 30
+    """most recorded episodes that run again for replays on the page, 0 for none"""
 
 
 def execute(command: Report) -> Answer:
@@ -39,7 +45,11 @@ def execute(command: Report) -> Answer:
     from lidarium.evaluation.report import write_report
 
     out = command.out or command.directory / "report"
-    result = write_report(command.directory, out, command.baseline, command.seed)
+
+    def progress(rows: Sequence["Row"]) -> Iterable["Row"]:
+        return counted(rows, len(rows), "replays", command.json)
+
+    result = write_report(command.directory, out, command.baseline, command.seed, command.replays, progress)
     return Answer(result, _summary(result, out))
 
 
@@ -67,7 +77,7 @@ def _summary(result: dict[str, Any], out: Path) -> str:
     lines += [
         "",
         *(f"careful: {warning}" for warning in result["warnings"]),
-        f"written to {out}: report.md, report.json and plots",
+        f"written to {out}: report.html, report.md, report.json and plots",
     ]
     return "\n".join(lines)
 

@@ -74,3 +74,9 @@ def test_the_rewards_of_the_tutorial_have_the_terms_that_it_shows(capsys):
     exec(compile(code_of("shape_a_reward.md"), "shape_a_reward.md", "exec"), {})
     text = (TUTORIALS / "shape_a_reward.md").read_text(encoding="utf-8")
     assert capsys.readouterr().out == re.search(r"```text\n(.*?)```", text, re.DOTALL)[1]
+
+
+def test_the_page_of_the_tutorial_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code_of("share_results.md"), "share_results.md", "exec"), {})
+    assert "explore_lite on apartment, 2 robots, seed 0" in (tmp_path / "episode.html").read_text()

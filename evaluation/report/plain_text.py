@@ -5,6 +5,7 @@ import re
 from lidarium.mapping.files.names import printable
 
 _SPECIAL = re.compile(r"([\\`*\[\]<>|$~])")
+_WRITTEN = re.compile(r"`([^`]*)`|\\([\\`*\[\]<>|$~])|&amp;")
 
 
 def plain(text: str) -> str:
@@ -16,3 +17,8 @@ def code(name: str) -> str:
     """Return a name as code; one that would end the code or a table's cell as plain text."""
     shown = printable(name)
     return f"`{shown}`" if shown.strip() and not set("`|") & set(shown) else plain(shown)
+
+
+def as_text(markdown: str) -> str:
+    """Return what `plain` and `code` wrote as it reads, for pages that are no markdown."""
+    return _WRITTEN.sub(lambda found: found[1] or found[2] or "&", markdown)

@@ -4,7 +4,7 @@ It has tables, plots, and all numbers behind them.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -12,16 +12,36 @@ from typing import Any
 import numpy as np
 
 import lidarium
-from lidarium.evaluation.analysis.episodes import Episodes, name_of, read_episodes
+from lidarium.evaluation.analysis.episodes import Episodes, Row, name_of, read_episodes
 from lidarium.evaluation.analysis.groups import grouped
 from lidarium.evaluation.analysis.records import FOLDER, Entry, Key, read_records, record_key
 from lidarium.evaluation.episodes.output import check_writable, check_written, write_text
+from lidarium.evaluation.record import read_record
+from lidarium.evaluation.report.page.content import chosen_replays, page_content, rounded
+from lidarium.evaluation.report.page.document import write_page
+from lidarium.evaluation.report.page.replay_content import replay_of
 from lidarium.evaluation.report.plain_text import code, plain
 from lidarium.evaluation.report.sections import Section, describe_group
 
+REPLAYS = 30
+"""Most episodes that the page replays."""
 
-def write_report(directory: Path, out: Path, baseline: str | None = None, seed: int = 0) -> dict[str, Any]:
-    """Write ``report.md``, ``report.json`` and plots of the episodes of a directory.
+PAGE = "report.html"
+"""The page that a browser shows."""
+
+Progress = Callable[[Sequence[Row]], Iterable[Row]]
+"""Passes on episodes whose replays are being made, and reports how many there were."""
+
+
+def write_report(
+    directory: Path,
+    out: Path,
+    baseline: str | None = None,
+    seed: int = 0,
+    replays: int = REPLAYS,
+    progress: Progress = iter,
+) -> dict[str, Any]:
+    """Write ``report.html``, ``report.md``, ``report.json`` and plots of a directory's episodes.
 
     Parameters
     ----------
@@ -35,6 +55,10 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
         the alphabet.
     seed : int
         Where the draws of bootstrap intervals come from.
+    replays : int
+        Most recorded episodes that run again for the page's replays.
+    progress : callable
+        Passes on the episodes that run again.
 
     Returns
     -------
@@ -46,11 +70,15 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
     FileNotFoundError, ValueError, OSError
         As `read_episodes`; where the baseline is not among the policies; where nothing can be written.
     """
+    if replays < 0:
+        raise ValueError(f"--replays is {replays}; want zero or more")
     check_writable(out)
     episodes = read_episodes(directory)
     baseline = _baseline(episodes, baseline)
     records, warnings = read_records(directory, episodes.rows)
-    sections = [describe_group(group, records, out, baseline, seed) for group in grouped(episodes.rows)]
+    groups = grouped(episodes.rows)
+    sections = [describe_group(group, records, out, baseline, seed) for group in groups]
+    replayed = chosen_replays(groups, records, replays)
     warnings = [*episodes.warnings, *_about_names(episodes), *warnings, *_about_records(episodes, records)]
     result = {
         "version": lidarium.__version__,
@@ -68,6 +96,7 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
                 for warning in section.warnings
             ),
         ],
+        "replays": len(replayed),
         "groups": [section.numbers for section in sections],
     }
     numbers: dict[str, Any] = jsonable(result)
@@ -77,8 +106,10 @@ def write_report(directory: Path, out: Path, baseline: str | None = None, seed: 
         json.dumps(numbers, allow_nan=False, ensure_ascii=False, separators=(",", ":")) + "\n",
     )
     write_text(out / "report.md", _page(result, sections))
+    made = [replay_of(read_record(records[record_key(row)].path)) for row in progress(replayed)]
+    write_page(out / PAGE, rounded(jsonable(page_content(result, sections, replayed))), made)
     pictures = [name for section in sections for name in section.numbers["pictures"]]
-    check_written(out, ["report.json", "report.md", *pictures])
+    check_written(out, [PAGE, "report.json", "report.md", *pictures])
     return numbers
 
 

@@ -16,25 +16,38 @@ def maps_on_floor(env: ExplorationEnv) -> NDArray[np.int8]:
     Maps of robots that do not know their starts are overlaid on it by their true starts: with true poses that
     is the best fit of the trajectories.
     """
-    world, settings = env.world, env.settings
-    tables, resolution = world.floors[0], settings.occupancy.resolution
-    assert tables is not None
-    if settings.known_starts:
-        return np.stack([on_floor(env, row, log_odds) for row, log_odds in enumerate(env.beliefs.log_odds)])
-    origin = tables.laser.origin
+    settings = env.settings
     rows, words = env.score.counted_masks[0].shape
-    placed = np.zeros((settings.robots, rows, words * 64), np.int8)
-    y, x = np.meshgrid(*((np.arange(size) + 0.5) * resolution for size in placed.shape[1:]), indexing="ij")
-    for row, log_odds in enumerate(env.beliefs.log_odds):
-        start_x, start_y, theta = world.starts[row]
-        east, north = x + origin[0] - start_x, y + origin[1] - start_y
-        own_x = math.cos(theta) * east + math.sin(theta) * north - env.beliefs.origins[row, 0]
-        own_y = math.cos(theta) * north - math.sin(theta) * east - env.beliefs.origins[row, 1]
-        columns, lines = (np.floor(own / resolution).astype(np.int64) for own in (own_x, own_y))
-        is_inside = (
-            (lines >= 0) & (lines < log_odds.shape[0]) & (columns >= 0) & (columns < log_odds.shape[1])
-        )
-        placed[row][is_inside] = log_odds[lines[is_inside], columns[is_inside]]
+    window = slice(0, rows), slice(0, words * 64)
+    return np.stack([map_within(env, row, *window) for row in range(settings.robots)])
+
+
+def map_within(env: ExplorationEnv, row: int, rows: slice, columns: slice) -> NDArray[np.int8]:
+    """Return a robot's log-odds within a window of the lattice of the scorer's masks.
+
+    As in `maps_on_floor`; the window has a start and a stop within the lattice.
+    """
+    log_odds = env.beliefs.log_odds[row]
+    if env.settings.known_starts:
+        return on_floor(env, row, log_odds)[rows, columns]
+    tables, resolution = env.world.floors[0], env.settings.occupancy.resolution
+    assert tables is not None
+    y, x = np.meshgrid(
+        *((np.arange(side.start, side.stop) + 0.5) * resolution for side in (rows, columns)), indexing="ij"
+    )
+    start_x, start_y, theta = env.world.starts[row]
+    east, north = x + tables.laser.origin[0] - start_x, y + tables.laser.origin[1] - start_y
+    own_x = math.cos(theta) * east + math.sin(theta) * north - env.beliefs.origins[row, 0]
+    own_y = math.cos(theta) * north - math.sin(theta) * east - env.beliefs.origins[row, 1]
+    own_columns, own_rows = (np.floor(own / resolution).astype(np.int64) for own in (own_x, own_y))
+    is_inside = (
+        (own_rows >= 0)
+        & (own_rows < log_odds.shape[0])
+        & (own_columns >= 0)
+        & (own_columns < log_odds.shape[1])
+    )
+    placed = np.zeros(x.shape, np.int8)
+    placed[is_inside] = log_odds[own_rows[is_inside], own_columns[is_inside]]
     return placed
 
 

@@ -1,82 +1,20 @@
-"""A directory of episodes as `lidarium evaluate` writes it: a few short real runs, with records in a form
-of their own."""
+"""A directory of episodes as `lidarium evaluate` writes it: a few short real runs, with their records."""
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 import lidarium
-from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.result import result_of
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
-from lidarium.evaluation.record import Recorder
-from lidarium.evaluation.truth.beliefs import team_log_odds
+from lidarium.evaluation.record import Recorder, write_record
 
 POLICIES = ("nearest_frontier", "random_walk", "utility_frontier")
 SEEDS = (0, 1)
-
-
-@dataclass(frozen=True)
-class Display:
-    """What the display track of a record is asked for."""
-
-    times: np.ndarray
-    poses: np.ndarray
-    coverage: np.ndarray
-    origin: tuple
-    resolution: float
-    levels: np.ndarray
-
-    def map_at(self, time_s):
-        assert time_s == self.times[-1]
-        return self.levels
-
-
-def save_display(path, episode, policy):
-    env, scorer = episode.env, episode.env.scorer
-    log_odds, origin = team_log_odds(env)
-    header = {
-        "version": lidarium.__version__,
-        "floor": env.floor.name,
-        "floor_sha256": env.floor.sha256,
-        "policy": policy,
-        "seed": episode.seed,
-        "robots": env.settings.robots,
-    }
-    path.parent.mkdir(exist_ok=True, parents=True)
-    np.savez_compressed(
-        path,
-        header=json.dumps(header),
-        times=np.array([time for time, _ in scorer.track] + [scorer.time]),
-        poses=np.stack([poses for _, poses in scorer.track] + [env.world.poses]),
-        coverage=np.array(scorer.curve),
-        origin=np.array(origin),
-        resolution=env.settings.occupancy.resolution,
-        levels=np.where(log_odds > 0, 0, np.where(log_odds < 0, 255, 127)).astype(np.uint8),
-    )
-
-
-def read_display(path):
-    try:
-        with np.load(path) as file:
-            display = Display(
-                file["times"],
-                file["poses"],
-                file["coverage"],
-                tuple(file["origin"]),
-                float(file["resolution"]),
-                file["levels"],
-            )
-            return SimpleNamespace(header=json.loads(str(file["header"])), display=display)
-    except (ValueError, EOFError) as error:
-        raise ValueError(f"{path} is not a whole episode record: {error}") from error
 
 
 def write_directory(folder, policies=POLICIES, seeds=SEEDS, floor="apartment", **options):
@@ -84,12 +22,12 @@ def write_directory(folder, policies=POLICIES, seeds=SEEDS, floor="apartment", *
     lines = []
     for policy in policies:
         for seed in seeds:
-            episode = run_episode(
-                lidarium.policy(policy), ExplorationEnv(floor, make_settings(**chosen)), seed
-            )
+            recorder = Recorder(policy, seed, floor)
+            env = WatchedExploration(floor, make_settings(**chosen), watchers=[recorder])
+            episode = run_episode(lidarium.policy(policy), env, seed)
             name = f"records/{floor.replace(':', '-')}-{chosen['robots']}-{policy}-{seed}.npz"
             lines.append(json.dumps({**result_of(episode, policy), "record": name}) + "\n")
-            save_display(folder / name, episode, policy)
+            write_record(folder / name, recorder.finish())
     with (folder / "episodes.jsonl").open("a") as file:
         file.writelines(lines)
     return folder
@@ -99,12 +37,6 @@ def write_directory(folder, policies=POLICIES, seeds=SEEDS, floor="apartment", *
 def episodes_folder(tmp_path_factory) -> Path:
     """Three policies, two seeds each, two robots on the apartment, with records."""
     return write_directory(tmp_path_factory.mktemp("episodes"))
-
-
-@pytest.fixture
-def readable_records(monkeypatch):
-    """Records are read in the form above."""
-    monkeypatch.setattr("lidarium.evaluation.analysis.records.read_record", read_display)
 
 
 @pytest.fixture(scope="session")

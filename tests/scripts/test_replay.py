@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from page_reader import replay_of_page
 
 from lidarium.mapping.files.map_files import write_ros_map
 from lidarium.scripts.main import main
@@ -157,3 +158,27 @@ def test_a_place_that_cannot_be_written_to_is_refused_before_the_work(record, tm
         place = tmp_path / "file" / "below"
         assert main(["replay", str(record), option, str(place if option == "--out" else place / "x")]) == 2
         assert "cannot write to" in capsys.readouterr().err
+
+
+def test_a_page_is_written_with_the_episode_in_it(record, tmp_path, capsys):
+    page = tmp_path / "pages" / "episode.html"
+    assert main(["replay", str(record), "--html", str(page)]) == 0
+    assert str(page) in capsys.readouterr().out
+    header, streams = replay_of_page(page)
+    assert (header["floor"], header["policy"], header["robots"]) == ("hall", "nearest_frontier", 2)
+    assert header["lacks"] == ""
+    assert streams["scans"]
+
+
+def test_a_page_of_a_record_whose_floor_is_gone_says_what_it_lacks(record, tmp_path, capsys):
+    shutil.rmtree(tmp_path / "in")
+    assert main(["replay", str(record), "--html", "episode.html"]) == 0
+    assert "the page is without scans, true walls and the robots' own maps" in capsys.readouterr().err
+    header, _ = replay_of_page(tmp_path / "episode.html")
+    assert "is not found" in header["lacks"]
+
+
+def test_a_page_that_cannot_be_written_is_told_before_the_record_is_run(record, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["replay", str(record), "--html", str(tmp_path / "file" / "episode.html")]) == 2
+    assert "is not a folder" in capsys.readouterr().err

@@ -14,7 +14,6 @@ def pictures_in(page):
     return [line.split("(")[1].rstrip(")") for line in page.splitlines() if line.startswith("![")]
 
 
-@pytest.mark.usefixtures("readable_records")
 def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_path):
     result = write_report(episodes_folder, tmp_path / "out")
     page = (tmp_path / "out" / "report.md").read_text()
@@ -31,7 +30,7 @@ def test_a_report_has_tables_plots_and_all_their_numbers(episodes_folder, tmp_pa
         "visits",
     ]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
-        [*group["pictures"], "report.json", "report.md"]
+        [*group["pictures"], "report.html", "report.json", "report.md"]
     )
     for name in group["pictures"]:
         picture = cv2.imread(str(tmp_path / "out" / name))
@@ -70,7 +69,6 @@ def test_without_records_their_plots_are_left_out_and_that_is_told(rows, directo
     assert "Compared with `random_walk`" in (tmp_path / "out" / "report.md").read_text()
 
 
-@pytest.mark.usefixtures("readable_records")
 def test_a_damaged_record_is_left_out_and_named(rows, directory_of, tmp_path, episodes_folder):
     folder = directory_of(
         [rows[0], {**rows[1], "record": "records/cut.npz"}, {**rows[2], "record": "records/other.npz"}]

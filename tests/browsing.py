@@ -1,0 +1,124 @@
+"""Pages in headless Chromium, used as a person uses them; skips with a reason where there is no Chromium."""
+
+import shutil
+
+import pytest
+
+WIDTH, HEIGHT = 1280, 800
+
+
+def chromium():
+    """Return a driver of a headless Chromium, or skip."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: extra [browser]")
+    programs = [shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome")]
+    browser = next((program for program in programs if program), None)
+    driver = shutil.which("chromedriver")
+    if browser is None or driver is None:
+        pytest.skip("no Chromium with its chromedriver: apt-get install chromium chromium-driver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser
+    # A container's root has no sandbox, and little shared memory.
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-dev-shm-usage",
+        "--hide-scrollbars",
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    return webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+
+
+class Browser:
+    """A page that is open.
+
+    Parameters
+    ----------
+    driver : selenium driver
+        Of `chromium`.
+    """
+
+    def __init__(self, driver):
+        self.driver = driver
+
+    def open(self, path, width=WIDTH, height=HEIGHT, theme="light"):
+        """Open a file as on a screen of a size; nothing of the page before is left."""
+        self._tell(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
+        features = [
+            {"name": "prefers-color-scheme", "value": theme},
+            {"name": "prefers-reduced-motion", "value": "reduce"},
+        ]
+        self._tell("Emulation.setEmulatedMedia", features=features)
+        self.driver.get("about:blank")
+        self.driver.get_log("browser")
+        self.driver.get(path.as_uri())
+        # All pages from the disk share what one of them has stored.
+        if self.run("return localStorage.length"):
+            self.run("localStorage.clear()")
+            self.driver.get(path.as_uri())
+
+    def _tell(self, command, **parameters):
+        self.driver.execute_cdp_cmd(command, parameters)
+
+    def run(self, script, *arguments):
+        """Run a script on the page and return what it returns."""
+        return self.driver.execute_script(script, *arguments)
+
+    def find(self, css, within=None):
+        return (within or self.driver).find_element("css selector", css)
+
+    def find_all(self, css, within=None):
+        return (within or self.driver).find_elements("css selector", css)
+
+    def labelled(self, label, within="body"):
+        """Return the control of a label."""
+        for field in self.find_all(f"{within} label"):
+            if field.text.split("\n")[0].strip() == label:
+                return self.find("select, input", field)
+        raise AssertionError(f"no control is labelled {label!r}")
+
+    def button(self, text, within="body"):
+        """Return the button that says something."""
+        found = [each for each in self.find_all(f"{within} button") if each.text.strip() == text]
+        assert found, f"no button says {text!r}"
+        return found[0]
+
+    def choose(self, label, text, within="body"):
+        """Choose an entry of a list by what it says."""
+        from selenium.webdriver.support.ui import Select
+
+        Select(self.labelled(label, within)).select_by_visible_text(text)
+
+    def keys(self, *keys):
+        """Press keys where the focus is."""
+        from selenium.webdriver import ActionChains
+
+        ActionChains(self.driver).send_keys(*keys).perform()
+
+    def wait(self, condition, seconds=10.0):
+        """Wait until something is so, and return it."""
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        return WebDriverWait(self.driver, seconds, poll_frequency=0.05).until(lambda _: condition())
+
+    def column(self, section, place):
+        """Return the cells of a column of a section's table as text, from above."""
+        return [
+            row.find_elements("css selector", "th, td")[place].text
+            for row in self.find_all(f"#{section} tbody tr")
+        ]
+
+    def complaints(self):
+        """Return what the browser's console says of errors and warnings."""
+        return [
+            entry["message"]
+            for entry in self.driver.get_log("browser")
+            if entry["level"] in ("SEVERE", "WARNING")
+        ]

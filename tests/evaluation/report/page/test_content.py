@@ -1,0 +1,126 @@
+import json
+
+import numpy as np
+import pytest
+from page_reader import Scripts, outside_of, page_data, replay_of_page
+
+from lidarium.evaluation.analysis.groups import grouped
+from lidarium.evaluation.analysis.records import Entry
+from lidarium.evaluation.report import write_report
+from lidarium.evaluation.report.page.content import chosen_replays, rounded
+from lidarium.evaluation.report.plain_text import as_text, code, plain
+
+EVIL = '</script><img src=x onerror=alert(1)>"&amp; `a|b` \\*'
+
+
+@pytest.fixture(scope="module")
+def report_folder(episodes_folder, tmp_path_factory):
+    out = tmp_path_factory.mktemp("report")
+    return out, write_report(episodes_folder, out, replays=4)
+
+
+def test_the_page_has_all_episodes_and_the_figures_of_the_report(report_folder, rows):
+    out, result = report_folder
+    data = page_data(out / "report.html")
+    episodes = data["episodes"]
+    assert len(episodes["group"]) == len(rows) == result["episodes"]
+    policies = list(data["policies"])
+    shown = {
+        (policies[policy], seed): (coverage, t90)
+        for policy, seed, coverage, t90 in zip(
+            episodes["policy"], episodes["seed"], episodes["coverage_percent"], episodes["t90_s"], strict=True
+        )
+    }
+    for row in rows:
+        coverage, t90 = shown[row["policy"], row["seed"]]
+        assert coverage == pytest.approx(100.0 * row["coverage_final"], abs=0.051)
+        assert t90 == (None if row["t90_s"] is None else pytest.approx(row["t90_s"], abs=0.01))
+    (group,), (told,) = data["groups"], result["groups"]
+    for key in ("times", "values", "comparisons", "coverage_over_time", "profiles", "by_floor"):
+        assert group[key] == rounded(told[key])
+    assert (group["robots"], group["floors"], group["settings"]) == (2, ["apartment"], rows[0]["realism"])
+
+
+def test_replays_are_those_of_the_episodes_that_name_them(report_folder):
+    out, result = report_folder
+    data = page_data(out / "report.html")
+    assert len(data["replays"]) == result["replays"] == 4
+    episodes = data["episodes"]
+    for place, policy, seed in zip(episodes["replay"], episodes["policy"], episodes["seed"], strict=True):
+        if place >= 0:
+            header, _ = replay_of_page(out / "report.html", place)
+            assert (header["policy"], header["seed"]) == (list(data["policies"])[policy], seed)
+            assert header["lacks"] == ""
+    assert sorted(place for place in episodes["replay"] if place >= 0) == [0, 1, 2, 3]
+
+
+def test_the_page_fetches_nothing(report_folder):
+    text = (report_folder[0] / "report.html").read_text(encoding="utf-8")
+    assert outside_of(text) == []
+    assert "default-src 'none'" in text
+
+
+def test_names_cannot_end_the_script_that_they_stand_in(rows, directory_of, tmp_path):
+    folder = directory_of([{**row, "policy": EVIL, "floor": EVIL, "variant": EVIL} for row in rows[:2]])
+    write_report(folder, tmp_path / "out")
+    scripts = Scripts((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
+    assert "img" not in scripts.tags
+    data = json.loads(scripts.found["page-data"])
+    assert list(data["policies"]) == [EVIL]
+    assert data["episodes"]["floors"] == [EVIL]
+    assert any(EVIL in warning for warning in data["warnings"])
+
+
+@pytest.mark.parametrize("name", [EVIL, "plain", "`", "a`b", "\\`", "&amp;", "a\\*b", "", "|"])
+def test_markdown_reads_as_the_name_that_was_written(name):
+    assert as_text(plain(name)) == name
+    assert as_text(code(name)) == name
+    assert as_text(f"1 of {code(name)}, {plain(name)}.") == f"1 of {name}, {name}."
+
+
+def recorded_rows(floors, seeds, policies):
+    return [
+        {
+            "floor": floor,
+            "floor_sha256": floor,
+            "policy": policy,
+            "robots": 2,
+            "seed": seed,
+            "horizon_s": 10.0,
+            "time_s": 10.0,
+            "record": f"{floor} {seed} {policy}",
+        }
+        for floor in floors
+        for seed in seeds
+        for policy in policies
+    ]
+
+
+def test_replays_are_of_all_policies_on_one_floor_then_of_the_next_floor():
+    rows = recorded_rows(["apartment", "office:1", "office:2"], [0, 1], ["a", "b"])
+    records = {
+        row["record"]: Entry(None, np.zeros((0, 2))) for row in rows if row["record"] != "office:1 0 b"
+    }
+    chosen = [row["record"] for row in chosen_replays(grouped(rows), records, 7)]
+    assert chosen == [
+        "apartment 0 a",
+        "apartment 0 b",
+        "office:1 0 a",
+        "apartment 1 a",
+        "apartment 1 b",
+        "office:2 0 a",
+        "office:2 0 b",
+    ]
+
+
+def test_a_negative_number_of_replays_is_refused_and_nothing_written(rows, directory_of, tmp_path):
+    with pytest.raises(ValueError, match=r"--replays is -1; want zero or more"):
+        write_report(directory_of(rows), tmp_path / "out", replays=-1)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_report_without_records_has_a_page_without_replays(rows, directory_of, tmp_path):
+    write_report(directory_of(rows), tmp_path / "out")
+    data = page_data(tmp_path / "out" / "report.html")
+    assert data["replays"] == []
+    assert set(data["episodes"]["replay"]) == {-1}
