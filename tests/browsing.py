@@ -1,33 +1,16 @@
 """Pages in headless Chromium, used as a person uses them; skips with a reason where there is no Chromium."""
 
-import shutil
-
 import pytest
 
-WIDTH, HEIGHT = 1280, 800
+from lidarium.benchmarks.studies.evaluation.browser import HEIGHT, WIDTH, headless_chromium, show_on_screen
 
 
 def chromium():
     """Return a driver of a headless Chromium, or skip."""
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: extra [browser]")
-    programs = [shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome")]
-    browser = next((program for program in programs if program), None)
-    driver = shutil.which("chromedriver")
-    if browser is None or driver is None:
-        pytest.skip("no Chromium with its chromedriver: apt-get install chromium chromium-driver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = browser
-    # A container's root has no sandbox, and little shared memory.
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-dev-shm-usage",
-        "--hide-scrollbars",
-    ):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    return webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    try:
+        return headless_chromium()
+    except ValueError as error:
+        pytest.skip(str(error))
 
 
 class Browser:
@@ -44,18 +27,7 @@ class Browser:
 
     def open(self, path, width=WIDTH, height=HEIGHT, theme="light"):
         """Open a file as on a screen of a size; nothing of the page before is left."""
-        self._tell(
-            "Emulation.setDeviceMetricsOverride",
-            width=width,
-            height=height,
-            deviceScaleFactor=1,
-            mobile=False,
-        )
-        features = [
-            {"name": "prefers-color-scheme", "value": theme},
-            {"name": "prefers-reduced-motion", "value": "reduce"},
-        ]
-        self._tell("Emulation.setEmulatedMedia", features=features)
+        show_on_screen(self.driver, theme, width, height)
         self.driver.get("about:blank")
         self.driver.get_log("browser")
         self.driver.get(path.as_uri())
@@ -63,9 +35,6 @@ class Browser:
         if self.run("return localStorage.length"):
             self.run("localStorage.clear()")
             self.driver.get(path.as_uri())
-
-    def _tell(self, command, **parameters):
-        self.driver.execute_cdp_cmd(command, parameters)
 
     def run(self, script, *arguments):
         """Run a script on the page and return what it returns."""

@@ -48,6 +48,11 @@ STUDIES.register(
     "map merging on the half of the bank on which its limits are tuned",
 )
 STUDIES.register(
+    "page",
+    f"{_PACKAGE}.evaluation.page_study:STUDY",
+    "the page of a report in a browser: size, opening, sorting, scrubbing, accessibility",
+)
+STUDIES.register(
     "parity",
     f"{_PACKAGE}.parity:STUDY",
     "random driving in the world of PyBullet beside the kinematic one, on 20 floors",

@@ -17,7 +17,7 @@ NAMES = (
         "merging",
         "merging_tuning",
     ),
-    *("parity", "policies", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
+    *("page", "parity", "policies", "realism", "slam", "sparse", "splines", "srt", "supervisor"),
 )
 
 

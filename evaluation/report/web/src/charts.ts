@@ -21,10 +21,11 @@ export function charts(report: Report): Shown {
   const legend = element("ul", { class: "legend", "aria-label": "Lines of the charts" });
   let wanted: Wanted | null = null;
   let plots: uPlot[] = [];
-  let isSeen = false;
+  let [isNear, isDrawn] = [false, false];
 
   function render(): void {
-    if (wanted === null || !isSeen) return;
+    isDrawn = wanted !== null && isNear;
+    if (!isDrawn) return;
     const group = report.groups[Number(which.select.value)];
     plots.forEach((plot) => plot.destroy());
     plots = [];
@@ -47,13 +48,11 @@ export function charts(report: Report): Shown {
   }
 
   const root = section("charts", "Coverage over time, profiles", element("div", { class: "row" }, which.field), legend, place);
-  // Charts far below need not be drawn before they are seen.
-  new IntersectionObserver((entries, observer) => {
-    if (!entries.some((entry) => entry.isIntersecting)) return;
-    observer.disconnect();
-    isSeen = true;
-    render();
-  }, { rootMargin: "400px" }).observe(root);
+  // Charts that are far from what is seen wait until the reader comes near.
+  new IntersectionObserver((entries) => {
+    isNear = entries.at(-1)?.isIntersecting === true;
+    if (isNear && !isDrawn) render();
+  }, { rootMargin: "300px" }).observe(root);
   new ResizeObserver(() => plots.forEach((plot) => {
     const width = plot.root.parentElement?.clientWidth ?? 0;
     if (width > 0 && width !== plot.width) plot.setSize({ width, height: HEIGHT });
