@@ -1,8 +1,11 @@
-"""Columns of whole numbers as few bytes.
+"""Columns of whole numbers as few bytes, deflated.
 
-Signs are in the lowest bit, then comes byte by byte of a column. Small numbers leave their upper bytes
-zero; those stand together and cost nothing once deflated.
+Numbers are mostly below 256. The lowest bytes of each column make a block of their own, so that each has
+codes for its own numbers; the upper bytes of all columns, mostly zero, follow in one block.
 """
+
+import zlib
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,46 +13,42 @@ from numpy.typing import NDArray
 BYTES = 4
 """Of a number."""
 
-_MORTON_BITS = 21
+
+def column_blocks(lists: Sequence[NDArray[np.int64]]) -> list[bytes]:
+    """Return the columns of lists (N, C) of numbers from 0 to below 2^32, as blocks of bytes."""
+    lowest, upper = [], []
+    for numbers in lists:
+        for column in numbers.T:
+            planes = column.astype("<u4").view(np.uint8).reshape(-1, BYTES).T
+            lowest.append(planes[0].tobytes())
+            upper.append(planes[1:].tobytes())
+    return [*lowest, b"".join(upper)]
 
 
-def pack_columns(columns: NDArray[np.int64]) -> bytes:
-    """Return columns (N, C) of numbers, of at most 30 bits each, as 4 N C bytes."""
-    marked = ((columns << 1) ^ (columns >> 63)).astype("<u4")
-    planes = np.ascontiguousarray(marked.T).view(np.uint8).reshape(columns.shape[1], -1, BYTES)
-    return np.ascontiguousarray(planes.transpose(0, 2, 1)).tobytes()
+def lists_of_columns(content: bytes, counts: Sequence[int], widths: Sequence[int]) -> list[NDArray[np.int64]]:
+    """Return the lists (count, width) whose blocks, joined, are the content.
+
+    Raises
+    ------
+    ValueError
+        Where the content is longer or shorter than these.
+    """
+    sizes = [count * width for count, width in zip(counts, widths, strict=True)]
+    whole = np.frombuffer(content, np.uint8)
+    lowest, upper = np.split(whole, [sum(sizes)])
+    ends = np.cumsum(sizes)[:-1]
+    lists = []
+    for low, high, count, width in zip(
+        np.split(lowest, ends), np.split(upper, (BYTES - 1) * ends), counts, widths, strict=True
+    ):
+        planes = np.concatenate([low.reshape(width, 1, count), high.reshape(width, BYTES - 1, count)], axis=1)
+        numbers = np.ascontiguousarray(planes.transpose(0, 2, 1)).view("<u4").reshape(width, count)
+        lists.append(numbers.T.astype(np.int64))
+    return lists
 
 
-def unpack_columns(content: bytes, count: int, width: int) -> NDArray[np.int64]:
-    """Return the columns (count, width) that `pack_columns` made bytes of."""
-    planes = np.frombuffer(content, np.uint8, count * width * BYTES).reshape(width, BYTES, count)
-    marked = (
-        np.ascontiguousarray(planes.transpose(0, 2, 1)).view("<u4").reshape(width, count).T.astype(np.int64)
-    )
-    return np.asarray((marked >> 1) ^ -(marked & 1))
-
-
-def differences(columns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return how each row (N, C) differs from the one before, the first one from zero."""
-    return np.diff(columns, axis=0, prepend=0)
-
-
-def morton_order(places: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the order of places (N, 3) along a curve that stays near, (N,)."""
-    if len(places) == 0:
-        return np.empty(0, np.int64)
-    apart = places - places.min(axis=0)
-    coarse = max(int(apart.max()).bit_length() - _MORTON_BITS, 0)
-    keys = np.zeros(len(places), np.int64)
-    for axis in range(3):
-        spread = apart[:, axis] >> coarse
-        for shift, mask in (
-            (32, 0x1F00000000FFFF),
-            (16, 0x1F0000FF0000FF),
-            (8, 0x100F00F00F00F00F),
-            (4, 0x10C30C30C30C30C3),
-            (2, 0x1249249249249249),
-        ):
-            spread = (spread | (spread << shift)) & mask
-        keys |= spread << axis
-    return np.lexsort((places[:, 2], places[:, 1], places[:, 0], keys))
+def deflated(blocks: Sequence[bytes]) -> bytes:
+    """Return blocks as one stream of zlib, in which each has codes of its own."""
+    packing = zlib.compressobj(9, strategy=zlib.Z_FILTERED)
+    parts = [packing.compress(block) + packing.flush(zlib.Z_BLOCK) for block in blocks]
+    return b"".join(parts) + packing.flush()
