@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lidarium.mapping.geometry.rigid import Transform
     from lidarium.mapping.merging.bend.deforming import Deformation
     from lidarium.mapping.merging.fusion import FusedMap
-    from lidarium.mapping.merging.merger import Merged
+    from lidarium.mapping.merging.joining.merged_maps import Merged
     from lidarium.mapping.merging.settings import MergeSettings
 
 DEFAULT_FOLDER = Path("merged")

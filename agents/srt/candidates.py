@@ -15,6 +15,7 @@ from lidarium.agents.intent import Intent
 from lidarium.agents.srt.frontier_arcs import Opening, least_opening
 from lidarium.agents.srt.memories.memory import Memory
 from lidarium.agents.srt.safe_region import DIRECTIONS, UNIT
+from lidarium.agents.srt.senses import Senses
 from lidarium.agents.srt.settings import SrtSettings
 from lidarium.agents.srt.tree import Node
 
@@ -31,6 +32,12 @@ NEARLY = 0.95
 A robot that reaches it need not try to pass the edge wider.
 """
 
+
+GOT_ON = 0.8
+"""Distance driven along free rays before checking their target [m].
+
+The robot then checks whether the rays were seen through.
+"""
 
 STANDS = (1, 3, 5)
 """Distances at which a robot may stand before an opening [0.1 m].
@@ -148,6 +155,16 @@ class CandidateSource:
         if candidate.is_frontier:
             return memory.is_frontier(candidate.focus)
         return candidate.opening is None or bool(len(self._open(node, candidate.opening, memory)))
+
+    def may_drop(self, candidate: Candidate, departed: float, senses: Senses) -> bool:
+        """Whether a robot that is so far from its last node [m] may drop a candidate that is seen through.
+
+        Every step sees a little more beyond free rays: a target there stands until the robot has got on; so
+        does one towards a goal.
+        """
+        is_along_rays = candidate.opening is not None and not candidate.opening.is_gap
+        waits = is_along_rays or senses.goal is not None
+        return departed >= (GOT_ON if waits else self._settings.least_step)
 
     def _open(self, node: Node, opening: Opening, memory: Memory) -> NDArray[np.int64]:
         return opening.open_points(lambda points: self._is_done(points, node, memory), self._least)

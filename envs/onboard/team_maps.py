@@ -14,8 +14,9 @@ from lidarium.envs.onboard.navigation import (
     take_in,
 )
 from lidarium.envs.simulation.kernels.arrays import MAP, MAP_COLUMNS, MAP_ROWS
-from lidarium.mapping.kernels.cell_blocks import positive_cells, sum_blocks
+from lidarium.mapping.kernels.cell_blocks import sum_blocks
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.sign_blocks import positive_cells
 from lidarium.mapping.kernels.vectors import BLOCK
 from lidarium.mapping.kernels.views import (
     int8_at,

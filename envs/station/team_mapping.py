@@ -20,7 +20,7 @@ from lidarium.mapping.merging.agreement.confirmation import Confirmation
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.growing_maps import GrowingMap
 from lidarium.mapping.merging.incremental import IncrementalMerger
-from lidarium.mapping.merging.merger import placed
+from lidarium.mapping.merging.joining.merged_maps import placed
 from lidarium.mapping.merging.settings import MergeSettings
 
 Frames = dict[tuple[str, str], Transform]

@@ -24,7 +24,7 @@ from lidarium.mapping.files.guarded_reading import shortened
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.merging.fusion import FusedMap, fuse
-from lidarium.mapping.merging.merger import Merged
+from lidarium.mapping.merging.joining.merged_maps import Merged
 
 INK, SEVERAL = "#1f2937", np.array([31, 41, 55], np.uint8)
 DPI = 130

@@ -27,8 +27,8 @@ from lidarium.evaluation.truth.team_counts import (
     recount_free,
     sum_up,
 )
-from lidarium.mapping.kernels.cell_blocks import negative_cells, positive_cells
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.sign_blocks import negative_cells, positive_cells
 
 SLACK = 4
 """Cells by which a map may change beyond the longest range.

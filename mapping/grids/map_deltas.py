@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.grids.scan_integration import WORD
-from lidarium.mapping.kernels.cell_blocks import sign_bits
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.sign_blocks import sign_bits
 from lidarium.mapping.kernels.views import int8_at
 
 _ALL = np.uint64(2**64 - 1)

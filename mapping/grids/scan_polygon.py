@@ -10,25 +10,18 @@ centre right of the crossing; the running exclusive-or along a row is then the i
 every cell is visited once however many beams crossed it.
 """
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
+from lidarium.mapping.grids.outlines.outline_edges import Outline, toggle_between, toggle_edges
+from lidarium.mapping.grids.outlines.toggled_bits import row_of, toggle_edge
 from lidarium.mapping.kernels.bit_words import running_xor
 from lidarium.mapping.kernels.compilation import Array, kernel
-from lidarium.mapping.kernels.views import scratch_vector, vector_at
+from lidarium.mapping.kernels.views import scratch_vector
 
 GRAZING = 8.0
 """Cotangent of the flattest angle at which neighbours share a surface.
 
 Neighbours are two neighbouring end points.
-"""
-
-JUMP = np.uint8(255)
-"""Mark of an edge that is traced by itself.
-
-Such an edge leads from a near to a far end point, or crosses more rows than a byte holds.
 """
 
 
@@ -45,38 +38,6 @@ def window_words(reach: float) -> int:
 def window_rows(reach: float) -> int:
     """Rows of a scan's window."""
     return 2 * (int(reach) + 3) + 1
-
-
-@kernel(inline=True, borrowing=True)
-def _toggle_bit(bits: int, place: int) -> None:
-    """Toggle a bit of the words at an address.
-
-    Words are reached by address throughout: numba counts who holds an array whenever it is handed on or a
-    part of it is taken, which for the few bits of an edge would cost more than the edge.
-    """
-    vector_at(bits + (place >> 6 << 3), 1, np.uint64)[0] ^= np.uint64(1) << np.uint64(place & 63)
-
-
-@kernel(inline=True, borrowing=True)
-def _toggle_edge(
-    bits: int, width: int, from_x: float, from_y: float, to_x: float, to_y: float, from_row: int, to_row: int
-) -> None:
-    """Toggle the cell centres right of the edge, in the rows between its ends.
-
-    Rows have ``width``. The interval is half open, so that corners count once.
-    """
-    slope = (to_x - from_x) / (to_y - from_y)
-    first, last = min(from_row, to_row), max(from_row, to_row)
-    x = from_x + (first + 0.5 - from_y) * slope + 0.5
-    for start in range(first * width, last * width, width):
-        _toggle_bit(bits, start + int(x))
-        x += slope
-
-
-@kernel(inline=True)
-def _row_of(y: float) -> int:
-    """First row whose centre line is not below y; y is not negative."""
-    return int(y + 0.5)
 
 
 @kernel(borrowing=True)
@@ -98,104 +59,6 @@ def scan_ends(lengths: Array, directions: Array, x: float, y: float, ends: Array
         ends[0, beam] = x + lengths[beam] * directions[0, beam]
     for beam in range(lengths.shape[0]):
         ends[1, beam] = y + lengths[beam] * directions[1, beam]
-
-
-class _Outline(NamedTuple):
-    """The outline of what a scan has seen.
-
-    Attributes
-    ----------
-    lengths, directions, ends
-        As for ``scan_ends``.
-    x, y : float
-        Position of the laser in the window [cells].
-    steepness : float
-        By how much of the nearer range the ranges of neighbours on one surface differ at most.
-    """
-
-    lengths: NDArray[np.float64]
-    directions: NDArray[np.float64]
-    ends: NDArray[np.float64]
-    x: float
-    y: float
-    steepness: float
-
-
-class _Edges(NamedTuple):
-    """The edges of an outline between neighbouring beams.
-
-    Attributes
-    ----------
-    crossed : (edges,) uint8
-        Rows that each crosses, or ``JUMP``.
-    first, second : (edges,) int32
-        Bits toggled in the first two of them.
-    crossings, slopes : (edges,) float64
-        Where its line crosses the first row, and by how much farther each one after it.
-    """
-
-    crossed: NDArray[np.uint8]
-    first: NDArray[np.int32]
-    second: NDArray[np.int32]
-    crossings: NDArray[np.float64]
-    slopes: NDArray[np.float64]
-
-
-@kernel(inline=True, borrowing=True)
-def _toggle_between(bits: int, width: int, outline: _Outline, previous: int, beam: int) -> None:
-    """Toggle the outline between the end points of two neighbouring beams."""
-    lengths, directions, ends, x, y, steepness = outline
-    step = lengths[beam] - lengths[previous]
-    if abs(step) <= 1.0 + steepness * min(lengths[beam], lengths[previous]):
-        from_row, to_row = _row_of(ends[1, previous]), _row_of(ends[1, beam])
-        if from_row != to_row:
-            _toggle_edge(
-                bits,
-                width,
-                ends[0, previous],
-                ends[1, previous],
-                ends[0, beam],
-                ends[1, beam],
-                from_row,
-                to_row,
-            )
-        return
-    # Between a near and a far end point the outline goes along the far beam, up to the near range only.
-    near, far = (previous, beam) if step > 0.0 else (beam, previous)
-    corner_x, corner_y = x + lengths[near] * directions[0, far], y + lengths[near] * directions[1, far]
-    row = _row_of(corner_y)
-    for end in (near, far):
-        end_row = _row_of(ends[1, end])
-        if end_row != row:
-            _toggle_edge(bits, width, ends[0, end], ends[1, end], corner_x, corner_y, end_row, row)
-
-
-@kernel(borrowing=True)
-def _find_edges(
-    lengths: Array, ends: Array, rows: Array, steepness: float, width: int, found: _Edges
-) -> None:
-    """Compute the rows crossed, the toggled bits and the line of each edge.
-
-    An edge joins a beam to the next. Loops without branches over few arrays, which LLVM runs on vectors.
-    """
-    crossed, first, second, crossings, slopes = found
-    edges = lengths.shape[0] - 1
-    from_x, to_x, from_y, to_y = ends[0, :-1], ends[0, 1:], ends[1, :-1], ends[1, 1:]
-    from_row, to_row, from_length, to_length = rows[:-1], rows[1:], lengths[:-1], lengths[1:]
-    for k in range(edges):
-        step = abs(to_length[k] - from_length[k])
-        climb = abs(to_row[k] - from_row[k])
-        is_surface = (step <= 1.0 + steepness * min(from_length[k], to_length[k])) & (climb < JUMP)
-        crossed[k] = np.uint8(climb) if is_surface else JUMP
-    for k in range(edges):
-        slopes[k] = (to_x[k] - from_x[k]) / (to_y[k] - from_y[k])
-    for k in range(edges):
-        crossings[k] = from_x[k] + (min(from_row[k], to_row[k]) + 0.5 - from_y[k]) * slopes[k] + 0.5
-    stride = np.int32(width)
-    for k in range(edges):
-        first[k] = min(from_row[k], to_row[k]) * stride + np.int32(crossings[k])
-    for k in range(edges):
-        second[k] = (min(from_row[k], to_row[k]) + np.int32(1)) * stride + np.int32(crossings[k] + slopes[k])
 
 
 @kernel(borrowing=True)
@@ -231,15 +94,15 @@ def fill_scan_polygon(
     """
     beams = lengths.shape[0]
     flat, width = bits.ctypes.data, 64 * bits.shape[1]
-    outline = _Outline(lengths, directions, ends, x, y, GRAZING * increment)
+    outline = Outline(lengths, directions, ends, x, y, GRAZING * increment)
     if is_full_circle:
-        _toggle_between(flat, width, outline, beams - 1, 0)
+        toggle_between(flat, width, outline, beams - 1, 0)
     else:
-        own_row = _row_of(y)
+        own_row = row_of(y)
         for beam in (0, beams - 1):
-            end_row = _row_of(ends[1, beam])
+            end_row = row_of(ends[1, beam])
             if end_row != own_row:
-                _toggle_edge(flat, width, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
+                toggle_edge(flat, width, ends[0, beam], ends[1, beam], x, y, end_row, own_row)
     rows, columns = scratch_vector(beams, np.int32), scratch_vector(beams, np.int32)
     for beam in range(beams):
         rows[beam], columns[beam] = np.int32(ends[1, beam] + 0.5), np.int32(ends[0, beam])
@@ -247,7 +110,7 @@ def fill_scan_polygon(
     for beam in range(beams):
         low_row, high_row = min(low_row, rows[beam]), max(high_row, rows[beam])
         low_column, high_column = min(low_column, columns[beam]), max(high_column, columns[beam])
-    _toggle_edges(flat, width, outline, rows)
+    toggle_edges(flat, width, outline, rows)
     box = (
         max(int(low_row) - 2, 0),
         min(int(high_row) + 2, bits.shape[0]),
@@ -256,40 +119,6 @@ def fill_scan_polygon(
     )
     _fill_rows(bits, box)
     return box
-
-
-@kernel(inline=True, borrowing=True)
-def _toggle_edges(flat: int, width: int, outline: _Outline, rows: Array) -> None:
-    """Toggle the outline between all end points; ``rows`` (beams,) int32 are theirs."""
-    beams = rows.shape[0]
-    crossed, first, second = (
-        scratch_vector(beams, np.uint8),
-        scratch_vector(beams, np.int32),
-        scratch_vector(beams, np.int32),
-    )
-    crossings, slopes = scratch_vector(beams, np.float64), scratch_vector(beams, np.float64)
-    edges = _Edges(crossed, first, second, crossings, slopes)
-    _find_edges(outline.lengths, outline.ends, rows, outline.steepness, width, edges)
-    toggles, listed = scratch_vector(2 * beams + 2, np.int32), np.uintp(0)
-    for k in range(beams - 1):
-        count = crossed[k]
-        if count == JUMP:
-            _toggle_between(flat, width, outline, k, k + 1)
-            continue
-        # Most edges cross two rows, one or none. What they toggle is listed without branches, which could not
-        # be foreseen.
-        toggles[listed] = first[k]
-        listed += np.uintp(count > 0)
-        toggles[listed] = second[k]
-        listed += np.uintp(count > 1)
-        if count > 2:
-            start, crossing = min(rows[k], rows[k + 1]) * width + width, crossings[k] + slopes[k]
-            for _ in range(2, count):
-                start += width
-                crossing += slopes[k]
-                _toggle_bit(flat, start + int(crossing))
-    for k in range(listed):
-        _toggle_bit(flat, toggles[k])
 
 
 @kernel(inline=True, borrowing=True)

@@ -25,8 +25,6 @@ from lidarium.mapping.kernels.vectors import (
     LEVELS,
     MASK,
     NO_BYTES,
-    NO_SHORTS,
-    SHORTS,
     alloca,
     call_vectors,
     load_at,
@@ -166,51 +164,12 @@ def _levels_of(cells: int) -> Any:  # noqa: ANN401
     return levels_of
 
 
-def _negative_block(typing_context: Any, block: Any) -> Any:  # noqa: ANN401
-    """Tell which log-odds of a block are less than 0."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        return builder.bitcast(
-            builder.icmp_signed("<", load_at(builder, arguments[0], BYTES), NO_BYTES), INT64
-        )
-
-    return types.uint64(types.int64), generate
-
-
-def _positive_block(typing_context: Any, block: Any) -> Any:  # noqa: ANN401
-    """Tell which log-odds of a block are more than 0."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        return builder.bitcast(
-            builder.icmp_signed(">", load_at(builder, arguments[0], BYTES), NO_BYTES), INT64
-        )
-
-    return types.uint64(types.int64), generate
-
-
-def _sign_bits(typing_context: Any, sums: Any) -> Any:  # noqa: ANN401
-    """Tell which cells of a block of sums are below and which are above 0."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ANN401
-        total = load_at(builder, arguments[0], SHORTS)
-        below, above = (
-            builder.bitcast(builder.icmp_signed(order, total, NO_SHORTS), INT64) for order in "<>"
-        )
-        return context.make_tuple(builder, signature.return_type, (below, above))
-
-    pair: Any = types.UniTuple
-    return pair(types.uint64, 2)(types.int64), generate
-
-
 _update = machine_code(_update_block, plain_forms.update_block)
 _fetch_line = machine_code(_fetch, plain_forms.fetch_block)
 _sum = machine_code(_sum_blocks, plain_forms.sum_blocks)
 _greatest = machine_code(_greatest_of_groups, plain_forms.write_greatest)
 _block_of_levels = machine_code(_levels_of(BLOCK), plain_forms.write_block_of_levels)
 _half_block_of_levels = machine_code(_levels_of(HALF_BLOCK), plain_forms.write_levels)
-_signs = machine_code(_sign_bits, plain_forms.sign_bits)
-_negative = machine_code(_negative_block, plain_forms.negative_cells)
-_positive = machine_code(_positive_block, plain_forms.positive_cells)
 
 
 @kernel(inline=True)
@@ -287,24 +246,3 @@ def write_levels(log_odds: int, levels: int) -> None:
 def write_block_of_levels(log_odds: int, levels: int) -> None:
     """Write 64 cells as ``write_levels`` does."""
     _block_of_levels(log_odds, levels)
-
-
-@kernel(inline=True)
-def sign_bits(address: int) -> tuple[np.uint64, np.uint64]:
-    """Return which of 64 int16 at an address are below 0, and which above.
-
-    Bit 0 is the first one.
-    """
-    return _signs(address)  # type: ignore[no-any-return]
-
-
-@kernel(inline=True)
-def negative_cells(address: int) -> np.uint64:
-    """Return which of the 64 int8 at an address are less than 0, bit 0 the first one."""
-    return _negative(address)  # type: ignore[no-any-return]
-
-
-@kernel(inline=True)
-def positive_cells(address: int) -> np.uint64:
-    """Return which of the 64 int8 at an address are more than 0, bit 0 the first one."""
-    return _positive(address)  # type: ignore[no-any-return]

@@ -17,7 +17,8 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.confirmation import Confirmation
 from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.growing_maps import DescribedMaps, GrowingMap, TriedPair
-from lidarium.mapping.merging.merger import Merged, joined_tree, placed
+from lidarium.mapping.merging.joining.joined_tree import joined_tree
+from lidarium.mapping.merging.joining.merged_maps import Merged, placed
 from lidarium.mapping.merging.pair import PairResult, merge_pair, verify_pair
 from lidarium.mapping.merging.settings import MergeSettings
 

@@ -21,7 +21,7 @@ from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.growing_maps import GrowingMap
 from lidarium.mapping.merging.incremental import IncrementalMerger
-from lidarium.mapping.merging.merger import Merged, placed
+from lidarium.mapping.merging.joining.merged_maps import Merged, placed
 from lidarium.mapping.merging.pair import PairResult
 from lidarium.mapping.merging.settings import MergeSettings
 

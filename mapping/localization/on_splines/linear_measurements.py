@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.localization.on_splines.spline_matches import Matches
-from lidarium.mapping.localization.on_splines.spline_tracking import TrackingSettings
+from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
 
 TURNED = np.array([[0.0, -1.0], [1.0, 0.0]])
 """A quarter turn."""

@@ -24,8 +24,10 @@ from lidarium.mapping.localization.on_splines.linear_measurements import (
     measured_rays,
     rotation_of,
 )
+from lidarium.mapping.localization.on_splines.motion_steps import steps_of
 from lidarium.mapping.localization.on_splines.spline_matches import Matches
-from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker, TrackingSettings, steps_of
+from lidarium.mapping.localization.on_splines.spline_tracking import SplineTracker
+from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
 from lidarium.mapping.splines.features import Observation, match_points
 
 POSE, SCALES = 3, 2

@@ -10,98 +10,23 @@ filter knows.
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.bounds import (
-    Angle,
-    Count,
-    Counted,
-    FromZero,
-    Positive,
-    Turn,
-    check_settings,
-)
 from lidarium.mapping.geometry.covariance import turned
 from lidarium.mapping.geometry.rigid import Transform, composed, relative, wrapped
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans, Sensing
 from lidarium.mapping.localization.dead_reckoning.odometry import compounded
 from lidarium.mapping.localization.matching.scan_points import at_last_beam
-from lidarium.mapping.localization.matching.settings.graph import GraphSettings
-from lidarium.mapping.localization.matching.settings.slam import SlamSettings
 from lidarium.mapping.localization.on_splines.spline_matches import Matches, match
+from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
 from lidarium.mapping.localization.slam.mapped_path import MappedPath
 from lidarium.mapping.splines.curve_lookup import CurveLookup
-from lidarium.mapping.splines.curves.settings import SplineSettings
 from lidarium.mapping.splines.features import Observation, observe
 from lidarium.mapping.splines.scan_points import scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
-
-_GRAPH = GraphSettings(deviation_m=0.003, deviation_per_metre=0.006, deviation_angle=math.radians(0.03))
-"""Curves follow walls a little closer than cells: chosen where true poses lie within the spread."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrackingSettings:
-    """How a pose is kept on a map of curves.
-
-    Attributes
-    ----------
-    splines : SplineSettings
-        How scans become curves, and curves a map.
-    turn_per_turn, turn_per_metre, slip_per_metre, slip_per_turn : float
-        Standard deviations of odometry: of a turn, for each radian and each metre [1, rad/m]; of a distance,
-        for each metre and each radian [1, m/rad].
-    feature_sigma, line_angle_sigma : float
-        Least standard deviations of features: of points and of the distance of lines [m], of the direction of
-        lines [rad].
-    curve_sigma : float
-        Standard deviation of the distance between a ray's end and its curve [m].
-    curve_distance : float
-        Rays that end farther from any curve see what is new, and say nothing of the pose [m].
-    ray_stride : int
-        Every so many-th beam that returned counts.
-    ray_share : float
-        What a ray counts, since neighbours are correlated.
-    least_sightings : int
-        Corners and peaks of the map count from so many scans on.
-    least_features, least_rays : int
-        With fewer matches of both kinds the pose is predicted only.
-    still_distance, still_turn : float
-        A robot that has moved less since its last correction is not corrected again: what it sees is not new
-        [m, rad].
-    map_distance, map_turn : float
-        The map takes in a scan whenever the robot has moved as far since the last one [m, rad].
-    path : SlamSettings
-        How local maps follow each other, places are recognised and poses brought to agree; its matching
-        serves to recognise places only.
-    """
-
-    splines: SplineSettings = field(default_factory=SplineSettings)
-    turn_per_turn: FromZero = 0.15
-    turn_per_metre: FromZero = 0.06
-    slip_per_metre: FromZero = 0.10
-    slip_per_turn: FromZero = 0.03
-    feature_sigma: Positive = 0.02
-    line_angle_sigma: Angle = math.radians(1.0)
-    curve_sigma: Positive = 0.03
-    curve_distance: Positive = 0.3
-    ray_stride: Count = 8
-    ray_share: Positive = 0.5
-    least_sightings: Count = 3
-    least_features: Counted = 2
-    least_rays: Counted = 20
-    still_distance: FromZero = 0.001
-    still_turn: Turn = math.radians(0.1)
-    map_distance: Positive = 0.1
-    map_turn: Angle = math.radians(5.0)
-    path: SlamSettings = field(default_factory=lambda: SlamSettings(graph=_GRAPH))
-
-    def __post_init__(self) -> None:
-        check_settings(self, "tracking")
 
 
 class SplineTracker(ABC):
@@ -281,7 +206,7 @@ class SplineTracker(ABC):
         if not self._is_mapped:
             frame: NDArray[np.float64] | None = path.begin(ranges, self._growth(), self._time_s)
         else:
-            points = path.points(ranges, matching.spacing_m, matching.points)
+            points = path.sampling.points(ranges, matching.spacing_m, matching.points)
             path.mapper.judge(points, path.local)
             frame = path.take(path.local, self._growth(), ranges, points, self._time_s)
         if path.last_node > last_node:
@@ -322,21 +247,6 @@ class SplineTracker(ABC):
         interval = self.tracking.splines.points.beam_interval_s
         step = np.array([motion.x, motion.y, motion.theta])
         return at_last_beam(ranges, self.geometry, step, interval, motion_s)
-
-
-def steps_of(motion: Transform) -> tuple[float, float, float]:
-    """Split a motion into a turn, a straight segment and a turn [rad, m, rad].
-
-    The segment leads ahead or back.
-    """
-    distance = math.hypot(motion.x, motion.y)
-    if distance < 0.001:
-        return 0.0, distance, motion.theta
-    first = math.atan2(motion.y, motion.x)
-    # A robot that backs up has not turned round twice.
-    if abs(first) > math.pi / 2.0:
-        first, distance = wrapped(first + math.pi), -distance
-    return first, distance, wrapped(motion.theta - first)
 
 
 def _is_beyond(motion: Transform, distance: float, turn: float) -> bool:

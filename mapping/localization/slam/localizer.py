@@ -103,7 +103,7 @@ class Slam:
                 matching.beam_interval_s,
                 period,
             )
-            points = path.points(ranges, matching.spacing_m, matching.points)
+            points = path.sampling.points(ranges, matching.spacing_m, matching.points)
             if len(points):
                 self._take(ranges, points, moved, sensing.time_s)
         return self.pose

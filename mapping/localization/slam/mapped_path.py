@@ -7,18 +7,18 @@ and end, nodes are set, places are recognised, and all nodes are brought to agre
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.rigid import Transform, composed, relative
+from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.grids.occupancy import OccupancyGrid
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import KeyScans
 from lidarium.mapping.localization.dead_reckoning.odometry import compounded
 from lidarium.mapping.localization.graph.node_graph import NodeGraph
 from lidarium.mapping.localization.matching.local_mapping import LocalMapper, way
-from lidarium.mapping.localization.matching.scan_points import scan_points
 from lidarium.mapping.localization.matching.settings.slam import SlamSettings
-from lidarium.mapping.localization.matching.wall_compass import WallCompass
 from lidarium.mapping.localization.slam.loop_closing import LoopClosing
 from lidarium.mapping.localization.slam.scan_history import ScanHistory
+from lidarium.mapping.localization.slam.scan_sampling import ScanSampling
+from lidarium.mapping.localization.slam.wall_survey import WallSurvey
 
 
 class MappedPath:
@@ -37,6 +37,8 @@ class MappedPath:
     ----------
     mapper : LocalMapper
         The local maps that grow.
+    sampling : ScanSampling
+        Samples the points of scans.
     local, matched, at_node : (3,) float64
         Poses in the frame of the older local map: now, at the last scan that was taken in, at the last node
         [m, rad]. The owner moves the first.
@@ -49,15 +51,12 @@ class MappedPath:
     """
 
     def __init__(self, settings: SlamSettings, geometry: ScanGeometry, pose: NDArray[np.float64]) -> None:
-        self._settings, self._geometry = settings, geometry
-        self._unit_vectors = geometry.unit_vectors
+        self._settings, self.sampling = settings, ScanSampling(settings, geometry)
         self.mapper = LocalMapper(settings, geometry)
         self._loops = LoopClosing(settings)
-        self._compass = WallCompass(settings.compass) if settings.uses_walls else None
-        self._graph = NodeGraph(settings.graph, self._compass, pose)
+        self._walls = WallSurvey(settings, self.sampling)
+        self._graph = NodeGraph(settings.graph, self._walls.compass, pose)
         self._history = ScanHistory(geometry, settings.submaps.resolution)
-        # After so much of the path it is surveyed where walls run.
-        self._orients_at = settings.graph.start_path_m
         # The first scan's points and pose, until the map shows how well they match.
         self._first: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self.local, self.matched, self.at_node = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -134,7 +133,7 @@ class MappedPath:
         """
         self._has_begun = True
         self.note_key(ranges, time_s)
-        self._first = self.all_points(ranges), self.local.copy()
+        self._first = self.sampling.all_points(ranges), self.local.copy()
         return self._begin_maps(ranges, self.motion_covariance(covariance, self.local))
 
     def restart(
@@ -142,9 +141,7 @@ class MappedPath:
     ) -> NDArray[np.float64]:
         """Begin new local maps where the robot is, as ``begin`` does; what it has learned is kept."""
         self._first = None
-        if self._compass is not None:
-            self._compass.forget()
-            self._orients_at = self.length + self._settings.graph.start_path_m
+        self._walls.restart(self.length)
         frame = self._begin_maps(ranges, covariance)
         self.note_key(ranges, time_s)
         return frame
@@ -183,11 +180,10 @@ class MappedPath:
         if not self.mapper.insert(pose, driven, ranges):
             since = relative(self.at_node, self.local)
             return self.restart(ranges, self.motion_covariance(covariance, since), time_s)
-        self._measure_walls(ranges)
+        self._walls.observe(ranges, relative(self.at_node, self.local))
         if self._first is not None and self.length >= self._settings.graph.start_path_m:
             self._find_start(*self._first)
-        if self._compass is not None and not self._compass.is_surveyed and self.length >= self._orients_at:
-            self._orient(self._compass)
+        self._walls.survey(self.length, self.mapper.node, self._history, self._graph.nodes)
         self._set_node(covariance, ranges, points, time_s)
         self.note_key(ranges, time_s)
         poses, ended = self.mapper.hand_over(np.stack([self.local, self.matched, self.at_node, np.zeros(3)]))
@@ -205,24 +201,6 @@ class MappedPath:
         if is_due or time_s == np.inf:
             self._graph.settle(len(acting))
             self._note_correction()
-
-    def points(self, ranges: NDArray[np.float32], spacing_m: float, limit: int) -> NDArray[np.float64]:
-        """Return representative points in which beams ended, (n, 2) [m].
-
-        In the robot's frame, thinned to few.
-        """
-        longest = min(self._settings.matching.range_m, self._geometry.range_max)
-        return scan_points(
-            ranges, self._unit_vectors, self._geometry.angle_increment, longest, spacing_m, limit
-        )
-
-    def all_points(self, ranges: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return nearly all points in which beams ended.
-
-        They serve what is found once per run and gains from each point, such as the direction of
-        walls.
-        """
-        return self.points(ranges, self._settings.compass.spacing_m, self._geometry.beams)
 
     def motion_covariance(
         self, matched: NDArray[np.float64], since: NDArray[np.float64]
@@ -287,28 +265,6 @@ class MappedPath:
         if match is not None:
             self._graph.begin_at(composed(pose, relative(match.pose, np.zeros(3))))
             self._note_correction()
-
-    def _orient(self, compass: WallCompass) -> None:
-        """Survey where walls run in the local map.
-
-        Where none do, survey again after as much of the path.
-        """
-        self._orients_at = self.length + self._settings.graph.start_path_m
-        node, scans = self.mapper.node, self.key_scans
-        since = self._history.since(node)
-        poses = relative(self._graph.nodes[node], scans.poses[since])
-        points = [
-            Transform(*pose).apply(self.all_points(ranges))
-            for pose, ranges in zip(poses, scans.ranges[since], strict=True)
-        ]
-        if points:  # none of the scans since may have been kept
-            compass.survey(np.concatenate(points), node, float(self._graph.nodes[node, 2]))
-
-    def _measure_walls(self, ranges: NDArray[np.float32]) -> None:
-        if self._compass is not None and self._compass.is_surveyed:
-            self._compass.observe(
-                Transform(*relative(self.at_node, self.local)).apply(self.all_points(ranges))
-            )
 
     def _note_correction(self) -> None:
         self.corrections += 1

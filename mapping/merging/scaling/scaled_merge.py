@@ -24,7 +24,8 @@ from lidarium.mapping.merging.description.described_map import (
     describe_map,
     three_levels_of,
 )
-from lidarium.mapping.merging.merger import Merged, joined_tree
+from lidarium.mapping.merging.joining.joined_tree import joined_tree
+from lidarium.mapping.merging.joining.merged_maps import Merged
 from lidarium.mapping.merging.pair import NO_WALLS
 from lidarium.mapping.merging.pair_result import PairResult
 from lidarium.mapping.merging.scaling.scale_search import (

@@ -259,7 +259,7 @@ class HeldFarAway(Held):
     is_held = False
 
     def act(self, observations):
-        legs = self._explorers["robot_0"]._route
+        legs = self._explorers["robot_0"]._travel.legs
         self.is_held = self.is_held or (self._team.time_s >= 60.0 and len(legs) > 1)
         act = Held.act if self.is_held else SensorBasedRandomTree.act
         return act(self, observations)
@@ -278,7 +278,7 @@ def test_what_stops_a_robot_on_its_way_is_not_held_against_a_target_far_away_at_
     blocks, given_up_at, settle, give_up = [], [], Explorer._settle_block, MapMemory.give_up
 
     def noted(self, senses, memory):
-        legs, before = len(self._route), len(given_up_at)
+        legs, before = len(self._travel.legs), len(given_up_at)
         settle(self, senses, memory)
         blocks.append((senses.time_s, legs, len(given_up_at) - before))
 

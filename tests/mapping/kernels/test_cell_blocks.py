@@ -34,12 +34,6 @@ def write_levels_at(log_odds, half, whole):
     cell_blocks.write_block_of_levels(log_odds, whole)
 
 
-@kernel
-def signs_at(bytes_at, shorts_at):
-    below, above = cell_blocks.sign_bits(shorts_at)
-    return cell_blocks.negative_cells(bytes_at), cell_blocks.positive_cells(bytes_at), below, above
-
-
 @given(blocks, words, words, st.integers(0, 127), st.integers(0, 127), st.integers(-127, 0))
 def test_seen_cells_are_lowered_and_hit_ones_raised(block, seen, hits, hit, miss, least):
     bounds = (least, -least)
@@ -71,10 +65,3 @@ def test_log_odds_are_written_as_levels(block):
     write_levels_at(block.ctypes.data, half.ctypes.data, whole.ctypes.data)
     assert np.array_equal(whole, plain.levels_of(block))
     assert np.array_equal(half, np.append(plain.levels_of(block[:32]), np.full(32, 9)))
-
-
-@given(arrays(np.int8, 67), arrays(np.int16, 64), st.integers(0, 3))
-def test_the_signs_of_a_block_are_found_at_any_address(cells, sums, offset):
-    block = cells[offset : offset + 64]
-    found = [int(word) for word in signs_at(block.ctypes.data, sums.ctypes.data)]
-    assert found == [plain.bits_of(cells) for cells in (block < 0, block > 0, sums < 0, sums > 0)]

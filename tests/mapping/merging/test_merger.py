@@ -14,7 +14,8 @@ from lidarium.mapping.files.map_files import FREE, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import three_levels
 from lidarium.mapping.merging import merger
-from lidarium.mapping.merging.merger import joined_tree, merge_maps
+from lidarium.mapping.merging.joining.joined_tree import joined_tree
+from lidarium.mapping.merging.merger import merge_maps
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 

@@ -11,7 +11,7 @@ from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import Localizer, Sensing
 from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf, SplineEkfSettings
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
-from lidarium.mapping.localization.on_splines.spline_tracking import TrackingSettings, steps_of
+from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
 
 LASER = ScanGeometry()
 WORLD_2 = np.vstack(
@@ -185,14 +185,6 @@ def test_particles_that_were_led_astray_find_back(seed):
         ranges = scan(WORLD_2, turned, LASER, 0.01, seed=k)
         pose = localizer.localize(Sensing(0.1 * k, np.array([0.0, 0.0, 0.02 * (k % 2)]), ranges))
     assert gap(pose, turned)[0] < 0.02
-
-
-def test_backing_up_is_not_two_half_turns():
-    first, distance, second = steps_of(Transform(-0.2, 0.01, 0.05))
-    assert abs(first) < 0.1
-    assert distance == pytest.approx(-math.hypot(0.2, 0.01))
-    assert first + second == pytest.approx(0.05)
-    assert steps_of(Transform(0.0, 0.0, 0.3)) == (0.0, 0.0, 0.3)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from lidarium.mapping.geometry.rigid import composed
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
 from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
-from lidarium.mapping.localization.on_splines.spline_tracking import TrackingSettings
+from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
 from lidarium.mapping.splines.curves.settings import PointSettings, SplineSettings
 
 KINDS = (SplineFilter, SplineEkf)

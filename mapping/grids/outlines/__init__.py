@@ -1,0 +1,1 @@
+"""Outlines of what scans have seen, as bits that their edges toggle."""

@@ -1,0 +1,1 @@
+"""Maps joined by what was accepted of their pairs."""
