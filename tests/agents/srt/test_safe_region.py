@@ -1,0 +1,85 @@
+"""Safe regions of a scan: balls, stars and radial regions."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from seen_from_nodes import BODY, HERE, PERCEPTION, box_view, region
+
+from lidarium.agents.srt.safe_region import (
+    ANGLES,
+    DIRECTIONS,
+    STEP,
+    UNIT,
+    joined_views,
+    region_of,
+    safe_region,
+    view_of,
+)
+from lidarium.agents.srt.settings import SHAPES
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+
+URG = ScanGeometry()
+
+
+def test_the_five_laser_regions_go_from_right_to_left():
+    degrees = np.array([-120, -73, -72, -25, -24, 0, 23, 24, 71, 72, 119, 121, 179])
+    assert region_of(np.radians(degrees)).tolist() == [0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4, 5, 6]
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 2**31), st.floats(-3.0, 3.0))
+def test_a_ball_lies_within_the_star_and_the_star_within_the_radial_region(seed, heading):
+    generator = np.random.default_rng(seed)
+    view = np.repeat(generator.uniform(0.3, 5.0, DIRECTIONS // 30), 30)
+    view[generator.integers(DIRECTIONS, size=50)] = np.nan
+    ball, star, radial = (region(view, shape, heading=heading).radii for shape in ("ball", "star", "radial"))
+    assert (ball <= star + 1e-9).all()
+    assert (star <= radial + 1e-9).all()
+    assert (radial[np.isnan(view)] == 0.0).all()
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 2**31))
+def test_no_end_of_a_ray_comes_within_the_body_on_the_way_through_a_region(seed):
+    generator = np.random.default_rng(seed)
+    view = np.repeat(generator.uniform(0.4, 3.5, DIRECTIONS // 20), 20)
+    ends = view[:, None] * UNIT
+    for shape in SHAPES:
+        radii = region(view, shape).radii
+        for direction in generator.integers(DIRECTIONS, size=8):
+            way = np.linspace(0.0, radii[direction], 30)[:, None] * UNIT[direction]
+            gaps = np.linalg.norm(way[:, None] - ends[None], axis=2)
+            assert gaps.min() >= BODY - 0.01
+
+
+def test_points_within_a_region_are_told():
+    square = region(box_view(), place=np.array([1.0, 1.0]))
+    points = np.array([[1.0, 1.0], [2.7, 1.0], [2.9, 1.0], [1.0, -0.7], [4.0, 4.0]])
+    assert square.contains(points).tolist() == [True, True, False, True, False]
+
+
+def test_a_region_with_a_near_return_is_not_safe_to_turn_in():
+    view = box_view()
+    view[0] = 0.25
+    radii = safe_region(HERE, view, 0.0, "radial", BODY, PERCEPTION, turn_room=0.1).radii
+    assert (radii[region_of(ANGLES) == 2] == 0.0).all()
+    assert (radii[region_of(ANGLES) == 4] > 0.0).all()
+
+
+def test_a_scan_becomes_ranges_along_the_axes_of_the_map():
+    scan = np.full(727, 3.0, np.float32)
+    scan[363], scan[400] = 1.0, np.nan
+    view = view_of(scan, URG, heading=math.pi / 2)
+    assert view[DIRECTIONS // 4] == 1.0
+    assert np.isnan(view).sum() == pytest.approx(DIRECTIONS // 3, abs=4)
+    assert np.isnan(view[round((math.pi / 2 + 37 * URG.angle_increment) / STEP)])
+    assert np.isnan(view[3 * DIRECTIONS // 4])
+    assert not np.isnan(joined_views(view, view_of(scan, URG, -math.pi / 2))[3 * DIRECTIONS // 4])
+
+
+@pytest.mark.parametrize("value", [5.6, np.float32(5.6), math.inf])
+def test_a_beam_that_meets_nothing_is_endless(value):
+    assert np.isinf(view_of(np.full(727, value, np.float32), URG, 0.0)[0])
