@@ -66,6 +66,11 @@ class Judge:
         """Put a robot before the tree of which nothing but its last report is known."""
         return self._decide(Case(self._inputs(agent, 0.0)))
 
+    def is_held(self, agent: str) -> bool:
+        """Whether a robot stands by, paused by an order."""
+        report = self._station.reports[agent]
+        return agent in self._standing_by and report.pause_cause == "order"
+
     def judge(
         self,
         agent: str,
@@ -123,6 +128,7 @@ class Judge:
             is_behind=self._is_behind(agent, group),
             is_enclosed=self._station.is_enclosed(agent),
             is_battery_low=self._settings.battery_margin > 0.0 and self._is_battery_low(agent, survey),
+            is_held=self.is_held(agent),
         )
         one = self._decide(case)
         one.goal = {OTHER: other, RICH: richer}.get(one.leaf.aim, NOBODY)

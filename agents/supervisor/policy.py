@@ -124,6 +124,8 @@ class Supervised(Policy):
             "decisions": len(orders),
             "redirections": orders.count(OrderKind.GO_TO.value),
             "stops": orders.count(OrderKind.STOP.value),
+            "pauses": orders.count(OrderKind.PAUSE.value),
+            "resumes": orders.count(OrderKind.RESUME.value),
             "by_rule": {str(rule): sum(each.rule == rule for each in self.decisions) for rule in rules},
             "joined": sum(event.event == "joined" for event in self.events),
             "dropped": sum(event.event == "dropped" for event in self.events),
@@ -259,8 +261,12 @@ class Supervised(Policy):
             self._errands.cancel(agent)
             if agent not in self._supervisor.standing_by or self.settings.is_stop_final:
                 stops[agent] = Order(OrderKind.STOP, reason="no_frontier" if command.rule == 5 else "stopped")
-        elif command.kind is OrderKind.RESUME:
-            stops[agent] = Order(OrderKind.RESUME, reason=f"rule {command.rule}: {command.why}")
+        elif command.kind in (OrderKind.PAUSE, OrderKind.RESUME):
+            stops[agent] = Order(command.kind, reason=f"rule {command.rule}: {command.why}")
+            if command.kind is OrderKind.PAUSE:
+                self._errands.cancel(agent)
+            else:
+                self._errands.begin(command)
         else:
             self._errands.begin(command)
 

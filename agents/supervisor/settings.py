@@ -70,6 +70,9 @@ class SupervisorSettings:
     resumes_paused : bool
         Whether a robot that has paused by itself, and says what it has touched or what blocks it, is ordered
         to go on.
+    pauses_idle : bool
+        Whether a robot that has no goal of its own while its teammates work is paused by an order, and
+        ordered to resume when there is one; else its policy lets it wait.
     trusts_starts : bool
         Whether robots that know how their frames lie in a common one are joined by that; nothing is searched
         for then.
@@ -102,6 +105,7 @@ class SupervisorSettings:
     returns_home: bool = False
     battery_margin: FromZero = 0.0
     resumes_paused: bool = False
+    pauses_idle: bool = False
     trusts_starts: bool = False
 
     def __post_init__(self) -> None:
@@ -110,4 +114,9 @@ class SupervisorSettings:
             raise ValueError(
                 f"assignment of the supervisor is {self.assignment!r}; want one of "
                 f"{', '.join(get_args(Assignment))}"
+            )
+        if self.pauses_idle and self.is_stop_final:
+            raise ValueError(
+                "pauses_idle and is_stop_final of the supervisor are both true; want one: robots without a "
+                "goal are paused or have ended"
             )

@@ -5,7 +5,7 @@ What the station knows becomes a case, the tree decides it, and orders to go get
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,11 @@ from lidarium.agents.supervisor.knowledge.survey import Survey
 from lidarium.agents.supervisor.log import Decision, StationEvent
 from lidarium.agents.supervisor.tree import (
     HOME,
+    LEFT,
     OTHER,
+    RESUMED,
     Leaf,
+    idle_leaf,
 )
 from lidarium.envs.radio.messages import OperatingState, OrderKind, Target
 from lidarium.mapping.planning.footprint import Footprint
@@ -39,7 +42,7 @@ class Command:
     agent : str
         The robot.
     kind : OrderKind
-        ``STOP``, ``GO_TO`` or ``RESUME``.
+        ``STOP``, ``PAUSE``, ``GO_TO`` or ``RESUME``; with a target it then goes there.
     rule : int
         The rule behind it.
     why : str
@@ -125,7 +128,12 @@ class Supervisor:
     ) -> list[Command]:
         """Decide about the robots of a group."""
         station = self.station
-        workers = [agent for agent in group if station.reports[agent].state is OperatingState.OPERATING]
+        held = {agent for agent in group if self._judge.is_held(agent)}
+        workers = [
+            agent
+            for agent in group
+            if agent in held or station.reports[agent].state is OperatingState.OPERATING
+        ]
         fused = station.fused(group, group[0])
         frames = {agent: frame for agent in group if (frame := station.lookup(group[0], agent)) is not None}
         if fused is None:
@@ -136,7 +144,12 @@ class Supervisor:
             if agent in given_up and len(given_up[agent])
         ]
         all_given_up = np.concatenate(places) if places else np.zeros((0, 2))
-        survey = Survey(fused, frames, station.reports, workers, all_given_up, self.footprint, self._settings)
+        # Who is paused keeps its target, but goes nowhere.
+        reports = {
+            agent: replace(report, target=None) if agent in held else report
+            for agent, report in station.reports.items()
+        }
+        survey = Survey(fused, frames, reports, workers, all_given_up, self.footprint, self._settings)
         judged: dict[str, Judged] = {}
         taken: dict[str, int] = dict(survey.going)
         for agent in group:
@@ -154,7 +167,7 @@ class Supervisor:
 
     def _assign_all(self, judged: Mapping[str, Judged], workers: list[str], survey: Survey) -> None:
         """Give goals to all robots of a group at once that are to explore."""
-        exploring = [agent for agent in workers if judged[agent].leaf.rule in (0, 3, 4, 7)]
+        exploring = [agent for agent in workers if judged[agent].leaf.rule in (0, 3, 4, 7, RESUMED.rule)]
         rows = [workers.index(agent) for agent in exploring]
         is_goal = survey.is_goal()
         ways = survey.goals.costs[rows]
@@ -173,10 +186,12 @@ class Supervisor:
             )
         for agent, goal in zip(exploring, goals.tolist(), strict=True):
             one = judged[agent]
-            if goal == NOBODY:
+            if one.case.is_held:
+                one.leaf, one.goal = (LEFT, NOBODY) if goal == NOBODY else (RESUMED, goal)
+            elif goal == NOBODY:
                 # More robots than goals; whom the rules stop or let go on, they do.
                 if one.leaf.order is OrderKind.GO_TO:
-                    one.leaf, one.goal = Leaf(6, OrderKind.STOP, "the others have all goals"), NOBODY
+                    one.leaf, one.goal = idle_leaf(6, "the others have all goals", self._settings), NOBODY
             elif goal == survey.going[agent]:
                 one.leaf, one.goal = Leaf(6, None, "it has the goal that it should have"), NOBODY
             else:
@@ -186,10 +201,10 @@ class Supervisor:
         """Return the order to a robot, and log the decision."""
         agent, leaf = one.case.robot.agent, one.leaf
         observes = None
-        if leaf.order is OrderKind.GO_TO and leaf.aim == HOME:
+        if leaf.aim == HOME:
             start = self.station.reports[agent].start
             one.target = Target(start.x, start.y)
-        elif leaf.order is OrderKind.GO_TO:
+        elif leaf.aim:
             one.target, observes = (
                 Target(*survey.stand(agent, one.goal)),
                 survey.observed_cell(agent, one.goal),
@@ -199,7 +214,7 @@ class Supervisor:
             if leaf.rule != 2:
                 self.standing_by.discard(agent)
             return None
-        if leaf.order is OrderKind.STOP and leaf.rule in (3, 6):
+        if leaf.order in (OrderKind.STOP, OrderKind.PAUSE) and leaf.rule in (3, 6):
             self.standing_by.add(agent)
         else:
             self.standing_by.discard(agent)

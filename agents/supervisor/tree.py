@@ -15,11 +15,12 @@ numbers:
 
 Beyond the thesis, each only where it is switched on: 6. all robots of a group get goals at once; 7. robots
 that would meet are separated; 8. robots drive home when the work is done; 9. a robot turns back before its
-battery is too low for that; 10. a robot that has paused by itself, and knows why, is ordered to go on.
+battery is too low for that; 10. a robot that has paused by itself, and knows why, is ordered to go on; 11. a
+robot without a goal of its own is paused, and ordered to resume when there is one.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lidarium.agents.supervisor.settings import SupervisorSettings
 from lidarium.envs.radio.messages import OperatingState, OrderKind
@@ -78,6 +79,8 @@ class Case:
         Whether its battery would soon not bring it home.
     is_pause_explained : bool
         Whether it has paused by itself, and says what it has touched or what blocks it.
+    is_held : bool
+        Whether the supervisor has paused it by an order.
     """
 
     robot: RobotInputs
@@ -90,6 +93,7 @@ class Case:
     is_enclosed: bool = False
     is_battery_low: bool = False
     is_pause_explained: bool = False
+    is_held: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +144,7 @@ EXPLAINED = Question(
     "has it paused for something that it touched or that blocks it?",
     lambda case: case.is_pause_explained,
 )
+HELD = Question("held", "has the supervisor paused it?", lambda case: case.is_held)
 FRONTIER = Question(
     "frontier", "does the merged map have a frontier left in reach?", lambda case: case.has_frontier
 )
@@ -169,6 +174,15 @@ It is a goal that no other robot has, one with more to map, or the start.
 """
 
 
+LEFT = Leaf(2, None, "its map is merged, it gets no order")
+RESUMED = Leaf(11, OrderKind.RESUME, "there is a goal for it again", OTHER)
+
+
+def idle_leaf(rule: int, why: str, settings: SupervisorSettings) -> Leaf:
+    """Return what follows for a robot without a goal of its own: it stops, or is paused."""
+    return Leaf(rule, OrderKind.PAUSE if settings.pauses_idle else OrderKind.STOP, why)
+
+
 def decision_tree(settings: SupervisorSettings) -> Node:
     """Return the tree of the thesis, with the nodes that the settings add."""
     goes_on = Leaf(0, None, "goes on by itself")
@@ -191,7 +205,7 @@ def decision_tree(settings: SupervisorSettings) -> Node:
         Node(
             OTHER_GOAL,
             Leaf(3, OrderKind.GO_TO, "another robot is nearer to the goal", OTHER),
-            Leaf(3, OrderKind.STOP, "another robot is nearer to the only goal"),
+            idle_leaf(3, "another robot is nearer to the only goal", settings),
         ),
     )
     done = Leaf(5, OrderKind.STOP, "no frontier is left, the work is done")
@@ -202,11 +216,15 @@ def decision_tree(settings: SupervisorSettings) -> Node:
         work = Node(
             LOW_BATTERY, Leaf(9, OrderKind.GO_TO, "its battery is just enough to get home", HOME), work
         )
-    idle: Node | Leaf = Leaf(2, None, "its map is merged, it gets no order")
+    idle: Node | Leaf = LEFT
     if settings.resumes_paused:
         idle = Node(
             EXPLAINED, Leaf(10, OrderKind.RESUME, "it backs out of what stopped it and goes on"), idle
         )
+    if settings.pauses_idle:
+        waits = Node(OTHER_GOAL, RESUMED, LEFT)
+        over = replace(done, order=OrderKind.RESUME) if settings.returns_home else done
+        idle = Node(HELD, Node(FRONTIER, waits, over), idle)
     operating = Node(OPERATING, work, idle)
     return Node(FAILED, Leaf(1, None, "it has failed and is left out"), operating)
 
@@ -239,11 +257,10 @@ def words_of(leaf: Leaf) -> str:
     """Return a leaf in one line."""
     rule = f"rule {leaf.rule}: " if leaf.rule else ""
     aims = {OTHER: "another goal", RICH: "where there is more to map", HOME: "home"}
-    order = (
-        "no order"
-        if leaf.order is None
-        else " ".join([leaf.order.value.replace("_", " "), *([aims[leaf.aim]] if leaf.aim else [])])
-    )
+    words = [] if leaf.order is None else [leaf.order.value.replace("_", " ")]
+    if leaf.aim:
+        words += ["and go to"] * (leaf.order is OrderKind.RESUME) + [aims[leaf.aim]]
+    order = " ".join(words or ["no order"])
     return f"{rule}{order} ({leaf.why})"
 
 

@@ -141,6 +141,28 @@ def test_robots_that_touch_something_go_on_by_order_alone(resumes):
     assert ("operating" in states) == resumes
 
 
+@pytest.mark.parametrize("assignment", ["pairs", "hungarian"])
+def test_robots_without_a_goal_are_paused_and_resume_to_go_to_one(assignment):
+    env = lidarium.parallel_env("clinic", robots=3, known_starts=False, horizon_s=300.0, stop_coverage=None)
+    policy = supervised(pauses_idle=True, assignment=assignment)
+    run_episode(policy, env, seed=0)
+    figures = policy.report().supervision.figures
+    assert figures["pauses"] > 0
+    assert set(env.unwrapped.scorer.ended_because.values()) == {"no_frontier"}
+    events = env.unwrapped.operating.events
+    assert not [event for event in events if event.kind == "refused"]
+    for event in events:
+        if (event.kind, event.what) == ("order", "resume"):
+            orders = [
+                later.what
+                for later in events
+                if later.agent == event.agent and later.kind == "order" and later.time_s > event.time_s
+            ]
+            assert orders[0] == "go_to"
+    if assignment == "pairs":
+        assert figures["resumes"] > 0
+
+
 def test_with_known_starts_there_is_nothing_to_search_for():
     env = lidarium.parallel_env("apartment", robots=2, horizon_s=20.0)
     policy = supervised()

@@ -20,3 +20,8 @@ from lidarium.agents.supervisor.settings import SupervisorSettings
 def test_settings_that_cannot_be_used_are_refused_by_name(name, value):
     with pytest.raises(ValueError, match=name):
         SupervisorSettings(**{name: value})
+
+
+def test_robots_without_a_goal_are_paused_or_have_ended_but_not_both():
+    with pytest.raises(ValueError, match="pauses_idle and is_stop_final"):
+        SupervisorSettings(pauses_idle=True, is_stop_final=True)

@@ -68,6 +68,21 @@ def test_a_robot_that_knows_why_it_paused_is_ordered_to_go_on_where_that_is_aske
     assert outcome(stopped, resuming)[:2] == (1, None)
 
 
+def test_a_robot_without_a_goal_is_paused_and_resumes_when_there_is_one_where_that_is_asked_for():
+    pausing = decision_tree(SupervisorSettings(pauses_idle=True))
+    near, far = robot("robot_0", 0.4), robot("robot_1", 0.7)
+    assert outcome(Case(far, rival=near, has_other_goal=False), pausing)[:2] == (3, OrderKind.PAUSE)
+    held = Case(robot(state=OperatingState.PAUSED), is_held=True)
+    assert outcome(held, pausing) == (11, OrderKind.RESUME, OTHER)
+    assert outcome(replace(held, has_other_goal=False), pausing)[:2] == (2, None)
+    assert outcome(replace(held, has_frontier=False), pausing)[:2] == (5, OrderKind.STOP)
+    # Whom somebody else has paused is left alone.
+    assert outcome(replace(held, is_held=False), pausing)[:2] == (2, None)
+    assert outcome(held)[:2] == (2, None)
+    homing = decision_tree(SupervisorSettings(pauses_idle=True, returns_home=True))
+    assert outcome(replace(held, has_frontier=False), homing) == (8, OrderKind.RESUME, HOME)
+
+
 def test_the_nearer_of_two_robots_keeps_the_goal_and_the_other_gets_another_or_is_stopped():
     near, far = robot("robot_0", 0.4), robot("robot_1", 0.7)
     assert outcome(Case(near, rival=far)) == (3, None, "")
