@@ -118,6 +118,58 @@ def extension_table(rows: Sequence[Row]) -> str:
     return table(head, lines)
 
 
+def bumper_table(rows: Sequence[Row]) -> str:
+    """Return runs of robots that pause where they touch or meet something."""
+    lines = []
+    for floor in dict.fromkeys(floor_of(row) for row in rows):
+        for robots in sorted({int(row["robots"]) for row in rows}):
+            for policy in dict.fromkeys(str(row["policy"]) for row in rows):
+                runs = chosen(rows, policy, robots, floor.__eq__)
+                if runs:
+                    lines.append((floor, f"`{policy}`", str(robots), str(len(runs)), *_bumper_cells(runs)))
+    head = (
+        "floor",
+        "policy",
+        "robots",
+        "runs",
+        "reached 99 %",
+        "time to 99 % [s]",
+        "pauses by contact",
+        "by what blocks",
+        "resumed",
+        "robots left paused [%]",
+        "IoU of occupied cells",
+    )
+    return table(head, lines)
+
+
+def _bumper_cells(runs: Sequence[Row]) -> tuple[str, ...]:
+    """Return what pauses came to in some runs; counts are of all of them."""
+    states = [event for row in runs for event in row["operating"] if event["kind"] == "state"]
+    causes = [event["reason"] for event in states if event["state"] == "paused"]
+    robots = sum(int(row["robots"]) for row in runs)
+    left = sum(len(_paused_at_end(row)) for row in runs)
+    return (
+        reached(runs),
+        shown(median([time_of(row) for row in runs]), 0),
+        str(causes.count("contact")),
+        str(causes.count("blocked")),
+        str(sum(event["state"] == "operating" for event in states)),
+        f"{100.0 * left / robots:.0f}",
+        shown(median([float(row["iou_occupied"]) for row in runs])),
+    )
+
+
+def _paused_at_end(row: Row) -> set[str]:
+    """Return the robots that stood paused when the run ended."""
+    last = {
+        event["agent"]: event["state"]
+        for event in row["operating"]
+        if event["kind"] == "state" and event["state"] in ("paused", "operating")
+    }
+    return {agent for agent, state in last.items() if state == "paused"}
+
+
 def wrong_table(rows: Sequence[Row]) -> str:
     """Return runs that used a wrong merge."""
     lines = [

@@ -116,6 +116,25 @@ def path_of(row: Row) -> float:
     return float(sum(row["path_m"]))
 
 
+def has_energy(rows: Iterable[Row]) -> bool:
+    """Whether runs say what their robots used."""
+    return any(row.get("energy_j") is not None for row in rows)
+
+
+def energy_of(row: Row) -> float:
+    """Return what all robots of a run used [kJ], nan where it was not counted."""
+    used = row.get("energy_j")
+    return float("nan") if used is None else float(sum(used)) / 1e3
+
+
+def energy_shares(rows: Sequence[Row], alone: Iterable[Row]) -> list[float]:
+    """Return what whole teams used as shares of one robot's."""
+    return [
+        energy_of(row) / float(np.mean([energy_of(one) for one in ones]))
+        for row, ones in with_alone(rows, alone)
+    ]
+
+
 def median(values: Sequence[float]) -> Interval | None:
     """Return the median with its interval of 95 %, None of nothing."""
     return median_interval(values) if len(values) else None

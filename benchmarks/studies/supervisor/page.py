@@ -8,16 +8,18 @@ from pathlib import Path
 import lidarium
 from lidarium.benchmarks.studies.supervisor import tables
 from lidarium.benchmarks.studies.supervisor.event_tables import (
+    bumper_table,
     extension_table,
     failing_table,
     left_table,
     wrong_table,
 )
 from lidarium.benchmarks.studies.supervisor.figures import Row, chosen, floor_of, has_wrong_merge
-from lidarium.benchmarks.studies.supervisor.goals import SUPERVISED, goals_of, is_covered
+from lidarium.benchmarks.studies.supervisor.goals import BUMPER, SUPERVISED, goals_of, is_covered
 from lidarium.benchmarks.studies.supervisor.logs import logs_section
 from lidarium.benchmarks.studies.supervisor.runs import FAILING, LOGS_FILE, asked_runs, read_json
 from lidarium.benchmarks.studies.supervisor.suites import (
+    BUMPED,
     FEWEST_SEEDS,
     MARGIN,
     SETTINGS,
@@ -70,6 +72,7 @@ def page(folder: Path, command: str) -> str:
         "## Five robots\n\n" + tables.five_table(rows["five"], alone),
         "## A robot fails\n\n" + _about_failing() + "\n\n" + failing_table(failing),
         *_left_section(failing),
+        *_bumper_section(rows[BUMPER]),
         "## Extensions\n\n" + _about_extensions(),
         *(extension_table(rows[name]) for name in EXTENSION_SUITES if rows[name]),
     ]
@@ -87,6 +90,17 @@ def _wrong_section(rows: Sequence[Row]) -> list[str]:
         "robot's own trajectory."
     )
     return ["### Wrong merges\n\n" + words + "\n\n" + wrong_table(wrong)]
+
+
+def _bumper_section(rows: Sequence[Row]) -> list[str]:
+    """Return the thesis's experiment with the bumper (4.2.3), where it was run."""
+    words = (
+        f"Robots of kind `{BUMPED['robot']}`, taller than what their lasers see, pause where they touch "
+        "something, or something stands in their way for a second. By the thesis's rule a paused robot gets "
+        "no order, since what it met would be drawn into its map and trap it (`supervised`). `resumes` "
+        "orders it to go on where the cause is known, after it has backed out. Counts are of all runs."
+    )
+    return ["## Bumpers\n\n" + words + "\n\n" + bumper_table(rows)] if rows else []
 
 
 def _left_section(failing: Sequence[Row]) -> list[str]:

@@ -103,6 +103,17 @@ EXTENSIONS: Mapping[str, Mapping[str, Any]] = {
 BUDGET: Mapping[str, Any] = {"capacity_j": 1000.0}
 """A battery that is empty before the floor is explored."""
 
+METER: Mapping[str, Any] = {"battery": "kobuki"}
+"""A battery that no run empties: it only counts what robots use."""
+
+BUMPED: Mapping[str, Any] = {"robot": "service", "pauses_when_blocked": True}
+"""Robots taller than what their lasers see, which pause where they touch or meet something."""
+
+RESUMING: Mapping[str, Mapping[str, Any]] = {
+    "resumes": {"policy": "supervised", "resumes_paused": True},
+}
+"""Who is ordered to go on where the cause of his pause is known."""
+
 MARGIN = 1.5
 RADIOS: Mapping[str, Mapping[str, Any]] = {
     "radio of 10 m": {"kind": "range", "reach": 10.0},
@@ -157,7 +168,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
             policies=(ALONE,),
             floors=SCENARIOS,
             seeds=tuple(range(RUNS_ALONE))[::every],
-            variants=_variants(),
+            variants=_variants(METER),
             starts=_starts((0,), (1,), (2,)),
         ),
         "pairs": Suite(
@@ -165,7 +176,7 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
             floors=SCENARIOS,
             robots=(2,),
             seeds=seeds,
-            variants=_variants(),
+            variants=_variants(METER),
             starts=_starts((0, 1), (0, 2)),
         ),
         "three": Suite(
@@ -173,13 +184,21 @@ def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
             floors=SCENARIOS[:1],
             robots=(3,),
             seeds=seeds,
-            variants=_variants(),
+            variants=_variants(METER),
             starts={SCENARIOS[0]: _starts((0, 1, 2))[SCENARIOS[0]]},
         ),
         "one": Suite(policies=(ALONE,), floors=floors, robots=(1,), seeds=seeds, variants=_variants()),
         "teams": Suite(policies=POLICIES, floors=floors, robots=(2, 3), seeds=seeds, variants=_variants()),
         "five": Suite(
             policies=POLICIES, floors=five_floors(floors), robots=(5,), seeds=seeds, variants=_variants()
+        ),
+        "bumper": Suite(
+            policies=("supervised", *RESUMING),
+            floors=SCENARIOS,
+            robots=(2, 3),
+            seeds=seeds,
+            policy_settings=RESUMING,
+            variants=_variants(BUMPED),
         ),
     }
     return {**found, **_extensions(seeds[:FEWEST_SEEDS], few)}
@@ -223,8 +242,8 @@ def _extensions(seeds: tuple[int, ...], few: int) -> dict[str, Suite]:
     }
 
 
-def _variants() -> dict[str, Mapping[str, Any]]:
-    return {DEFAULT_VARIANT: SETTINGS}
+def _variants(more: Mapping[str, Any] | None = None) -> dict[str, Mapping[str, Any]]:
+    return {DEFAULT_VARIANT: {**SETTINGS, **(more or {})}}
 
 
 def _starts(*teams: tuple[int, ...]) -> dict[str, tuple[tuple[tuple[float, float, float], ...], ...]]:

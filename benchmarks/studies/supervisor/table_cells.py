@@ -26,9 +26,9 @@ def reached(runs: Sequence[Row]) -> str:
     return f"{100.0 * np.mean([np.isfinite(time_of(row)) for row in runs]):.0f} %" if runs else "-"
 
 
-def listed(values: Iterable[float]) -> str:
-    """Return whole numbers, one after the other."""
-    return ", ".join(number(value, 0) for value in values)
+def listed(values: Iterable[float], digits: int = 0) -> str:
+    """Return numbers, one after the other."""
+    return ", ".join(number(value, digits) for value in values)
 
 
 def number(value: float, digits: int) -> str:

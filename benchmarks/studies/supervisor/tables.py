@@ -9,7 +9,10 @@ import numpy as np
 from lidarium.benchmarks.studies.supervisor.figures import (
     Row,
     chosen,
+    energy_of,
+    energy_shares,
     floor_of,
+    has_energy,
     has_false_merge,
     has_wrong_merge,
     median,
@@ -59,8 +62,10 @@ def alone_table(rows: Sequence[Row], names: Sequence[str] = ("A", "B", "C")) -> 
             runs = [row for row in rows if floor_of(row) == floor and str(row["starts"]) == start]
             times, ways = [time_of(row) for row in runs], [path_of(row) for row in runs]
             complete = f"{sum(np.isfinite(times))} of {len(runs)}"
-            lines.append((floor, name, complete, listed(times), listed(ways)))
-    return table(("floor", "start", "maps of 99 %", "times to 99 % [s]", "ways [m]"), lines)
+            energy = [listed(map(energy_of, runs), 2)] if has_energy(rows) else []
+            lines.append((floor, name, complete, listed(times), listed(ways), *energy))
+    head = ("floor", "start", "maps of 99 %", "times to 99 % [s]", "ways [m]")
+    return table((*head, *(["energy [kJ]"] if has_energy(rows) else [])), lines)
 
 
 def team_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
@@ -74,7 +79,8 @@ def team_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
             runs = chosen(rows, policy, robots)
             told = chosen(rows, TOLD, robots)
             if runs:
-                lines.append(_team_line(policy, robots, runs, alone, told))
+                line = _team_line(policy, robots, runs, alone, told)
+                lines.append((*line, *(_energy_cells(runs, alone) if has_energy(rows) else ())))
     head = (
         "robots",
         "policy",
@@ -88,6 +94,7 @@ def team_table(rows: Sequence[Row], alone: Sequence[Row]) -> str:
         f"less `{TOLD}` [points]",
         "wrong merges",
         "not correct",
+        *(("energy of all [kJ]", "energy / one robot's") if has_energy(rows) else ()),
     )
     return table(head, lines)
 
@@ -162,6 +169,11 @@ def _team_line(
             for holds in (has_wrong_merge, has_false_merge)
         ),
     )
+
+
+def _energy_cells(runs: Sequence[Row], alone: Sequence[Row]) -> tuple[str, str]:
+    shares = energy_shares(runs, alone) if has_energy(alone) else []
+    return shown(median([energy_of(row) for row in runs])), shown(median(shares))
 
 
 def _of_ticks(ticks: Iterable[Mapping[str, Any]], name: str) -> str:

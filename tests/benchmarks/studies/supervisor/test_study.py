@@ -6,9 +6,10 @@ import pytest
 from lidarium.benchmarks.studies import STUDIES
 from lidarium.benchmarks.studies.supervisor import study as supervisor
 from lidarium.benchmarks.studies.supervisor import suites as plan
-from lidarium.benchmarks.studies.supervisor.event_tables import failing_table, left_table
+from lidarium.benchmarks.studies.supervisor.event_tables import bumper_table, failing_table, left_table
 from lidarium.benchmarks.studies.supervisor.goals import Goal
 from lidarium.benchmarks.studies.supervisor.study import failing_suite, typical_runs
+from lidarium.benchmarks.studies.supervisor.tables import alone_table, team_table
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.free_space import reachable_free_space
 from lidarium.envs.floors.starts import draw_starts
@@ -80,11 +81,13 @@ def test_a_tiny_share_runs_from_end_to_end_and_is_not_run_again(tiny, tmp_path):
         "Test 3",
         "All floors",
         "Five robots",
+        "Bumpers",
         "Extensions",
     ):
         assert f"## {heading}" in page
     assert "`oracle_starts`" in page
     assert "nan" not in page
+    assert page.count("energy of all [kJ]") == 3
 
 
 def row(policy, robots, seed, t99, floor="f", start=(0.0, 0.0, 0.0), **more):
@@ -152,6 +155,47 @@ def test_runs_that_left_something_are_listed_beside_those_of_the_other_policies(
         death("independent", 1, 0.5),
     ]
     assert left_table(runs).splitlines()[2:] == ["| `f` | 2 | 0 | 97.60 | 99.50 | - | no_frontier | 80 |"]
+
+
+def test_pauses_are_counted_by_cause_and_robots_that_were_left_paused():
+    def events(*states):
+        return [
+            {"time_s": 1.0, "kind": "state", "agent": agent, "state": state, "reason": reason}
+            for agent, state, reason in states
+        ]
+
+    met = ("robot_0", "paused", "contact")
+    runs = [
+        row(
+            "supervised",
+            2,
+            0,
+            None,
+            iou_occupied=0.5,
+            operating=events(met, ("robot_1", "paused", "blocked"), ("robot_0", "stopped", "horizon")),
+        ),
+        row(
+            "resumes",
+            2,
+            0,
+            60.0,
+            iou_occupied=0.7,
+            operating=events(met, ("robot_0", "operating", "order"), ("robot_0", "stopped", "covered")),
+        ),
+    ]
+    cells = [line.strip("| ").split(" | ") for line in bumper_table(runs).splitlines()[2:]]
+    assert [line[1:5] + line[6:] for line in cells] == [
+        ["`supervised`", "2", "1", "0 %", "1", "1", "0", "100", "0.50"],
+        ["`resumes`", "2", "1", "100 %", "1", "0", "1", "0", "0.70"],
+    ]
+
+
+def test_energy_stands_in_tables_of_runs_that_count_it():
+    alone = [row("independent", 1, 0, 100.0, energy_j=[900.0])]
+    runs = [row("supervised", 2, 0, 50.0, energy_j=[400.0, 500.0], merges={"wrong": 0, "false": 0})]
+    assert team_table(runs, alone).splitlines()[2].endswith("| 0.90 | 1.00 |")
+    assert "0.90" in alone_table(alone)
+    assert "energy" not in team_table([{**runs[0], "energy_j": None}], alone)
 
 
 def test_the_page_is_of_what_was_asked_for_though_the_folder_holds_more(tiny, tmp_path):
