@@ -1,4 +1,4 @@
-"""Which corners of one map may be which of another: three methods behind one call.
+"""Which corners of one map may be which of another: four methods behind one call.
 
 Descriptors are compared under all rotations at once: a correlation along the angle is a product of spectra.
 """
@@ -11,12 +11,17 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from lidarium.mapping.geometry.bounds import Count, check_settings, share, within
+from lidarium.mapping.geometry.bounds import Count, Length, check_settings, share, within
 from lidarium.mapping.geometry.rigid import wrapped
+from lidarium.mapping.merging.description.corner_neighbours import (
+    common_distances,
+    like_clusters,
+    like_triangles,
+)
 from lidarium.mapping.merging.description.corners import Corners
 from lidarium.mapping.merging.description.descriptors import Descriptors
 
-METHODS = ("descriptors", "distances", "triplets")
+METHODS = ("descriptors", "distances", "triplets", "radius")
 MEASURES = ("correlation", "difference")
 
 
@@ -27,8 +32,9 @@ class CorrespondenceSettings:
     Attributes
     ----------
     method : str
-        ``descriptors``, ``distances`` (pairs of corners equally far apart in both maps) or ``triplets``
-        (corners whose two nearest neighbours form the same triangle).
+        ``descriptors``, ``distances`` (pairs of corners equally far apart in both maps), ``triplets``
+        (corners whose two nearest neighbours form the same triangle) or ``radius`` (corners whose neighbours
+        within ``cluster_radius_m`` are equally far away).
     measure : str
         How descriptors are compared: ``correlation``, normalised; ``difference``, 1 less half the mean square
         of the difference of their samples over their mean square.
@@ -53,6 +59,8 @@ class CorrespondenceSettings:
         angles.
     length_tolerance : float
         Two lengths are equal where they differ by at most this share of the longer one.
+    cluster_radius_m : float
+        Reach of the cluster of corners around a corner, with ``radius`` [m].
     """
 
     method: str = "descriptors"
@@ -66,6 +74,7 @@ class CorrespondenceSettings:
     least_known: Annotated[float, share()] = 0.25
     use_shift: bool = True
     length_tolerance: Annotated[float, share(has_least=False, has_most=False)] = 0.08
+    cluster_radius_m: Length = 3.0
 
     def __post_init__(self) -> None:
         check_settings(self, "correspondence")
@@ -131,11 +140,7 @@ def match_corners(
     if settings.method == "descriptors":
         similarity, shift = compare_descriptors(first_descriptors, second_descriptors, settings)
     else:
-        compare = _distance_votes if settings.method == "distances" else _triplet_similarity
-        similarity, shift = (
-            compare(first.points, second.points, settings.length_tolerance),
-            np.zeros_like(difference),
-        )
+        similarity, shift = _compared_places(first.points, second.points, settings), np.zeros_like(difference)
     # Of a corner seen at a in the first map and at b in the second, the second map is turned by a - b.
     rotation = difference + shift if settings.use_shift else difference
     threshold = settings.threshold if settings.method == "descriptors" else 0.0
@@ -194,6 +199,18 @@ def compare_descriptors(
     return np.asarray(peak, np.float32), np.asarray(angle, np.float32)
 
 
+def _compared_places(
+    first: NDArray[np.float64], second: NDArray[np.float64], settings: CorrespondenceSettings
+) -> NDArray[np.float64]:
+    """Return the similarity of corners (n, m) by where their neighbours are."""
+    tolerance = settings.length_tolerance
+    if settings.method == "distances":
+        return common_distances(first, second, tolerance)
+    if settings.method == "triplets":
+        return like_triangles(first, second, tolerance)
+    return like_clusters(first, second, tolerance, settings.cluster_radius_m)
+
+
 def _energy(first: NDArray[np.floating], second: NDArray[np.floating], measure: str) -> NDArray[np.floating]:
     """Return what products of samples are divided by: their geometric mean square, or their mean square.
 
@@ -238,60 +255,3 @@ def _chosen(
     is_match = (values > 0.0) & (values >= threshold) & (values >= best - settings.margin)
     i, rank = np.nonzero(is_match)
     return i.astype(np.int64), order[i, rank].astype(np.int64)
-
-
-def _distance_votes(
-    first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float
-) -> NDArray[np.float64]:
-    """Return the share of common distances of each pair of corners, (n, m).
-
-    The share of the first corner's distances that the second one has too.
-    """
-    left, right = _distances(first), _distances(second)
-    votes = np.zeros((len(first), len(second)))
-    for j in range(len(second)):
-        lengths = np.sort(np.delete(right[j], j))
-        if len(lengths) == 0:
-            continue
-        # A length has a like one if the first not shorter than its lower bound is not longer than its upper
-        # bound.
-        place = np.minimum(np.searchsorted(lengths, left * (1.0 - tolerance)), len(lengths) - 1)
-        votes[:, j] = (
-            (lengths[place] >= left * (1.0 - tolerance))
-            & (lengths[place] * (1.0 - tolerance) <= left)
-            & (left > 0.0)
-        ).sum(axis=1)
-    return votes / max(len(first) - 1, 1)
-
-
-def _triplet_similarity(
-    first: NDArray[np.float64], second: NDArray[np.float64], tolerance: float
-) -> NDArray[np.float64]:
-    """Return the similarity of the triangles of each pair of corners, (n, m).
-
-    Triangles are with the two nearest neighbours; 0 where they are not alike.
-    """
-    if len(first) < 3 or len(second) < 3:
-        return np.zeros((len(first), len(second)))
-    left, right = _triangles(first), _triangles(second)
-    longer = np.maximum(left[:, None], right[None])
-    difference = (np.abs(left[:, None] - right[None]) / np.maximum(longer, 1e-9)).max(axis=2)
-    return np.where(difference <= tolerance, 1.0 - difference, 0.0)
-
-
-def _triangles(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the sides of each corner's triangle of neighbours, (n, 3) [m].
-
-    Distances to the nearest and second neighbour, and between the two.
-    """
-    distances = _distances(points)
-    order = np.argsort(distances + np.diag(np.full(len(points), np.inf)), axis=1, kind="stable")[:, :2]
-    rows = np.arange(len(points))
-    return np.stack(
-        [distances[rows, order[:, 0]], distances[rows, order[:, 1]], distances[order[:, 0], order[:, 1]]],
-        axis=1,
-    )
-
-
-def _distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.linalg.norm(points[:, None] - points[None], axis=2))

@@ -24,6 +24,7 @@ from lidarium.mapping.merging.correspondence import METHODS, CorrespondenceSetti
 from lidarium.mapping.merging.description.corners import Corners, CornerSettings, detect_corners
 from lidarium.mapping.merging.description.described_map import DescribedMap
 from lidarium.mapping.merging.description.descriptors import VARIANTS, DescriptorSettings, describe_corners
+from lidarium.mapping.merging.description.grey_images import trajkovic_corners
 from lidarium.mapping.merging.pair import described
 from lidarium.mapping.merging.settings import MergeSettings
 
@@ -32,6 +33,9 @@ REPEATS, BURST = 20, 3
 
 After another's round, caches hold nothing of it.
 """
+
+TRAJKOVIC = (8000.0, 4000.0)
+"""Thresholds of the detector of Trajkovic and Hedley that the thesis set for its maps [grey^2]."""
 
 RIGHT_M, VOTED_M = 0.15, 0.5
 """Distances within which a match and a voted transform are right [m].
@@ -52,9 +56,10 @@ def images(maps: dict[str, BankMap]) -> dict[str, NDArray[np.uint8]]:
 
 
 def compare_detectors(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
-    """Return points and least time of each detector on each image [us].
+    """Return points, least time [us] and stability of each detector on each image.
 
-    One thread, the runs of all detectors in turn.
+    One thread, the runs of all detectors in turn. Stability is the share of points that all runs find, of
+    those that any finds.
     """
     cv2.setNumThreads(1)
     raw = CornerSettings(separation_m=0.0, limit=0)
@@ -62,12 +67,45 @@ def compare_detectors(maps: dict[str, BankMap]) -> list[dict[str, Any]]:
     detectors: dict[str, Callable[[NDArray[np.uint8]], int]] = {
         "ours": lambda image: len(detect_corners(image, RESOLUTION, raw)),
         "goodFeaturesToTrack": lambda image: len(cv2.goodFeaturesToTrack(image, 500, 0.01, 3)),
+        "Trajkovic": lambda image: len(trajkovic_corners(image, *TRAJKOVIC)),
         "Harris": lambda image: int(np.count_nonzero(cv2.cornerHarris(image, 3, 3, 0.04) > 0.01)),
         "FAST": lambda image: len(peers["fast"].detect(image)),
         "ORB": lambda image: len(peers["orb"].detect(image)),
         "SIFT": lambda image: len(peers["sift"].detect(image)),
     }
-    return [_timed(name, image, detectors) for name, image in images(maps).items()]
+    return [
+        {
+            **_timed(name, image, detectors),
+            "stable": {one: stability(find, image) for one, find in _point_finders(raw).items()},
+        }
+        for name, image in images(maps).items()
+    ]
+
+
+def _point_finders(raw: CornerSettings) -> dict[str, Callable[[NDArray[np.uint8]], NDArray[np.floating]]]:
+    """Return what finds the points (n, 2) of an image, by detector."""
+    found: dict[str, Callable[[NDArray[np.uint8]], NDArray[np.floating]]] = {
+        "ours": lambda image: detect_corners(image, RESOLUTION, raw).points,
+        "goodFeaturesToTrack": lambda image: np.asarray(
+            cv2.goodFeaturesToTrack(image, 500, 0.01, 3), np.float64
+        ).reshape(-1, 2),
+        "Trajkovic": lambda image: trajkovic_corners(image, *TRAJKOVIC).astype(float),
+        "Harris": lambda image: np.argwhere(cv2.cornerHarris(image, 3, 3, 0.04) > 0.01).astype(float),
+    }
+    return found | {name.upper(): partial(_keypoints, finder) for name, finder in finders().items()}
+
+
+def _keypoints(finder: Any, image: NDArray[np.uint8]) -> NDArray[np.float64]:  # noqa: ANN401
+    return np.array([point.pt for point in finder.detect(image)], np.float64).reshape(-1, 2)
+
+
+def stability(
+    find: Callable[[NDArray[np.uint8]], NDArray[np.floating]], image: NDArray[np.uint8], runs: int = REPEATS
+) -> float:
+    """Return the share of an image's points that all of some runs find, of those that any finds."""
+    seen = [{tuple(point) for point in find(image).tolist()} for _ in range(runs)]
+    any_run = set().union(*seen)
+    return len(set(any_run).intersection(*seen)) / len(any_run) if any_run else 1.0
 
 
 def compare_descriptors(maps: dict[str, BankMap]) -> list[dict[str, Any]]:

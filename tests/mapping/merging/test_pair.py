@@ -71,7 +71,7 @@ def test_parts_that_share_some_rooms_are_joined():
     assert is_right(result, truth, (4.0, 4.0))
 
 
-@pytest.mark.parametrize("method", ["distances", "triplets"])
+@pytest.mark.parametrize("method", ["distances", "triplets", "radius"])
 def test_the_other_methods_of_matching_never_join_wrongly(method):
     chosen = merge_settings()
     chosen = replace(chosen, correspondence=replace(chosen.correspondence, method=method))
