@@ -69,6 +69,7 @@ def _of_station(result: dict[str, Any]) -> list[tuple[str, str]]:
     if known is None:
         return []
     rules = ", ".join(f"{count} by rule {rule}" for rule, count in known["by_rule"].items() if rule != "0")
+    pauses = "".join(f", {known[name]} {name}" for name in ("pauses", "resumes") if known[name])
     return [
         (
             "merges",
@@ -76,8 +77,8 @@ def _of_station(result: dict[str, Any]) -> list[tuple[str, str]]:
         ),
         (
             "orders",
-            f"{known['redirections']} redirections and {known['stops']} stops of {known['decisions']} "
-            f"decisions{f'; {rules}' if rules else ''}",
+            f"{known['redirections']} redirections{pauses} and {known['stops']} stops of "
+            f"{known['decisions']} decisions{f'; {rules}' if rules else ''}",
         ),
     ]
 
