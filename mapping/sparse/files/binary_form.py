@@ -136,8 +136,8 @@ def parsed_binary(content: bytes) -> tuple[SparseMap, GraphEdges | None]:
     )
     low, sizes = lists.boxes[:, :3], lists.boxes[:, 3:]
     sparse_map = SparseMap(
-        occupied=occupied_codes(np.stack([low, low + sizes], axis=1) / STEPS_A_METRE),
-        ground=free_codes(lists.free / STEPS_A_METRE),
+        occupied=occupied_codes(_checked(np.stack([low, low + sizes], axis=1) / STEPS_A_METRE)),
+        ground=free_codes(_checked(lists.free / STEPS_A_METRE)),
         floor=floor,
         settings=settings,
     )

@@ -224,6 +224,17 @@ def test_a_binary_file_that_lies_is_refused_by_its_name(tmp_path, changes, messa
     assert str(path) in str(caught.value)
 
 
+def test_a_binary_file_with_a_place_too_far_away_is_refused_by_its_name(tmp_path):
+    content = binary_content(SparseMap(occupied=occupied_codes(np.zeros((1, 2, 3))), ground=free_codes([])))
+    body = zlib.decompress(content[_HEADER.size :]).replace(b'"origin":[0,0,0]', b'"origin":[9e9,0,0]')
+    (length,) = struct.unpack_from("<I", body)
+    body = struct.pack("<I", length + 2) + body[4:]
+    path = tmp_path / "far.smap"
+    path.write_bytes(rewritten(content, length=len(body), body=zlib.compress(body)))
+    with pytest.raises(ValueError, match=r"far.smap.*not within 1,000,000 m"):
+        read_binary(path)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
