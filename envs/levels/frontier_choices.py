@@ -13,6 +13,7 @@ from lidarium.envs.levels.frontier_gains import expected_gain
 from lidarium.envs.levels.frontier_ranking import choose_offers
 from lidarium.envs.onboard.navigation import (
     COLUMNS,
+    ROW_LOW,
     ROWS,
     closeness_of,
     flags_of,
@@ -21,11 +22,19 @@ from lidarium.envs.onboard.navigation import (
 )
 from lidarium.envs.onboard.team_maps import TeamMaps, refresh_team
 from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.kernels.lanes.cost_lanes import FAR
 from lidarium.mapping.kernels.work_queue import Work, take_next
-from lidarium.mapping.planning.frontier_approach import approach_places
+from lidarium.mapping.planning.cheapest_views import cheapest_views
 from lidarium.mapping.planning.frontiers import frontier_clusters, ignore_frontiers_near
-from lidarium.mapping.planning.search.path_search import clear_memory, search_all
-from lidarium.mapping.planning.search.search_state import LARGEST_BUDGET, STRAIGHT
+from lidarium.mapping.planning.search.path_search import clear_memory, search_all, touched_in
+from lidarium.mapping.planning.search.search_state import STRAIGHT
+from lidarium.mapping.planning.search.swept_costs import (
+    SweptCosts,
+    costs_in,
+    prepare_costs,
+    spread_costs,
+    take_costs,
+)
 
 FARTHEST = 1000.0
 """Largest number in a table of offers [m]."""
@@ -138,11 +147,14 @@ class Renewal(NamedTuple):
         Whose choices are examined, and who is offered frontiers.
     reasons : (rows,) int8
         Result: why each robot's chosen frontier was given up, 0 where it was not.
+    memory : (pieces, 5) int64
+        For the costs of paths, a piece for each thread, see ``SweepMemory``.
     """
 
     is_live: NDArray[np.bool_]
     is_offered: NDArray[np.bool_]
     reasons: NDArray[np.int8]
+    memory: NDArray[np.int64]
 
 
 @kernel
@@ -172,11 +184,18 @@ def _why_in_vain(planning: Planning, drives: Drives, choices: Choices, row: int,
 
 @kernel
 def _offer(
-    planning: Planning, view: ViewReach, offers: Offers, row: int, cells: Array, starts: Array, piece: int
+    planning: Planning,
+    view: ViewReach,
+    swept: SweptCosts,
+    offers: Offers,
+    row: int,
+    cells: Array,
+    starts: Array,
+    piece: int,
 ) -> None:
     """Offer a robot frontier clusters that it can approach and see, see `choose_offers`.
 
-    The cheapest path comes first.
+    The cheapest path comes first. ``swept`` is where costs are found, prepared for the map.
     """
     table, mask = offers.tables[row], offers.masks[row]
     table[:], mask[:], offers.counts[row] = 0.0, 0, 0
@@ -186,22 +205,21 @@ def _offer(
     if len(starts) < 2:
         return
     record, resolution = planning.records[row // planning.sharing], planning.resolution
-    log_odds, memory = log_odds_of(record), planning.memory[piece]
+    log_odds = log_odds_of(record)
     origin_x, origin_y = planning.origins[row, 0], planning.origins[row, 1]
     start_row = int(math.floor((planning.believed[row, 1] - origin_y) / resolution))
     start_column = int(math.floor((planning.believed[row, 0] - origin_x) / resolution))
     if not (0 <= start_row < record[ROWS] and 0 <= start_column < record[COLUMNS]):
         return
-    remaining, parent, touched, least = search_all(
-        log_odds, closeness_of(record), passage_in(planning), memory, start_row, start_column
-    )
-    places, left, is_near = approach_places(cells, starts, log_odds, remaining, parent, least, view.spans)
-    clear_memory(memory, record[ROWS], record[COLUMNS], touched)
-    sizes, is_long = np.diff(starts), is_near.copy()
+    if not spread_costs(swept, start_row, start_column):
+        _leave_and_spread(planning, swept, record, start_row, start_column, piece)
+    places, costs = cheapest_views(cells, starts, log_odds, swept, view.spans)
+    sizes, is_near = np.diff(starts), costs < FAR
+    is_long = is_near.copy()
     for k in range(len(is_long)):
         is_long[k] &= sizes[k] * resolution >= view.least_size
     ranked = np.empty(len(table), np.int64)
-    count = choose_offers(left, sizes, is_long if is_long.any() else is_near, view.by_size, ranked)
+    count = choose_offers(-costs, sizes, is_long if is_long.any() else is_near, view.by_size, ranked)
     offset_x, offset_y = planning.offsets[row, 0], planning.offsets[row, 1]
     x, y = planning.believed[row, 0] - offset_x, planning.believed[row, 1] - offset_y
     for i in range(count):
@@ -212,7 +230,7 @@ def _offer(
         offers.targets[row, i, 0], offers.targets[row, i, 1] = target_x, target_y
         offers.headings[row, i] = math.atan2(float(rise), float(run)) if rise != 0 or run != 0 else np.nan
         offers.cells[row, i, 0], offers.cells[row, i, 1] = places[k, 2], places[k, 3]
-        cost = (LARGEST_BUDGET - left[k]) * (resolution / STRAIGHT)
+        cost = costs[k] * (resolution / STRAIGHT)
         table[i, 0], table[i, 1] = (
             min(max(target_x - x, -FARTHEST), FARTHEST),
             min(max(target_y - y, -FARTHEST), FARTHEST),
@@ -226,6 +244,23 @@ def _offer(
             gain = expected_gain(log_odds, places[k, 0], places[k, 1], view.rays, view.range_cells)
             offers.gains[row, i] = min(gain * resolution * resolution, MOST_GAIN)
     offers.counts[row] = count
+
+
+@kernel
+def _leave_and_spread(
+    planning: Planning, swept: SweptCosts, record: Array, row: int, column: int, piece: int
+) -> None:
+    """Find the costs of paths from a cell where the body does not fit.
+
+    It leaves by where there is no less room. Few robots stand so: a search cell by cell does it.
+    """
+    memory = planning.memory[piece]
+    remaining, parent, count, least = search_all(
+        log_odds_of(record), closeness_of(record), passage_in(planning), memory, row, column
+    )
+    touched = touched_in(memory, record[ROWS], record[COLUMNS])
+    take_costs(swept, remaining, parent, touched[:count], least)
+    clear_memory(memory, record[ROWS], record[COLUMNS], count)
 
 
 @kernel
@@ -250,6 +285,16 @@ def _give_up(
             ignore_frontiers_near(flags_of(record), tiles_of(record), cell[0], cell[1], view.reach)
 
 
+@kernel
+def _prepared(planning: Planning, record: Array, memory: Array) -> SweptCosts:
+    """Return what the costs of paths on a map are found in, once for all robots that plan on it."""
+    row_low, row_high, column_low, column_high = record[ROW_LOW:]
+    window = (row_low, max(row_high, row_low), column_low, max(column_high, column_low))
+    swept: SweptCosts = costs_in(memory, window)
+    prepare_costs(swept, log_odds_of(record), closeness_of(record), passage_in(planning))
+    return swept
+
+
 def renew_teams(
     planning: Planning,
     maps: TeamMaps,
@@ -267,6 +312,7 @@ def renew_teams(
             episode = work.items[k]
             _give_up(planning, maps, drives, view, choices, renewal, episode)
             cells, starts = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
+            swept = costs_in(renewal.memory[piece], (0, 0, 0, 0))
             listed = -1
             for row in range(episode * planning.robots, (episode + 1) * planning.robots):
                 if not renewal.is_offered[row]:
@@ -275,7 +321,8 @@ def renew_teams(
                     listed = row // planning.sharing
                     record = planning.records[listed]
                     cells, starts = frontier_clusters(flags_of(record), tiles_of(record), 1)
-                _offer(planning, view, offers, row, cells, starts, piece)
+                    swept = _prepared(planning, record, renewal.memory[piece])
+                _offer(planning, view, swept, offers, row, cells, starts, piece)
             k = take_next(work.taken)
 
 

@@ -24,6 +24,7 @@ from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.kernels.work_queue import new_work
 from lidarium.mapping.planning.frontier_approach import default_reach
 from lidarium.mapping.planning.search.search_targets import disc_spans
+from lidarium.mapping.planning.search.swept_costs import SweepMemory
 
 REASONS = ("", "unseen", "blocked", "no_progress")
 """Why a chosen frontier is given up, by number; 0 where it is not."""
@@ -59,7 +60,7 @@ class FrontierOffers:
         self._perception, self._driver, self._robots = perception, driver, settings.robots
         rows, resolution = settings.robots * perception.world.episodes, settings.occupancy.resolution
         reach = default_reach(footprint_of(settings.robot.radius), resolution) / resolution
-        offers = settings.frontiers
+        offers, self._memory = settings.frontiers, SweepMemory(len(perception.memory.table))
         self._view = ViewReach(
             disc_spans(reach),
             reach,
@@ -92,6 +93,8 @@ class FrontierOffers:
     def start(self, episode: int = 0) -> None:
         """Begin an episode: nothing is offered or chosen."""
         rows = slice(episode * self._robots, (episode + 1) * self._robots)
+        for grid in self._perception.beliefs.log_odds[rows]:
+            self._memory.fit(*grid.shape)
         self.offers.counts[rows], self.offers.tables[rows], self.offers.masks[rows] = 0, 0.0, 0
         self.choices.is_chosen[rows], self.choices.tried[rows] = False, -1
 
@@ -154,7 +157,7 @@ class FrontierOffers:
                 self._view,
                 self.offers,
                 self.choices,
-                Renewal(is_live, is_offered, reasons),
+                Renewal(is_live, is_offered, reasons, self._memory.table),
                 new_work(episodes, threads),
             )
         return reasons

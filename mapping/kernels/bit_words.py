@@ -27,6 +27,16 @@ def _place_of_first(typing_context: Any, word: Any) -> Any:  # noqa: ANN401
     return types.int64(types.uint64), generate
 
 
+def _place_of_last(typing_context: Any, word: Any) -> Any:  # noqa: ANN401
+    """Tell which is the last bit that is set."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:  # noqa: ANN401
+        before = builder.ctlz(arguments[0], ir.Constant(ir.IntType(1), 1))
+        return builder.sub(ir.Constant(_WORD, 63), before)
+
+    return types.int64(types.uint64), generate
+
+
 def _multiply_without_carry(builder: Any, word: Any) -> Any:  # noqa: ANN401
     """Return the lower half of the carry-less product with a word of ones.
 
@@ -62,6 +72,7 @@ CAN_MULTIPLY_WITHOUT_CARRY = has_feature("pclmul")
 """Whether the processor multiplies without carrying."""
 
 _first = machine_code(_place_of_first, plain_forms.first_bit)
+_last = machine_code(_place_of_last, plain_forms.last_bit)
 _run = machine_code(_running_xor, plain_forms.running_xor)
 
 
@@ -69,6 +80,13 @@ _run = machine_code(_running_xor, plain_forms.running_xor)
 def first_bit(word: np.uint64) -> int:
     """Return which bit of a word is the first that is set; one must be."""
     place: int = _first(word)
+    return place
+
+
+@kernel(inline=True)
+def last_bit(word: np.uint64) -> int:
+    """Return which bit of a word is the last that is set; one must be."""
+    place: int = _last(word)
     return place
 
 

@@ -37,6 +37,11 @@ def first_bit(word: np.uint64) -> int:
     return plain.first_bit(int(word))
 
 
+def last_bit(word: np.uint64) -> int:
+    """Return which bit of a word is the last that is set."""
+    return int(word).bit_length() - 1
+
+
 def running_xor(word: np.uint64) -> np.uint64:
     """Return the running exclusive-or of a word's bits."""
     return np.uint64(plain.running_xor(int(word)))
@@ -206,6 +211,56 @@ def nearest_in_tile(points: int, codes: int, numbers: int, count: int, squares: 
         array_at(numbers, (count,), np.int32),
         (nearest, chosen),
     )
+
+
+def relax_forwards(costs: int, straight: int, diagonal: int, kinds: int, at: int, beside: int) -> int:
+    """Lower the costs of 16 cells by those of the row beside and, in the order of columns, of their own."""
+    return _relax((costs, straight, diagonal, kinds), at, beside, 1)
+
+
+def relax_backwards(costs: int, straight: int, diagonal: int, kinds: int, at: int, beside: int) -> int:
+    """Lower the costs of 16 cells by those of the row beside and, against the columns, of their own."""
+    return _relax((costs, straight, diagonal, kinds), at, beside, -1)
+
+
+def _relax(grids: tuple[int, int, int, int], at: int, beside: int, step: int) -> int:
+    """Lower the costs of 16 cells; return the bits of those that have changed."""
+    numbers, width = max(at, beside) + GROUP + 1, np.int32
+    costs, straight, diagonal = (array_at(grid, (numbers,), width) for grid in grids[:3])
+    kinds, changed = array_at(grids[3], (numbers,), np.uint8), 0
+    for k in range(GROUP)[::step]:
+        cell, before = at + k, costs[at + k]
+        if not kinds[cell] & 2:
+            continue
+        ways = [before, 2**29, costs[beside + k] + straight[beside + k] + straight[cell]]
+        ways.append(costs[cell - step] + straight[cell - step] + straight[cell])
+        for side in (-1, 1):
+            corner, between = beside + k + side, (kinds[beside + k], kinds[cell + side])
+            is_roomy = kinds[cell] & kinds[corner] & 4 and (between[0] | between[1]) & 1
+            if is_roomy or between[0] & between[1] & 2:
+                ways.append(costs[corner] + diagonal[corner] + diagonal[cell])
+        costs[cell] = min(ways)
+        changed |= int(costs[cell] != before) << k
+    return changed
+
+
+def look_up_costs(log_odds: int, closeness: int, body: int, kinds: int, straight: int, diagonal: int) -> None:
+    """Write the kinds of 16 cells, and what steps cost there."""
+    table, length, plain_up_to, tight, roomy = array_at(body, (5,), np.int64).tolist()
+    near = np.asarray(_shorts(closeness, GROUP))
+    free = _bytes(log_odds, GROUP) < 0
+    fits = free & (near <= tight)
+    array_at(kinds, (GROUP,), np.uint8)[:] = free + 2 * fits + 4 * (free & (near <= roomy))
+    places = np.where(near > plain_up_to, near, 0)
+    if not fits.any():
+        return
+    for address, costs in zip((straight, diagonal), array_at(table, (2, length), np.int32), strict=True):
+        array_at(address, (GROUP,), np.int32)[:] = np.where(fits, np.asarray(costs)[places], 0)
+
+
+def cheaper_cells(costs: int, limit: int) -> int:
+    """Return which of 16 costs are below a limit."""
+    return plain.bits_of(array_at(costs, (GROUP,), np.int32) < limit)
 
 
 def add_one(address: int) -> int:

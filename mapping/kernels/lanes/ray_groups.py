@@ -58,7 +58,7 @@ def cells_at(builder: Any, start: Any, direction: Any, distance: Any) -> Any:  #
     return builder.fptosi(builder.fadd(start, builder.fmul(distance, direction)), INTS)
 
 
-def _gather(builder: Any, address: Any, places: Any, alive: Any) -> Any:  # noqa: ANN401
+def gather(builder: Any, address: Any, places: Any, alive: Any) -> Any:  # noqa: ANN401
     """Return the four bytes from each place on; 0 in lanes that are not alive."""
     if HAS_GATHERS:
         pointer = ir.IntType(8).as_pointer()
@@ -140,7 +140,7 @@ class Squares:
     def sides(self, column: Any, row: Any, alive: Any) -> Any:  # noqa: ANN401
         """Return the side of the largest square that opens from each lane's cell."""
         within = self._builder.add(self._builder.mul(row, self._columns), column)
-        found = _gather(self._builder, self._address, self._builder.add(self._offset, within), alive)
+        found = gather(self._builder, self._address, self._builder.add(self._offset, within), alive)
         return self._builder.and_(found, _BYTE)
 
 

@@ -212,6 +212,13 @@ def clear_memory(memory: Array, rows: int, columns: int, count: int) -> None:
 
 
 @kernel
+def touched_in(memory: Array, rows: int, columns: int) -> Array:
+    """Return the room for the cells that a search has touched, row and column packed (kernel)."""
+    touched: Array = int32_table_at(memory[TOUCHED_AT], 1, rows * columns + SPARE_CELLS)[0]
+    return touched
+
+
+@kernel
 def find_path(
     terrain: Terrain, memory: Array, start: tuple[int, int], goal: tuple[int, int], budget: int
 ) -> tuple[int, Array]:

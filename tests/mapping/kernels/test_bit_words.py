@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numba.extending import intrinsic
 
 from lidarium.mapping.kernels import bit_words
-from lidarium.mapping.kernels.bit_words import first_bit, running_xor
+from lidarium.mapping.kernels.bit_words import first_bit, last_bit, running_xor
 from lidarium.mapping.kernels.compilation import kernel
 from lidarium.mapping.kernels.in_python import plain
 
@@ -17,7 +17,7 @@ words = st.integers(0, 2**64 - 1)
 
 @kernel
 def apply_to(word):
-    return running_xor(word), first_bit(word)
+    return running_xor(word), first_bit(word), last_bit(word)
 
 
 @given(words)
@@ -26,8 +26,8 @@ def test_each_bit_is_the_exclusive_or_of_all_up_to_it(word):
 
 
 @given(words.filter(bool))
-def test_the_first_bit_is_found(word):
-    assert apply_to(np.uint64(word))[1] == plain.first_bit(word)
+def test_the_first_and_the_last_bit_are_found(word):
+    assert apply_to(np.uint64(word))[1:] == (plain.first_bit(word), word.bit_length() - 1)
 
 
 @pytest.mark.parametrize("word", [0, 1, 2**63, 2**64 - 1, 0x5555555555555555, 0x8000000000000001])
