@@ -22,8 +22,8 @@ class Bench(Command):
     """questions to ask, all where left out.
 
     Questions are kernel_step, ray_casting, range_error, map_update, exploration_projects,
-    environment_step, batch_step, learning_preset, waypoint_decision, cached_start,
-    bullet_world, depth_image, quantisation, sparse_planning.
+    environment_step, batch_step, learning_preset, waypoint_decision, frontier_decision,
+    cached_start, bullet_world, depth_image, quantisation, sparse_planning.
     """
 
 

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from lidarium.benchmarks.speed.cases import cached_start, waypoint_decision
+from lidarium.benchmarks.speed.cases import cached_start, frontier_decision, waypoint_decision
 from lidarium.benchmarks.speed.cases.waypoint_decision import Deciders
 from lidarium.benchmarks.speed.harness import batches
 from lidarium.benchmarks.speed.harness.batches import DrivenBatch
@@ -53,6 +53,18 @@ def test_waypoints_are_free_cells_some_way_off(few_episodes):
         column, line = ((place - beliefs.origins[row]) / 0.025).astype(int)
         assert 0.5 <= distance <= 3.0
         assert beliefs.log_odds[row][line, column] < 0
+
+
+def test_decisions_by_frontiers_are_counted_by_robot(monkeypatch):
+    monkeypatch.setattr(frontier_decision, "EPISODES", 2)
+    monkeypatch.setattr(frontier_decision, "FLOORS", "apartment")
+    monkeypatch.setattr(frontier_decision, "WARM_DECISIONS", 1)
+    choosers = frontier_decision.Choosers(3)
+    assert choosers._decide() == 6
+    assert choosers.run(0.0) > 0.0
+    lines = frontier_decision.measure(LEAST)
+    assert [line.to_reach for line in lines] == [6000.0, 3000.0]
+    assert all(line.judged > 0.0 and line.unit == "rows/CPU s" for line in lines)
 
 
 def test_the_profile_has_all_parts_and_they_make_up_the_whole(tmp_path):

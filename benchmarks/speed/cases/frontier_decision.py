@@ -1,0 +1,87 @@
+"""Decisions by frontiers of a batch, rows a second of one core's time, on floors that nobody was trained on.
+
+A row is one decision of one robot: it chooses a frontier that it is offered, drives for up to 2 s, and is
+offered frontiers again. Episodes begin anew where they end, which counts as well.
+"""
+
+import statistics
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+import lidarium
+from lidarium.benchmarks.speed.harness.lines import Line, shown
+from lidarium.benchmarks.speed.harness.report import run_alone
+from lidarium.benchmarks.speed.harness.timing import Effort
+
+CORES = 1
+EPISODES, RESOLUTION, FLOORS = 16, 0.05, "set:validation"
+WARM_DECISIONS = 20
+"""Decisions before the clock starts: maps are begun then, and most floors are in memory."""
+
+TO_REACH = {1: 6000.0, 3: 3000.0}
+"""Rows a CPU second by size of the team."""
+
+NOTES = (
+    f"*Frontier decision*: `lidarium.vector_env` with level `frontier`, {EPISODES} episodes on `{FLOORS}`, "
+    f"maps of {100 * RESOLUTION:g} cm, the default laser and observations, one thread. Each robot takes any "
+    "of its offers with equal chance. A row is a decision of one robot, up to 20 steps, new episodes "
+    "included; time is that of the processor, not of the clock.",
+)
+
+
+class Choosers:
+    """A batch whose robots choose among their frontiers at random.
+
+    Parameters
+    ----------
+    robots : int
+        Robots of each episode.
+    """
+
+    def __init__(self, robots: int) -> None:
+        self._env = lidarium.vector_env(
+            EPISODES,
+            FLOORS,
+            level="frontier",
+            robots=robots,
+            resolution=RESOLUTION,
+            threads=1,
+            copy=False,
+        )
+        self._generator = np.random.default_rng(0)
+        self._masks: NDArray[np.int8] = self._env.reset(seed=0)[0]["action_mask"]
+        for _ in range(WARM_DECISIONS):
+            self._decide()
+
+    def _decide(self) -> int:
+        """Take a decision of all robots; return how many took part."""
+        chances = self._generator.random(self._masks.shape) * self._masks
+        chances[:, -1] *= 1e-6  # to stay only where nothing is offered
+        observations, _, _, _, infos = self._env.step(chances.argmax(axis=1))
+        self._masks = observations["action_mask"]
+        return int(infos["active"].sum())
+
+    def run(self, seconds: float) -> float:
+        """Decide for about so many seconds; return the processor's seconds a row."""
+        rows, began = 0, time.process_time()
+        while rows == 0 or time.process_time() - began < seconds:
+            rows += self._decide()
+        return (time.process_time() - began) / rows
+
+
+def measure(effort: Effort) -> list[Line]:
+    """Measure teams of one and of three robots."""
+    lines = []
+    for robots, wanted in TO_REACH.items():
+        choosers = Choosers(robots)
+        rate = 1.0 / statistics.median(choosers.run(4.0 * effort.block_s) for _ in range(effort.rounds))
+        name = f"frontier decision, {EPISODES} episodes x {robots} robot{'s' if robots > 1 else ''}"
+        unit = "rows/CPU s"
+        lines.append(Line(name, f"{shown(rate)} {unit}", "-", None, wanted, figure=rate, unit=unit))
+    return lines
+
+
+if __name__ == "__main__":
+    run_alone(measure, "Decisions by frontiers of a batch.", CORES)
