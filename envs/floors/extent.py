@@ -48,23 +48,27 @@ def check_extent(what: str, bounds: Iterable[float], rings: Iterable[NDArray[np.
             f"{what} has a side of {side:g} m, up to {farthest:g} m from its origin; want at most "
             f"{MOST_EXTENT_M:,.0f} m, up to {MOST_COORDINATE_M:,.0f} m: check its scale"
         )
-    corners, outline = 0, 0.0
-    low = np.array([low_x, low_y]) - MOST_BEYOND_M
-    high = np.array([high_x, high_y]) + MOST_BEYOND_M
-    for ring in rings:
-        if not ((ring >= low) & (ring <= high)).all():
-            raise ValueError(
-                f"{what} has something that stands more than {MOST_BEYOND_M:,.0f} m beyond its bounds; want "
-                "all of it within: check its scale"
-            )
-        corners += len(ring)
-        steps = np.diff(ring, axis=0, append=ring[:1])
-        outline += float(np.hypot(steps[:, 0], steps[:, 1]).sum())
-        if corners > MOST_CORNERS or outline > MOST_OUTLINE_M:
-            raise ValueError(
-                f"{what} has more than {MOST_CORNERS:,} corners or {MOST_OUTLINE_M:,.0f} m of walls; want "
-                "fewer: check its scale, or part it"
-            )
+    outlines = [np.asarray(ring, np.float64) for ring in rings if len(ring)]
+    if not outlines:
+        return
+    corners = np.concatenate(outlines)
+    if not (
+        (corners >= [low_x - MOST_BEYOND_M, low_y - MOST_BEYOND_M]).all()
+        and (corners <= [high_x + MOST_BEYOND_M, high_y + MOST_BEYOND_M]).all()
+    ):
+        raise ValueError(
+            f"{what} has something that stands more than {MOST_BEYOND_M:,.0f} m beyond its bounds; want "
+            "all of it within: check its scale"
+        )
+    ends = np.cumsum([len(ring) for ring in outlines])
+    following = np.arange(1, len(corners) + 1)
+    following[ends - 1] = np.concatenate([[0], ends[:-1]])
+    steps = corners[following] - corners
+    if len(corners) > MOST_CORNERS or float(np.hypot(steps[:, 0], steps[:, 1]).sum()) > MOST_OUTLINE_M:
+        raise ValueError(
+            f"{what} has more than {MOST_CORNERS:,} corners or {MOST_OUTLINE_M:,.0f} m of walls; want "
+            "fewer: check its scale, or part it"
+        )
 
 
 def check_pairs(what: str, walls: int, doors: int) -> None:

@@ -187,19 +187,37 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
+class _Latest:
+    """What was made last, of which raster."""
+
+    def __init__(self) -> None:
+        self._made: tuple[Raster, tuple[Any, ...], Any] | None = None
+
+    def value(self, raster: Raster, key: tuple[Any, ...], make: Callable[[], Made]) -> Made:
+        """Return what was made last where it is what is asked for, or make it."""
+        made = self._made
+        if made is None or made[0] is not raster or made[1] != key:
+            made = self._made = (raster, key, make())
+        value: Made = made[2]
+        return value
+
+
+_LATEST = _Latest()
+
+
 def _kept(raster: Raster, key: tuple[Any, ...], make: Callable[[], Made]) -> Made:
     """Return what a raster keeps, or make it.
 
     A raster that can be written to keeps nothing.
 
     It is kept from the second time on: many floors of large sets are drawn once, and would only fill the
-    memory.
+    memory. What was made last is at hand until something else is made: a beginning asks for it twice.
     """
     if raster.solid.flags.writeable:
         return make()
     value: Made | None = raster.kept.get(key)
     if value is None:
-        value = make()
+        value = _LATEST.value(raster, key, make)
         raster.kept[key] = value if key in raster.kept else None
         while len(raster.kept) > KEPT:
             raster.kept.pop(next(iter(raster.kept)))

@@ -70,5 +70,6 @@ def test_advantages_are_those_of_a_plain_sum():
 
 def test_maskable_ppo_trains():
     module = script("maskable_ppo", "sb3_contrib", "rl")
-    model = module.train({**ROOM, "robots": 2}, steps=24, episodes=2, rollout=6)
-    assert model.num_timesteps == 24
+    model = module.make({**ROOM, "robots": 2}, episodes=2, rollout=6)
+    assert module.train(model, 48) > 0.0
+    assert model.num_timesteps == 48

@@ -25,6 +25,7 @@ A door cuts every wall that passes through its middle.
 import json
 import math
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,7 @@ INNER_WALL = 0.1
 DOOR_WIDTH = 0.9
 
 
+@lru_cache(maxsize=1)  # it is asked for each floor that an episode draws
 def drawn_names() -> tuple[str, ...]:
     """Names of the drawn floors, in alphabetical order."""
     return tuple(sorted(path.stem for path in DATA.glob("*.json") if not path.stem.startswith("_")))
