@@ -12,7 +12,7 @@ from lidarium.envs.batch.merged_rows import MergedRows
 from lidarium.envs.conventions.conventions import Conventions
 from lidarium.envs.conventions.messages import MESSAGES, MessageBoard, split_action, talking_space
 from lidarium.envs.conventions.number_infos import flat_row_infos
-from lidarium.envs.conventions.observation_forms import ObservationForm
+from lidarium.envs.conventions.observation_forms import MASK, ObservationForm
 from lidarium.envs.conventions.team_rewards import TEAM, shared_rewards
 from lidarium.envs.wrappers.team_exchange import MergingSettings
 
@@ -125,6 +125,9 @@ class RowConventions:
         """Return infos of all rows, arrays with their masks."""
         if self._merged is not None:
             infos = self._merged.infos(infos, self._seen)
-        if self._conventions.infos == "full":
+        if self._conventions.infos != "full":
+            infos = {} if self._conventions.infos == "none" else flat_row_infos(infos, self._rows)
+        if not self._form.has_mask_apart:
             return infos
-        return {} if self._conventions.infos == "none" else flat_row_infos(infos, self._rows)
+        masks = self._batch.observations[MASK].copy()
+        return {**infos, MASK: masks, f"_{MASK}": self._batch.everyone}

@@ -3,11 +3,13 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from lidarium.envs.conventions.conventions import Conventions
 from lidarium.envs.conventions.number_infos import ENDED, flat_infos
-from lidarium.envs.conventions.observation_forms import ObservationForm, zeros_of
+from lidarium.envs.conventions.observation_forms import MASK, ObservationForm, zeros_of
 from lidarium.envs.conventions.talking_team import TalkingTeam
 from lidarium.envs.conventions.team_rewards import TEAM, shared_among
 from lidarium.envs.team_wrapper import TeamWrapper
@@ -38,6 +40,7 @@ class ConventionalEnv(TeamWrapper):
         self._forms = {
             agent: ObservationForm(env.observation_space(agent), conventions) for agent in env.possible_agents
         }
+        self._has_masks_apart = conventions.action_mask == "infos"
         self._keeps = conventions.ended_agents == "zeros"
         self._ended: dict[str, str] = {}
         self._numbers: dict[str, dict[str, Any]] = {}
@@ -56,7 +59,7 @@ class ConventionalEnv(TeamWrapper):
         """Start an episode; see ``ExplorationEnv.reset``."""
         observations, infos = super().reset(seed, options)
         self._ended, self._numbers = {}, {}
-        return self._observations(observations), self._infos(infos)
+        return self._observations(observations), self._infos(infos, observations)
 
     def step(self, actions: Any) -> Any:  # noqa: ANN401
         """Take a step or a decision."""
@@ -72,21 +75,27 @@ class ConventionalEnv(TeamWrapper):
             rewards,
             terminations,
             truncations,
-            self._infos(infos),
+            self._infos(infos, observations),
         )
         return self._with_ended(*outcome, infos) if self._keeps else outcome
 
     def _observations(self, observations: dict[str, Any]) -> dict[str, Any]:
         return {agent: self._forms[agent].of(observation) for agent, observation in observations.items()}
 
-    def _infos(self, infos: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        if self.conventions.infos == "none":
-            return {agent: {} for agent in infos}
+    def _infos(
+        self, infos: dict[str, dict[str, Any]], observations: dict[str, Any]
+    ) -> dict[str, dict[str, Any]]:
         flat = self.conventions.infos == "flat"
-        active: dict[str, Any] = {} if not self._keeps else {ACTIVE: 1.0 if flat else True}
-        formed = {agent: {**(flat_infos(info) if flat else info), **active} for agent, info in infos.items()}
-        self._numbers = {**self._numbers, **formed} if flat else {}
-        return formed
+        formed: dict[str, dict[str, Any]] = {agent: {} for agent in infos}
+        if self.conventions.infos != "none":
+            active: dict[str, Any] = {} if not self._keeps else {ACTIVE: 1.0 if flat else True}
+            formed = {
+                agent: {**(flat_infos(info) if flat else info), **active} for agent, info in infos.items()
+            }
+            self._numbers = {**self._numbers, **formed} if flat else {}
+        if not self._has_masks_apart:
+            return formed
+        return {agent: {**info, MASK: observations[agent][MASK]} for agent, info in formed.items()}
 
     def _shared(self, rewards: dict[str, float], infos: dict[str, dict[str, Any]]) -> dict[str, float]:
         """Share rewards; the terms of the reward still add up to it."""
@@ -125,13 +134,20 @@ class ConventionalEnv(TeamWrapper):
 
     def _info_of_ended(self, agent: str) -> dict[str, Any]:
         """Return what is said of an agent that has ended: its last numbers, and no reward."""
+        mask = {MASK: self._only_stay(agent)} if self._has_masks_apart else {}
         if self.conventions.infos == "none":
-            return {}
+            return mask
         if self.conventions.infos == "full":
-            return {ACTIVE: False, "ended_because": self._ended[agent]}
+            return {ACTIVE: False, "ended_because": self._ended[agent], **mask}
         last = self._numbers[agent]
         gone = {name: 0.0 for name in last if name.startswith("reward_terms.")}
-        return {**last, **gone, ACTIVE: 0.0, ENDED: last[ENDED]}
+        return {**last, **gone, ACTIVE: 0.0, ENDED: last[ENDED], **mask}
+
+    def _only_stay(self, agent: str) -> NDArray[np.int8]:
+        """Return the mask of an agent that has ended: it may stay."""
+        mask = np.zeros(self.env.observation_space(agent)[MASK].shape, np.int8)
+        mask[-1] = 1
+        return mask
 
 
 def conventional(env: Any, conventions: Conventions) -> Any:  # noqa: ANN401

@@ -11,7 +11,7 @@ MOST_FLOATS = 4096
 
 FORMS: dict[str, tuple[str, ...]] = {
     "observation": ("dict", "flat"),
-    "action_mask": ("inside", "beside"),
+    "action_mask": ("inside", "beside", "infos"),
     "infos": ("full", "flat", "none"),
     "ended_agents": ("leave", "zeros"),
 }
@@ -28,8 +28,9 @@ class Conventions:
         ``dict``, or ``flat``: one float32 vector, with the keys in the order of the alphabet; see
         `flat_columns`.
     action_mask : str
-        Where the mask of actions is: ``inside`` the observation, or ``beside`` it, as in ``{"observation":
-        ..., "action_mask": ...}``; only at the level of frontiers.
+        Where the mask of actions is: ``inside`` the observation; ``beside`` it, as in ``{"observation": ...,
+        "action_mask": ...}``; or in ``infos`` of any form, as ``"action_mask"``. Only at the level of
+        frontiers.
     infos : str
         ``full``; ``flat``, numbers alone with the same keys at each step; or ``none``.
     ended_agents : str
@@ -52,7 +53,11 @@ class Conventions:
         check_settings(self)
         for name, known in FORMS.items():
             if getattr(self, name) not in known:
-                raise ValueError(f"{name} is {shown(getattr(self, name))}; want {' or '.join(known)}")
+                raise ValueError(f"{name} is {shown(getattr(self, name))}; want {_either(known)}")
+
+
+def _either(names: tuple[str, ...]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 NAMES = tuple(each.name for each in fields(Conventions))

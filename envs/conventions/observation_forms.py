@@ -1,4 +1,4 @@
-"""Observations as one vector, with the mask of actions inside or beside."""
+"""Observations as one vector, with the mask of actions inside, beside or apart."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,33 +27,36 @@ class ObservationForm:
     ----------
     space : Space
         Of one robot's observations in this form.
+    has_mask_apart : bool
+        Whether the mask is in infos.
 
     Raises
     ------
     ValueError
-        Where a mask is to be beside observations that have none, or nothing else is observed.
+        Where a mask is to be beside or apart from observations that have none, or nothing else is observed.
     """
 
     def __init__(self, space: spaces.Space[Any], conventions: Conventions) -> None:
         assert isinstance(space, spaces.Dict)
         boxes: dict[str, Any] = dict(space.spaces)
-        self._is_flat, self._is_beside = (
-            conventions.observation == "flat",
-            conventions.action_mask == "beside",
-        )
-        if self._is_beside and MASK not in boxes:
+        place = conventions.action_mask
+        self._is_flat, self._is_beside = conventions.observation == "flat", place == "beside"
+        self.has_mask_apart = place == "infos"
+        if place != "inside" and MASK not in boxes:
             raise ValueError(
-                f"action_mask is 'beside', but observations have none ({', '.join(boxes)}); masks are "
+                f"action_mask is {place!r}, but observations have none ({', '.join(boxes)}); masks are "
                 "there at level='frontier'"
             )
-        mask = boxes.pop(MASK) if self._is_beside else None
+        mask = boxes.pop(MASK) if place != "inside" else None
         self._boxes = {name: boxes[name] for name in sorted(boxes)}
         if not boxes:
             raise ValueError("nothing is observed beside the mask of actions; choose what in observe")
         self.columns = flat_columns(self._boxes) if self._is_flat else ()
         rest = flat_box(self._boxes) if self._is_flat else spaces.Dict(boxes)
-        self.space: spaces.Space[Any] = rest if mask is None else spaces.Dict({REST: rest, MASK: mask})
-        self._is_plain = not self._is_flat and not self._is_beside
+        self.space: spaces.Space[Any] = rest
+        if mask is not None and self._is_beside:
+            self.space = spaces.Dict({REST: rest, MASK: mask})
+        self._is_plain = not self._is_flat and place == "inside"
 
     def of(self, observation: Mapping[str, NDArray[Any]], rows: tuple[int, ...] = ()) -> Any:  # noqa: ANN401
         """Return an observation in this form.

@@ -58,9 +58,50 @@ def test_the_mask_may_be_beside_the_observation(form):
         assert observation["action_mask"].shape == (33,)
 
 
+@pytest.mark.parametrize("form", ["dict", "flat"])
+@pytest.mark.parametrize("infos", ["full", "flat", "none"])
+def test_the_mask_may_be_in_infos_of_any_form(form, infos):
+    env = make(level="frontier", observation=form, action_mask="infos", infos=infos)
+    inside = make(level="frontier")
+    observations, told = env.reset(seed=1)
+    wanted = inside.reset(seed=1)[0]
+    for _ in range(3):
+        for agent, observation in observations.items():
+            assert env.observation_space(agent).contains(observation)
+            assert "action_mask" not in (observation if form == "dict" else ())
+            assert np.array_equal(told[agent]["action_mask"], wanted[agent]["action_mask"])
+            rest = {name: value for name, value in told[agent].items() if name != "action_mask"}
+            assert infos == "full" or all(type(value) is float for value in rest.values())
+            assert (infos == "none") == (not rest)
+        observations, *_, told = step(env, 0)
+        wanted = step(inside, 0)[0]
+
+
+def test_the_turn_based_form_has_masks_in_infos():
+    env = lidarium.env("scene_room", **OPTIONS, level="frontier", action_mask="infos", infos="none")
+    env.reset(seed=1)
+    for _ in range(6):
+        observation, _, terminated, truncated, info = env.last()
+        assert "action_mask" not in observation
+        assert info["action_mask"].any()
+        env.step(None if terminated or truncated else int(np.flatnonzero(info["action_mask"])[0]))
+
+
+@pytest.mark.parametrize("infos", ["full", "flat", "none"])
+def test_agents_that_have_ended_may_only_stay(infos):
+    env = make(level="frontier", action_mask="infos", infos=infos, ended_agents="zeros")
+    env.reset(seed=0)
+    env.stop("robot_1", "enough")
+    step(env, 0)
+    assert env.agents == ["robot_0", "robot_1"]
+    told = step(env, 0)[-1]
+    assert told["robot_1"]["action_mask"].tolist() == [0] * 32 + [1]
+
+
 def test_the_level_of_frontiers_alone_has_masks():
-    with pytest.raises(ValueError, match="action_mask is 'beside', but observations have none"):
-        make(action_mask="beside")
+    for place in ("beside", "infos"):
+        with pytest.raises(ValueError, match=f"action_mask is '{place}', but observations have none"):
+            make(action_mask=place)
     solo = gymnasium.make("lidarium/FrontierExploration-v1", floor="scene_room", observation="flat").unwrapped
     observation, _ = solo.reset(seed=0)
     assert solo.action_masks().dtype == np.bool_
@@ -140,6 +181,7 @@ def test_agents_that_stay_end_as_terminated_where_the_horizon_cuts_the_others():
         {"ended_agents": "zeros", "infos": "flat", "observation": "flat"},
         {"team_reward": 0.5, "infos": "none"},
         {"level": "frontier", "observation": "flat", "action_mask": "beside"},
+        {"level": "frontier", "infos": "none", "action_mask": "infos", "ended_agents": "zeros"},
     ],
 )
 def test_the_tests_of_pettingzoo_pass(conventions):
@@ -174,11 +216,13 @@ def test_a_share_beyond_the_whole_is_refused():
         make(team_reward=1.5)
 
 
-@pytest.mark.parametrize("level", ["velocity", "frontier"])
-def test_rows_of_a_batch_take_the_forms_of_single_teams(level):
+@pytest.mark.parametrize(
+    ("level", "mask"), [("velocity", None), ("frontier", "beside"), ("frontier", "infos")]
+)
+def test_rows_of_a_batch_take_the_forms_of_single_teams(level, mask):
     forms = {"observation": "flat", "infos": "flat", "team_reward": 0.5}
-    if level == "frontier":
-        forms["action_mask"] = "beside"
+    if mask is not None:
+        forms["action_mask"] = mask
     options = {**ENDING, "level": level, **forms}
     batch = lidarium.vector_env(2, CLOSET, **options)
     teams = [lidarium.parallel_env(CLOSET, **options) for _ in range(2)]
@@ -192,12 +236,12 @@ def test_rows_of_a_batch_take_the_forms_of_single_teams(level):
                 row = 2 * episode + int(agent[-1])
                 pairs = (
                     [(observations[name][row], own[agent][name]) for name in own[agent]]
-                    if level == "frontier"
+                    if mask == "beside"
                     else [(observations[row], own[agent])]
                 )
                 assert all(np.array_equal(mine, theirs) for mine, theirs in pairs)
                 for name, value in told[agent].items():
-                    assert infos[name][row] == value, name
+                    assert np.array_equal(infos[name][row], value), name
         action = 0 if level == "frontier" else AHEAD
         observations, rewards, *_, infos = batch.step(np.array([action] * 4))
         alone = [step(env, action) if env.agents else env.reset() for env in teams]
