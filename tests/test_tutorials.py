@@ -80,3 +80,11 @@ def test_the_page_of_the_tutorial_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     exec(compile(code_of("share_results.md"), "share_results.md", "exec"), {})
     assert "explore_lite on apartment, 2 robots, seed 0" in (tmp_path / "episode.html").read_text()
+
+
+def test_networks_of_the_tutorial_explore(capsys):
+    name = "train_a_team.md"
+    exec(compile(code_of(name), name, "exec"), {})
+    text = (TUTORIALS / name).read_text(encoding="utf-8")
+    shown = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
+    assert capsys.readouterr().out == "".join(shown)

@@ -8,6 +8,7 @@ import pytest
 
 from lidarium.envs.simulation.kernels.arrays import WorldArrays
 from lidarium.evaluation.suites.suite import read_suite
+from lidarium.training.settings import read_training
 from lidarium.registry import REGISTRIES
 from lidarium.scripts.main import Choice
 
@@ -26,7 +27,10 @@ def test_suites_of_the_pages_are_read(page, tmp_path):
     ):
         path = tmp_path / f"suite_{number}.toml"
         path.write_text(block, encoding="utf-8")
-        assert next(iter(read_suite(path).trials()))
+        if "[[rounds]]" in block:
+            assert read_training(path).rounds
+        else:
+            assert next(iter(read_suite(path).trials()))
 
 
 def test_the_architecture_names_all_arrays_of_the_kernels():
