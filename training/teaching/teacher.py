@@ -24,6 +24,9 @@ MOST_STOPS = 16
 KEPT_SHARE = 0.3
 """A stop is left out where an option shows all but this share of what it is for."""
 
+VISIT_M = 1.0
+"""What slowing down, turning and setting out at each stop costs [m]."""
+
 WEIGHTS = TourWeights(1.0, 0.1, 0.0)
 """What the teacher's tours are weighed by: the longest, the sum, and nothing for waiting."""
 
@@ -146,7 +149,7 @@ class TaughtTours(ChosenTours):
             return first * (WEIGHTS.longest + WEIGHTS.total)
         robots, spent = list(rest.robots), list(rest.spent)
         robots[robot], spent[robot] = view, first
-        lengths = np.minimum(graph.lengths[:, stops], NO_PATH)
+        lengths = np.minimum(graph.lengths[:, stops], NO_PATH) + VISIT_M
         begin, between = lengths[robots] + np.array(spent)[:, None], lengths[stops]
         worth = np.zeros(len(stops))
         tours = team_tours(begin, between, worth, WEIGHTS)
