@@ -12,8 +12,6 @@ from lidarium.agents.srt.safe_region import (
 from lidarium.agents.srt.tree import Node
 
 BODY, PERCEPTION = 0.2, 4.0
-
-
 HERE = np.zeros(2)
 
 

@@ -1,12 +1,9 @@
-"""Codes keep their frames: corrected poses move them."""
+"""Codes move with their frames."""
 
 import numpy as np
 import pytest
 from furnished_room import pose_at
 
-from lidarium.mapping.sparse.floor_plane import FloorPlane
-from lidarium.mapping.sparse.rigid_motions import checked_poses, inverse_of, moved_boxes, moved_points
-from lidarium.mapping.sparse.settings import FloorSettings, MapperSettings
 from lidarium.mapping.sparse.sparse_map import SparseMap, free_codes, occupied_codes
 
 BOX = np.array([[[1.0, 0.0, 0.0], [2.0, 0.2, 1.0]]])
@@ -56,29 +53,6 @@ def test_normals_turn_with_their_frame():
     np.testing.assert_allclose(moved.normals[0], [0.0, 1.0, 0.0], atol=1e-12)
 
 
-def test_motions_are_undone_by_their_inverse():
-    motions = np.stack([pose_at(1.0, 2.0, 3.0, 0.4, 0.2), pose_at(-1.0, 0.5, 0.0, 2.0)])
-    points = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    np.testing.assert_allclose(moved_points(moved_points(points, motions), inverse_of(motions)), points)
-    around = moved_boxes(np.stack([points, points + 1.0], axis=1), motions)
-    assert (around[:, 1] - around[:, 0] >= 1.0).all()
-
-
-@pytest.mark.parametrize(
-    ("pose", "message"),
-    [
-        (np.eye(3), "shape"),
-        (2.0 * np.eye(4), "rigid motion"),
-        (np.diag([1.0, 1.0, -1.0, 1.0]), "rigid motion"),
-        (np.full((4, 4), np.nan), "rigid motion"),
-        (np.eye(4) + np.eye(4)[[3, 1, 2, 0]] * [[0], [0], [0], [1]], "last row"),
-    ],
-)
-def test_what_is_no_pose_is_refused(pose, message):
-    with pytest.raises(ValueError, match=message):
-        checked_poses(pose)
-
-
 def test_codes_of_unknown_frames_are_refused():
     with pytest.raises(ValueError, match="frames up to 1"):
         SparseMap(occupied=occupied_codes(BOX, 1), ground=free_codes(np.empty((0, 3))))
@@ -89,37 +63,3 @@ def test_codes_of_unknown_frames_are_refused():
 def test_boxes_have_their_low_corner_first():
     with pytest.raises(ValueError, match="low before high"):
         occupied_codes(BOX[:, ::-1])
-
-
-@pytest.mark.parametrize("plane", [FloorPlane(0.6, 0.0, 0.8, 1.5), FloorPlane(0.0, -1.0, 0.0, 2.0)])
-def test_levelling_makes_the_floor_level(plane):
-    points = np.random.default_rng(0).uniform(-3.0, 3.0, (20, 3))
-    np.testing.assert_allclose(
-        moved_points(points, plane.levelling())[:, 2], plane.heights(points), atol=1e-12
-    )
-    checked_poses(plane.levelling())
-    checked_poses(FloorPlane(0.0, 0.0, -1.0, 0.0).levelling())
-
-
-def test_a_floor_has_a_unit_normal():
-    with pytest.raises(ValueError, match="unit normal"):
-        FloorPlane(0.0, 0.0, 2.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"mode": "printed"}, "mode of the mapper is 'printed'"),
-        ({"split": "colour"}, "split of the mapper is 'colour'"),
-        ({"voxel_m": -1.0}, "voxel_m of the mapper"),
-        ({"seed": 1.5}, "seed of the mapper"),
-    ],
-)
-def test_settings_out_of_bounds_are_named(settings, message):
-    with pytest.raises(ValueError, match=message):
-        MapperSettings(**settings)
-
-
-def test_up_is_a_direction():
-    with pytest.raises(ValueError, match="want a direction"):
-        FloorSettings(up_z=0.0)

@@ -10,8 +10,6 @@ from lidarium.agents.srt.settings import SrtSettings
 from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 URG = ScanGeometry()
-
-
 LIMITS = Limits(0.4, 1.0, 0.5, 0.18)
 
 

@@ -1,4 +1,4 @@
-"""Quantisation gives what it says of every code, the same bits for the same seed, and refuses bad input."""
+"""Clouds are quantised: codes, labels, weights, budgets."""
 
 import time
 
@@ -6,15 +6,31 @@ import numpy as np
 import pytest
 from scattered_points import room, searched
 
-from lidarium.mapping.sparse.quantisation.lloyd import improved, nearest_codes
-from lidarium.mapping.sparse.quantisation.on_gpu import has_gpu, improved_on_gpu
 from lidarium.mapping.sparse.quantisation.quantiser import quantise
-from lidarium.mapping.sparse.quantisation.relocation import exchanged, merging_costs
 from lidarium.mapping.sparse.quantisation.settings import METHODS, QuantisationSettings
-from lidarium.mapping.sparse.quantisation.summary import summary_of
-from lidarium.mapping.sparse.quantisation.tiles import tiles_of
 
 POINTS = room()
+NAN = np.where(np.arange(len(POINTS))[:, None] == 7, np.nan, POINTS)
+
+
+BAD = {
+    "no points": (lambda: quantise(np.empty((0, 3)), 1), "at least one point"),
+    "shape": (lambda: quantise(POINTS[:, :2], 1), r"want \(N, 3\)"),
+    "all equal": (lambda: quantise(np.ones((90, 3)), 2), "all 90 points are at"),
+    "fewer than k": (lambda: quantise(POINTS[:5], 6), "6 codes are asked for of 5 points"),
+    "fewer places": (lambda: quantise(np.repeat(POINTS[:5], 9, axis=0), 6), "5 different places"),
+    "no codes": (lambda: quantise(POINTS, 0), "0 codes are asked for"),
+    "power": (lambda: quantise(POINTS, 12, QuantisationSettings("lbg")), "want a power of two"),
+    "nan": (lambda: quantise(NAN, 4), "want finite coordinates"),
+    "weights": (lambda: quantise(POINTS, 4, weights=np.ones(3)), "weights have shape"),
+    "weight": (lambda: quantise(POINTS[:2], 1, weights=[1.0, 0.0]), "above 0"),
+    "start": (lambda: quantise(POINTS, 4, start=POINTS[:3]), r"want \(4, 3\)"),
+    "method": (lambda: QuantisationSettings("median"), "method of quantisation is 'median'"),
+    "mode": (lambda: QuantisationSettings(mode="printed"), "want one of default, thesis"),
+    "device": (lambda: QuantisationSettings(device="tpu"), "want one of cpu"),
+    "budget": (lambda: QuantisationSettings(budget_s=0.0), "budget_s of quantisation"),
+    "steps": (lambda: QuantisationSettings(steps=-1), "steps of quantisation"),
+}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -101,63 +117,6 @@ def test_a_budget_is_no_harm_to_few_points(count):
     better = quantise(points, count, QuantisationSettings(budget_s=0.05))
     assert better.phi2 <= plain.phi2
     assert better.counts.all()
-
-
-def test_exchanges_take_from_where_codes_are_crowded():
-    crowd = np.random.default_rng(0).normal(0.0, 0.01, (400, 3))
-    spread = np.random.default_rng(1).uniform((5, 0, 0), (9, 4, 0), (400, 3))
-    tiles = tiles_of(np.concatenate([crowd, spread]).astype(np.float32))
-    codes = np.array([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [7, 2, 0]], np.float32)
-    summary = summary_of(tiles, codes, nearest_codes(tiles, codes))
-    costs, partners = merging_costs(codes, summary.masses)
-    assert (partners[:3] < 3).all()
-    assert costs[3] > costs[:3].max()
-    moved = exchanged(codes, summary, 1)
-    assert (moved[:, 0] > 5).sum() == 2
-    assert nearest_codes(tiles, moved).group_errors.sum() < 0.8 * summary.errors[:, 1].sum()
-
-
-def test_torch_gives_the_codes_of_the_processor_on_any_of_its_devices():
-    pytest.importorskip("torch")
-    tiles = tiles_of(POINTS)
-    devices = ("cpu", "cuda") if has_gpu() else ("cpu",)
-    for device in devices:
-        found = improved_on_gpu(tiles, POINTS[:40], 5, device=device)
-        assert found == pytest.approx(improved(tiles, POINTS[:40], 5), abs=1e-5)
-
-
-@pytest.mark.skipif(not has_gpu(), reason="torch finds no GPU")
-def test_a_gpu_gives_the_same_quantisation():
-    found, wanted = (quantise(POINTS, 40, QuantisationSettings(device=name)) for name in ("cuda", "cpu"))
-    assert found.codes == pytest.approx(wanted.codes, abs=1e-5)
-
-
-@pytest.mark.skipif(has_gpu(), reason="torch finds a GPU")
-def test_a_gpu_that_is_not_there_is_told():
-    with pytest.raises(RuntimeError, match="torch finds no GPU"):
-        quantise(POINTS, 4, QuantisationSettings(device="cuda"))
-    assert quantise(POINTS, 4, QuantisationSettings(device="auto")).counts.all()
-
-
-NAN = np.where(np.arange(len(POINTS))[:, None] == 7, np.nan, POINTS)
-BAD = {
-    "no points": (lambda: quantise(np.empty((0, 3)), 1), "at least one point"),
-    "shape": (lambda: quantise(POINTS[:, :2], 1), r"want \(N, 3\)"),
-    "all equal": (lambda: quantise(np.ones((90, 3)), 2), "all 90 points are at"),
-    "fewer than k": (lambda: quantise(POINTS[:5], 6), "6 codes are asked for of 5 points"),
-    "fewer places": (lambda: quantise(np.repeat(POINTS[:5], 9, axis=0), 6), "5 different places"),
-    "no codes": (lambda: quantise(POINTS, 0), "0 codes are asked for"),
-    "power": (lambda: quantise(POINTS, 12, QuantisationSettings("lbg")), "want a power of two"),
-    "nan": (lambda: quantise(NAN, 4), "want finite coordinates"),
-    "weights": (lambda: quantise(POINTS, 4, weights=np.ones(3)), "weights have shape"),
-    "weight": (lambda: quantise(POINTS[:2], 1, weights=[1.0, 0.0]), "above 0"),
-    "start": (lambda: quantise(POINTS, 4, start=POINTS[:3]), r"want \(4, 3\)"),
-    "method": (lambda: QuantisationSettings("median"), "method of quantisation is 'median'"),
-    "mode": (lambda: QuantisationSettings(mode="printed"), "want one of default, thesis"),
-    "device": (lambda: QuantisationSettings(device="tpu"), "want one of cpu"),
-    "budget": (lambda: QuantisationSettings(budget_s=0.0), "budget_s of quantisation"),
-    "steps": (lambda: QuantisationSettings(steps=-1), "steps of quantisation"),
-}
 
 
 @pytest.mark.parametrize("name", BAD)
