@@ -65,9 +65,11 @@ def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, 
     optimizer = torch.optim.AdamW(
         network.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
     )
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, settings.epochs)
     best, least = network.weights(), evaluate(network, held_out, settings)
     for _ in range(settings.epochs):
         loss = _epoch(network, fitted, settings, optimizer, generator)
+        schedule.step()
         found = Fit(loss, evaluate(network, held_out, settings))
         if found.held_out < least:
             best, least = network.weights(), found.held_out

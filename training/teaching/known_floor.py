@@ -10,7 +10,7 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.evaluation.bounds.view_graph import ViewGraph, bits_of, count, view_graph
 
-MOST_PLACES, LEAST_SIDE, SAMPLE_M = 700, 0.6, 0.25
+MOST_PLACES, LEAST_SIDE, SAMPLE_M = 1000, 0.4, 0.15
 """Floors have about so many places at most, so far apart at least, and points that are to be seen [m]."""
 
 MOST_STOPS = 60

@@ -21,10 +21,10 @@ from lidarium.training.teaching.known_floor import KnownFloor, known_floor
 MOST_STOPS = 16
 """Tours pass so many of the nearest stops."""
 
-KEPT_SHARE = 0.3
+KEPT_SHARE = 0.1
 """A stop is left out where an option shows all but this share of what it is for."""
 
-VISIT_M = 1.0
+VISIT_M = 0.5
 """What slowing down, turning and setting out at each stop costs [m]."""
 
 WEIGHTS = TourWeights(1.0, 0.1, 0.0)
