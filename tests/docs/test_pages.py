@@ -8,9 +8,9 @@ import pytest
 
 from lidarium.envs.simulation.kernels.arrays import WorldArrays
 from lidarium.evaluation.suites.suite import read_suite
-from lidarium.training.settings import read_training
 from lidarium.registry import REGISTRIES
 from lidarium.scripts.main import Choice
+from lidarium.training.settings import read_training
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
