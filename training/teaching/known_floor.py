@@ -10,8 +10,11 @@ from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.evaluation.bounds.view_graph import ViewGraph, bits_of, count, view_graph
 
-MOST_PLACES, LEAST_SIDE, SAMPLE_M = 1000, 0.4, 0.15
-"""Floors have about so many places at most, so far apart at least, and points that are to be seen [m]."""
+MOST_PLACES, LEAST_SIDE = 700, 0.4
+"""Floors have about so many places at most, so far apart at least [m]."""
+
+MOST_POINTS, LEAST_SAMPLE = 4000, 0.15
+"""Floors have about so many points that are to be seen at most, so far apart at least [m]."""
 
 MOST_STOPS = 60
 """What is left is seen from so many places at most."""
@@ -85,6 +88,7 @@ def known_floor(env: ExplorationEnv) -> KnownFloor:
     tables = floor_tables(floor, settings.raster_resolution, settings.lidar.height, settings.robot.height)
     area = float((tables.body.solid == 0).sum()) * tables.body.resolution**2
     side = max(LEAST_SIDE, math.sqrt(area / MOST_PLACES))
+    sample = max(LEAST_SAMPLE, math.sqrt(area / MOST_POINTS))
     starts = np.asarray(env.world.starts, np.float64)
     graph = view_graph(
         tables.body,
@@ -92,7 +96,7 @@ def known_floor(env: ExplorationEnv) -> KnownFloor:
         settings.robot.radius,
         settings.lidar.range_max,
         starts,
-        (side, SAMPLE_M),
+        (side, sample),
     )
     multiple = round(settings.occupancy.resolution / settings.raster_resolution)
     return KnownFloor(env, graph, graph.points // multiple)
