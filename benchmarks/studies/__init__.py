@@ -38,6 +38,11 @@ STUDIES.register(
     "all policies on generated and real floors, 1 to 3 robots, known starts",
 )
 STUDIES.register(
+    "learned",
+    f"{_PACKAGE}.learned:STUDY",
+    "learned explorers beside classic ones and beside bounds, on floors that no training has seen",
+)
+STUDIES.register(
     "merging",
     f"{_PACKAGE}.merging.study:STUDY",
     "map merging on a bank of maps that robots made, beside the thesis and ROS map_merge",

@@ -22,6 +22,7 @@ POLICIES = (
     "utility_frontier",
     "explore_lite",
     "tour_frontier",
+    "learned",
     "srt",
     "random_walk",
 )

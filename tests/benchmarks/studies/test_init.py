@@ -14,6 +14,7 @@ NAMES = (
         "floors",
         "interval_coverage",
         "leaderboard",
+        "learned",
         "merging",
         "merging_tuning",
     ),

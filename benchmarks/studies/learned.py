@@ -1,0 +1,274 @@
+"""Learned explorers beside classic ones, on floors that no training has seen.
+
+The floors of the set ``test`` and real ones choose nothing: neither settings nor weights.
+"""
+
+import json
+import math
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lidarium
+from lidarium.agents.learned.weights import CARD
+from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.real_floors import real_floors
+from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.envs.floors.catalogue.names import set_floors
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.bounds.bound import known_floor_bound
+from lidarium.evaluation.statistics.means import paired_ratio
+from lidarium.evaluation.statistics.medians import median_interval
+from lidarium.evaluation.suites.campaign import EPISODES_FILE
+from lidarium.evaluation.suites.episodes_file import read_episodes
+from lidarium.evaluation.suites.starts import drawn_starts, starts_in
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
+
+LEARNED, TOURS = "learned", "tour_frontier"
+CLASSICS = ("nearest_frontier", "utility_frontier", "explore_lite")
+TEAMS = (1, 2, 3)
+HORIZON_S = 1800.0
+SETTINGS: dict[str, Any] = {"resolution": 0.05, "stop_coverage": 0.99, "horizon_s": HORIZON_S}
+CLASSICS_EVERY, REAL_EVERY, BOUNDS_EVERY = 4, 6, 8
+"""Classic explorers run on every so many-th floor; so are real floors taken, and floors with a bound."""
+
+KINDS = {
+    "test": "generated floors of the set `test`",
+    "kth": "KTH campus floors",
+    "lifull": "LIFULL apartments",
+    "slam": "maps that robots made of real buildings",
+}
+BOUNDS_FILE = "bounds.jsonl"
+
+PAGE = """# Learned explorers
+
+`learned` beside `tour_frontier`, whose tours it corrects, and `tour_frontier` beside the other classic
+explorers: simulated time to 99 % of `C_free`, pair by pair, from the same starts. Kobuki, URG-04LX, perfect
+poses, no noise, maps of 5 cm, cut at {horizon:.0f} s; runs that did not get there count as that. Nothing was
+chosen by these floors.
+
+Made with `{command}` on {date}: lidarium {version}, Python {python}.
+
+## The weights
+
+{card}
+
+## Times
+
+A ratio below 1 is less time. *Mean* is the geometric mean with its 95 % interval; *path* is the ratio of the
+longest path of a robot.
+
+{times}
+
+## Beside bounds
+
+What a team needs that [knows the floor](../reference/bounds.md), on {bounded} floors of the set `test` that
+have a bound: medians of multiples of its time, and the share of the time between `tour_frontier` and the
+bound that `learned` saves.
+
+{bounds}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounded:
+    """A floor and a number of robots whose bound is wanted."""
+
+    floor: str
+    robots: int
+
+    @property
+    def key(self) -> str:
+        """Name that no other one of its file has."""
+        return f"{self.floor} | {self.robots}"
+
+
+def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
+    """Return the suites: all floors for the two, a part of them for classic explorers.
+
+    Parameters
+    ----------
+    data : Path or None
+        Folder of real floors; generated floors alone where None.
+    every : int
+        Of each kind every so many-th floor is run.
+    """
+    floors = {"test": list(set_floors("test"))[::every]}
+    if data is not None:
+        real = {kind: paths for kind, paths in real_floors(data).items() if kind in KINDS}
+        floors |= {kind: [str(path) for path in paths[:: REAL_EVERY * every]] for kind, paths in real.items()}
+    found = {}
+    for kind, names in floors.items():
+        found[kind] = _suite((TOURS, LEARNED), names)
+        part = names[::CLASSICS_EVERY] if kind == "test" else names
+        found[f"{kind}_classic"] = _suite(CLASSICS, part)
+    return {kind: suite for kind, suite in found.items() if suite.floors}
+
+
+def _suite(policies: Sequence[str], floors: Sequence[str]) -> Suite:
+    return Suite(
+        policies=tuple(policies),
+        floors=tuple(floors),
+        robots=TEAMS,
+        seeds=(0,),
+        variants={DEFAULT_VARIANT: SETTINGS},
+    )
+
+
+def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
+    """Bound a part of the floors."""
+    floors = set_floors("test")[:: BOUNDS_EVERY * every]
+    teams = [Bounded(floor, robots) for floor in floors for robots in TEAMS]
+    yield from do_missing(folder / BOUNDS_FILE, "bounds", teams, measure_bound, workers)
+
+
+def measure_bound(team: Bounded) -> dict[str, Any]:
+    """Return what a team needs that knows the floor, from where the explorers start."""
+    settings = make_settings(robots=team.robots, **SETTINGS)
+    starts = drawn_starts(team.floor, settings, 0) or starts_in(team.floor, settings, 0)
+    bound = known_floor_bound(team.floor, settings, starts)
+    known = bound.time_s if math.isfinite(bound.time_s) else None
+    return {"floor": team.floor, "robots": team.robots, "known_s": known}
+
+
+def page(folder: Path, command: str) -> str:
+    """Return the results as markdown."""
+    episodes = {kind: _times_in(folder, kind) for kind in KINDS}
+    bounds = kept_lines(folder / BOUNDS_FILE) if (folder / BOUNDS_FILE).exists() else []
+    return PAGE.format(
+        command=command,
+        date=date.today().isoformat(),
+        version=lidarium.__version__,
+        python=platform.python_version(),
+        horizon=HORIZON_S,
+        card=card_text(json.loads((resources.files("lidarium.agents.learned") / "data" / CARD).read_text())),
+        times="\n\n".join(_kind_part(kind, found) for kind, found in episodes.items() if found),
+        bounded=len({line["floor"] for line in bounds if line["known_s"] is not None}),
+        bounds=bounds_table(bounds, episodes["test"]),
+    )
+
+
+Times = dict[str, dict[tuple[str, int], Mapping[str, Any]]]
+
+
+def _times_in(folder: Path, kind: str) -> Times:
+    """Return the episodes of a kind of floor by policy, floor and size of team."""
+    found: Times = {}
+    for name in (kind, f"{kind}_classic"):
+        path = folder / name / EPISODES_FILE
+        for episode in read_episodes(path) if path.exists() else []:
+            found.setdefault(episode["policy"], {})[episode["floor"], episode["robots"]] = episode
+    return found
+
+
+def _kind_part(kind: str, episodes: Times) -> str:
+    """Return the tables of a kind of floor."""
+    about, rows = KINDS[kind], []
+    for robots in TEAMS:
+        best = best_classic(episodes, robots)
+        rows.append(_row(episodes, LEARNED, TOURS, robots))
+        rows.append(_row(episodes, TOURS, best, robots) if best else "")
+    header = (
+        "| robots | policy | over | floors | median | mean | faster | reached 99 % | path |\n"
+        "|---:|---|---|---:|---:|---:|---:|---:|---:|"
+    )
+    lines = "\n".join(row for row in rows if row)
+    return f"### {about[0].upper()}{about[1:]}\n\n{header}\n{lines}"
+
+
+def best_classic(episodes: Times, robots: int) -> str | None:
+    """Return the classic explorer that took least time in the mean, None where none ran."""
+    means = {
+        name: float(np.mean([_time(each) for (_, size), each in episodes[name].items() if size == robots]))
+        for name in CLASSICS
+        if any(size == robots for _, size in episodes.get(name, {}))
+    }
+    return min(means, key=lambda name: means[name]) if means else None
+
+
+def _row(episodes: Times, ours: str, theirs: str, robots: int) -> str:
+    """Return a row of the table of times."""
+    first, second = episodes.get(ours, {}), episodes.get(theirs, {})
+    pairs = sorted(key for key in set(first) & set(second) if key[1] == robots)
+    if len(pairs) < 2:
+        return ""
+    a, b = ([_time(found[key]) for key in pairs] for found in (first, second))
+    ratios = np.array(a) / np.array(b)
+    median, mean = median_interval(ratios), paired_ratio(a, b)
+    longest = [[max(found[key]["path_m"]) for key in pairs] for found in (first, second)]
+    paths = paired_ratio(longest[0], longest[1])
+    reached = [sum(found[key]["t99_s"] is not None for key in pairs) for found in (first, second)]
+    cells = (
+        robots,
+        f"`{ours}`",
+        f"`{theirs}`",
+        len(pairs),
+        f"{median.estimate:.3f} ({median.low:.3f} to {median.high:.3f})",
+        f"{mean.estimate:.3f} ({mean.low:.3f} to {mean.high:.3f})",
+        f"{100 * np.mean(ratios < 1.0):.0f} %",
+        f"{reached[0]}, {reached[1]}",
+        f"{paths.estimate:.3f}",
+    )
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+def _time(episode: Mapping[str, Any]) -> float:
+    return HORIZON_S if episode["t99_s"] is None else float(episode["t99_s"])
+
+
+def bounds_table(bounds: Sequence[Mapping[str, Any]], episodes: Times) -> str:
+    """Return multiples of the bound by size of team, and what is saved of the time above it."""
+    names = [name for name in (*CLASSICS, TOURS, LEARNED) if name in episodes]
+    rows = [
+        "| robots | floors | " + " | ".join(f"`{name}`" for name in names) + " | saved |",
+        "|---:|" + "---:|" * (len(names) + 2),
+    ]
+    for robots in TEAMS:
+        known = {
+            (line["floor"], robots): line["known_s"]
+            for line in bounds
+            if line["robots"] == robots and line["known_s"] is not None
+        }
+        both = [key for key in known if all(key in episodes.get(name, {}) for name in (TOURS, LEARNED))]
+        if not both:
+            continue
+        cells = []
+        for name in names:
+            multiples = [_time(episodes[name][key]) / known[key] for key in both if key in episodes[name]]
+            cells.append(f"{np.median(multiples):.2f}" if multiples else "-")
+        tours, ours = (np.array([_time(episodes[name][key]) for key in both]) for name in (TOURS, LEARNED))
+        above = tours - np.array([known[key] for key in both])
+        saved = f"{100 * (tours - ours).sum() / above.sum():.0f} %"
+        rows.append(f"| {robots} | {len(both)} | " + " | ".join(cells) + f" | {saved} |")
+    return "\n".join(rows) if len(rows) > 2 else "No floor has a bound in this run."
+
+
+def card_text(card: Mapping[str, Any]) -> str:
+    """Return what the card of the weights says."""
+    training, lines = card["training"], []
+    floors = sum(each["floors"] for each in training["rounds"])
+    lessons = max((each["samples"] for each in card["fits"].values()), default=0)
+    lines.append(
+        f"`lidarium train docs/tutorials/learned.toml`: {floors:,} floors of the training set in "
+        f"{len(training['rounds'])} rounds, {lessons:,} decisions taught, {card['hours']:.1f} hours with "
+        f"{card['workers']} workers, PyTorch {card['versions']['torch']}, seed {training['seed']}. "
+        f"Best on the floors of the validation: `{card['best']}`."
+    )
+    lines.append(
+        "| weights | over `tour_frontier`, mean | faster | episodes |\n|---|---:|---:|---:|\n"
+        + "\n".join(
+            f"| `{name}` | {found['ratio']:.3f} | {100 * found['better']:.0f} % | {found['episodes']} |"
+            for name, found in card["validation"].items()
+        )
+    )
+    return "\n\n".join(lines)
+
+
+STUDY = Study(page, suites, work)

@@ -1,0 +1,68 @@
+"""The study of learned explorers: its suites, its rows, its page."""
+
+import pytest
+
+from lidarium.benchmarks.studies import learned
+
+
+def episode(t99_s, path_m=10.0):
+    return {"t99_s": t99_s, "path_m": [path_m]}
+
+
+@pytest.fixture
+def episodes():
+    floors = [(f"f{number}", 1) for number in range(8)]
+    return {
+        "tour_frontier": {key: episode(100.0) for key in floors},
+        "learned": {key: episode(80.0 + k, 8.0) for k, key in enumerate(floors)},
+        "nearest_frontier": {key: episode(200.0) for key in floors[:4]},
+        "utility_frontier": {key: episode(150.0) for key in floors[:4]},
+        "explore_lite": {key: episode(None) for key in floors[:4]},
+    }
+
+
+def test_suites_run_all_floors_for_the_two_and_a_part_for_the_others():
+    suites = learned.suites(None, 20)
+    assert suites["test"].policies == ("tour_frontier", "learned")
+    assert len(suites["test"].floors) == 10
+    assert suites["test_classic"].policies == learned.CLASSICS
+    assert set(suites["test_classic"].floors) <= set(suites["test"].floors)
+    assert suites["test"].robots == (1, 2, 3)
+
+
+def test_a_row_compares_pairs(episodes):
+    row = learned._row(episodes, "learned", "tour_frontier", 1)
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells[:4] == ["1", "`learned`", "`tour_frontier`", "8"]
+    assert cells[4].startswith("0.835 (")
+    assert cells[6:] == ["100 %", "8, 8", "0.800"]
+    assert learned._row(episodes, "learned", "tour_frontier", 2) == ""
+
+
+def test_the_best_classic_has_the_least_mean_and_the_horizon_counts(episodes):
+    assert learned.best_classic(episodes, 1) == "utility_frontier"
+    assert learned.best_classic(episodes, 3) is None
+
+
+def test_bounds_say_what_is_saved(episodes):
+    bounds = [{"floor": f"f{number}", "robots": 1, "known_s": 60.0} for number in range(2)]
+    bounds.append({"floor": "f3", "robots": 1, "known_s": None})
+    table = learned.bounds_table(bounds, episodes).splitlines()
+    cells = [cell.strip() for cell in table[-1].strip("|").split("|")]
+    assert cells == ["1", "2", "3.33", "2.50", "30.00", "1.67", "1.34", "49 %"]
+    assert learned.bounds_table([], episodes).startswith("No floor")
+
+
+def test_a_bound_begins_where_explorers_do(monkeypatch):
+    seen = {}
+
+    def bound(floor, settings, starts):
+        from lidarium.evaluation.bounds.bound import KnownFloorBound
+
+        seen.update(starts=starts, robots=settings.robots)
+        return KnownFloorBound(12.0, 1.0, 1.0, 0.99, [])
+
+    monkeypatch.setattr(learned, "known_floor_bound", bound)
+    found = learned.measure_bound(learned.Bounded("apartment:7", 2))
+    assert found == {"floor": "apartment:7", "robots": 2, "known_s": 12.0}
+    assert len(seen["starts"]) == seen["robots"] == 2
