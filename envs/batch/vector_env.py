@@ -80,6 +80,7 @@ class ExplorationVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         curriculum: Curriculum | None = None,
         **options: Any,  # noqa: ANN401
     ) -> None:
+        self.closed = True  # Gymnasium before 1.2 closes even what could not be made
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode is {render_mode!r}; want rgb_array or None")
         merging = options.pop("merging", None)

@@ -132,6 +132,7 @@ def test_ids_are_found_through_the_module_prefix(name):
     env.close()
 
 
+@pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="PettingZoo before 1.27 has no register")
 @pytest.mark.parametrize("name", IDS)
 def test_pettingzoo_makes_both_forms_by_the_same_ids(name):
     parallel = pettingzoo.make("parallel", name, robots=2)
