@@ -18,6 +18,7 @@ from lidarium.envs.simulation.backends import BACKENDS
 from lidarium.envs.simulation.kernels.floor_cache import floor_tables
 from lidarium.envs.simulation.kernels.floor_tables import FloorTables
 from lidarium.envs.simulation.simulation import Simulation
+from lidarium.envs.starting.first_reset import compile_first_reset
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +67,7 @@ def begin(
     ValueError, FileNotFoundError
         Where the floor or an option cannot be used.
     """
+    compile_first_reset()
     choice_here = choice if chosen.floor is None else choice.instead(chosen.floor)
     floor = choice_here.load(generator)
     if isinstance(chosen.starts, np.ndarray):

@@ -15,6 +15,9 @@ hypothesis.settings.load_profile("lidarium")
 # Tests neither read nor fill the user's store of floors; those of the store name one of their own.
 os.environ["LIDARIUM_FLOOR_STORE"] = "off"
 
+# Each process of the suite would begin others that compile kernels.
+os.environ["LIDARIUM_FIRST_START"] = "off"
+
 
 def _data_folder() -> Path:
     return Path(os.environ.get("LIDARIUM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

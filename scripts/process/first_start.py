@@ -1,6 +1,5 @@
 """The kernels that a first start compiles, in several processes."""
 
-import importlib
 import json
 import multiprocessing
 import os
@@ -9,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import Any
 
 from lidarium.evaluation.suites.processes import interrupts_held
+from lidarium.mapping.kernels.first_start.listed_kernels import Entry, compile_kernel
 from lidarium.scripts.common import counted, notify
 
 LIST = Path(__file__).parents[1] / "data" / "kernels_of_run.json"
@@ -21,9 +20,6 @@ MOST_PROCESSES = 4
 """The longest kernel takes a quarter of all the time: more processes gain little, and cost memory."""
 
 POLL_S = 0.5
-
-Entry = dict[str, Any]
-"""A kernel: ``name`` as ``module:name``, and ``signature``, a list of encoded types."""
 
 
 def compile_first(is_quiet: bool) -> None:
@@ -81,66 +77,3 @@ def _compiled(folder: Path, kernels: Sequence[Entry], processes: int) -> Iterato
 def _begin_process() -> None:
     """Leave Ctrl-C to the process that waits."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def compile_kernel(entry: Entry) -> None:
-    """Compile a kernel for the types of its arguments; keep it in the cache.
-
-    Raises
-    ------
-    ValueError, AttributeError, ImportError
-        Where there is no such kernel or type.
-    """
-    module, name = entry["name"].split(":")
-    compiled = getattr(importlib.import_module(module), name)
-    compiled.compile(tuple(decode_type(each) for each in entry["signature"]))
-
-
-def _numba_types() -> Any:  # noqa: ANN401
-    """Return numba's module of types, which has no hints."""
-    from numba.core import types
-
-    return types
-
-
-def encode_type(kind: Any) -> Any:  # noqa: ANN401
-    """Return the type of a kernel's argument as strings, lists and dicts.
-
-    Scalars are their names; arrays ``dtype:dimensions+layout``, with ``:readonly`` where they are; tuples
-    lists; named tuples ``{"class": "module:name", "of": list}``.
-
-    Raises
-    ------
-    ValueError
-        Where the type is none of these.
-    """
-    types = _numba_types()
-    if isinstance(kind, types.Array):
-        return f"{kind.dtype}:{kind.ndim}{kind.layout}" + ("" if kind.mutable else ":readonly")
-    if isinstance(kind, types.BaseNamedTuple):
-        made = kind.instance_class
-        return {
-            "class": f"{made.__module__}:{made.__qualname__}",
-            "of": [encode_type(each) for each in kind.types],
-        }
-    if isinstance(kind, types.BaseTuple):
-        return [encode_type(each) for each in kind.types]
-    if isinstance(kind, types.Number | types.Boolean):
-        return str(kind)
-    raise ValueError(f"the type {kind!r} of a kernel's argument cannot be written; want numbers or arrays")
-
-
-def decode_type(text: Any) -> Any:  # noqa: ANN401
-    """Return the type that ``encode_type`` wrote."""
-    types = _numba_types()
-    if isinstance(text, dict):
-        module, name = text["class"].split(":")
-        made = getattr(importlib.import_module(module), name)
-        return types.BaseTuple.from_types([decode_type(each) for each in text["of"]], made)
-    if isinstance(text, list):
-        return types.BaseTuple.from_types([decode_type(each) for each in text])
-    dtype, *shape = text.split(":")
-    scalar = {"bool": types.boolean}.get(dtype) or getattr(types, dtype)
-    if not shape:
-        return scalar
-    return types.Array(scalar, int(shape[0][:-1]), shape[0][-1], readonly=shape[1:] == ["readonly"])

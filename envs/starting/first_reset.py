@@ -1,0 +1,70 @@
+"""The kernels of a first reset, compiled side by side where the cache has none."""
+
+import json
+import multiprocessing
+import os
+import sys
+from collections.abc import Iterable
+from itertools import islice
+from pathlib import Path
+
+from lidarium.mapping.kernels.compilation import kernel_cache
+from lidarium.mapping.kernels.first_start.side_by_side import SWITCH, compiled_side_by_side
+from lidarium.mapping.kernels.in_python.interpreted import IS_INTERPRETED
+
+LIST = Path(__file__).parent / "data" / "kernels_of_reset.json"
+"""The kernels of a first reset that take long; ``scripts/dev/list_reset_kernels.py`` writes it."""
+
+MOST_PROCESSES = 4
+LOCK = "first_start.lock"
+"""File in the cache that says that another process compiles already."""
+
+_asked = False
+
+
+def compile_first_reset() -> None:
+    """Compile what a reset calls in several processes, where next to nothing is compiled yet.
+
+    It is looked at once in a process, and left out in processes of others, on one core, and where
+    ``LIDARIUM_FIRST_START`` is ``off``.
+    """
+    global _asked  # once in a process
+    if _asked:
+        return
+    _asked = True
+    processes = min(_cores(), MOST_PROCESSES)
+    if IS_INTERPRETED or processes < 2 or os.environ.get(SWITCH) == "off" or not sys.executable:
+        return
+    folder = kernel_cache()
+    if folder is None or multiprocessing.parent_process() is not None:
+        return
+    entries = json.loads(LIST.read_text())
+    if sum(1 for _ in islice(folder.rglob("*.nbc"), len(entries))) == len(entries):
+        return
+    try:
+        lock = os.open(folder / LOCK, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
+    except OSError:
+        return
+    os.close(lock)
+    try:
+        for _ in _shown(compiled_side_by_side(entries, processes), len(entries), processes):
+            pass
+    finally:
+        (folder / LOCK).unlink(missing_ok=True)
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else int(os.cpu_count() or 1)
+
+
+def _shown(names: Iterable[str], total: int, processes: int) -> Iterable[str]:
+    """Pass names on, and show on standard error how many there were: a bar on a terminal, else a line."""
+    about = f"lidarium: the first reset compiles kernels in {processes} processes; later ones find them"
+    print(about, file=sys.stderr, flush=True)
+    if not sys.stderr.isatty():
+        return names
+    from tqdm import tqdm
+
+    shown: Iterable[str] = tqdm(names, total=total, unit="kernel", leave=False)
+    return shown

@@ -1,0 +1,1 @@
+"""Kernels compiled side by side where a first start has none."""
