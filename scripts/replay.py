@@ -43,6 +43,8 @@ class Replay(Command):
 
     Works for records of other versions too, with less to be seen
     """
+    mcap: Path | None = None
+    """run the record again and write what was sensed as a bag of ROS 2 (extra mcap)"""
     video_speed: float = 10.0
     """simulated seconds per second of the film"""
 
@@ -58,7 +60,9 @@ def execute(command: Replay) -> Answer:
     from lidarium.evaluation.episodes.output import check_writable, write_json
     from lidarium.evaluation.record import read_record
 
-    drawn = [path for path in (command.picture, command.video, command.html) if path is not None]
+    drawn = [
+        path for path in (command.picture, command.video, command.html, command.mcap) if path is not None
+    ]
     for folder in (command.out, *(path.parent for path in drawn)):
         if folder is not None:
             check_writable(folder)
@@ -91,6 +95,11 @@ def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
     if command.html is not None:
         _write_page(command.html, command, record)
         files.append(str(command.html))
+    if command.mcap is not None:
+        from lidarium.evaluation.record.bag import write_bag
+
+        write_bag(command.mcap, record, command.floor)
+        files.append(str(command.mcap))
     display = record.display
     result = {
         **_about(command, record),

@@ -30,11 +30,13 @@ class Slam(Command):
     """
 
     log: Positional[Path]
-    """CARMEN log or .npz file.
+    """CARMEN log, .npz file or bag of ROS 2.
 
     CARMEN logs (.log, .clf, also .gz) have FLASER or ROBOTLASER1 lines; .npz holds ranges, stamp and
-    pose_odom.
+    pose_odom; bags are .mcap files with LaserScan messages (extra mcap).
     """
+    topic: str | None = None
+    """topic of the scans, where a bag has several"""
     resolution: float = 0.05
     """side of a cell of the map [m]"""
     range: float = 30.0
@@ -141,13 +143,23 @@ def settings_of(command: Slam) -> "SlamSettings":
     )
 
 
-def _log(command: Slam) -> "LaserLog":
-    """Read the log and print what was left out of it."""
+def _read(command: Slam) -> "LaserLog":
+    from lidarium.mapping.files.bags.reading import read_mcap_log
     from lidarium.mapping.files.carmen_logs import read_carmen_log
     from lidarium.mapping.files.npz_logs import read_npz_log
 
-    view = None if command.field_of_view is None else math.radians(command.field_of_view)
-    log = read_npz_log(command.log) if command.log.suffix == ".npz" else read_carmen_log(command.log, view)
+    if command.log.suffix == ".mcap":
+        return read_mcap_log(command.log, command.topic)
+    if command.log.suffix == ".npz":
+        return read_npz_log(command.log)
+    return read_carmen_log(
+        command.log, None if command.field_of_view is None else math.radians(command.field_of_view)
+    )
+
+
+def _log(command: Slam) -> "LaserLog":
+    """Read the log and print what was left out of it."""
+    log = _read(command)
     for reason, count in log.skipped.items():
         notify(f"{command.log}: left out: {count} {reason}")
     for remark in log.remarks:

@@ -1,0 +1,276 @@
+"""Bags are those of ROS 2: the mcap library's own decoder reads them, and reading gives the log back."""
+
+import io
+import math
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mcap_ros2", reason="mcap-ros2-support is not installed: extra [mcap]")
+
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from mcap_ros2._dynamic import serialize_dynamic
+from mcap_ros2.decoder import DecoderFactory
+
+from lidarium.mapping.files.bags import schemas
+from lidarium.mapping.files.bags.reading import read_mcap_log
+from lidarium.mapping.files.bags.writing import BagWriter, bag, write_mcap_log
+from lidarium.mapping.files.laser_logs import LaserLog
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
+
+GEOMETRY = ScanGeometry(beams=9, field_of_view=math.pi, range_min=0.1, range_max=5.0)
+
+
+@pytest.fixture
+def log():
+    """Scans, the laser before the robot's middle, odometry that turns past pi."""
+    draws = np.random.default_rng(1)
+    ranges = draws.uniform(0.2, 4.9, (20, 9)).astype(np.float32)
+    ranges[3, 2], ranges[4, 5] = np.inf, np.nan
+    turns = np.linspace(0.0, 8.0, 20)
+    poses = np.stack([0.1 * turns, -0.2 * turns, turns], axis=1)
+    return LaserLog(0.25 * np.arange(20) + 3.0, ranges, GEOMETRY, poses, np.array([0.1, 0.02, 0.3]))
+
+
+def decoded(path):
+    with open(path, "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        return [(channel.topic, content) for _, channel, _, content in reader.iter_decoded_messages()]
+
+
+def same_turns(a, b):
+    return np.allclose(np.cos(a - b), 1.0, atol=1e-12)
+
+
+def test_a_log_comes_back(log, tmp_path):
+    write_mcap_log(tmp_path / "log.mcap", log)
+    found = read_mcap_log(tmp_path / "log.mcap")
+    assert np.array_equal(found.ranges, log.ranges, equal_nan=True)
+    assert np.allclose(found.stamps, log.stamps, atol=1e-9)
+    assert np.allclose(found.odometry[:, :2], log.odometry[:, :2], atol=1e-12)
+    assert same_turns(found.odometry[:, 2], log.odometry[:, 2])
+    assert np.allclose(found.laser_pose, log.laser_pose, atol=1e-6)
+    assert (found.geometry.beams, found.skipped, found.remarks) == (9, {}, ())
+    assert found.geometry.field_of_view == pytest.approx(math.pi, abs=1e-6)
+
+
+def test_beams_that_are_taken_one_after_the_other_come_back(log, tmp_path):
+    write_mcap_log(tmp_path / "log.mcap", replace(log, beam_interval_s=0.001))
+    (scan,) = [content for topic, content in decoded(tmp_path / "log.mcap") if topic == "/robot/scan"][:1]
+    # A message has the time of its first beam, a log that of the last.
+    assert scan.header.stamp.sec + 1e-9 * scan.header.stamp.nanosec == pytest.approx(3.0 - 0.008)
+    found = read_mcap_log(tmp_path / "log.mcap")
+    assert found.beam_interval_s == pytest.approx(0.001)
+    assert np.allclose(found.stamps, log.stamps, atol=1e-8)
+
+
+def quaternion(theta):
+    return {"x": 0.0, "y": 0.0, "z": math.sin(theta / 2), "w": math.cos(theta / 2)}
+
+
+def header(frame, sec, nanosec):
+    return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame}
+
+
+def pose(x, y, theta, z=0.0):
+    return {"position": {"x": x, "y": y, "z": z}, "orientation": quaternion(theta)}
+
+
+def expected_messages():
+    """Return messages as dicts, as the library's own encoder takes them."""
+    nothing = dict.fromkeys("xyz", 0.0)
+    return {
+        schemas.LASER_SCAN: {
+            "header": header("odd", 2, 500_000_000),
+            "angle_min": GEOMETRY.angle_first,
+            "angle_max": -GEOMETRY.angle_first,
+            "angle_increment": GEOMETRY.angle_increment,
+            "time_increment": 0.0,
+            "scan_time": 0.0,
+            "range_min": 0.1,
+            "range_max": 5.0,
+            "ranges": [0.5 * k for k in range(9)],
+            "intensities": [],
+        },
+        schemas.ODOMETRY: {
+            "header": header("odom", 2, 500_000_000),
+            "child_frame_id": "base_link",
+            "pose": {"pose": pose(1.0, -2.0, 0.5), "covariance": [0.0] * 36},
+            "twist": {"twist": {"linear": nothing, "angular": nothing}, "covariance": [0.0] * 36},
+        },
+        schemas.TRANSFORMS: {
+            "transforms": [
+                {
+                    "header": header("map", 2, 500_000_000),
+                    "child_frame_id": "odom",
+                    "transform": {
+                        "translation": {"x": 1.0, "y": 2.0, "z": 0.25},
+                        "rotation": quaternion(-1.5),
+                    },
+                }
+            ]
+        },
+        schemas.GRID: {
+            "header": header("map", 2, 500_000_000),
+            "info": {
+                "map_load_time": {"sec": 2, "nanosec": 500_000_000},
+                "resolution": 0.05,
+                "width": 3,
+                "height": 2,
+                "origin": pose(-1.0, -2.0, 0.0),
+            },
+            "data": [100, -1, 0, 0, 0, -1],
+        },
+        schemas.PATH: {
+            "header": header("map", 2, 500_000_000),
+            "poses": [
+                {"header": header("map", 1, 0), "pose": pose(0.0, 1.0, 2.0)},
+                {"header": header("map", 2, 0), "pose": pose(0.5, 1.5, -2.0)},
+            ],
+        },
+    }
+
+
+def write_all(writer):
+    writer.scan("/scan", "odd", 2.5, np.arange(9, dtype=np.float32) * 0.5, GEOMETRY)
+    writer.odometry("/odom", "odom", "base_link", 2.5, (1.0, -2.0, 0.5))
+    writer.transform("map", "odom", 2.5, (1.0, 2.0, -1.5), height=0.25)
+    levels = np.array([[0, 127, 255], [255, 255, 127]], np.uint8)
+    writer.grid("/map", "map", 2.5, levels, (-1.0, -2.0), 0.05)
+    writer.path("/path", "map", 2.5, [1.0, 2.0], np.array([[0.0, 1.0, 2.0], [0.5, 1.5, -2.0]]))
+
+
+@pytest.mark.parametrize("name", list(expected_messages()))
+def test_bytes_are_those_of_the_library_s_own_encoder(name):
+    file = io.BytesIO()
+    writer = BagWriter(file)
+    write_all(writer)
+    writer.finish()
+    reader = make_reader(io.BytesIO(file.getvalue()))
+    (ours,) = [message.data for schema, _, message in reader.iter_messages() if schema.name == name]
+    encode = serialize_dynamic(name, schemas.definition(name))[name]
+    assert ours == bytes(encode(expected_messages()[name]))
+
+
+def test_times_of_a_bag_are_those_of_its_messages(tmp_path):
+    with bag(tmp_path / "all.mcap") as writer:
+        write_all(writer)
+    with open(tmp_path / "all.mcap", "rb") as file:
+        reader = make_reader(file)
+        assert {message.log_time for _, _, message in reader.iter_messages()} == {2_500_000_000}
+        assert reader.get_header().profile == "ros2"
+        encodings = {schema.encoding for schema in reader.get_summary().schemas.values()}
+        assert encodings == {"ros2msg"}
+
+
+def test_a_bag_without_scans_is_refused(tmp_path):
+    with bag(tmp_path / "empty.mcap") as writer:
+        writer.odometry("/odom", "odom", "base_link", 0.0, np.zeros(3))
+    with pytest.raises(
+        ValueError, match=r"empty.mcap holds no scans; want a topic of sensor_msgs/msg/LaserScan"
+    ):
+        read_mcap_log(tmp_path / "empty.mcap")
+
+
+def test_of_several_topics_one_has_to_be_chosen(log, tmp_path):
+    with bag(tmp_path / "two.mcap") as writer:
+        for robot in ("a", "b"):
+            for k in range(3):
+                writer.odometry(
+                    f"/{robot}/odom",
+                    "odom",
+                    "base_link",
+                    float(k),
+                    (k * (1.0 if robot == "a" else -1.0), 0, 0),
+                )
+                writer.scan(f"/{robot}/scan", "laser", float(k), log.ranges[k], GEOMETRY)
+    with pytest.raises(ValueError, match=r"scans on 2 topics; choose one by --topic: /a/scan, /b/scan"):
+        read_mcap_log(tmp_path / "two.mcap")
+    with pytest.raises(ValueError, match=r"no scans on topic '/c/scan'; want one of /a/scan, /b/scan"):
+        read_mcap_log(tmp_path / "two.mcap", "/c/scan")
+    assert read_mcap_log(tmp_path / "two.mcap", "/b/scan").odometry[:, 0].tolist() == [0.0, -1.0, -2.0]
+    assert read_mcap_log(tmp_path / "two.mcap", "/a/scan").odometry[:, 0].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_without_odometry_transforms_say_where_the_robot_is(log, tmp_path):
+    with bag(tmp_path / "tf.mcap") as writer:
+        for k in range(4):
+            writer.transform("map", "odom", float(k), (5.0, 5.0, 0.0))
+            writer.transform("odom", "base", float(k), (0.5 * k, 0.0, 0.0))
+            writer.scan("/scan", "laser", float(k), log.ranges[k], GEOMETRY)
+        writer.transform("base", "laser", 0.0, (0.2, 0.0, 0.0), is_static=True)
+    found = read_mcap_log(tmp_path / "tf.mcap")
+    assert np.allclose(found.odometry[:, 0], [0.0, 0.5, 1.0, 1.5])
+    assert np.allclose(found.laser_pose, [0.2, 0.0, 0.0], atol=1e-6)
+
+
+def test_without_both_there_is_no_odometry(log, tmp_path):
+    write_mcap_log(tmp_path / "bare.mcap", replace(log, odometry=None))
+    assert read_mcap_log(tmp_path / "bare.mcap").odometry is None
+
+
+def test_a_laser_that_turns_clockwise_and_scans_of_other_lengths_are_read(log, tmp_path):
+    class Clockwise:
+        beams, range_min, range_max = 9, 0.1, 5.0
+        angle_first, angle_increment = -GEOMETRY.angle_first, -GEOMETRY.angle_increment
+
+    with bag(tmp_path / "odd.mcap") as writer:
+        for k in range(5):
+            beams = 9 if k != 2 else 4
+            writer.scan("/scan", "laser", float(k), log.ranges[k][:beams], Clockwise())
+    found = read_mcap_log(tmp_path / "odd.mcap")
+    assert found.skipped == {"scans of another length than most": 1}
+    assert np.array_equal(found.ranges, log.ranges[[0, 1, 3, 4], ::-1], equal_nan=True)
+
+
+def test_what_is_cut_off_or_damaged_is_refused_by_name(log, tmp_path):
+    write_mcap_log(tmp_path / "whole.mcap", log)
+    content = (tmp_path / "whole.mcap").read_bytes()
+    draws = np.random.default_rng(7)
+    for size in [0, 5, 8, 100, *draws.integers(9, len(content) - 1, 40).tolist()]:
+        (tmp_path / "cut.mcap").write_bytes(content[:size])
+        with pytest.raises(ValueError, match=r"cut.mcap"):
+            read_mcap_log(tmp_path / "cut.mcap")
+    for place in draws.integers(0, len(content), 60).tolist():
+        damaged = bytearray(content)
+        damaged[place] ^= 0xFF
+        (tmp_path / "damaged.mcap").write_bytes(damaged)
+        with suppress(ValueError):  # where damage is that nobody needs, the scans are as they were
+            found = read_mcap_log(tmp_path / "damaged.mcap")
+            assert np.array_equal(found.ranges, log.ranges, equal_nan=True)
+
+
+def test_a_bag_of_something_else_is_refused(tmp_path):
+    with open(tmp_path / "json.mcap", "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel(
+            "/scan", "json", writer.register_schema("Scan", "jsonschema", b"{}")
+        )
+        writer.add_message(channel, 0, b"{}", 0)
+        writer.finish()
+    with pytest.raises(ValueError, match=r"json.mcap holds no scans"):
+        read_mcap_log(tmp_path / "json.mcap")
+    with open(tmp_path / "idl.mcap", "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema(schemas.LASER_SCAN, "ros2idl", b"module sensor_msgs {};")
+        writer.add_message(writer.register_channel("/scan", "cdr", schema), 0, b"\x00\x01\x00\x00", 0)
+        writer.finish()
+    with pytest.raises(ValueError, match=r"idl.mcap has messages of another kind .*ros2msg, CDR"):
+        read_mcap_log(tmp_path / "idl.mcap")
+    (tmp_path / "text.mcap").write_text("no bag")
+    with pytest.raises(ValueError, match=r"text.mcap is not a whole bag"):
+        read_mcap_log(tmp_path / "text.mcap")
+    with pytest.raises(FileNotFoundError, match=r"no file"):
+        read_mcap_log(tmp_path / "nowhere.mcap")
+
+
+def test_nothing_is_written_where_writing_fails(log, tmp_path):
+    lent = bag(tmp_path / "half.mcap")
+    write_all(lent.__enter__())
+    assert not lent.__exit__(RuntimeError, RuntimeError("half-way"), None)
+    assert list(tmp_path.iterdir()) == []
