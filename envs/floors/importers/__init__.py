@@ -5,7 +5,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.importers import amrl, arrays, houseexpo, images, kth, lifull, ros_map
+from lidarium.envs.floors.importers import (
+    amrl,
+    arrays,
+    houseexpo,
+    images,
+    kth,
+    lifull,
+    movingai,
+    ros_map,
+    svg,
+)
 from lidarium.mapping.files.guarded_reading import check_file, reading
 from lidarium.mapping.files.map_files import RESOLUTION
 from lidarium.mapping.geometry.bounds import shown
@@ -50,6 +60,12 @@ FORMATS.register(
 FORMATS.register("kth", Format((".xml", ".xml.gz"), _always, kth.load), "KTH floor plan as XML")
 FORMATS.register("amrl", Format((".txt", ".txt.gz"), amrl.matches, amrl.load), "AMRL vector map")
 FORMATS.register("lifull", Format((".txt", ".txt.gz"), _always, lifull.load), "LIFULL vector annotation")
+FORMATS.register(
+    "movingai",
+    Format((".map", ".map.gz"), movingai.matches, movingai.load, movingai.has_scale),
+    "MovingAI grid map",
+)
+FORMATS.register("svg", Format((".svg",), _always, svg.load, svg.has_scale), "SVG drawing")
 FORMATS.register("array", Format((".npy", ".npz"), _always, arrays.load, arrays.has_scale), "numpy array")
 FORMATS.register(
     "dungeon", Format(images.SUFFIXES, images.is_dungeon, images.load_dungeon), "picture of a dungeon"
@@ -70,9 +86,10 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     ----------
     path : Path
         The file: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy
-        array.
+        array, MovingAI grid map, SVG drawing.
     resolution : float or None
-        Side of a pixel [m] where the file does not say it: needed for plain images and numpy arrays.
+        Side of a pixel [m] where the file does not say it: needed for plain images, numpy arrays,
+        grid maps and drawings.
 
     Returns
     -------
