@@ -14,6 +14,7 @@ from lidarium.envs.floors.importers import (
     lifull,
     movingai,
     ros_map,
+    sdf,
     svg,
 )
 from lidarium.mapping.files.guarded_reading import check_file, reading
@@ -65,6 +66,7 @@ FORMATS.register(
     Format((".map", ".map.gz"), movingai.matches, movingai.load, movingai.has_scale),
     "MovingAI grid map",
 )
+FORMATS.register("sdf", Format(sdf.SUFFIXES, _always, sdf.load), "SDF, a world of Gazebo")
 FORMATS.register("svg", Format((".svg",), _always, svg.load, svg.has_scale), "SVG drawing")
 FORMATS.register("array", Format((".npy", ".npz"), _always, arrays.load, arrays.has_scale), "numpy array")
 FORMATS.register(
@@ -86,7 +88,7 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     ----------
     path : Path
         The file: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy
-        array, MovingAI grid map, SVG drawing.
+        array, MovingAI grid map, SVG drawing, SDF world.
     resolution : float or None
         Side of a pixel [m] where the file does not say it: needed for plain images, numpy arrays,
         grid maps and drawings.

@@ -114,7 +114,7 @@ def floor_of_lines(path: Path, walls: NDArray[np.float64], openings: NDArray[np.
     solids = [Solid(strip(wall, WALL_THICKNESS, overhang=WALL_THICKNESS / 2.0)) for wall in walls]
     half = WALL_THICKNESS / 2.0
     bounds = (low[0] - half, low[1] - half, high[0] + half, high[1] + half)
-    surroundings = Solid(_box(low - 1.0, high + 1.0), holes=_enclosed(path, everything, low, high))
+    surroundings = Solid(_box(low - 1.0, high + 1.0), holes=enclosed(path, everything, low, high))
     return Floor(
         floor_name(path),
         (float(bounds[0]), float(bounds[1]), float(bounds[2]), float(bounds[3])),
@@ -126,10 +126,10 @@ def _box(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.floa
     return np.array([low, (high[0], low[1]), high, (low[0], high[1])])
 
 
-def _enclosed(
+def enclosed(
     path: Path, lines: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return the outlines of what the lines enclose.
+    """Return the outlines of what lines enclose, between the lowest and the highest of their ends.
 
     The outlines run along the middle of the outer walls.
 

@@ -97,10 +97,11 @@ def outlines(element: Element, kind: str) -> list[Polyline]:
 
 def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
     """Yield each command of a path with the numbers that it wants."""
-    for command, words in _COMMANDS.findall(text):
+    for found in _COMMANDS.finditer(text):
+        command, words = str(found[1]), str(found[2])
         wants = _WANTS.get(command.upper(), 0)
         if command in "Aa":
-            given = [float(word) for found in _ARCS.findall(words) for word in found]
+            given = [float(word) for arc in _ARCS.findall(words) for word in arc]
         else:
             given = numbers(words)
         if not wants:

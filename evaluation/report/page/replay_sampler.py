@@ -134,7 +134,7 @@ class ReplaySampler(Watcher):
             slice(grid.column + columns.start * block, grid.column + columns.stop * block),
         )
         maps = [map_within(env, row, *window) for row in range(env.settings.robots)]
-        together: NDArray[np.int16] = np.sum(maps, axis=0, dtype=np.int16)
+        together = np.asarray(np.sum(maps, axis=0, dtype=np.int16))
         of_layers: list[NDArray[np.signedinteger[Any]]] = [together, *maps]
         for layer, log_odds in zip([samples.team, *samples.own], of_layers, strict=False):
             levels = layer.levels.copy()
