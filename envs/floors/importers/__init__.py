@@ -8,6 +8,7 @@ from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers import (
     amrl,
     arrays,
+    dxf,
     houseexpo,
     images,
     kth,
@@ -66,6 +67,7 @@ FORMATS.register(
     Format((".map", ".map.gz"), movingai.matches, movingai.load, movingai.has_scale),
     "MovingAI grid map",
 )
+FORMATS.register("dxf", Format((".dxf",), _always, dxf.load, dxf.has_scale), "DXF drawing")
 FORMATS.register("sdf", Format(sdf.SUFFIXES, _always, sdf.load), "SDF, a world of Gazebo")
 FORMATS.register("svg", Format((".svg",), _always, svg.load, svg.has_scale), "SVG drawing")
 FORMATS.register("array", Format((".npy", ".npz"), _always, arrays.load, arrays.has_scale), "numpy array")
@@ -88,7 +90,7 @@ def load_file(path: Path, resolution: float | None = None) -> Floor:
     ----------
     path : Path
         The file: ROS map (yaml), dungeon or plain image, KTH XML, LIFULL or AMRL text, HouseExpo JSON, numpy
-        array, MovingAI grid map, SVG drawing, SDF world.
+        array, MovingAI grid map, SVG or DXF drawing, SDF world.
     resolution : float or None
         Side of a pixel [m] where the file does not say it: needed for plain images, numpy arrays,
         grid maps and drawings.

@@ -11,7 +11,8 @@ def box(name, x, y, wide, deep, high=2.5, z=None, turns="0 0 0"):
     middle = high / 2 if z is None else z
     return (
         f'<link name="{name}"><pose>{x} {y} 0 0 0 0</pose><collision name="{name}_collision">'
-        f"<pose>0 0 {middle} {turns}</pose><geometry><box><size>{wide} {deep} {high}</size></box></geometry></collision></link>"
+        f"<pose>0 0 {middle} {turns}</pose>"
+        f"<geometry><box><size>{wide} {deep} {high}</size></box></geometry></collision></link>"
     )
 
 

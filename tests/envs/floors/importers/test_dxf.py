@@ -1,0 +1,101 @@
+import math
+
+import pytest
+
+from lidarium.envs.floors.importers import load_file, takes_resolution
+
+ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed: extra [dxf]")
+
+
+@pytest.fixture
+def drawing():
+    """A room of 6 by 4 m in millimetres."""
+    document = ezdxf.new(units=4)
+    corners = [(0, 0), (6000, 0), (6000, 4000), (0, 4000)]
+    document.modelspace().add_lwpolyline(corners, close=True)
+    return document
+
+
+def saved(document, tmp_path, name="plan.dxf"):
+    document.saveas(tmp_path / name)
+    return tmp_path / name
+
+
+def free_area(floor):
+    return float((floor.raster(0.025, 0.3, 0.3).solid == 0).sum()) * 0.025**2
+
+
+def test_a_room_is_as_large_as_its_unit_says(drawing, tmp_path):
+    floor = load_file(saved(drawing, tmp_path))
+    assert floor.name == "plan"
+    # Walls are 0.1 m thick along their lines.
+    assert floor.bounds == pytest.approx((-0.05, -0.05, 6.05, 4.05))
+    assert free_area(floor) == pytest.approx(5.9 * 3.9, rel=0.01)
+    assert not takes_resolution(tmp_path / "plan.dxf")
+
+
+@pytest.mark.parametrize(("number", "metres"), [(1, 0.0254), (2, 0.3048), (5, 0.01), (6, 1.0)])
+def test_other_units_are_metres_too(tmp_path, number, metres):
+    document = ezdxf.new(units=number)
+    wide, high = 6.0 / metres, 4.0 / metres
+    document.modelspace().add_lwpolyline([(0, 0), (wide, 0), (wide, high), (0, high)], close=True)
+    assert load_file(saved(document, tmp_path)).bounds == pytest.approx((-0.05, -0.05, 6.05, 4.05))
+
+
+def test_lines_and_curves_are_walls_and_the_rest_is_not(drawing, tmp_path):
+    space = drawing.modelspace()
+    space.add_line((2000, 0), (2000, 3000))
+    space.add_circle((4000, 2000), 500)
+    space.add_text("office")
+    space.add_hatch()
+    floor = load_file(saved(drawing, tmp_path))
+    # The inside of the circle is free, though no robot gets there: a line drawing has no insides.
+    removed = 0.1 * 2.95 + math.pi * (0.55**2 - 0.45**2)
+    assert free_area(floor) == pytest.approx(5.9 * 3.9 - removed, rel=0.01)
+
+
+def test_blocks_are_taken_apart_where_they_are_inserted(drawing, tmp_path):
+    desk = drawing.blocks.new("DESK")
+    desk.add_lwpolyline([(0, 0), (100, 0)])
+    drawing.modelspace().add_blockref("DESK", (1000, 1000), {"xscale": 20, "yscale": 20, "rotation": 90})
+    floor = load_file(saved(drawing, tmp_path))
+    ends = [solid.polygon for solid in floor.solids if abs(solid.polygon[:, 0].mean() - 1.0) < 1e-6]
+    assert len(ends) == 1
+    assert ends[0][:, 1].min() == pytest.approx(0.95)
+    assert ends[0][:, 1].max() == pytest.approx(3.05)
+
+
+def test_layers_that_are_off_or_frozen_are_left_out(drawing, tmp_path):
+    drawing.layers.add("furniture").off()
+    drawing.layers.add("old").freeze()
+    for layer in ("furniture", "old"):
+        drawing.modelspace().add_line((0, 2000), (6000, 2000), {"layer": layer})
+    assert free_area(load_file(saved(drawing, tmp_path))) == pytest.approx(5.9 * 3.9, rel=0.01)
+
+
+def test_a_drawing_without_a_unit_needs_a_resolution(drawing, tmp_path):
+    drawing.header["$INSUNITS"] = 0
+    path = saved(drawing, tmp_path)
+    assert takes_resolution(path)
+    with pytest.raises(ValueError, match=r"has no unit; give --resolution"):
+        load_file(path)
+    assert load_file(path, 0.001).bounds == pytest.approx((-0.05, -0.05, 6.05, 4.05))
+    drawing.header["$INSUNITS"] = 4
+    with pytest.raises(ValueError, match=r"has units of 0.001 m, but a resolution of 0.01 m is given"):
+        load_file(saved(drawing, tmp_path), 0.01)
+
+
+def test_what_is_no_plan_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"empty.dxf has no lines in model space"):
+        load_file(saved(ezdxf.new(units=6), tmp_path, "empty.dxf"))
+    (tmp_path / "text.dxf").write_text("no drawing\nEOF\n")
+    with pytest.raises(ValueError, match=r"text.dxf is not a DXF drawing"):
+        load_file(tmp_path / "text.dxf")
+
+
+def test_a_file_that_is_cut_off_is_refused(drawing, tmp_path):
+    content = saved(drawing, tmp_path).read_bytes()
+    for share in (0.1, 0.5, 0.9):
+        (tmp_path / "cut.dxf").write_bytes(content[: int(share * len(content))])
+        with pytest.raises(ValueError, match=r"cut.dxf has no EOF at its end; want a whole DXF drawing"):
+            load_file(tmp_path / "cut.dxf")
