@@ -1,7 +1,7 @@
 // Coverage over time and performance profiles, drawn by uPlot from figures that lidarium computed.
 import uPlot from "uplot";
 import type { Curve, Group, Report } from "./data";
-import { choice, drawn, element, number, section, setOptions } from "./dom";
+import { choice, count, drawn, element, number, section, setOptions } from "./dom";
 import { shows, type Wanted } from "./filters";
 import { capital, type Shown } from "./tables";
 import { colour, onGround, onTheme } from "./theme";
@@ -88,7 +88,7 @@ function plotsOf(report: Report, group: Group, policies: readonly string[]): Plo
   }
   for (const [key, profile] of Object.entries(group.profiles.within_factor)) {
     found.push({
-      title: `${capital(report.times[key] ?? key)}: share of ${profile.runs} paired runs within a factor of the fastest`,
+      title: `${capital(report.times[key] ?? key)}: share of ${count(profile.runs, "paired run")} within a factor of the fastest`,
       x: profile.factors, xLabel: "factor of the fastest policy's time", yLabel: "share of runs [%]",
       lines: policies.map((policy) => ({ policy, y: (profile.shares[policy] ?? []).map((share) => 100 * share) })),
       xEnds: [1, profile.factors.at(-1) ?? 4], factors: true, step: 1,
@@ -148,7 +148,7 @@ function drawnPlot(report: Report, order: readonly string[], plot: Plot, target:
     scales: {
       x: { time: false, range: plot.xEnds, ...(plot.factors === true ? { distr: 3 } : {}) }, y: { range: [0, 102] },
     },
-    axes: [{ ...axis, label: plot.xLabel, ...factors }, { ...axis, label: plot.yLabel, size: 44 }],
+    axes: [{ ...axis, label: plot.xLabel, size: 30, ...factors }, { ...axis, label: plot.yLabel, size: 44 }],
     cursor: { show: false },
   };
   return new uPlot(options, data as uPlot.AlignedData, target);

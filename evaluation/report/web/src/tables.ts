@@ -23,14 +23,6 @@ export function leaderboard(report: Report): Shown {
   const columns: Column<Standing>[] = [
     { title: "Policy", value: (line) => line.policy, show: (line) => named(report, line.policy) },
     { title: "Robots", value: (line) => line.group.robots, show: (line) => String(line.group.robots), isNumber: true },
-    { title: "Floors", value: floorsOf, show: floorsOf },
-    { title: "Realism", value: (line) => line.group.settings, show: (line) => line.group.settings },
-    { title: "Runs", value: (line) => runsOf(line, timeKeys), show: (line) => String(runsOf(line, timeKeys)), isNumber: true },
-    ...timeKeys.slice(-1).map((key): Column<Standing> => ({
-      title: `Reached ${shareOf(report, key)}`, isNumber: true,
-      value: (line) => successOf(line, key)?.estimate ?? null,
-      show: (line) => percent(successOf(line, key)),
-    })),
     ...timeKeys.map((key): Column<Standing> => ({
       title: `${capital(report.times[key] ?? key)} [s]`, isNumber: true,
       value: (line) => medianOf(line, key).estimate,
@@ -41,12 +33,20 @@ export function leaderboard(report: Report): Shown {
       value: (line) => comparisonOf(line, timeKeys)?.difference?.estimate ?? null,
       show: (line) => differenceCell(comparisonOf(line, timeKeys), line.policy === report.baseline),
     },
+    ...timeKeys.slice(-1).map((key): Column<Standing> => ({
+      title: `Reached ${shareOf(report, key)}`, isNumber: true,
+      value: (line) => successOf(line, key)?.estimate ?? null,
+      show: (line) => percent(successOf(line, key)),
+    })),
+    { title: "Runs", value: (line) => runsOf(line, timeKeys), show: (line) => String(runsOf(line, timeKeys)), isNumber: true },
     ...["coverage_percent", "path_m", "overlap_percent"].map((key): Column<Standing> => ({
       title: `${capital(report.values[key]?.title ?? key)} [${report.values[key]?.unit ?? ""}]`, isNumber: true,
       value: (line) => valueOf(line, key), show: (line) => number(valueOf(line, key)),
     })),
+    { title: "Floors", value: floorsOf, show: floorsOf },
+    { title: "Realism", value: (line) => line.group.settings, show: (line) => line.group.settings },
   ];
-  const table = new SortedTable("Leaderboard", columns, 5 + timeKeys.length, false, "line");
+  const table = new SortedTable("Leaderboard", columns, 1 + timeKeys.length, false, "line");
   const update = (wanted: Wanted): void => table.show(
     report.groups.filter((group) => shows(wanted, group)).flatMap((group) => Object.keys(group.times[timeKeys[0] ?? ""] ?? {})
       .filter((policy) => wanted.policies.has(policy))
@@ -54,7 +54,7 @@ export function leaderboard(report: Report): Shown {
       .map((policy) => ({ group, policy, floor: wanted.floor }))));
   return {
     root: section("leaderboard", "Leaderboard", element("p", { class: "note" },
-      "Times are medians with 95 % intervals; the last columns are medians, of coverage the mean. "
+      "Times are medians with 95 % intervals; path and overlap are medians, coverage is the mean. "
       + "The difference is that of the restricted mean of the last time to the baseline's, bold where it is beyond "
       + "chance (Holm). Of a single floor there are no intervals."), table.root),
     update: repainted(update),
