@@ -61,9 +61,15 @@ class ChosenTours(TourFrontier):
         return picks
 
     def _choose(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
-        """Return the option that is chosen; where there is but one, nobody is asked."""
+        """Return the option that is chosen.
+
+        Nobody is asked where there is but one, or where tours let the robot go on to what it drives to: minds
+        that change with every plan of the team make robots turn between targets.
+        """
         if decision.mask.sum() == 1:
             return int(decision.mask.argmax())
+        if scene.options.is_kept[robot, decision.classic]:
+            return decision.classic
         return self._choose_among(scene, robot, decision, picks)
 
     def _choose_among(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
