@@ -1,1 +1,1 @@
-"""Training of explorers."""
+"""Training of explorers: from a teacher that knows the floors, then from rewards."""

@@ -1,1 +1,1 @@
-"""Explorers that were trained: what they see, and how they prefer one frontier to another."""
+"""Trained explorers: what a network sees of frontiers, how it ranks them, where its weights are."""

@@ -27,10 +27,10 @@ CROP_SIDE, CROP_STEP = 24, 0.25
 """Squares a side of the crop around each option, and the side of a square [m]."""
 
 LEAST_DETOUR = 0.01
-"""What tours do not begin with counts as so much longer at least [m]."""
+"""Least detour of an option with which tours do not begin [m]."""
 
 MOST_DETOUR = 50.0
-"""Tours that are longer than this are all alike [m]."""
+"""Longer detours count as this one [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +212,10 @@ def decision_of(
 
 
 def tours_in(sequence: NDArray[np.int64], count: int) -> list[list[int]]:
-    """Return each robot's tour of a sequence past ``count`` places, see ``team_tours``."""
+    """Return each robot's tour of a sequence past ``count`` places.
+
+    The sequence is that of ``team_tours``.
+    """
     tours: list[list[int]] = [[]]
     for number in sequence:
         if number >= count:

@@ -137,7 +137,7 @@ def option_features(
 def far_gains(
     log_odds: NDArray[np.int8], resolution: float, cells: NDArray[np.int64], reach: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what each of n cells shows far away [m2], and the direction to it [rad], (n,) each.
+    """Return what each of n cells shows far away [m2], and where [rad], (n,) each.
 
     Parameters
     ----------
@@ -186,7 +186,10 @@ def teammate_features(
 
 
 def table_of(values: Mapping[str, NDArray[np.float64]], scales: Mapping[str, float]) -> NDArray[np.float32]:
-    """Return features as a table, (n, features) float32, divided by their scales and bounded by ``MOST``."""
+    """Return features as a table, (n, features) float32.
+
+    They are divided by their scales and bounded by ``MOST``.
+    """
     columns = [np.asarray(values[name], np.float64) / scale for name, scale in scales.items()]
     return np.clip(np.stack(columns, axis=-1), -MOST, MOST).astype(np.float32)
 
@@ -194,7 +197,7 @@ def table_of(values: Mapping[str, NDArray[np.float64]], scales: Mapping[str, flo
 def in_frame(
     places: NDArray[np.float64], pose: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return places (n, 2) in the frame of a pose: ahead and to the left, (n,) each [m]."""
+    """Return places (n, 2) as seen from a pose: ahead and left, (n,) each [m]."""
     gap = places - pose[:2]
     cosine, sine = math.cos(wrapped(float(pose[2]))), math.sin(wrapped(float(pose[2])))
     return gap[:, 0] * cosine + gap[:, 1] * sine, gap[:, 1] * cosine - gap[:, 0] * sine

@@ -74,7 +74,7 @@ class Network:
         return int(np.argmax(np.where(decision.mask, preferences, -np.inf)))
 
     def preferences(self, decision: Decision) -> NDArray[np.float32]:
-        """Return how much each option is preferred, (n,) float32; the mask is not looked at."""
+        """Return how much each option is preferred, (n,) float32, whatever the mask."""
         tokens = self._tokens(decision)
         for layer in range(LAYERS):
             tokens = self._layer(f"layers.{layer}", tokens)

@@ -22,7 +22,7 @@ RATE_S = 20.0
 
 
 class ChosenTours(TourFrontier):
-    """Explorers on tours of which somebody chooses the first leg.
+    """Explorers on tours of which a callable chooses the first leg.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ class ChosenTours(TourFrontier):
     def _choose(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
         """Return the option that is chosen.
 
-        Nobody is asked where there is but one, or where tours let the robot go on to what it drives to: minds
-        that change with every plan of the team make robots turn between targets.
+        It is the only one where there is but one, and what the robot drives to where tours go on to that:
+        choices that change with every plan of the team make robots turn between targets.
         """
         if decision.mask.sum() == 1:
             return int(decision.mask.argmax())
@@ -77,7 +77,10 @@ class ChosenTours(TourFrontier):
         return self.choose_option(decision)
 
     def _progress(self, navigation: NavigationMap) -> dict[str, float]:
-        """Return the time [s], the free area that is known [m2] and how fast it grows [m2/s]."""
+        """Return the progress of the exploration.
+
+        These are the time [s], the free area that is known [m2] and how fast it grows [m2/s].
+        """
         known = float((navigation.log_odds < 0).sum()) * navigation.resolution**2
         past = self._known.setdefault(id(navigation), deque([(0.0, 0.0)]))
         while len(past) > 1 and past[1][0] <= self.team.time_s - RATE_S:

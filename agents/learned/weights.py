@@ -23,7 +23,7 @@ SHIPPED, CARD = "learned.safetensors", "learned.json"
 
 
 def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
-    """Return the weights of a file, or those that the package has where ``path`` is empty.
+    """Return the weights of a file; where ``path`` is empty, the package's.
 
     Raises
     ------
