@@ -52,5 +52,5 @@ def place_of(training: TrainingSettings, stage: Round, number: int) -> Place:
 
 
 def first_number(training: TrainingSettings, number: int) -> int:
-    """Return the number of the first episode of a round, or of what comes behind all rounds."""
+    """Return the number of the first episode of a round, or after all rounds."""
     return sum(each.floors for each in training.rounds[:number])

@@ -21,9 +21,23 @@ FLOOR_KINDS = ("building", *KINDS)
 Part = TypeVar("Part")
 
 
+def _check_sizes(robots: tuple[int, ...], whose: str) -> None:
+    """Check that sizes of teams are some.
+
+    Raises
+    ------
+    ValueError
+        Where there is none, or one is no number from 1 to 100.
+    """
+    if not robots or not all(type(size) is int and 1 <= size <= 100 for size in robots):
+        raise ValueError(f"robots of {whose} is {shown(robots)}; want sizes of teams, as in [1, 1, 2, 3]")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
-    """Floors on which robots are taught, after which the network is fitted; a curriculum has several.
+    """Floors on which robots are taught, after which the network is fitted.
+
+    A curriculum has several rounds.
 
     Attributes
     ----------
@@ -51,8 +65,7 @@ class Round:
                 raise ValueError(f"kinds.{kind} is {shown(often)}; want a number of 0 or more")
         if not sum(self.kinds.values()) > 0.0:
             raise ValueError(f"kinds is {shown(dict(self.kinds))}; want at least one above 0")
-        if not self.robots or not all(type(size) is int and 1 <= size <= 100 for size in self.robots):
-            raise ValueError(f"robots is {shown(self.robots)}; want sizes of teams, as in [1, 1, 2, 3]")
+        _check_sizes(self.robots, "a round")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +81,7 @@ class FitSettings:
     learning_rate, weight_decay : float
         Of AdamW.
     most_regret : float
-        Options that cost more than this are all alike [m].
+        Greater regrets count as this one [m].
     held_out : float
         Share of the floors that are not fitted; the epoch that is best on them is kept.
     correction_cost : float
@@ -89,14 +102,16 @@ class FitSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PpoSettings:
-    """How a network goes on by proximal policy optimization with masks; see sb3-contrib's MaskablePPO.
+    """How a network goes on by proximal policy optimization with masks.
+
+    See sb3-contrib's MaskablePPO.
 
     Attributes
     ----------
     decisions : int
         How many; 0 for none.
     checkpoint : int
-        So many decisions lie between two checkpoints; episodes begin afresh behind each.
+        Decisions from one checkpoint to the next; new episodes begin after each.
     environments : int
         Episodes side by side, each in a process of its own.
     steps : int
@@ -121,6 +136,12 @@ class PpoSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, "ppo")
+        update = self.environments * self.steps
+        if self.checkpoint % update:
+            raise ValueError(
+                f"checkpoint of ppo is {self.checkpoint}; want a whole multiple of environments times steps, "
+                f"{update}: so many decisions are made between two updates"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,6 +161,12 @@ class ValidationSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, "validation")
+        if not self.floors or not all(isinstance(floor, str) for floor in self.floors):
+            raise ValueError(
+                f"floors of validation is {shown(self.floors)}; want names of floors, as in "
+                '["set:validation:16"]'
+            )
+        _check_sizes(self.robots, "validation")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,19 +194,30 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, "training")
-        self.team(1)
+        if "robots" in self.settings:
+            raise ValueError("settings has 'robots'; want them in [[rounds]] and [validation]")
+        for size in sorted(
+            {*self.validation.robots, *(size for each in self.rounds for size in each.robots)}
+        ):
+            self.team(size)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Options of the environment, but for the size of the team."""
+        return {"stop_coverage": 0.99, "horizon_s": 1800.0, **self.settings}
 
     def team(self, robots: int) -> ExplorationSettings:
-        """Return the settings of a team; it ends where 0.99 of the floor is seen, or as ``settings`` says.
+        """Return the settings of a team.
+
+        It ends where 0.99 of the floor is seen, or as ``settings`` says.
 
         Raises
         ------
         ValueError
             Where a setting cannot be used.
         """
-        options = {"stop_coverage": 0.99, "horizon_s": 1800.0, **self.settings}
         try:
-            return make_settings(**{**options, "robots": robots})
+            return make_settings(**self.options, robots=robots)
         except (TypeError, AttributeError) as error:
             raise ValueError(f"settings of the training cannot be used: {error}") from error
 
@@ -198,7 +236,9 @@ def read_training(path: Path) -> TrainingSettings:
     """
     path = Path(path)
     if not path.exists():
-        raise FileNotFoundError(f"no training {path}; want a TOML file, as docs/tutorials/train.md shows one")
+        raise FileNotFoundError(
+            f"no training {path}; want a TOML file, as docs/tutorials/train_a_team.md shows one"
+        )
     text = read_text(path, MOST_BYTES)
     with reading(path, "TOML"):
         content = tomllib.loads(text)

@@ -83,7 +83,10 @@ class _Layer(nn.Module):
         self.inner, self.outer = nn.Linear(WIDTH, INNER), nn.Linear(INNER, WIDTH)
 
     def forward(self, tokens: Tensor, is_there: Tensor) -> Tensor:
-        """Return what becomes of the tokens (N, tokens, WIDTH); to those that are not there none attends."""
+        """Return what becomes of the tokens (N, tokens, WIDTH).
+
+        No token attends to those that are not there.
+        """
         count, length = tokens.shape[:2]
         parts = self.queries_keys_values(self.before_attention(tokens))
         queries, keys, values = parts.view(count, length, 3, HEADS, -1).permute(2, 0, 3, 1, 4)

@@ -14,12 +14,13 @@ import torch
 
 import lidarium
 from lidarium.agents.learned.weights import load_weights, save_weights
-from lidarium.evaluation.episodes.output import write_json
+from lidarium.evaluation.episodes.output import clear_unfinished, write_json
 from lidarium.mapping.files.guarded_reading import read_text, reading
+from lidarium.mapping.files.output import remove_unfinished
 from lidarium.training.progress import Progress
 from lidarium.training.settings import MOST_BYTES, TrainingSettings
-from lidarium.training.teaching.rounds import FIT, RoundFolder, run_round
-from lidarium.training.validation import Validated, compared, validate
+from lidarium.training.teaching.rounds import FIT, LESSONS, RoundFolder, run_round
+from lidarium.training.validation import Validated, compared, validate, validation_suite
 
 TRAINING_FILE, HOURS_FILE, WEIGHTS_FILE, CARD_FILE = (
     "training.json",
@@ -54,12 +55,14 @@ class Training:
         Raises
         ------
         ValueError
-            Where the folder holds another training or other files, or ``workers`` is less than 1.
+            Where the folder holds another training or other files, ``workers`` is less than 1, or a floor of
+            the validation cannot be used.
         OSError
             Where the folder cannot be written to.
         """
         if self.workers < 1:
             raise ValueError(f"workers is {self.workers}; want at least 1")
+        validation_suite(self.settings, {})  # hours of lessons are not for floors that are not there
         self._begin()
         torch.set_num_threads(1)
         clock = time.monotonic()
@@ -81,7 +84,7 @@ class Training:
             candidates[REWARDS] = yield from self._learn(begin)
             yield from validate(self.settings, self.folder / VALIDATION, candidates, self.workers)
         self._keep_best(candidates)
-        yield Progress("done", 1, 1)
+        yield Progress("best weights", 1, 1)
 
     def _learn(self, begin: Path) -> Generator[Progress, None, Path]:
         """Go on by rewards; return the file of the weights."""
@@ -104,6 +107,7 @@ class Training:
             Where it is not; the message says what differs.
         """
         path, asked = self.folder / TRAINING_FILE, self._asked()
+        clear_unfinished(self.folder, ".json")
         if not path.exists():
             if self.folder.exists() and any(self.folder.iterdir()):
                 raise ValueError(
@@ -119,6 +123,15 @@ class Training:
                     f"{self.folder} holds a training with {name} = {kept.get(name)!r}, this one has "
                     f"{asked.get(name)!r}; choose another folder"[:480]
                 )
+        self._clear_unfinished()
+
+    def _clear_unfinished(self) -> None:
+        """Remove what killed writers of a training have left half written."""
+        rounds = [RoundFolder(self.folder, number).path for number in range(len(self.settings.rounds))]
+        lessons = [each / LESSONS for each in rounds]
+        for folder in (self.folder, self.folder / REWARDS, *rounds, *lessons):
+            clear_unfinished(folder, ".json")
+            remove_unfinished(folder, (".npz", ".safetensors"))
 
     def _asked(self) -> dict[str, Any]:
         content: dict[str, Any] = json.loads(json.dumps(self.settings.as_dict()))
@@ -152,7 +165,7 @@ class Training:
         }
         write_json(self.folder / CARD_FILE, card)
 
-    def _curve(self) -> list[tuple[int, float]]:
+    def _curve(self) -> list[tuple[int, float | None]]:
         if not self.settings.ppo.decisions:
             return []
         from lidarium.training.reinforcement.checkpoints import latest_checkpoint
@@ -168,7 +181,10 @@ class Training:
             return float(json.loads(read_text(path, MOST_BYTES))["hours"])
 
     def _count_hours(self, since: float) -> float:
-        """Add what has passed to the hours of the training, from time to time; return since when to count."""
+        """Add what has passed to the hours of the training, from time to time.
+
+        Returns since when to count.
+        """
         now = time.monotonic()
         if now - since < COUNT_PERIOD_S:
             return since

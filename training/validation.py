@@ -1,5 +1,6 @@
 """Networks beside classic tours, paired, on floors that are not trained on."""
 
+import math
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,10 +45,37 @@ class Validated:
     by_robots: Mapping[str, float]
 
 
+def validation_suite(training: TrainingSettings, candidates: Mapping[str, Path]) -> Suite:
+    """Return the suite on which networks are compared with classic tours.
+
+    Parameters
+    ----------
+    training : TrainingSettings
+        What is asked for.
+    candidates : mapping of str to Path
+        Files of weights by name.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        Where a floor, a setting or a file of weights cannot be used, or is not there.
+    """
+    return Suite(
+        policies=(CLASSIC, *candidates),
+        floors=training.validation.floors,
+        robots=training.validation.robots,
+        seeds=(0,),
+        variants={DEFAULT_VARIANT: training.options},
+        policy_settings={
+            name: {"policy": "learned", "weights": str(path.absolute())} for name, path in candidates.items()
+        },
+    )
+
+
 def validate(
     training: TrainingSettings, folder: Path, candidates: Mapping[str, Path], workers: int
 ) -> Generator[Progress, None, None]:
-    """Run what is missing of classic tours and of networks on the floors of the validation.
+    """Run missing episodes of classic tours and networks on the validation's floors.
 
     Parameters
     ----------
@@ -65,17 +93,7 @@ def validate(
     Exception
         What an episode has raised.
     """
-    settings = {"stop_coverage": 0.99, "horizon_s": 1800.0, **training.settings}
-    suite = Suite(
-        policies=(CLASSIC, *candidates),
-        floors=training.validation.floors,
-        robots=training.validation.robots,
-        seeds=(0,),
-        variants={DEFAULT_VARIANT: settings},
-        policy_settings={
-            name: {"policy": "learned", "weights": str(path.absolute())} for name, path in candidates.items()
-        },
-    )
+    suite = validation_suite(training, candidates)
     campaign = Campaign(suite, folder, workers, records=False)
     total = sum(1 for _ in suite.trials())
     for _ in campaign.run():
@@ -101,12 +119,14 @@ def compared(folder: Path, name: str, training: TrainingSettings) -> Validated:
     ValueError
         Where there is no pair of episodes.
     """
-    horizon = training.team(1).horizon_s or 0.0
+    team = training.team(1)
+    wanted, horizon = team.stop_coverage or 1.0, team.horizon_s or math.inf
     times: dict[str, dict[tuple[Any, ...], float | None]] = {CLASSIC: {}, name: {}}
     for episode in read_episodes(folder / EPISODES_FILE):
         if episode["policy"] in times:
             key = (episode["robots"], episode["floor"], episode["seed"])
-            times[episode["policy"]][key] = episode["t99_s"]
+            is_enough = episode["coverage_final"] >= wanted - 1e-9
+            times[episode["policy"]][key] = episode["time_s"] if is_enough else None
     pairs = sorted(set(times[CLASSIC]) & set(times[name]))
     if not pairs:
         raise ValueError(f"{folder} has no episodes of {name} beside {CLASSIC}; run the training again")

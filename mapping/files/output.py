@@ -1,10 +1,14 @@
 """Files that are there whole or not at all."""
 
 import os
+import re
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+
+_BESIDE = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}")
+"""Names under which ``write_whole`` writes."""
 
 
 @contextmanager
@@ -55,3 +59,19 @@ def write_whole(path: Path, content: bytes, *, is_lasting: bool = True) -> None:
     except BaseException:
         Path(beside).unlink(missing_ok=True)
         raise
+
+
+def remove_unfinished(folder: Path, suffixes: Sequence[str]) -> None:
+    """Remove what ``write_whole`` left where its process was killed.
+
+    Parameters
+    ----------
+    folder : Path
+        Where it wrote; nobody writes there now, and all files of its naming there are its own.
+    suffixes : sequence of str
+        How the files' names end, such as ``.npz``.
+    """
+    for path in folder.glob(".*"):
+        named = _BESIDE.fullmatch(path.name)
+        if named is not None and named["name"].endswith(tuple(suffixes)) and path.is_file():
+            path.unlink(missing_ok=True)

@@ -26,8 +26,12 @@ class KilledError(Exception):
     """Stands for the death of the process."""
 
 
-def run(folder, settings=SMALL, steps=None):
+def run(folder, settings=SMALL, steps=None, is_killed=False):
     """Run a training, or so many steps of it."""
+    if is_killed:
+        with pytest.raises(KilledError):
+            run(folder, settings, steps)
+        return []
     training = Training(training_of(settings), folder)
     seen = []
     for step in training.run():
@@ -76,7 +80,7 @@ def test_a_training_that_was_killed_goes_on_to_the_same_end(whole, tmp_path):
 
 def test_a_finished_training_does_nothing_more(whole):
     before = {path: path.stat().st_mtime_ns for path in whole.rglob("*.safetensors")}
-    assert run(whole)[-1].part == "done"
+    assert run(whole)[-1].part == "best weights"
     after = {path: path.stat().st_mtime_ns for path in whole.rglob("*.safetensors")}
     before.pop(whole / "weights.safetensors"), after.pop(whole / "weights.safetensors")
     assert before == after
@@ -87,26 +91,46 @@ def test_a_folder_of_another_training_is_refused(whole):
         run(whole, {**SMALL, "seed": 2})
 
 
+def test_a_training_that_was_killed_while_it_began_goes_on(tmp_path):
+    unfinished = tmp_path / ".training.json.ab_12xyz"
+    unfinished.mkdir()
+    (unfinished / "training.json").write_text('{"se')
+    run(tmp_path, steps=1, is_killed=True)
+    assert json.loads((tmp_path / "training.json").read_text())["seed"] == 1
+    assert not unfinished.exists()
+
+
+def test_what_killed_writers_left_is_removed(tmp_path):
+    run(tmp_path, steps=1, is_killed=True)
+    left = [
+        tmp_path / ".weights.safetensors.0123abcd",
+        tmp_path / "round-0" / "lessons" / ".000000.npz.0123abcd",
+    ]
+    others = [tmp_path / ".gitignore", tmp_path / ".notes.txt.0123abcd"]
+    for path in left + others:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"half")
+    run(tmp_path, steps=1, is_killed=True)
+    assert not any(path.exists() for path in left)
+    assert all(path.exists() for path in others)
+
+
+def test_a_training_of_another_version_is_refused(whole, tmp_path):
+    asked = json.loads((whole / "training.json").read_text())
+    (tmp_path / "training.json").write_text(json.dumps({**asked, "version": "0.0.1"}))
+    with pytest.raises(ValueError, match=r"version = '0\.0\.1'.*choose another folder"):
+        run(tmp_path)
+
+
+def test_floors_of_the_validation_are_checked_before_anything_is_written(tmp_path):
+    settings = {**SMALL, "validation": {"floors": ["castle:3"], "robots": [1]}}
+    with pytest.raises((ValueError, FileNotFoundError), match="castle:3"):
+        run(tmp_path / "new", settings)
+    assert not (tmp_path / "new").exists()
+
+
 def test_a_folder_of_other_files_is_refused(tmp_path):
     (tmp_path / "mine.txt").write_text("x")
     with pytest.raises(ValueError, match="no training has written them"):
         run(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-
-
-def test_a_damaged_checkpoint_is_named(whole, tmp_path):
-    import shutil
-
-    folder = tmp_path / "b"
-    shutil.copytree(whole, folder)
-    newest = sorted((folder / "rewards").glob("*.learner.safetensors"))[-1]
-    newest.write_bytes(newest.read_bytes()[:100])
-    settings = {**SMALL, "ppo": {**SMALL["ppo"], "decisions": 64}}
-    (folder / "training.json").unlink()
-    for path in folder.iterdir():
-        if path.name != "rewards":
-            (shutil.rmtree if path.is_dir() else type(path).unlink)(path)
-    from lidarium.training.reinforcement.learning import learn
-
-    with pytest.raises(ValueError, match=r"learner\.safetensors is damaged"):
-        list(learn(training_of(settings), folder / "rewards", None, 1, tmp_path / "log"))

@@ -13,15 +13,18 @@ from torch import nn
 
 from lidarium.agents.learned.weights import load_weights, save_weights
 from lidarium.evaluation.episodes.output import write_json
-from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading
+from lidarium.mapping.files.guarded_reading import read_bytes, read_text, reading, shortened
 from lidarium.mapping.files.output import write_whole
 from lidarium.training.torch_network import ExplorerNetwork
 
 MOMENTS = ("exp_avg", "exp_avg_sq")
 """What Adam keeps of each parameter, beside how often it was changed."""
 
-MOST_STATE = 1 << 16
+MOST_STATE = 1 << 20
 """Files that say how far a training has come are no larger."""
+
+KEPT = 2
+"""So many checkpoints are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +35,12 @@ class Checkpoint:
     ----------
     decisions : int
         How many were made.
-    curve : list of (int, float)
-        Mean reward of the episodes that ended, by the number of decisions.
+    curve : list of (int, float or None)
+        Mean reward of the episodes that ended, by the number of decisions; None where none ended.
     """
 
     decisions: int
-    curve: list[tuple[int, float]]
+    curve: list[tuple[int, float | None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +62,18 @@ class Learner:
 def write_checkpoint(
     folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, learner: Learner
 ) -> None:
-    """Write a checkpoint; the file that makes it one is written last."""
+    """Write a checkpoint, and remove all but the last two.
+
+    The file that makes it one is written last and removed first: whenever the process is killed, what is
+    found is whole.
+    """
     name = _name(checkpoint.decisions)
     save_weights(folder / f"{name}.safetensors", network.weights())
     write_whole(folder / f"{name}.learner.safetensors", save(_state_of(learner)))
     write_json(folder / f"{name}.json", {"decisions": checkpoint.decisions, "curve": checkpoint.curve})
-    for old in sorted(folder.glob("decisions-*.json"))[:-2]:
-        for path in (old, *(old.with_suffix(end) for end in (".safetensors", ".learner.safetensors"))):
+    kept = {path.stem for path in sorted(folder.glob("decisions-*.json"))[-KEPT:]}
+    for path in sorted(folder.glob("decisions-*"), key=lambda path: path.suffix != ".json"):
+        if path.name.partition(".")[0] not in kept:
             path.unlink(missing_ok=True)
 
 
@@ -82,7 +90,9 @@ def latest_checkpoint(folder: Path) -> Checkpoint | None:
         return None
     with reading(found[-1], "how far a training has come"):
         content = json.loads(read_text(found[-1], MOST_STATE))
-        curve = [(int(number), float(reward)) for number, reward in content["curve"]]
+        curve = [
+            (int(number), None if reward is None else float(reward)) for number, reward in content["curve"]
+        ]
         return Checkpoint(int(content["decisions"]), curve)
 
 
@@ -91,19 +101,21 @@ def restore(folder: Path, checkpoint: Checkpoint, network: ExplorerNetwork, lear
 
     Raises
     ------
-    ValueError, FileNotFoundError
-        Where a file is damaged or missing, or is of another network.
+    ValueError
+        Where a file is missing, damaged, or of another network; the message names it, and what to remove.
     """
     name = _name(checkpoint.decisions)
-    network.set_weights(load_weights(folder / f"{name}.safetensors"))
-    path = folder / f"{name}.learner.safetensors"
+    path = weights_of(folder, checkpoint)
     try:
-        arrays = load(read_bytes(path))
-        _set_state(learner, arrays)
-    except (SafetensorError, ValueError, KeyError, RuntimeError) as error:
+        weights = load_weights(path)
+        path = folder / f"{name}.learner.safetensors"
+        _set_state(learner, load(read_bytes(path)))
+    except (OSError, SafetensorError, ValueError, KeyError, RuntimeError) as error:
         raise ValueError(
-            f"{path} is damaged, or of another network: {error}; remove this checkpoint to go on before it"
+            f"{path} is missing, damaged or of another network: {shortened(str(error), 200)}; remove "
+            f"{folder / name}.* to go on from the checkpoint before"
         ) from error
+    network.set_weights(weights)
 
 
 def weights_of(folder: Path, checkpoint: Checkpoint) -> Path:
@@ -123,19 +135,25 @@ def _state_of(learner: Learner) -> dict[str, NDArray[np.float32]]:
     arrays = {f"critic.{name}": array.numpy() for name, array in learner.critic.state_dict().items()}
     for k, parameter in enumerate(_parameters(learner.optimizer)):
         state = learner.optimizer.state[parameter]
-        if state:
-            arrays |= {f"{k}.{moment}": state[moment].numpy() for moment in MOMENTS}
-            arrays[f"{k}.step"] = np.array([float(state["step"])], np.float32)
+        arrays |= {f"{k}.{moment}": state[moment].numpy() for moment in MOMENTS}
+        arrays[f"{k}.step"] = np.array([float(state["step"])], np.float32)
     return arrays
 
 
 def _set_state(learner: Learner, arrays: dict[str, NDArray[np.float32]]) -> None:
+    """Take the critic and the moments of the optimizer over.
+
+    Raises
+    ------
+    KeyError, RuntimeError
+        Where an array is missing, or has another shape.
+    """
     tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
+    state = {}
+    for k, parameter in enumerate(_parameters(learner.optimizer)):
+        moments = {moment: tensors[f"{k}.{moment}"].reshape(parameter.shape) for moment in MOMENTS}
+        state[parameter] = {"step": tensors[f"{k}.step"][0], **moments}
     learner.critic.load_state_dict(
         {name.removeprefix("critic."): tensor for name, tensor in tensors.items() if "critic." in name}
     )
-    for k, parameter in enumerate(_parameters(learner.optimizer)):
-        if f"{k}.step" not in tensors:
-            continue
-        moments = {moment: tensors[f"{k}.{moment}"].reshape(parameter.shape) for moment in MOMENTS}
-        learner.optimizer.state[parameter] = {"step": tensors[f"{k}.step"][0], **moments}
+    learner.optimizer.state.update(state)

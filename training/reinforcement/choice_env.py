@@ -1,7 +1,7 @@
 """A Gymnasium environment of decisions: each step chooses where one robot of a team sets out.
 
 The robots of a team are asked in turn; all share the rewards. These are what is gained on classic tours: of
-the time that those take, the share that they needed for what was seen anew, minus the share that it took.
+the time that those take, the share that they needed for what was newly seen, minus the share that it took.
 They add up to 1 less the time over that of classic tours.
 """
 
@@ -116,7 +116,7 @@ class ChoiceEnv(gymnasium.Env[Observation, np.int64]):
         return _row(before.decision), reward, True, False, info
 
     def close(self) -> None:
-        """End the episode at hand."""
+        """End the episode that runs."""
         if self._episode is not None:
             self._episode.abandon()
             self._episode = None

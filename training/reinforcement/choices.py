@@ -58,12 +58,15 @@ class Pace:
         return float(self.times[-1])
 
     def left(self, coverage: float) -> float:
-        """Return the share of their time that classic tours still needed when they had seen so much."""
+        """Return the share of their time that classic tours need beyond a coverage."""
         return 1.0 - float(np.interp(coverage, self.coverages, self.times)) / self.time_s
 
 
 def classic_pace(place: Place) -> Pace | None:
-    """Return how fast classic tours explore, None where they do not see enough, or all at once."""
+    """Return how fast classic tours explore.
+
+    None where they do not see enough, or all at once.
+    """
     env = ExplorationEnv(place.floor, place.settings)
     course: list[tuple[float, float]] = []
     starts = drawn_starts(place.floor, place.settings, place.seed)
@@ -84,7 +87,7 @@ def classic_pace(place: Place) -> Pace | None:
 
 
 class _AbandonedError(Exception):
-    """Ends the thread of an episode that nobody goes on with."""
+    """Ends the thread of an episode that was abandoned."""
 
 
 class AskedEpisode:

@@ -53,9 +53,10 @@ def learn(
         Where TensorBoard's files go.
     """
     settings, checkpoint = training.ppo, latest_checkpoint(folder) or Checkpoint(0, [])
-    if checkpoint.decisions >= settings.decisions:
+    total = -(-settings.decisions // settings.checkpoint) * settings.checkpoint
+    if checkpoint.decisions >= total:
         return
-    yield Progress("rewards", checkpoint.decisions, settings.decisions)
+    yield Progress("rewards", checkpoint.decisions, total)
     environment = _environments(training, workers)
     try:
         model = _model(settings, environment, training.seed)
@@ -67,13 +68,13 @@ def learn(
             restore(folder, checkpoint, policy.network, learner)
         elif begin is not None:
             policy.network.set_weights(load_weights(begin))
-        while checkpoint.decisions < settings.decisions:
+        while checkpoint.decisions < total:
             number = checkpoint.decisions // settings.checkpoint
             reward = _learn_on(model, environment, training, number)
             decisions = checkpoint.decisions + settings.checkpoint
             checkpoint = Checkpoint(decisions, [*checkpoint.curve, (decisions, reward)])
             write_checkpoint(folder, checkpoint, policy.network, learner)
-            yield Progress("rewards", decisions, settings.decisions, {"reward": reward})
+            yield Progress("rewards", decisions, total, {} if reward is None else {"reward": reward})
     finally:
         environment.close()
 
@@ -114,11 +115,18 @@ def _model(settings: PpoSettings, environment: VecEnv, seed: int) -> MaskablePPO
         )
 
 
-def _learn_on(model: MaskablePPO, environment: VecEnv, training: TrainingSettings, number: int) -> float:
-    """Learn up to the next checkpoint; return the mean reward of the episodes that ended.
+def _learn_on(
+    model: MaskablePPO, environment: VecEnv, training: TrainingSettings, number: int
+) -> float | None:
+    """Learn up to the next checkpoint.
 
-    Episodes begin afresh and all draws begin anew, so that a training that goes on from a checkpoint does the
-    same as one that was never interrupted.
+    New episodes begin and all draws are seeded again, so that a training that goes on from a checkpoint does
+    the same as one that was never interrupted.
+
+    Returns
+    -------
+    float or None
+        Mean reward of the episodes that ended, None where none did.
     """
     environment.env_method("begin_at", number * PLACES_PER_CHECKPOINT)
     model.set_random_seed(training.seed + 1 + number)
@@ -126,4 +134,4 @@ def _learn_on(model: MaskablePPO, environment: VecEnv, training: TrainingSetting
     model.ep_info_buffer = None
     model.learn(training.ppo.checkpoint, reset_num_timesteps=False)
     episodes: list[dict[str, float]] = list(model.ep_info_buffer or [])
-    return float(np.mean([each["r"] for each in episodes])) if episodes else 0.0
+    return float(np.mean([each["r"] for each in episodes])) if episodes else None

@@ -15,7 +15,7 @@ from lidarium.training.torch_network import ExplorerNetwork, Seen
 
 
 class _PreferencesAndValue(BaseFeaturesExtractor):
-    """The network's preferences, and behind them how well an episode goes on from here.
+    """The network's preferences, then the critic's estimate of what is still gained.
 
     Gradients of values do not reach the network: it prefers, and nothing else.
     """

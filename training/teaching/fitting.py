@@ -32,7 +32,7 @@ class Fit:
 
 
 def fit(network: ExplorerNetwork, floors: list[Samples], settings: FitSettings, seed: int) -> Iterator[Fit]:
-    """Fit a network to the samples of some floors; at the end it is as it was in its best epoch.
+    """Fit a network to the samples of some floors, and keep its best epoch.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class KnownFloor:
     cells: NDArray[np.int64]
 
     def node_at(self, place: NDArray[np.float64]) -> int:
-        """Return the place of the graph that is nearest to one of the floor's frame (2,) [m]."""
+        """Return the place of the graph that is nearest to a place (2,) of the floor [m]."""
         return int(np.argmin(np.hypot(*(self.graph.places - place).T)))
 
     def unseen(self) -> NDArray[np.uint64]:

@@ -98,7 +98,7 @@ def _is_done(path: Path) -> bool:
 
 
 def _teach(training: TrainingSettings, folder: RoundFolder, number: int) -> int:
-    """Teach robots on a floor, into the file of their lessons; return how many there are."""
+    """Teach robots on a floor and write their lessons; return how many there are."""
     choose: Chooser = choose_classic if folder.before is None else Network(load_weights(folder.before))
     stage = training.rounds[folder.number]
     place = place_of(training, stage, number)

@@ -108,7 +108,7 @@ class TaughtTours(ChosenTours):
         return super().pick(agents, options)
 
     def _choose_among(self, scene: Scene, robot: int, decision: Decision, picks: Sequence[int | None]) -> int:
-        """Let somebody choose, and keep what the teacher says."""
+        """Return the option that is chosen, and keep what the teacher says."""
         rest = self._rest = self._rest or self._rest_of(scene)
         for k, pick in enumerate(picks):
             if pick is not None:

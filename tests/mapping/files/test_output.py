@@ -5,7 +5,7 @@ import os
 import pytest
 
 from lidarium.mapping.files import output as files
-from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.files.output import remove_unfinished, write_whole
 
 
 def test_a_file_is_whole_and_nothing_is_left_beside(tmp_path):
@@ -61,3 +61,16 @@ def test_what_cannot_be_brought_to_the_disk_leaves_the_old_file(tmp_path, monkey
         write_whole(path, b"two")
     assert os.listdir(tmp_path) == ["file"]
     assert path.read_bytes() == b"one"
+
+
+def test_what_a_killed_writer_left_is_removed_and_nothing_else(tmp_path):
+    left = tmp_path / ".a.npz.0123abcd"
+    others = [tmp_path / name for name in (".a.npz.backup01", ".a.npz.0123abcde", ".b.txt.0123abcd", "a.npz")]
+    for path in (left, *others):
+        path.write_bytes(b"half")
+    (tmp_path / ".c.npz.0123abcd").mkdir()
+    remove_unfinished(tmp_path, [".npz"])
+    assert not left.exists()
+    assert all(path.exists() for path in others)
+    assert (tmp_path / ".c.npz.0123abcd").is_dir()
+    remove_unfinished(tmp_path / "nowhere", [".npz"])
