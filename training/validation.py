@@ -12,6 +12,7 @@ from lidarium.evaluation.suites.campaign import EPISODES_FILE, Campaign
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
+from lidarium.training.failures import raise_named
 from lidarium.training.progress import Progress
 from lidarium.training.settings import TrainingSettings
 
@@ -99,7 +100,8 @@ def validate(
     for _ in campaign.run():
         yield Progress("validation", campaign.done, total)
     if campaign.failures:
-        raise campaign.failures[0][1]
+        trial, error = campaign.failures[0]
+        raise_named(error, f"the episode {trial.key}")
 
 
 def compared(folder: Path, name: str, training: TrainingSettings) -> Validated:

@@ -15,6 +15,7 @@ from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.suites.starts import drawn_starts
 from lidarium.evaluation.suites.workers import shared_out
+from lidarium.training.failures import raise_named
 from lidarium.training.places import first_number, place_of
 from lidarium.training.progress import Progress
 from lidarium.training.settings import TrainingSettings
@@ -74,6 +75,13 @@ def run_round(
         Where the round is kept; the one before has ended.
     workers : int
         How many processes teach; they change nothing in what is found.
+
+    Raises
+    ------
+    ValueError
+        Where a floor, or the lessons of one, cannot be used; the message names it.
+    Exception
+        What an episode has raised.
     """
     if folder.weights.exists():
         return
@@ -87,7 +95,8 @@ def run_round(
     yield Progress(name, done, stage.floors)
     for number, result in shared_out(partial(_teach, training, folder), missing, workers):
         if isinstance(result, Exception):
-            raise result
+            place = place_of(training, stage, number)
+            raise_named(result, f"teaching on {place.floor} with {place.settings.robots} robots")
         done += 1
         yield Progress(name, done, stage.floors, {"floor": float(number), "samples": float(result)})
     yield from _fit(training, folder)

@@ -78,7 +78,7 @@ def read_samples(path: Path) -> Samples:
     ValueError
         Where the file holds something else.
     """
-    with reading(path, "lessons of a training"):
+    with reading(path, "lessons of a training", "remove it, and the same command teaches there again"):
         archive = GuardedArchive(read_bytes(path))
         decisions = Decisions(*(archive.array(field.name) for field in fields(Decisions)))
         return Samples(decisions, archive.array("regrets"))
