@@ -1,6 +1,7 @@
 """The policies by name."""
 
 import importlib
+import inspect
 import os
 import sys
 from collections.abc import Callable
@@ -119,8 +120,8 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     Raises
     ------
     ValueError
-        Where the name is unknown; the message suggests the nearest one. Where there is no such module or
-        class, or it makes no policy.
+        Where the name, or that of a setting, is unknown; the message suggests the nearest one. Where there is
+        no such module or class, or it makes no policy.
     """
     maker = POLICIES[name] if not isinstance(name, str) or ":" not in name else maker_at(name)
     try:
@@ -128,7 +129,11 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     except TypeError as error:
         if "unexpected keyword argument" not in str(error):
             raise
-        raise ValueError(f"policy {name!r} has no such setting: {error}; leave it out") from error
+        wrong = str(error).partition("argument ")[2].split("'")[1]
+        known = [
+            key for key, each in inspect.signature(maker).parameters.items() if each.kind != each.VAR_KEYWORD
+        ]
+        raise ValueError(f"policy {name!r}: {unknown('setting', wrong, known)}") from error
     if not isinstance(policy, Policy):
         raise ValueError(f"policy {name!r} makes {type(policy).__name__}; want a subclass of Policy")
     return policy

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 
-from lidarium.agents.learned.decision import Chooser, Decision, Scene, decision_of, scene_of
+from lidarium.agents.learned.decision import Chooser, Decision, Scene, choose_classic, decision_of, scene_of
 from lidarium.agents.learned.network import Network
 from lidarium.agents.learned.weights import load_weights
 from lidarium.agents.policy import Team
@@ -104,9 +104,10 @@ class Learned(ChosenTours):
 
     Raises
     ------
-    ValueError
-        Where the file is none of weights for this network.
+    ValueError, FileNotFoundError
+        Where the file is not there, or is none of weights for this network.
     """
 
     def __init__(self, weights: str | Path = "", shares_map: bool = True, **settings: float) -> None:
-        super().__init__(Network(load_weights(weights)), shares_map, **settings)
+        super().__init__(choose_classic, shares_map, **settings)
+        self.choose_option = Network(load_weights(weights))

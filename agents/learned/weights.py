@@ -12,8 +12,9 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from lidarium.agents.learned.network import Weights, check_weights
-from lidarium.mapping.files.guarded_reading import read_bytes
+from lidarium.mapping.files.guarded_reading import read_bytes, reason
 from lidarium.mapping.files.output import write_whole
+from lidarium.mapping.geometry.bounds import shown
 
 MOST_BYTES = 5_000_000
 """Files of weights are no larger."""
@@ -28,12 +29,16 @@ def load_weights(path: str | Path = "") -> dict[str, NDArray[np.float32]]:
     Raises
     ------
     ValueError
-        Where the file is truncated, larger than 5 MB, or of another network; where what the package has is
-        not what it was made with.
+        Where ``path`` is no name; where the file is truncated, larger than 5 MB, or of another network; where
+        the package's weights are missing, or not what their card names.
     OSError
         Where it cannot be read.
     """
-    return dict(_shipped() if not str(path) else weights_from(read_bytes(Path(path), MOST_BYTES), str(path)))
+    if not isinstance(path, str | Path):
+        raise ValueError(f"weights is {shown(path)}; want the name of a file")
+    if not str(path):
+        return dict(_shipped())
+    return weights_from(read_bytes(Path(path), MOST_BYTES), str(path))
 
 
 def weights_from(content: bytes, name: str) -> dict[str, NDArray[np.float32]]:
@@ -73,8 +78,14 @@ def save_weights(path: Path, weights: Weights) -> str:
 def _shipped() -> dict[str, NDArray[np.float32]]:
     """Return the package's weights, checked against the hash that their card names."""
     folder = resources.files("lidarium.agents.learned") / "data"
-    content = (folder / SHIPPED).read_bytes()
-    card = json.loads((folder / CARD).read_text(encoding="utf-8"))
-    if hashlib.sha256(content).hexdigest() != card["sha256"]:
+    try:
+        content = (folder / SHIPPED).read_bytes()
+        wanted = json.loads((folder / CARD).read_text(encoding="utf-8"))["sha256"]
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise ValueError(
+            f"{SHIPPED} of the package or its card {CARD} cannot be read: {reason(error)}; install the "
+            "package again, or name a file of weights: weights=FILE"
+        ) from error
+    if hashlib.sha256(content).hexdigest() != wanted:
         raise ValueError(f"{SHIPPED} is not what its card {CARD} names; install the package again")
     return weights_from(content, SHIPPED)

@@ -14,6 +14,7 @@ rapid collaborative exploration with a decentralized multi-UAV system", 2023: to
 """
 
 import math
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ from lidarium.mapping.planning.frontier_kernels import FRONTIER
 from lidarium.mapping.planning.frontiers import Clusters
 from lidarium.mapping.planning.grid_planning import centres_of
 from lidarium.mapping.planning.touring.frontier_views import gain_at
+from lidarium.registry import unknown
 
 SIGHT_MARGIN = 0.5
 """What is this far within the edges of a laser's field of view is seen for certain [rad]."""
@@ -56,12 +58,21 @@ class TourFrontier(FrontierExplorer):
         Whether robots explore on the team's map.
     **settings
         Any attribute of ``TourSettings``.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such setting, or it cannot have such a value.
     """
 
     decision_period_s = 0.5
 
     def __init__(self, shares_map: bool = True, **settings: float) -> None:
         super().__init__(shares_map)
+        known = [each.name for each in fields(TourSettings)]
+        for name in settings:
+            if name not in known:
+                raise ValueError(unknown("setting of tours", name, known))
         self.settings = TourSettings(**settings)  # type: ignore[arg-type]
 
     def reset(self, team: Team, seed: int) -> None:

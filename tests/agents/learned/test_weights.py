@@ -3,11 +3,14 @@
 import hashlib
 import json
 import pickle
+import re
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lidarium.agents.learned import weights
 from lidarium.agents.learned.network import shapes
 from lidarium.agents.learned.weights import CARD, SHIPPED, load_weights, save_weights
 
@@ -18,13 +21,13 @@ def drawn():
 
 
 def test_what_was_saved_is_loaded(tmp_path):
-    weights = drawn()
-    digest = save_weights(tmp_path / "a" / "weights.safetensors", weights)
+    saved = drawn()
+    digest = save_weights(tmp_path / "a" / "weights.safetensors", saved)
     path = tmp_path / "a" / "weights.safetensors"
     assert hashlib.sha256(path.read_bytes()).hexdigest() == digest
     found = load_weights(path)
-    assert found.keys() == weights.keys()
-    for name, array in weights.items():
+    assert found.keys() == saved.keys()
+    for name, array in saved.items():
         np.testing.assert_array_equal(found[name], array)
 
 
@@ -52,11 +55,80 @@ def test_large_files_are_refused(tmp_path):
 
 
 def test_weights_of_another_network_are_not_written(tmp_path):
-    weights = drawn()
-    weights.pop("steepness")
+    lacking = drawn()
+    lacking.pop("steepness")
     with pytest.raises(ValueError, match="steepness"):
-        save_weights(tmp_path / "weights.safetensors", weights)
+        save_weights(tmp_path / "weights.safetensors", lacking)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package whose weights are in another folder."""
+    monkeypatch.setattr(weights.resources, "files", lambda name: tmp_path)
+    weights._shipped.cache_clear()
+    digest = save_weights(tmp_path / "data" / SHIPPED, drawn())
+    (tmp_path / "data" / CARD).write_text(json.dumps({"sha256": digest}))
+    yield tmp_path / "data"
+    weights._shipped.cache_clear()
+
+
+def test_weights_of_the_package_are_those_that_their_card_names(package):
+    np.testing.assert_array_equal(load_weights()["steepness"], drawn()["steepness"])
+
+
+def test_weights_of_the_package_that_were_changed_are_refused(package):
+    other = drawn()
+    other["steepness"][0] += 1.0
+    save_weights(package / SHIPPED, other)
+    with pytest.raises(ValueError, match=r"not what its card learned\.json names; install"):
+        load_weights()
+
+
+@pytest.mark.parametrize("damage", [None, "", "[]", "{}", "3"])
+@pytest.mark.parametrize("name", [SHIPPED, CARD])
+def test_a_package_without_weights_or_card_says_what_to_do(package, name, damage):
+    path = package / name
+    path.unlink() if damage is None else path.write_text(damage)
+    with pytest.raises(ValueError, match="install the package again"):
+        load_weights()
+
+
+@pytest.mark.parametrize("path", [3, 2.5, True, ["a"]])
+def test_what_is_no_name_of_a_file_is_refused(path):
+    with pytest.raises(ValueError, match="want the name of a file"):
+        load_weights(path)
+
+
+def test_no_pickle_is_loaded_from_file_to_policy(tmp_path, monkeypatch):
+    """Neither by the policy nor by what a training reads; torch and numpy could."""
+    import torch
+    from drawn_decisions import drawn_decision
+
+    from lidarium.agents import make_policy
+    from lidarium.training.teaching.samples import read_samples, samples_of, write_samples
+    from lidarium.training.teaching.teacher import Lesson
+
+    def load(*arguments, **options):
+        raise AssertionError("a pickle is loaded")
+
+    path = tmp_path / "weights.safetensors"
+    save_weights(path, drawn())
+    lesson = Lesson(drawn_decision(np.random.default_rng(0)), np.zeros(5))
+    for module, names in ((pickle, ("load", "loads", "Unpickler")), (torch, ("load",))):
+        for name in names:
+            monkeypatch.setattr(module, name, load)
+    assert make_policy("learned", weights=path).choose_option(lesson.decision) in range(5)
+    write_samples(tmp_path / "lessons.npz", samples_of([lesson]))
+    assert len(read_samples(tmp_path / "lessons.npz")) == 1
+
+
+def test_no_source_of_training_and_policy_loads_pickles():
+    root = Path(weights.__file__).resolve().parents[2]
+    words = re.compile(r"import pickle|pickle\.load|torch\.(load|save)|allow_pickle=True|joblib|cloudpickle")
+    paths = [*(root / "agents").rglob("*.py"), *(root / "training").rglob("*.py")]
+    assert len(paths) > 20
+    assert not [path for path in paths if words.search(path.read_text(encoding="utf-8"))]
 
 
 def test_the_package_ships_weights_that_are_what_their_card_names():

@@ -53,8 +53,10 @@ def test_what_is_left_at_the_end_is_named():
 
 
 def test_unknown_settings_and_values_out_of_bounds_are_refused():
-    with pytest.raises(TypeError):
+    with pytest.raises(ValueError, match=r"setting of tours 'hurry'.*known: minimum_size"):
         TourFrontier(hurry=1.0)
+    with pytest.raises(ValueError, match=r"'turn_lenght'; did you mean 'turn_length'"):
+        TourFrontier(turn_lenght=1.0)
     with pytest.raises(ValueError, match="kept_share"):
         TourFrontier(kept_share=2.0)
 
