@@ -33,7 +33,7 @@ def test_a_policy_and_a_training_see_the_same_to_the_bit():
     last = episode.ask()
     assert last.decision is None
     assert (last.time_s, last.coverage) == (env.scorer.time, env.scorer.coverage)
-    assert len(seen) > 5
+    assert len(seen) >= 3
 
 
 def starts_of(team):
