@@ -3,7 +3,7 @@
 ``python -m robustness.kills --count 1000``, with ``--train`` for trainings
 
 Run it in the folder ``tests``. A folder is filled by one command, called again after each kill until it ends
-by itself. Then nothing may be lost or there twice: every episode, record, replay and weight is that of a
+by itself. Then nothing may be lost or there twice: every episode, record, lesson and weight is that of a
 command that nobody disturbed, and what was on the disk once stays there.
 """
 
@@ -33,11 +33,14 @@ SHORT = ("--horizon-s", "1", "--map-resolution", "0.1", "--lidar", "lidar_360_6m
 TRAINING = """
 seed = 1
 settings = { resolution = 0.1, horizon_s = 600.0, stop_coverage = 0.9 }
-rounds = [{ floors = 3, kinds = { apartment = 1.0 }, robots = [1], replays = 2 }]
+rounds = [{ floors = 3, kinds = { apartment = 1.0 }, robots = [1] }]
 fit = { epochs = 2, batch = 4 }
 ppo = { decisions = 24, checkpoint = 8, environments = 1, steps = 8, batch = 8, epochs = 1 }
-validation = { floors = ["srt_l_room"], robots = [1] }
+validation = { floors = ["apartment:7"], robots = [1] }
 """
+ENDS = (".safetensors", ".npz", ".none", "fit.json", "training.json")
+"""How the files of a training end that are the same whenever it is run."""
+
 ENDS_S = 120.0
 """How long an evaluation may take to end when it is left alone [s]."""
 
@@ -120,7 +123,7 @@ def training(place: Path) -> Work:
     """Return a training whose file lies in a folder."""
     path = place / "training.toml"
     path.write_text(TRAINING)
-    return Work(("train", str(path), "--workers", "2"), trained_in, replays_in)
+    return Work(("train", str(path), "--workers", "2"), trained_in, lessons_in)
 
 
 def kill(process: "subprocess.Popen[bytes]", victim: str, chance: random.Random) -> str:
@@ -161,7 +164,7 @@ def found_in(out: Path) -> dict[str, object]:
 def trained_in(out: Path) -> dict[str, object]:
     """Return what a training leaves, without hours and times of the clock."""
     found: dict[str, object] = {}
-    for path in sorted([*out.rglob("*.safetensors"), *out.rglob("replays/*"), *out.rglob("fit.json")]):
+    for path in sorted(each for end in ENDS for each in out.rglob(f"*{end}")):
         found[path.relative_to(out).as_posix()] = hashlib.sha256(path.read_bytes()).hexdigest()
     if (out / "card.json").exists():
         card = json.loads((out / "card.json").read_text())
@@ -170,9 +173,10 @@ def trained_in(out: Path) -> dict[str, object]:
     return found
 
 
-def replays_in(out: Path) -> set[object]:
-    """Return the replays and fitted weights of a training."""
-    return {path.relative_to(out).as_posix() for path in out.glob("round-*/**/*") if path.is_file()}
+def lessons_in(out: Path) -> set[object]:
+    """Return the lessons and fitted weights of a training, without what is half written."""
+    paths = (path.relative_to(out) for path in out.glob("round-*/**/*") if path.is_file())
+    return {path.as_posix() for path in paths if not any(part.startswith(".") for part in path.parts)}
 
 
 def has_left(group: int) -> bool:

@@ -51,6 +51,11 @@ def learn(
         Where 1, all environments are in this process; else each has one of its own. It changes nothing else.
     log : Path
         Where TensorBoard's files go.
+
+    Raises
+    ------
+    ValueError
+        Where a checkpoint is damaged, or the process of an environment has ended.
     """
     settings, checkpoint = training.ppo, latest_checkpoint(folder) or Checkpoint(0, [])
     total = -(-settings.decisions // settings.checkpoint) * settings.checkpoint
@@ -58,6 +63,7 @@ def learn(
         return
     yield Progress("rewards", checkpoint.decisions, total)
     environment = _environments(training, workers)
+    is_whole = False
     try:
         model = _model(settings, environment, training.seed)
         model.set_logger(configure(str(log), ["tensorboard"]))
@@ -75,8 +81,31 @@ def learn(
             checkpoint = Checkpoint(decisions, [*checkpoint.curve, (decisions, reward)])
             write_checkpoint(folder, checkpoint, policy.network, learner)
             yield Progress("rewards", decisions, total, {} if reward is None else {"reward": reward})
+        is_whole = True
+    except (EOFError, ConnectionError) as error:
+        raise ValueError(
+            "the process of an environment has ended: killed from outside, out of memory, or by an error "
+            "printed above; the last checkpoint is kept, and the same command goes on from there"
+        ) from error
     finally:
+        _close(environment, is_whole)
+
+
+def _close(environment: VecEnv, is_whole: bool) -> None:
+    """Close environments; where learning was broken off, end their processes.
+
+    Of these some may have answered and others not: asked to close, they would be waited for without end.
+    """
+    if is_whole or not isinstance(environment, SubprocVecEnv):
         environment.close()
+        return
+    for process in environment.processes:
+        process.terminate()
+    for process in environment.processes:
+        process.join()
+    for remote in environment.remotes:
+        remote.close()
+    environment.closed = True
 
 
 def _environments(training: TrainingSettings, workers: int) -> VecEnv:

@@ -1,7 +1,12 @@
 """Learning from rewards, from checkpoint to checkpoint."""
 
+import multiprocessing
+import os
+import signal
+
 import numpy as np
 import pytest
+from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from lidarium.agents.learned.weights import load_weights, save_weights
 from lidarium.training.reinforcement.checkpoints import latest_checkpoint, weights_of
@@ -67,6 +72,41 @@ def test_it_begins_with_the_weights_that_are_given(tmp_path):
     learned(tmp_path, 8, begin, learning_rate=1e-9)
     for name, array in weights_in(tmp_path).items():
         np.testing.assert_allclose(array, given[name], atol=1e-6, err_msg=name)
+
+
+def environments_of(folder):
+    """Return learning in processes of its own that has begun, and these."""
+    steps = learn(training(24, environments=1), folder, None, 2, folder / "log")
+    next(steps)
+    assert next(steps).done == 8
+    (process,) = multiprocessing.active_children()
+    return steps, process
+
+
+def test_processes_change_nothing_and_end_where_learning_is_broken_off(tmp_path):
+    learned(tmp_path / "one", 8, environments=1)
+    steps, process = environments_of(tmp_path / "other")
+    assert latest_checkpoint(tmp_path / "other") == latest_checkpoint(tmp_path / "one")
+    for name, array in weights_in(tmp_path / "one").items():
+        np.testing.assert_array_equal(weights_in(tmp_path / "other")[name], array)
+    os.kill(process.pid, signal.SIGKILL)
+    with pytest.raises(ValueError, match=r"process of an environment has ended.*last checkpoint is kept"):
+        next(steps)
+    assert not multiprocessing.active_children()
+    assert latest_checkpoint(tmp_path / "other").decisions == 8
+
+
+def test_an_interrupt_while_processes_work_ends_them(tmp_path, monkeypatch):
+    """They may have answered or not: they are not asked."""
+    steps, process = environments_of(tmp_path)
+
+    def interrupted(environment):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(SubprocVecEnv, "step_wait", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        next(steps)
+    assert not process.is_alive()
 
 
 def test_a_damaged_checkpoint_is_named_and_the_one_before_goes_on(whole, tmp_path):
