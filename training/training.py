@@ -16,7 +16,7 @@ import lidarium
 from lidarium.agents.learned.weights import load_weights, save_weights
 from lidarium.evaluation.episodes.output import clear_unfinished, write_json
 from lidarium.mapping.files.guarded_reading import read_text, reading
-from lidarium.mapping.files.output import remove_unfinished
+from lidarium.mapping.files.output import only_writer, remove_unfinished
 from lidarium.training.progress import Progress
 from lidarium.training.settings import MOST_BYTES, TrainingSettings
 from lidarium.training.teaching.rounds import FIT, LESSONS, RoundFolder, run_round
@@ -55,8 +55,8 @@ class Training:
         Raises
         ------
         ValueError
-            Where the folder holds another training or other files, ``workers`` is less than 1, or a floor of
-            the validation cannot be used.
+            Where the folder holds another training or other files, or another process trains into it, where
+            ``workers`` is less than 1, or a floor of the validation cannot be used.
         OSError
             Where the folder cannot be written to.
         """
@@ -64,11 +64,13 @@ class Training:
             raise ValueError(f"workers is {self.workers}; want at least 1")
         validation_suite(self.settings, {})  # hours of lessons are not for floors that are not there
         self._begin()
-        torch.set_num_threads(1)
-        clock = time.monotonic()
-        for step in self._steps():
-            yield step
-            clock = self._count_hours(clock)
+        with only_writer(self.folder / TRAINING_FILE):
+            self._clear_unfinished()
+            torch.set_num_threads(1)
+            clock = time.monotonic()
+            for step in self._steps():
+                yield step
+                clock = self._count_hours(clock)
 
     def _steps(self) -> Generator[Progress, None, None]:
         candidates: dict[str, Path] = {}
@@ -107,8 +109,8 @@ class Training:
             Where it is not; the message says what differs.
         """
         path, asked = self.folder / TRAINING_FILE, self._asked()
-        clear_unfinished(self.folder, ".json")
         if not path.exists():
+            clear_unfinished(self.folder, ".json")
             if self.folder.exists() and any(self.folder.iterdir()):
                 raise ValueError(
                     f"{self.folder} has files, and no training has written them; choose another folder"
@@ -123,7 +125,6 @@ class Training:
                     f"{self.folder} holds a training with {name} = {kept.get(name)!r}, this one has "
                     f"{asked.get(name)!r}; choose another folder"[:480]
                 )
-        self._clear_unfinished()
 
     def _clear_unfinished(self) -> None:
         """Remove what killed writers of a training have left half written."""

@@ -20,6 +20,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from lidarium.mapping.files.guarded_reading import read_bytes, reason
+from lidarium.mapping.files.output import lock_file
 from lidarium.mapping.geometry.bounds import shown
 
 KEY = "key"
@@ -167,7 +168,7 @@ class EpisodesFile:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._handle = _opened(self.path)
         try:
-            _lock(self._handle, self.path)
+            lock_file(self._handle, self.path)
             self.episodes, whole = _parsed(self.path)
             os.ftruncate(self._handle, whole)
             self._size = whole
@@ -281,20 +282,3 @@ def _check_ours(path: Path, whole: int) -> None:
             f"{path} ends with {rest[:20]!r}, which no evaluation has written; move the file away, or choose "
             "another folder"
         )
-
-
-def _lock(handle: int, path: Path) -> None:
-    """Take the file for this process.
-
-    The system gives it back when the process ends, however that comes about.
-    """
-    try:
-        import fcntl
-    except ImportError:  # there are no such locks on this system
-        return
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        raise ValueError(
-            f"{path} is being written to by another process; wait for it, or choose another folder"
-        ) from error

@@ -75,3 +75,42 @@ def remove_unfinished(folder: Path, suffixes: Sequence[str]) -> None:
         named = _BESIDE.fullmatch(path.name)
         if named is not None and named["name"].endswith(tuple(suffixes)) and path.is_file():
             path.unlink(missing_ok=True)
+
+
+def lock_file(handle: int, path: Path) -> None:
+    """Take an open file for this process.
+
+    The system gives it back when the process ends, however that comes about.
+
+    Raises
+    ------
+    ValueError
+        Where another process has taken it.
+    """
+    try:
+        import fcntl
+    except ImportError:  # there are no such locks on this system
+        return
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise ValueError(
+            f"{path} is being written to by another process; wait for it, or choose another folder"
+        ) from error
+
+
+@contextmanager
+def only_writer(path: Path) -> Iterator[None]:
+    """Take a file that is there for this process.
+
+    Raises
+    ------
+    ValueError
+        Where another process has taken it.
+    """
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        lock_file(handle, path)
+        yield
+    finally:
+        os.close(handle)

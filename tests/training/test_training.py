@@ -1,6 +1,7 @@
 """A whole training, small."""
 
 import json
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -113,6 +114,18 @@ def test_what_killed_writers_left_is_removed(tmp_path):
     run(tmp_path, steps=1, is_killed=True)
     assert not any(path.exists() for path in left)
     assert all(path.exists() for path in others)
+
+
+def test_a_second_training_in_the_same_folder_is_refused(tmp_path):
+    with closing(Training(training_of(SMALL), tmp_path).run()) as first:
+        next(first)
+        unfinished = tmp_path / ".hours.json.abcd1234"
+        unfinished.mkdir()
+        with pytest.raises(ValueError, match=r"training\.json is being written to by another process"):
+            run(tmp_path, steps=1)
+        assert unfinished.exists()
+    run(tmp_path, steps=1, is_killed=True)
+    assert not unfinished.exists()
 
 
 def test_a_training_of_another_version_is_refused(whole, tmp_path):
