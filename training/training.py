@@ -4,9 +4,11 @@ What is finished is on the disk. The same call goes on where an earlier one was 
 """
 
 import json
+import platform
 import time
 from collections.abc import Generator
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,9 @@ TRAINING_FILE, HOURS_FILE, WEIGHTS_FILE, CARD_FILE = (
     "weights.safetensors",
     "card.json",
 )
+LIBRARIES = ("numpy", "numba", "torch", "stable-baselines3", "sb3-contrib")
+"""What weights may depend on; the card names their versions."""
+
 REWARDS, VALIDATION, TENSORBOARD = "rewards", "validation", "tensorboard"
 
 
@@ -158,7 +163,11 @@ class Training:
             "best": best,
             "hours": self._hours(),
             "workers": self.workers,
-            "versions": {"lidarium": lidarium.__version__, "torch": torch.__version__},
+            "versions": {
+                "lidarium": lidarium.__version__,
+                "python": platform.python_version(),
+                **{name: version(name) for name in LIBRARIES},
+            },
             "training": self._asked(),
             "validation": {name: asdict(self._validated(name)) for name in candidates},
             "fits": fits,

@@ -83,7 +83,7 @@ def _shipped() -> dict[str, NDArray[np.float32]]:
         wanted = json.loads((folder / CARD).read_text(encoding="utf-8"))["sha256"]
     except (OSError, ValueError, LookupError, TypeError) as error:
         raise ValueError(
-            f"{SHIPPED} of the package or its card {CARD} cannot be read: {reason(error)}; install the "
+            f"{SHIPPED} of the package or its card {CARD} cannot be read ({reason(error)}); install the "
             "package again, or name a file of weights: weights=FILE"
         ) from error
     if hashlib.sha256(content).hexdigest() != wanted:

@@ -1,5 +1,6 @@
 """A whole training, small."""
 
+import hashlib
 import json
 from contextlib import closing
 
@@ -56,6 +57,9 @@ def test_a_training_leaves_weights_and_a_card(whole):
     assert card["validation"][card["best"]]["episodes"] == 1
     assert [number for number, _ in card["rewards"]] == [16, 32, 48]
     assert set(card["fits"]) == {"round-0", "round-1"}
+    assert {"lidarium", "python", "numpy", "torch", "sb3-contrib"} <= card["versions"].keys()
+    assert card["training"]["seed"] == 1
+    assert card["sha256"] == hashlib.sha256((whole / "weights.safetensors").read_bytes()).hexdigest()
     assert load_weights(whole / "weights.safetensors").keys()
     assert list((whole / "tensorboard").iterdir())
 
