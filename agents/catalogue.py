@@ -129,14 +129,19 @@ def make_policy(name: str, **settings: Any) -> Policy:  # noqa: ANN401
     except TypeError as error:
         if "unexpected keyword argument" not in str(error):
             raise
-        wrong = str(error).partition("argument ")[2].split("'")[1]
-        known = [
-            key for key, each in inspect.signature(maker).parameters.items() if each.kind != each.VAR_KEYWORD
-        ]
-        raise ValueError(f"policy {name!r}: {unknown('setting', wrong, known)}") from error
+        raise ValueError(f"policy {name!r}: {_unknown_setting(maker, error)}") from error
     if not isinstance(policy, Policy):
         raise ValueError(f"policy {name!r} makes {type(policy).__name__}; want a subclass of Policy")
     return policy
+
+
+def _unknown_setting(maker: Callable[..., Any], error: TypeError) -> str:
+    """Return the message for a setting that what makes a policy does not have."""
+    wrong = str(error).partition("argument ")[2].split("'")[1]
+    parameters = inspect.signature(maker).parameters
+    if any(each.kind == each.VAR_KEYWORD for each in parameters.values()):
+        return f"there is no setting {wrong!r}; leave it out"
+    return unknown("setting", wrong, parameters)
 
 
 def maker_at(name: str) -> Callable[..., Any]:

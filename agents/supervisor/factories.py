@@ -31,9 +31,22 @@ def supervised_tours(**options: Any) -> Supervised:  # noqa: ANN401
     return supervised("tour_frontier", **options)
 
 
-def supervised_learned(**options: Any) -> Supervised:  # noqa: ANN401
-    """Return explorers that were trained, under a supervisor; options as for ``supervised``."""
-    return supervised("learned", **options)
+def supervised_learned(weights: str = "", **options: Any) -> Supervised:  # noqa: ANN401
+    """Return trained explorers under a supervisor.
+
+    Parameters
+    ----------
+    weights : str
+        A file of weights; those that the package ships where empty.
+    **options
+        Those of ``SupervisorSettings``.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        Where the file is not there, or is none of weights for this network.
+    """
+    return Supervised(make_policy("learned", weights=weights), **options)
 
 
 def oracle_starts(**options: Any) -> Supervised:  # noqa: ANN401

@@ -84,7 +84,15 @@ def check_supervised(name: str) -> None:
     from lidarium.agents import policy_names
 
     if not is_supervised(name):
-        led = ", ".join(filter(is_supervised, policy_names()))
+        led = ", ".join(filter(_can_be_led, policy_names()))
         raise ValueError(
             f"settings of the supervisor are given, and policy {name!r} has none; want one of {led}"
         )
+
+
+def _can_be_led(name: str) -> bool:
+    """Return whether a policy is led by a supervisor, and can be made here."""
+    try:
+        return is_supervised(name)
+    except ValueError:  # weights of a network are missing or damaged
+        return False

@@ -60,6 +60,8 @@ def refused(arguments, out, capsys, *words):
         ("tour_frontier", "kept=-1.0", ("kept",)),
         ("tour_frontier", "kept=much", ("kept", "much")),
         ("nearest_frontier", "kept", ("sets nothing",)),
+        ("supervised", "kepd=1.0", ("policy 'supervised': there is no setting 'kepd'",)),
+        ("supervised_learned", "weights=nowhere.safetensors", ("nowhere.safetensors",)),
         ("learned", "weights=nowhere.safetensors", ("nowhere.safetensors",)),
         ("learned", "weights=pyproject.toml", ("pyproject.toml", "no file of weights")),
         ("learned", "weights=3", ("weights is 3; want the name of a file",)),
