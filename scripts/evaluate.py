@@ -65,6 +65,8 @@ class Evaluate(TeamCommand):
     """metres per pixel, where floors are plain images"""
     workers: int = 0
     """processes that run episodes; 0 for as many as there are cores"""
+    ray: str | None = None
+    """Ray cluster that runs episodes in place of --workers: auto, or HOST:PORT (extra `ray`)"""
     bounds: bool = False
     """set each episode beside how soon a team that knew the floor could have seen it (extra `bounds`)"""
     records: bool = True
@@ -87,7 +89,11 @@ def execute(command: Evaluate) -> Answer:
     folder = command.out or DEFAULT_FOLDER
     check_writable(folder)
     campaign = Campaign(
-        _suite(command), folder, command.workers or len(os.sched_getaffinity(0)), command.records
+        _suite(command),
+        folder,
+        command.workers or len(os.sched_getaffinity(0)),
+        command.records,
+        cluster=command.ray,
     )
     first_start.compile_first(command.json)
     is_interrupted = False

@@ -9,8 +9,8 @@ before, so that any number of workers leaves the same lines, though in another o
 
 import json
 import time
-from collections.abc import Generator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import lidarium
 from lidarium.agents.policy import settings_for
-from lidarium.evaluation.episodes.output import clear_unfinished, write_json
+from lidarium.evaluation.episodes.output import clear_unfinished, whole_file, write_json
 from lidarium.evaluation.suites.bounds import beside_bound
 from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
 from lidarium.evaluation.suites.episodes_file import KEY, EpisodesFile
@@ -55,6 +55,8 @@ class Campaign:
         Whether every episode's record is kept.
     trials : sequence of Trial or None
         Those of the suite that are run; all where None.
+    cluster : str or None
+        A Ray cluster that runs them, ``auto`` or HOST:PORT, in place of processes of this machine.
 
     Attributes
     ----------
@@ -71,6 +73,7 @@ class Campaign:
     workers: int = 1
     records: bool = True
     trials: Sequence[Trial] | None = None
+    cluster: str | None = None
     failures: list[tuple[Trial, Exception]] = field(default_factory=list)
     done: int = 0
     total: int = 0
@@ -100,8 +103,7 @@ class Campaign:
             finished = {episode[KEY] for episode in file.episodes}
             missing = [trial for trial in trials if trial.key not in finished]
             self.done = self.total - len(missing)
-            work = shared_out(partial(run_trial, self.suite, records=records), missing, self.workers)
-            with closing(work):
+            with closing(self._work(missing, records)) as work:
                 for trial, result in work:
                     if isinstance(result, RecordNotWrittenError):
                         raise result
@@ -112,6 +114,16 @@ class Campaign:
                     self.done += 1
                     yield result
             file.check_in_place()
+
+    def _work(
+        self, missing: Sequence[Trial], records: Path | None
+    ) -> Generator[tuple[Trial, dict[str, Any] | Exception], None, None]:
+        """Return what runs trials: this machine's processes, or a cluster."""
+        if self.cluster is None:
+            return shared_out(partial(run_trial, self.suite, records=records), missing, self.workers)
+        from lidarium.evaluation.suites.on_ray import trials_on_ray
+
+        return trials_on_ray(self.suite, missing, records, self.cluster)
 
 
 def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[str, Any]:
@@ -163,11 +175,30 @@ def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[s
     }
 
 
+def write_record_bytes(path: Path, content: bytes) -> None:
+    """Write a record that another machine has made, whole or not at all.
+
+    Raises
+    ------
+    RecordNotWrittenError
+        Where it cannot be written.
+    """
+    with _kept(path), whole_file(path) as beside:
+        beside.write_bytes(content)
+
+
 def _keep_record(path: Path, record: "EpisodeRecord") -> None:
     from lidarium.evaluation.record import write_record
 
-    try:
+    with _kept(path):
         write_record(path, record)
+
+
+@contextmanager
+def _kept(path: Path) -> Iterator[None]:
+    """Say of a record that cannot be written what is kept all the same."""
+    try:
+        yield
     except OSError as error:
         raise RecordNotWrittenError(
             error.errno,

@@ -1,0 +1,183 @@
+"""Episodes shared out among the machines of a Ray cluster, with results as they are ready.
+
+A task whose worker or machine is lost is done again elsewhere; its result comes once.
+"""
+
+import logging
+import socket
+import tempfile
+from collections.abc import Callable, Generator, Iterable
+from contextlib import closing
+from itertools import islice
+from pathlib import Path
+from typing import Any, TypeVar
+
+import lidarium
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import Trial
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+ANSWERS_S = 10.0
+"""A cluster answers within this [s]."""
+
+WAITING_PER_CORE = 2
+"""Tasks that are handed over for each core, so that none waits."""
+
+POLL_S = 0.5
+"""Wall time after which an interrupt is acted on at the latest [s]."""
+
+
+def on_ray(
+    work: Callable[[Task], Result], tasks: Iterable[Task], address: str
+) -> Generator[tuple[Task, Result | Exception], None, None]:
+    """Do tasks on a Ray cluster; yield each with its result when ready.
+
+    Parameters
+    ----------
+    work : callable
+        Does a task; it and the tasks can be pickled. What it reads is on all machines.
+    tasks : iterable
+        What is done.
+    address : str
+        ``auto`` for the cluster of this machine, or HOST:PORT.
+
+    Yields
+    ------
+    task, result
+        An exception that the task has raised is its result.
+
+    Raises
+    ------
+    ValueError
+        Where the extra ``ray`` is missing, no cluster answers within 10 s, or a machine has another version
+        of lidarium.
+    """
+    ray = _connected(address)
+    try:
+        # Lost workers and machines are no fault of a task: it is tried until it has an end.
+        remote = ray.remote(max_retries=-1, num_cpus=1)(_done)
+        window = WAITING_PER_CORE * max(int(ray.cluster_resources().get("CPU", 1)), 1)
+        pending = iter(tasks)
+        running = {remote.remote(work, task, lidarium.__version__): task for task in islice(pending, window)}
+        while running:
+            for ready in ray.wait(list(running), num_returns=1, timeout=POLL_S)[0]:
+                task = running.pop(ready)
+                result = _result(ray, ready)
+                if isinstance(result, OtherVersionError):
+                    raise ValueError(str(result))
+                yield task, result
+                for following in islice(pending, 1):
+                    running[remote.remote(work, following, lidarium.__version__)] = following
+    finally:
+        ray.shutdown()
+
+
+class OtherVersionError(RuntimeError):
+    """Raised where a machine of a cluster has another version."""
+
+
+def _connected(address: str) -> Any:  # noqa: ANN401
+    """Return the module ``ray``, connected to a cluster."""
+    try:
+        import ray
+    except ModuleNotFoundError as error:
+        raise ValueError("a Ray cluster needs the extra ray: pip install 'lidarium[ray]'") from error
+    if address != "auto":
+        host, colon, port = address.rpartition(":")
+        if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+            raise ValueError(f"the Ray cluster is {address!r}; want auto or HOST:PORT, such as 10.0.0.1:6379")
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), ANSWERS_S).close()
+        except OSError as error:
+            raise ValueError(
+                f"no Ray cluster answers at {address} within {ANSWERS_S:g} s ({error}); start one there with "
+                "`ray start --head`"
+            ) from error
+    try:
+        ray.init(address=address, logging_level=logging.ERROR, log_to_driver=False)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        raise ValueError(
+            f"there is no Ray cluster at {address} ({str(error).splitlines()[0]}); start one with "
+            "`ray start --head`"
+        ) from error
+    return ray
+
+
+def _done(work: Callable[[Task], Result], task: Task, version: str) -> Result:
+    """Do a task on a machine of the cluster, if it has the same version."""
+    if lidarium.__version__ != version:
+        raise OtherVersionError(
+            f"machine {socket.gethostname()} of the cluster has lidarium {lidarium.__version__}, this is "
+            f"{version}; install the same on all"
+        )
+    return work(task)
+
+
+def _result(ray: Any, ready: Any) -> Any:  # noqa: ANN401
+    """Return the result of a task, or what it has raised."""
+    try:
+        return ray.get(ready)
+    except ray.exceptions.RayTaskError as error:
+        return error.cause if isinstance(error.cause, Exception) else error
+    except ray.exceptions.RayError as error:
+        return error
+
+
+class Recorded:
+    """A trial's line, and its record as bytes.
+
+    Parameters
+    ----------
+    suite : Suite
+        What is asked for.
+    keeps_records : bool
+        Whether there is a record.
+    """
+
+    def __init__(self, suite: Suite, keeps_records: bool) -> None:
+        self._suite, self._keeps_records = suite, keeps_records
+
+    def __call__(self, trial: Trial) -> tuple[dict[str, Any], bytes | None]:
+        """Run a trial; its record is made in a folder of this machine that goes again."""
+        from lidarium.evaluation.suites.campaign import run_trial
+
+        if not self._keeps_records:
+            return run_trial(self._suite, trial), None
+        with tempfile.TemporaryDirectory() as folder:
+            line = run_trial(self._suite, trial, Path(folder))
+            return line, (Path(folder) / f"{trial.file_name}.npz").read_bytes()
+
+
+def trials_on_ray(
+    suite: Suite, trials: Iterable[Trial], records: Path | None, address: str
+) -> Generator[tuple[Trial, dict[str, Any] | Exception], None, None]:
+    """Run trials on a Ray cluster; yield each with its line when its record is written here.
+
+    Parameters
+    ----------
+    suite : Suite
+        What is asked for.
+    trials : iterable of Trial
+        What is run.
+    records : Path or None
+        Where records go on this machine; none are kept where None.
+    address : str
+        As in ``on_ray``.
+    """
+    from lidarium.evaluation.suites.campaign import write_record_bytes
+
+    with closing(on_ray(Recorded(suite, records is not None), trials, address)) as work:
+        for trial, result in work:
+            if isinstance(result, Exception):
+                yield trial, result
+                continue
+            line, record = result
+            if records is not None and record is not None:
+                try:
+                    write_record_bytes(records / f"{trial.file_name}.npz", record)
+                except OSError as error:
+                    yield trial, error
+                    continue
+            yield trial, line
