@@ -8,8 +8,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import yaml
+from drawn_decisions import drawn_decision
 
 import lidarium
+from lidarium.agents.learned.network import shapes
+from lidarium.agents.learned.weights import save_weights
 from lidarium.envs.settings.making import make_settings
 from lidarium.evaluation.episodes.runner import run_episode
 from lidarium.evaluation.episodes.watching import WatchedExploration
@@ -26,6 +29,8 @@ from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.splines.features import observe
 from lidarium.mapping.splines.scan_points import scan_points
 from lidarium.mapping.splines.spline_map import SplineMap
+from lidarium.training.teaching.samples import samples_of, write_samples
+from lidarium.training.teaching.teacher import Lesson
 
 PLAN = {
     "name": "two rooms",
@@ -65,6 +70,33 @@ policy = "nearest_frontier"
 figure = "c_free"
 at_least = 0.9
 """
+TRAINING = """
+seed = 3
+
+[settings]
+resolution = 0.05
+lidar = "urg"
+
+[[rounds]]
+floors = 300
+kinds = { apartment = 0.7, building = 0.3 }
+robots = [1, 1, 2]
+teaching_share = 0.5
+
+[fit]
+epochs = 20
+learning_rate = 5e-4
+
+[ppo]
+decisions = 100
+environments = 2
+steps = 8
+checkpoint = 64
+
+[validation]
+floors = ["set:validation:16", "apartment"]
+robots = [1, 3]
+"""
 KTH = """<?xml version="1.0"?>
 <floor><Scale PixelDistance="10" RealDistance="1.0"/>
 <space name="a"><contour>{}</contour></space><space name="b"><contour>{}</contour></space></floor>
@@ -78,6 +110,7 @@ def make_samples(folder: Path) -> None:
     _floors(folder)
     _logs(folder)
     _results(folder)
+    _trainings(folder)
 
 
 def _room() -> np.ndarray:
@@ -187,3 +220,14 @@ def _results(folder: Path) -> None:
         pass
     (folder / "episodes.jsonl").write_bytes((evaluated / "episodes.jsonl").read_bytes())
     (folder / "kept_suite.json").write_bytes((evaluated / "suite.json").read_bytes())
+
+
+def _trainings(folder: Path) -> None:
+    generator = np.random.default_rng(0)
+    drawn = {name: 0.1 * generator.normal(size=shape) for name, shape in shapes().items()}
+    save_weights(
+        folder / "weights.safetensors", {name: each.astype(np.float32) for name, each in drawn.items()}
+    )
+    lessons = [Lesson(drawn_decision(generator, 4, 2), generator.uniform(0, 9, 4)) for _ in range(3)]
+    write_samples(folder / "lessons.npz", samples_of(lessons))
+    (folder / "training.toml").write_text(TRAINING)

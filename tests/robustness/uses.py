@@ -5,8 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from drawn_decisions import drawn_decision
 
 from lidarium.agents import make_policy
+from lidarium.agents.learned.network import Network
+from lidarium.agents.learned.weights import load_weights
 from lidarium.envs.floors.catalogue.drawn import load_drawn
 from lidarium.envs.floors.catalogue.names import load_floor
 from lidarium.envs.floors.floor import Floor
@@ -27,6 +30,9 @@ from lidarium.mapping.files.trajectories import interpolated, read_tum
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
 from lidarium.mapping.localization.registry import make_localizer
 from lidarium.scripts.evaluate import summary_of
+from lidarium.training.places import place_of
+from lidarium.training.settings import read_training
+from lidarium.training.teaching.samples import joined, read_samples
 
 SCANS = 3
 
@@ -109,6 +115,21 @@ def _episodes(path: Path) -> None:
     read_episodes(path)
 
 
+def _weights(path: Path) -> None:
+    Network(load_weights(path)).preferences(drawn_decision(np.random.default_rng(0)))
+
+
+def _lessons(path: Path) -> None:
+    samples = joined([read_samples(path)] * 2)
+    samples.decisions.take(np.arange(len(samples)))
+
+
+def _training(path: Path) -> None:
+    training = read_training(path)
+    place_of(training, training.rounds[-1], 7)
+    training.as_dict()
+
+
 USES: dict[str, Callable[[Path], None]] = {
     "map": _map,
     "image": _image,
@@ -128,6 +149,9 @@ USES: dict[str, Callable[[Path], None]] = {
     "suite": _suite,
     "episodes": _episodes,
     "kept": _kept_suite,
+    "weights": _weights,
+    "lessons": _lessons,
+    "training": _training,
 }
 """By the beginning of a sample's name."""
 

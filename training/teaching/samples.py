@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lidarium.mapping.files.guarded_arrays import GuardedArchive
 from lidarium.mapping.files.guarded_reading import read_bytes, reading
 from lidarium.mapping.files.output import write_whole
-from lidarium.training.decisions import MOST_OPTIONS, Decisions, stacked
+from lidarium.training.decisions import MOST_OPTIONS, MOST_TEAMMATES, Decisions, stacked
 from lidarium.training.teaching.teacher import Lesson
 
 
@@ -81,4 +81,31 @@ def read_samples(path: Path) -> Samples:
     with reading(path, "lessons of a training", "remove it, and the same command teaches there again"):
         archive = GuardedArchive(read_bytes(path))
         decisions = Decisions(*(archive.array(field.name) for field in fields(Decisions)))
-        return Samples(decisions, archive.array("regrets"))
+        samples = Samples(decisions, archive.array("regrets"))
+        _check(samples)
+        return samples
+
+
+def _check(samples: Samples) -> None:
+    """Check that all arrays are as ``samples_of`` makes them.
+
+    Raises
+    ------
+    ValueError
+        Where one is not; the message names it.
+    """
+    wanted = samples_of([])
+    own, like_own = samples.decisions, wanted.decisions
+    pairs = [
+        (field.name, getattr(own, field.name), getattr(like_own, field.name)) for field in fields(Decisions)
+    ]
+    pairs.append(("regrets", samples.regrets, wanted.regrets))
+    for name, array, like in pairs:
+        shape = (len(samples), *like.shape[1:])
+        if array.shape != shape or array.dtype != like.dtype:
+            raise ValueError(f"{name} is {array.dtype} {array.shape}; want {like.dtype} {shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} has numbers that are not finite")
+    most = np.array([MOST_OPTIONS, MOST_TEAMMATES])
+    if ((samples.decisions.counts < 0) | (samples.decisions.counts > most)).any():
+        raise ValueError(f"counts has numbers that are not from 0 to {MOST_OPTIONS} and {MOST_TEAMMATES}")

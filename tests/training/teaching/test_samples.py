@@ -39,6 +39,29 @@ def test_damaged_files_are_named(tmp_path, length):
         read_samples(path)
 
 
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("options", lambda array: array[..., :-1]),  # of a version with other features
+        ("options", lambda array: array.astype(np.float64)),
+        ("mask", lambda array: array.astype(np.int8)),
+        ("crops", lambda array: array[:1]),
+        ("regrets", lambda array: np.full_like(array, np.nan)),
+        ("counts", lambda array: array + 100),
+        ("counts", lambda array: array[:, 0]),
+    ],
+)
+def test_lessons_of_another_version_are_named(tmp_path, name, change):
+    path = tmp_path / "a.npz"
+    write_samples(path, drawn(2))
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    arrays[name] = change(arrays[name])
+    np.savez_compressed(path, **arrays)
+    with pytest.raises(ValueError, match=rf"a\.npz is not lessons of a training: {name} .*; remove it"):
+        read_samples(path)
+
+
 def test_parts_are_joined():
     whole = joined([drawn(2, 0), drawn(3, 1)])
     assert len(whole) == 5
