@@ -72,6 +72,7 @@ def learn(
         learner = Learner(policy.critic, policy.optimizer)
         if checkpoint.decisions:
             restore(folder, checkpoint, policy.network, learner)
+            model.num_timesteps = checkpoint.decisions  # where TensorBoard's curves go on
         elif begin is not None:
             policy.network.set_weights(load_weights(begin))
         while checkpoint.decisions < total:

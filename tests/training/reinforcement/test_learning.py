@@ -7,6 +7,7 @@ import signal
 import numpy as np
 import pytest
 from stable_baselines3.common.vec_env import SubprocVecEnv
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from lidarium.agents.learned.weights import load_weights, save_weights
 from lidarium.training.reinforcement.checkpoints import latest_checkpoint, weights_of
@@ -56,6 +57,16 @@ def test_a_training_that_goes_on_has_the_same_curve_and_weights(whole, tmp_path)
     assert latest_checkpoint(tmp_path) == latest_checkpoint(whole[0])
     for name, array in weights_in(whole[0]).items():
         np.testing.assert_array_equal(weights_in(tmp_path)[name], array)
+    curves = [steps_of(folder / "log", "time/fps") for folder in (whole[0], tmp_path)]
+    assert curves[0] == curves[1]
+    assert curves[0] == [8, 16, 24]
+
+
+def steps_of(folder, name):
+    """Return at which decisions a figure is in TensorBoard's files."""
+    events = EventAccumulator(str(folder))
+    events.Reload()
+    return sorted(each.step for each in events.Scalars(name))
 
 
 def test_what_is_finished_is_not_learned_again(whole):
