@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from lidarium.agents.learned.decision import CROP_SIDE, Decision
 from lidarium.agents.learned.features import OPTION_FEATURES, SITUATION_FEATURES, TEAMMATE_FEATURES
+from lidarium.agents.tours.settings import TourSettings
 
-MOST_OPTIONS, MOST_TEAMMATES = 14, 8
+MOST_OPTIONS, MOST_TEAMMATES = TourSettings().most, 8
 """So many options and teammates of a decision are kept; there are no more of the first."""
 
 
