@@ -1,5 +1,6 @@
 """Networks beside classic tours, paired, on floors that are not trained on."""
 
+import json
 import math
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass
@@ -8,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from lidarium.evaluation.suites.campaign import EPISODES_FILE, Campaign
+from lidarium.evaluation.episodes.output import write_json
+from lidarium.evaluation.suites.campaign import EPISODES_FILE, SUITE_FILE, Campaign
+from lidarium.evaluation.suites.content import MOST_SUITE_BYTES
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
+from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.training.failures import raise_named
 from lidarium.training.progress import Progress
 from lidarium.training.settings import TrainingSettings
@@ -95,6 +99,7 @@ def validate(
         What an episode has raised.
     """
     suite = validation_suite(training, candidates)
+    _follow_move(folder / SUITE_FILE, suite)
     campaign = Campaign(suite, folder, workers, records=False)
     total = sum(1 for _ in suite.trials())
     for _ in campaign.run():
@@ -102,6 +107,23 @@ def validate(
     if campaign.failures:
         trial, error = campaign.failures[0]
         raise_named(error, f"the episode {trial.key}")
+
+
+def _follow_move(path: Path, suite: Suite) -> None:
+    """Name weights in a kept suite by where they are now.
+
+    The folder of a training may have been moved since; the names in it are still those of the same networks.
+    """
+    if not path.exists():
+        return
+    with reading(path, "the suite of a validation", "remove the folder to validate again"):
+        kept = json.loads(read_text(path, MOST_SUITE_BYTES))
+        moved = {
+            name: {**options, **suite.policy_settings.get(name, {})}
+            for name, options in kept["policy_settings"].items()
+        }
+    if moved != kept["policy_settings"]:
+        write_json(path, {**kept, "policy_settings": moved})
 
 
 def compared(folder: Path, name: str, training: TrainingSettings) -> Validated:

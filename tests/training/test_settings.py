@@ -1,5 +1,7 @@
 """What a training is asked for."""
 
+from pathlib import Path
+
 import pytest
 
 from lidarium.training.settings import TrainingSettings, read_training, training_of
@@ -37,6 +39,12 @@ def test_a_file_says_what_to_train(tmp_path):
     assert training.validation.floors == ("apartment",)
     team = training.team(2)
     assert (team.robots, team.occupancy.resolution, team.stop_coverage) == (2, 0.05, 0.99)
+
+
+def test_the_recipe_of_the_weights_can_be_used():
+    training = read_training(Path(__file__).parents[2] / "docs" / "tutorials" / "learned.toml")
+    assert len(training.rounds) >= 2
+    assert all(floor.startswith("set:validation") for floor in training.validation.floors)
 
 
 def test_all_has_defaults():

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shutil
 from contextlib import closing
 
 import numpy as np
@@ -89,6 +90,17 @@ def test_a_finished_training_does_nothing_more(whole):
     after = {path: path.stat().st_mtime_ns for path in whole.rglob("*.safetensors")}
     before.pop(whole / "weights.safetensors"), after.pop(whole / "weights.safetensors")
     assert before == after
+
+
+def test_a_folder_that_was_moved_goes_on(whole, tmp_path):
+    moved = tmp_path / "moved"
+    shutil.copytree(whole, moved)
+    path = moved / "validation" / "episodes.jsonl"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:-1]))
+    assert run(moved)[-1].part == "best weights"
+    keys = [json.loads(line)["key"] for line in path.read_text().splitlines()]
+    assert sorted(keys) == sorted(json.loads(line)["key"] for line in lines)
 
 
 def test_a_folder_of_another_training_is_refused(whole):
