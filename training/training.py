@@ -19,6 +19,7 @@ from lidarium.agents.learned.weights import load_weights, save_weights
 from lidarium.evaluation.episodes.output import clear_unfinished, write_json
 from lidarium.mapping.files.guarded_reading import read_text, reading
 from lidarium.mapping.files.output import only_writer, remove_unfinished
+from lidarium.mapping.geometry.bounds import shown
 from lidarium.training.progress import Progress
 from lidarium.training.settings import MOST_BYTES, TrainingSettings
 from lidarium.training.teaching.rounds import FIT, LESSONS, RoundFolder, run_round
@@ -123,12 +124,14 @@ class Training:
             write_json(path, asked)
             return
         with reading(path, "what a training was asked for"):
-            kept = dict(json.loads(read_text(path, MOST_BYTES)))
+            kept = _flat(dict(json.loads(read_text(path, MOST_BYTES))))
+        asked = _flat(asked)
         for name in sorted({*kept, *asked}):
-            if kept.get(name) != asked.get(name):
+            before, now = kept.get(name, "nothing"), asked.get(name, "nothing")
+            if before != now:
                 raise ValueError(
-                    f"{self.folder} holds a training with {name} = {kept.get(name)!r}, this one has "
-                    f"{asked.get(name)!r}; choose another folder"[:480]
+                    f"{self.folder} holds a training with {name} = {shown(before)}, this one has "
+                    f"{shown(now)}; choose another folder"
                 )
 
     def _clear_unfinished(self) -> None:
@@ -220,3 +223,14 @@ def _fitted(folder: RoundFolder) -> dict[str, Any]:
     path = folder.path / FIT
     with reading(path, "how a fit went"):
         return dict(json.loads(read_text(path, MOST_BYTES)))
+
+
+def _flat(content: Any, name: str = "") -> dict[str, Any]:  # noqa: ANN401
+    """Return what tables and lists hold by dotted names, such as ``rounds.0.floors``."""
+    if not isinstance(content, dict | list):
+        return {name: content}
+    parts = content.items() if isinstance(content, dict) else enumerate(content)
+    found: dict[str, Any] = {}
+    for key, part in parts:
+        found |= _flat(part, f"{name}.{key}" if name else str(key))
+    return found

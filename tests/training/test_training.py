@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shutil
 from contextlib import closing
 
@@ -103,9 +104,18 @@ def test_a_folder_that_was_moved_goes_on(whole, tmp_path):
     assert sorted(keys) == sorted(json.loads(line)["key"] for line in lines)
 
 
-def test_a_folder_of_another_training_is_refused(whole):
-    with pytest.raises(ValueError, match=r"holds a training with seed = 1, this one has 2"):
-        run(whole, {**SMALL, "seed": 2})
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"seed": 2}, "seed = 1, this one has 2"),
+        ({"fit": {"epochs": 3, "batch": 8}}, "fit.epochs = 2, this one has 3"),
+        ({"rounds": SMALL["rounds"][:1]}, "rounds.1.floors = 2, this one has 'nothing'"),
+        ({"settings": {"resolution": 0.1}}, "settings.resolution = 0.05, this one has 0.1"),
+    ],
+)
+def test_a_folder_of_another_training_is_refused(whole, change, words):
+    with pytest.raises(ValueError, match=rf"holds a training with {re.escape(words)}; choose another folder"):
+        run(whole, {**SMALL, **change})
 
 
 def test_a_training_that_was_killed_while_it_began_goes_on(tmp_path):
