@@ -1,7 +1,7 @@
 """A command that is killed, or whose workers are, goes on with nothing lost or there twice.
 
-``LIDARIUM_KILLS=1000`` kills so many evaluations, and a hundredth of them trainings, at least four, half a
-minute each; ``python -m robustness.kills`` does the same by hand.
+``LIDARIUM_KILLS=1000`` kills so many evaluations, and a hundredth of them trainings, at least four, which
+take twenty seconds each; ``python -m robustness.kills`` does the same by hand.
 """
 
 import os
