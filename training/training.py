@@ -12,6 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 import lidarium
@@ -33,6 +34,9 @@ TRAINING_FILE, HOURS_FILE, WEIGHTS_FILE, CARD_FILE = (
 )
 LIBRARIES = ("numpy", "numba", "torch", "stable-baselines3", "sb3-contrib")
 """What weights may depend on; the card names their versions."""
+
+MEAN, MEAN_FILE = "mean", "mean.safetensors"
+"""Mean of the weights of the last two rounds."""
 
 REWARDS, VALIDATION, TENSORBOARD = "rewards", "validation", "tensorboard"
 
@@ -87,12 +91,29 @@ class Training:
                 yield step
             candidates[f"round-{number}"] = folder.weights
             yield from validate(self.settings, self.folder / VALIDATION, candidates, self.workers)
+        if len(candidates) > 1:
+            candidates[MEAN] = self._mean_of(list(candidates.values())[-2:])
+            yield from validate(self.settings, self.folder / VALIDATION, candidates, self.workers)
         begin = candidates[self._best(candidates)]
         if self.settings.ppo.decisions:
             candidates[REWARDS] = yield from self._learn(begin)
             yield from validate(self.settings, self.folder / VALIDATION, candidates, self.workers)
         self._keep_best(candidates)
         yield Progress("best weights", 1, 1)
+
+    def _mean_of(self, files: list[Path]) -> Path:
+        """Write the mean of some weights, and return its file.
+
+        Each round goes on from the one before; their mean is often better than either (P. Izmailov et al.,
+        "Averaging weights leads to wider optima and better generalization", 2018).
+        """
+        path = self.folder / MEAN_FILE
+        parts = [load_weights(file) for file in files]
+        mean = {
+            name: np.asarray(np.mean([part[name] for part in parts], axis=0), np.float32) for name in parts[0]
+        }
+        save_weights(path, mean)
+        return path
 
     def _learn(self, begin: Path) -> Generator[Progress, None, Path]:
         """Go on by rewards; return the file of the weights."""
