@@ -4,10 +4,12 @@ A task whose worker or machine is lost is done again elsewhere; its result comes
 """
 
 import logging
+import signal
 import socket
 import tempfile
-from collections.abc import Callable, Generator, Iterable
-from contextlib import closing
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +17,7 @@ from typing import Any, TypeVar
 import lidarium
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import Trial
+from lidarium.evaluation.suites.trial_run import run_trial, write_record_bytes
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -96,13 +99,27 @@ def _connected(address: str) -> Any:  # noqa: ANN401
                 "`ray start --head`"
             ) from error
     try:
-        ray.init(address=address, logging_level=logging.ERROR, log_to_driver=False)
+        with _handlers_kept():
+            ray.init(address=address, logging_level=logging.ERROR, log_to_driver=False)
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise ValueError(
             f"there is no Ray cluster at {address} ({str(error).splitlines()[0]}); start one with "
             "`ray start --head`"
         ) from error
     return ray
+
+
+@contextmanager
+def _handlers_kept() -> Iterator[None]:
+    """Keep what this process does at SIGTERM: Ray puts a handler of its own there."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    kept = signal.getsignal(signal.SIGTERM)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, kept)
 
 
 def _done(work: Callable[[Task], Result], task: Task, version: str) -> Result:
@@ -141,8 +158,6 @@ class Recorded:
 
     def __call__(self, trial: Trial) -> tuple[dict[str, Any], bytes | None]:
         """Run a trial; its record is made in a folder of this machine that goes again."""
-        from lidarium.evaluation.suites.campaign import run_trial
-
         if not self._keeps_records:
             return run_trial(self._suite, trial), None
         with tempfile.TemporaryDirectory() as folder:
@@ -166,8 +181,6 @@ def trials_on_ray(
     address : str
         As in ``on_ray``.
     """
-    from lidarium.evaluation.suites.campaign import write_record_bytes
-
     with closing(on_ray(Recorded(suite, records is not None), trials, address)) as work:
         for trial, result in work:
             if isinstance(result, Exception):

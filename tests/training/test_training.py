@@ -55,7 +55,7 @@ def whole(tmp_path_factory):
 def test_a_training_leaves_weights_and_a_card(whole):
     card = json.loads((whole / "card.json").read_text())
     assert card["best"] in card["validation"]
-    assert set(card["validation"]) == {"round-0", "round-1", "rewards"}
+    assert set(card["validation"]) == {"round-0", "round-1", "mean", "rewards"}
     assert card["validation"][card["best"]]["episodes"] == 1
     assert [number for number, _ in card["rewards"]] == [16, 32, 48]
     assert set(card["fits"]) == {"round-0", "round-1"}
@@ -173,3 +173,9 @@ def test_a_folder_of_other_files_is_refused(tmp_path):
     with pytest.raises(ValueError, match="no training has written them"):
         run(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_the_mean_of_the_last_two_rounds_is_tried(whole):
+    first, second = (load_weights(whole / f"round-{number}" / "weights.safetensors") for number in range(2))
+    for name, array in load_weights(whole / "mean.safetensors").items():
+        np.testing.assert_allclose(array, (first[name] + second[name]) / 2.0, rtol=1e-6, atol=1e-7)

@@ -1,6 +1,7 @@
 """Episodes on a Ray cluster of two nodes, one of which is killed."""
 
 import json
+import signal
 import socket
 from functools import partial
 
@@ -65,7 +66,9 @@ def test_rows_are_those_of_one_machine_though_a_node_is_killed(cluster, tmp_path
 
 
 def test_what_a_task_raises_is_its_result(cluster):
+    before = signal.getsignal(signal.SIGTERM)
     results = dict(on_ray(_reciprocal, [0, 2], cluster.address))
+    assert signal.getsignal(signal.SIGTERM) is before
     assert results[2] == 0.5
     assert isinstance(results[0], ZeroDivisionError)
 

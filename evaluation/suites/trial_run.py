@@ -1,0 +1,111 @@
+"""Runs one trial of a suite, and keeps its record."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lidarium.agents.policy import settings_for
+from lidarium.evaluation.episodes.output import whole_file
+from lidarium.evaluation.suites.bounds import beside_bound
+from lidarium.evaluation.suites.episodes_file import KEY
+from lidarium.evaluation.suites.starts import drawn_starts
+from lidarium.evaluation.suites.suite import Suite
+from lidarium.evaluation.suites.trial import Trial
+
+if TYPE_CHECKING:
+    from lidarium.evaluation.record import EpisodeRecord
+
+RECORDS_FOLDER = "records"
+
+
+class RecordNotWrittenError(OSError):
+    """Raised where a record cannot be written; the next ones could not be either."""
+
+
+def run_trial(suite: Suite, trial: Trial, records: Path | None = None) -> dict[str, Any]:
+    """Run one episode and return its line.
+
+    Its record is written before, where a folder is given.
+    """
+    from lidarium.evaluation.episodes.history import History
+    from lidarium.evaluation.episodes.result import result_of
+    from lidarium.evaluation.episodes.runner import run_episode
+    from lidarium.evaluation.episodes.stop_rules import Stopper, stop_rule_of
+    from lidarium.evaluation.episodes.watching import WatchedExploration
+    from lidarium.evaluation.record import Recorder
+
+    began = time.perf_counter()
+    policy = suite.make_policy(trial.policy)
+    settings = settings_for(policy, suite.settings(trial.variant, trial.robots))
+    history = History()
+    image_resolution = _image_resolution(suite, trial)
+    recorder = Recorder(trial.policy, trial.seed, trial.floor, image_resolution)
+    env = WatchedExploration(
+        trial.floor, settings, image_resolution, [history] if records is None else [history, recorder]
+    )
+    rule = stop_rule_of(suite.stop)
+    starts = suite.starts_of(trial) or (
+        drawn_starts(trial.floor, settings, trial.seed, image_resolution) if suite.draws_starts else None
+    )
+    options = None if starts is None else {"starts": starts}
+    episode = run_episode(
+        policy,
+        env,
+        trial.seed,
+        options,
+        None if rule is None else Stopper(rule, history),
+    )
+    result = result_of(episode, trial.policy, history)
+    if records is not None:
+        _keep_record(records / f"{trial.file_name}.npz", recorder.finish())
+    where = [[round(float(number), 6) for number in start] for start in env.world.starts]
+    record = None if records is None else f"{RECORDS_FOLDER}/{trial.file_name}.npz"
+    about = {KEY: trial.key, "variant": trial.variant, "starts": where, "record": record}
+    known = beside_bound(trial, settings, {**about, **result}, image_resolution) if suite.bounds else {}
+    return {
+        **about,
+        **result,
+        **known,
+        "decisions": len(episode.decision_seconds),
+        "wall_s": round(time.perf_counter() - began, 4),
+    }
+
+
+def write_record_bytes(path: Path, content: bytes) -> None:
+    """Write a record that another machine has made, whole or not at all.
+
+    Raises
+    ------
+    RecordNotWrittenError
+        Where it cannot be written.
+    """
+    with _kept(path), whole_file(path) as beside:
+        beside.write_bytes(content)
+
+
+def _keep_record(path: Path, record: "EpisodeRecord") -> None:
+    from lidarium.evaluation.record import write_record
+
+    with _kept(path):
+        write_record(path, record)
+
+
+@contextmanager
+def _kept(path: Path) -> Iterator[None]:
+    """Say of a record that cannot be written what is kept all the same."""
+    try:
+        yield
+    except OSError as error:
+        raise RecordNotWrittenError(
+            error.errno,
+            f"{error.strerror or error}; the episodes before are kept, the same command goes on from there",
+            str(path),
+        ) from error
+
+
+def _image_resolution(suite: Suite, trial: Trial) -> float | None:
+    from lidarium.envs.floors.catalogue.names import is_file_name
+
+    return suite.image_resolution if is_file_name(trial.floor) else None
