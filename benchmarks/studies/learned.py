@@ -66,7 +66,7 @@ A ratio below 1 is less time. *Mean* is the geometric mean with its 95 % interva
 longest path of a robot.
 
 {times}
-
+{missing}
 ## Beside bounds
 
 What a team needs that [knows the floor](../reference/bounds.md), on {bounded} floors of the set `test` that
@@ -150,9 +150,15 @@ def page(folder: Path, command: str) -> str:
         horizon=HORIZON_S,
         card=card_text(json.loads((resources.files("lidarium.agents.learned") / "data" / CARD).read_text())),
         times="\n\n".join(_kind_part(kind, found) for kind, found in episodes.items() if found),
+        missing=missing_text([kind for kind, found in episodes.items() if not found]),
         bounded=len({line["floor"] for line in bounds if line["known_s"] is not None}),
         bounds=bounds_table(bounds, episodes["test"]),
     )
+
+
+def missing_text(kinds: Sequence[str]) -> str:
+    """Return which kinds of floors a run lacks, as a paragraph."""
+    return f"\nNot in it: {', '.join(KINDS[kind] for kind in kinds)}.\n" if kinds else ""
 
 
 Times = dict[str, dict[tuple[str, int], Mapping[str, Any]]]

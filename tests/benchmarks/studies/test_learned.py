@@ -66,3 +66,8 @@ def test_a_bound_begins_where_explorers_do(monkeypatch):
     found = learned.measure_bound(learned.Bounded("apartment:7", 2))
     assert found == {"floor": "apartment:7", "robots": 2, "known_s": 12.0}
     assert len(seen["starts"]) == seen["robots"] == 2
+
+
+def test_kinds_that_did_not_run_are_named():
+    assert learned.missing_text([]) == ""
+    assert "LIFULL apartments" in learned.missing_text(["slam", "lifull"])
