@@ -108,6 +108,8 @@ class Training:
         "Averaging weights leads to wider optima and better generalization", 2018).
         """
         path = self.folder / MEAN_FILE
+        if path.exists():
+            return path
         parts = [load_weights(file) for file in files]
         mean = {
             name: np.asarray(np.mean([part[name] for part in parts], axis=0), np.float32) for name in parts[0]

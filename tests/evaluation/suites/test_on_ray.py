@@ -30,10 +30,13 @@ pytestmark = [
 def cluster():
     from ray.cluster_utils import Cluster
 
+    handler = signal.getsignal(signal.SIGTERM)  # nodes put one of their own there
     made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     made.add_node(num_cpus=1)
+    signal.signal(signal.SIGTERM, handler)
     yield made
     made.shutdown()
+    signal.signal(signal.SIGTERM, handler)
 
 
 def suite():
