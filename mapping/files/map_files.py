@@ -17,6 +17,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from lidarium.mapping.files.guarded_reading import shortened
 from lidarium.mapping.files.guarded_yaml import read_yaml
 from lidarium.mapping.files.images import read_image
 from lidarium.mapping.files.map_levels import (
@@ -253,8 +254,9 @@ def _image_path(yaml_path: Path, name: str) -> Path:
         _LOG.warning("%s: there is no image %s; %s beside it is used", yaml_path, name, beside.name)
         return beside
     if not os.path.lexists(named):
+        short = shortened(str(named), 200)
         raise FileNotFoundError(
-            f"there is no file {named}; {yaml_path} names it as its image: put the image beside it"
+            f"there is no file {short}; {yaml_path} names it as its image: put the image beside it"
         )
     return named
 

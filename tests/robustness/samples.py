@@ -1,6 +1,7 @@
 """Valid files of every reader, small ones, from which damaged ones are made."""
 
 import gzip
+import importlib.util
 import json
 import math
 from pathlib import Path
@@ -19,6 +20,7 @@ from lidarium.evaluation.episodes.watching import WatchedExploration
 from lidarium.evaluation.record import Recorder, write_record
 from lidarium.evaluation.suites.campaign import Campaign
 from lidarium.evaluation.suites.suite import read_suite
+from lidarium.mapping.files.bags.writing import write_mcap_log
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.map_files import write_ros_map
 from lidarium.mapping.files.npz_logs import write_npz_log
@@ -45,6 +47,16 @@ PLAN = {
     "furniture": [["bed", 2, 3, 90]],
     "starts": [[1, 2, 0]],
     "goal": [5, 3],
+}
+PLANS = {
+    "svg.svg": '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40"><rect width="60" height="40" '
+    'fill="none" stroke="black"/><path d="M 30 0 v 25 c 1 1 2 2 3 0 z" transform="rotate(3)"/></svg>',
+    "sdf.world": '<?xml version="1.0"?><sdf version="1.6"><world name="w"><model name="m">'
+    '<pose>1 0 0 0 0 1</pose><link name="a"><collision name="c"><pose>3 2 1 0 0 0</pose>'
+    "<geometry><box><size>6 0.2 2</size></box>"
+    '</geometry></collision><collision name="d"><geometry><cylinder><radius>0.4</radius><length>1</length>'
+    "</cylinder></geometry></collision></link></model></world></sdf>",
+    "movingai.map": "type octile\nheight 4\nwidth 6\nmap\n@@@@@@\n@...T@\n@.S..@\n@@@@@@\n",
 }
 SUITE = """
 policies = ["random_walk", "greedy"]
@@ -152,6 +164,8 @@ def _floors(folder: Path) -> None:
         + "30 30 30 40 door\n",
         "houseexpo.json": json.dumps({"id": "h", "verts": [[0, 0], [6, 0], [6, 4], [3, 5], [0, 4], [0, 0]]}),
     }
+    for name, text in PLANS.items():
+        (folder / name).write_text(text)
     for name, text in texts.items():
         (folder / name).write_text(text)
         (folder / f"{name}.gz").write_bytes(gzip.compress(text.encode()))
@@ -188,6 +202,8 @@ def _logs(folder: Path) -> None:
         reading_of_scan=steps.astype(np.int64),
     )
     write_npz_log(folder / "log.npz", log)
+    if importlib.util.find_spec("mcap_ros2") is not None:  # the extra mcap
+        write_mcap_log(folder / "bag.mcap", log)
     lines = ["PARAM robot_frontlaser_offset 0.1"]
     for scan, (x, y, theta), stamp in zip(ranges, poses, log.stamps, strict=True):
         pose = f"{x:.4f} {y:.4f} {theta:.4f}"

@@ -21,6 +21,7 @@ from lidarium.evaluation.record.replay import drive_again
 from lidarium.evaluation.suites.campaign import _kept_suite
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.evaluation.suites.suite import read_suite
+from lidarium.mapping.files.bags.reading import read_mcap_log
 from lidarium.mapping.files.carmen_logs import read_carmen_log
 from lidarium.mapping.files.laser_logs import LaserLog
 from lidarium.mapping.files.map_files import cropped, read_grey_map, read_ros_map
@@ -49,6 +50,10 @@ def _floor(path: Path) -> None:
 def _image(path: Path) -> None:
     _use_floor(load_floor(path, 0.1))
     read_grey_map(path, 0.05)
+
+
+def _plan(path: Path) -> None:
+    _use_floor(load_floor(path, 0.1))
 
 
 def _map(path: Path) -> None:
@@ -139,6 +144,10 @@ USES: dict[str, Callable[[Path], None]] = {
     "lifull": _floor,
     "houseexpo": _floor,
     "drawn": _drawn,
+    "svg": _plan,
+    "sdf": _floor,
+    "movingai": _plan,
+    "bag": lambda path: _log(read_mcap_log, path),
     "array": _array,
     "log": lambda path: _log(read_npz_log, path),
     "carmen": lambda path: _log(read_carmen_log, path),

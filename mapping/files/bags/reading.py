@@ -81,6 +81,9 @@ def read_mcap_log(path: Path, topic: str | None = None) -> LaserLog:
     path = Path(path)
     try:
         from mcap.exceptions import DecoderNotFoundError, McapError
+
+        # What the parser of message definitions raises has no public name.
+        from mcap_ros2._vendor.rosidl_adapter.parser import InvalidSpecification, InvalidValue
         from zstandard import ZstdError
     except ImportError as error:
         raise ValueError('bags need mcap-ros2-support; pip install "lidarium[mcap]"') from error
@@ -89,7 +92,7 @@ def read_mcap_log(path: Path, topic: str | None = None) -> LaserLog:
             messages = _messages(path, topic)
         except DecoderNotFoundError as error:
             raise ValueError(f"{path} has messages of another kind ({error}); {_WANTED}") from error
-        except (McapError, ZstdError) as error:
+        except (McapError, ZstdError, InvalidSpecification, InvalidValue, NameError) as error:
             raise ValueError(
                 f"{path} is not a whole bag, it is cut off or damaged ({error}); {_WANTED}"
             ) from error
