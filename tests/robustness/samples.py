@@ -169,11 +169,29 @@ def _floors(folder: Path) -> None:
     for name, text in texts.items():
         (folder / name).write_text(text)
         (folder / f"{name}.gz").write_bytes(gzip.compress(text.encode()))
+    if importlib.util.find_spec("ezdxf") is not None:  # the extra dxf
+        _drawing(folder / "dxf.dxf")
     (folder / "drawn.json").write_text(json.dumps(PLAN, indent=1))
     np.save(folder / "array.npy", _room())
     np.savez_compressed(
         folder / "array.npz", solid=_room() == 0, origin=np.array([0.0, 1.0]), resolution=np.array(0.1)
     )
+
+
+def _drawing(path: Path) -> None:
+    """Write a room in millimetres with a table, which is a block, and curves."""
+    import ezdxf
+
+    ezdxf.options.write_fixed_meta_data_for_testing = True  # the same bytes at each call
+    document = ezdxf.new(units=4)
+    space, table = document.modelspace(), document.blocks.new("TABLE")
+    table.add_lwpolyline([(0, 0), (100, 0), (100, 50)], close=True)
+    space.add_lwpolyline([(0, 0), (6000, 0), (6000, 4000), (0, 4000)], close=True)
+    space.add_blockref("TABLE", (1000, 1000), {"xscale": 10, "rotation": 30})
+    space.add_line((3000, 0), (3000, 2500))
+    space.add_arc((3000, 2500), 800, 0, 90)
+    space.add_spline([(4000, 1000), (4500, 1500), (5000, 1000)])
+    document.saveas(path)
 
 
 def _logs(folder: Path) -> None:

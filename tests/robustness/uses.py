@@ -147,6 +147,7 @@ USES: dict[str, Callable[[Path], None]] = {
     "svg": _plan,
     "sdf": _floor,
     "movingai": _plan,
+    "dxf": _floor,
     "bag": lambda path: _log(read_mcap_log, path),
     "array": _array,
     "log": lambda path: _log(read_npz_log, path),

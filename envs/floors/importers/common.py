@@ -3,7 +3,6 @@
 They read text, find the free areas of pixel floors and put walls around line drawings.
 """
 
-import itertools
 from pathlib import Path
 
 import cv2
@@ -29,8 +28,7 @@ WALL_THICKNESS = 0.1
 _GAPS = (0.0, 0.2, 0.5, 1.0, 2.0)
 _CLOSED_SHARE = 0.85
 _OUTLINE_RESOLUTION = 0.02
-_MAX_OUTLINE_CELLS = 50_000_000
-_FAR_CELLS = 8_000_000
+_MAX_OUTLINE_CELLS = 30_000_000  # 12,000 m2; wider drawings have coarser cells
 
 
 def read_text(path: Path) -> str:
@@ -138,9 +136,7 @@ def enclosed(
     """
     widest = max(_GAPS) + WALL_THICKNESS
     size = high - low + 2.0 * widest
-    is_building = size.prod() <= _MAX_OUTLINE_CELLS * _OUTLINE_RESOLUTION**2
-    # Beyond any building it is a matter of seconds, not of outlines.
-    resolution = _OUTLINE_RESOLUTION if is_building else float(np.sqrt(size.prod() / _FAR_CELLS))
+    resolution = max(_OUTLINE_RESOLUTION, float(np.sqrt(size.prod() / _MAX_OUTLINE_CELLS)))
     origin = (float(low[0] - widest), float(low[1] - widest))
     drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
     fill_shapes(
@@ -150,28 +146,33 @@ def enclosed(
         [ring_edges(strip(line, WALL_THICKNESS, WALL_THICKNESS / 2.0)) for line in lines],
         1,
     )
-    distance = np.asarray(cv2.distanceTransform(1 - drawn, cv2.DIST_L2, 5) * resolution, np.float32)
-    insides = list(
-        itertools.accumulate((_inside(distance, gap / 2.0, resolution) for gap in _GAPS), np.maximum)
-    )
-    areas = [int(inside.sum()) for inside in insides]
+    distance = _distance(1 - drawn, resolution)
+    union, insides, areas = np.zeros_like(drawn), [], []
+    for gap in _GAPS:
+        union |= _inside(distance, gap / 2.0, resolution)
+        insides.append(np.packbits(union))  # five of them, of up to 30 MB each
+        areas.append(np.count_nonzero(union))
     if areas[-1] == 0:
         raise ValueError(f"{path} has no walls that enclose a space; want a floor plan")
-    inside = next(
-        inside for inside, area in zip(insides, areas, strict=True) if area >= _CLOSED_SHARE * areas[-1]
-    )
+    closed = next(k for k, area in enumerate(areas) if area >= _CLOSED_SHARE * areas[-1])
+    inside = np.unpackbits(insides[closed], count=union.size).reshape(union.shape)
     contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     rings = [contour[:, 0, :].astype(np.float64) for contour in contours if len(contour) >= 3]
     return tuple((ring + 0.5) * resolution + origin for ring in rings)
 
 
-def _inside(distance: NDArray[np.float32], widening: float, resolution: float) -> NDArray[np.uint8]:
+def _inside(distance: NDArray[np.float32], widening: float, resolution: float) -> NDArray[np.bool_]:
     """Return the area enclosed between the widened lines.
 
     It cannot be reached from the border; half of the wall is taken off it.
     """
-    passable = (distance > widening).astype(np.uint8)
-    _, labels = cv2.connectedComponents(passable, connectivity=4, ltype=cv2.CV_32S)
-    kept = (labels != labels[0, 0]).astype(np.uint8)
-    to_outside = cv2.distanceTransform(kept, cv2.DIST_L2, 5) * resolution
-    return np.asarray(to_outside > widening + WALL_THICKNESS / 2.0, dtype=np.uint8)
+    reached = (distance > widening).astype(np.uint8)
+    cv2.floodFill(reached, None, (0, 0), (2,))
+    return np.asarray(_distance((reached != 2).view(np.uint8), resolution) > widening + WALL_THICKNESS / 2.0)
+
+
+def _distance(cells: NDArray[np.uint8], resolution: float) -> NDArray[np.float32]:
+    """Return how far each cell is from the nearest that is zero [m]."""
+    distance = np.asarray(cv2.distanceTransform(cells, cv2.DIST_L2, 5), np.float32)
+    distance *= resolution
+    return distance
