@@ -6,6 +6,7 @@ edge share no cell.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ Rings = list[NDArray[np.float64]]
 # Corners are rounded to a millionth of a cell, so that a wall on a cell's centre line is drawn alike on all
 # machines.
 _SNAP = 1e6
+
+_FEW = 16  # so many values are sorted fastest by insertion
 
 
 def ring_edges(ring: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -32,14 +35,14 @@ def ring_edges(ring: NDArray[np.float64]) -> NDArray[np.float64]:
     (N, 4) float64
         x1, y1, x2, y2 per edge [m].
     """
-    return np.hstack([ring, np.roll(ring, -1, axis=0)])
+    return np.concatenate([ring, np.concatenate([ring[1:], ring[:1]])], axis=1)
 
 
 def fill_shapes(
     cells: NDArray[np.uint8],
     origin: tuple[float, float],
     resolution: float,
-    shapes: list[NDArray[np.float64]],
+    shapes: Sequence[NDArray[np.float64]] | NDArray[np.float64],
     value: int,
 ) -> None:
     """Set the cells whose centre is inside a shape (even-odd), in place.
@@ -50,12 +53,12 @@ def fill_shapes(
         Grid to draw into; row 0 at the lowest y.
     origin, resolution : (float, float), float
         Lower left corner of cell (0, 0) and side of a cell [m].
-    shapes : list of (E, 4) float64
+    shapes : sequence of (E, 4) float64
         Edges x1, y1, x2, y2 of each shape [m]; together they close its rings.
     value : int
         What the cells inside are set to.
     """
-    if not shapes:
+    if not len(shapes):
         return
     edges = (np.concatenate(shapes) - np.tile(origin, 2)) / resolution - 0.5
     ends = np.cumsum([len(shape) for shape in shapes], dtype=np.int64)
@@ -109,6 +112,37 @@ def strip(segment: NDArray[np.float64], thickness: float, overhang: float = 0.0)
     return np.array([start - across, end - across, end + across, start + across])
 
 
+def strip_edges(
+    segments: NDArray[np.float64], thickness: float | NDArray[np.float64], overhang_share: float = 0.0
+) -> NDArray[np.float64]:
+    """Return the edges of the rectangles around many segments, as `fill_shapes` wants them.
+
+    Parameters
+    ----------
+    segments : (N, 4) float64
+        x1, y1, x2, y2 [m].
+    thickness : float or (N,) float64
+        Width of the rectangles [m].
+    overhang_share : float
+        How far they go on beyond both ends, as a share of the width.
+
+    Returns
+    -------
+    (N, 4, 4) float64
+        x1, y1, x2, y2 of the four edges of each [m].
+    """
+    start, end = segments[:, :2], segments[:, 2:]
+    steps = end - start
+    lengths = np.hypot(steps[:, 0], steps[:, 1])[:, None]
+    is_point = lengths == 0.0
+    widths = np.broadcast_to(thickness, len(segments))[:, None]
+    along = np.where(is_point, (1.0, 0.0), steps / np.where(is_point, 1.0, lengths)) * widths
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1) / 2.0
+    start, end = start - along * overhang_share, end + along * overhang_share
+    corners = np.stack([start - across, end - across, end + across, start + across], axis=1)
+    return np.concatenate([corners, np.roll(corners, -1, axis=1)], axis=2)
+
+
 @kernel
 def _fill(
     cells: NDArray[np.uint8], edges: NDArray[np.float64], ends: NDArray[np.int64], value: np.uint8
@@ -140,12 +174,27 @@ def _fill(
                     crossings[position[i - low]] = x + (i - y) * (edges[k, 2] - x) / (edges[k, 3] - y)
                     position[i - low] += 1
             for i in range(low, high + 1):
-                row = np.sort(crossings[offsets[i - low] : offsets[i - low + 1]])
+                row = crossings[offsets[i - low] : offsets[i - low + 1]]
+                _sort(row)
                 for k in range(0, len(row) - 1, 2):
                     left = min(max(math.ceil(row[k]), 0), columns)
                     right = min(max(math.ceil(row[k + 1]), 0), columns)
                     cells[i, left:right] = value
         first = last
+
+
+@kernel
+def _sort(values: NDArray[np.float64]) -> None:
+    """Sort in place; rows of most shapes have two values."""
+    if len(values) > _FEW:
+        values[:] = np.sort(values)
+        return
+    for k in range(1, len(values)):
+        value, place = values[k], k
+        while place > 0 and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
 
 
 @kernel

@@ -7,6 +7,7 @@ its CPU time, and its memory beyond what was held, are printed.
 """
 
 import gzip
+import importlib.util
 import io
 import json
 import math
@@ -24,6 +25,8 @@ from robustness.uses import use
 from robustness.worker import outcome_of, read_all
 
 from lidarium.mapping.files.images import MOST_COLOURED, MOST_PIXELS
+from lidarium.mapping.files.laser_logs import LaserLog
+from lidarium.mapping.grids.scan_geometry import ScanGeometry
 
 MOST_BYTES = 1 << 20
 MOST_SIDE, COLOURED_SIDE = math.isqrt(MOST_PIXELS), math.isqrt(MOST_COLOURED)
@@ -86,6 +89,61 @@ def _carmen(beams: int, lines: int) -> bytes:
     return "".join(rows).encode()
 
 
+def _svg(*elements: str, count: int = 1) -> bytes:
+    head = '<svg xmlns="http://www.w3.org/2000/svg" fill="none" stroke="black">'
+    each = "".join(elements)
+    return _repeated(each, head, "</svg>") if count == 0 else (head + each * count + "</svg>").encode()
+
+
+def _sdf(models: int, size: float) -> bytes:
+    places = _draws.uniform(0.0, size, (models, 2)).round(2)
+    shape = "<geometry><cylinder><radius>.3</radius><length>1</length></cylinder></geometry>"
+    each = [f"<collision><pose>{x} {y} 0 0 0 0</pose>{shape}</collision>" for x, y in places]
+    head, tail = '<sdf version="1.6"><model name="m"><link name="a">', "</link></model></sdf>"
+    return (head + "".join(each)[: 140 * models] + tail).encode()
+
+
+def _grid(side: int, share: float) -> bytes:
+    letters = np.where(_draws.random((side, side)) < share, "@", ".")
+    lines = "\n".join("".join(row) for row in letters)
+    return f"type octile\nheight {side}\nwidth {side}\nmap\n{lines}\n".encode()
+
+
+def _dxf(entities: str, blocks: str = "") -> bytes:
+    """Return a drawing in metres of lines of group codes and values, separated by blanks."""
+    header = "0 SECTION 2 HEADER 9 $ACADVER 1 AC1009 9 $INSUNITS 70 6 0 ENDSEC "
+    text = f"{header}0 SECTION 2 BLOCKS {blocks}0 ENDSEC 0 SECTION 2 ENTITIES {entities}0 ENDSEC 0 EOF"
+    return text.replace(" ", "\n").encode()
+
+
+def _nested_blocks(deep: int, wide: int, last: str) -> str:
+    """Return blocks of which each holds the next one several times."""
+    each = "0 BLOCK 8 0 2 B{0} 70 0 10 0 20 0 {1}0 ENDBLK 8 0 "
+    inserts = [f"0 INSERT 8 0 2 B{k + 1} 10 1 20 1 " * wide for k in range(deep)]
+    return "".join(each.format(k, held) for k, held in enumerate([*inserts, last]))
+
+
+def _bag(scans: int, beams: int) -> bytes:
+    from lidarium.mapping.files.bags.writing import write_mcap_log
+
+    stamps, poses = 0.1 * np.arange(scans), np.zeros((scans, 3))
+    log = LaserLog(
+        stamps=stamps,
+        ranges=np.full((scans, beams), 3.0, np.float32),
+        geometry=ScanGeometry(beams=beams, field_of_view=3.0, range_max=8.0),
+        odometry=poses,
+        readings_stamps=stamps,
+        readings=poses,
+        reading_of_scan=np.arange(scans),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        write_mcap_log(Path(folder, "bag.mcap"), log)
+        return Path(folder, "bag.mcap").read_bytes()
+
+
+_LINE = "0 LINE 8 0 10 {} 20 {} 11 {} 21 {} "
+_ROOM = "".join(map(_LINE.format, (0, 9, 9, 0), (0, 0, 9, 9), (9, 9, 0, 0), (0, 9, 9, 0)))
+
 CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "a large room": ("image.png", lambda: _picture(MOST_SIDE, MOST_SIDE)),
     "a large room in colour": ("image.png", lambda: _picture(COLOURED_SIDE, COLOURED_SIDE, ".png", 0.0, 4)),
@@ -114,9 +172,52 @@ CASES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "numbers of a suite": ("suite.toml", lambda: _repeated("1,", "robots = [", "1]\n")),
     "tables of a suite": ("suite.toml", lambda: "".join(f"[a{k}]\n" for k in range(100_000)).encode()),
     "nested file": ("drawn.json", lambda: _repeated('{"a":', "", "")),
+    "many lines of a drawing": ("svg.svg", lambda: _svg('<path d="M1 1L9 9"/>', count=0)),
+    "a long path": ("svg.svg", lambda: _svg('<path d="M0 0', "L9 1L1 9" * 120_000, '"/>')),
+    "long lines of a drawing": ("svg.svg", lambda: _svg('<path d="M0 0H9000V9000H0Z"/>', count=200)),
+    "curves of a drawing": (
+        "svg.svg",
+        lambda: _svg('<circle r="900"/><path d="M0 0a9 9 1 0 1 9 9"/>', count=0),
+    ),
+    "many solids of a world": ("sdf.world", lambda: _sdf(7000, 50.0)),
+    "far solids of a world": ("sdf.world", lambda: _sdf(50, 4000.0)),
+    "a grid map": ("movingai.map", lambda: _grid(1000, 0.3)),
+    "lines of a DXF": (
+        "dxf.dxf",
+        lambda: _dxf(_segments(_LINE, 20_000, 9).decode()[:900_000].rsplit("0 LINE", 1)[0] + _ROOM),
+    ),
+    "long lines of a DXF": ("dxf.dxf", lambda: _dxf(_segments(_LINE, 500, 900).decode() + _ROOM)),
+    "nested blocks": (
+        "dxf.dxf",
+        lambda: _dxf("0 INSERT 8 0 2 B0 10 0 20 0 " + _ROOM, _nested_blocks(9, 9, _ROOM)),
+    ),
+    "nested empty blocks": (
+        "dxf.dxf",
+        lambda: _dxf("0 INSERT 8 0 2 B0 10 0 20 0 " + _ROOM, _nested_blocks(9, 9, "")),
+    ),
+    "a block within itself": (
+        "dxf.dxf",
+        lambda: _dxf(
+            "0 INSERT 8 0 2 B0 10 0 20 0 " + _ROOM,
+            "0 BLOCK 8 0 2 B0 70 0 10 0 20 0 0 INSERT 8 0 2 B0 10 1 20 1 0 ENDBLK 8 0 ",
+        ),
+    ),
+    "rows of a block": (
+        "dxf.dxf",
+        lambda: _dxf(
+            "0 INSERT 8 0 2 B0 10 0 20 0 70 30000 71 30000 44 1 45 1 " + _ROOM, _nested_blocks(0, 0, _ROOM)
+        ),
+    ),
+    "a large circle": ("dxf.dxf", lambda: _dxf("0 CIRCLE 8 0 10 0 20 0 40 1e12 " + _ROOM)),
+    "curves of a DXF": ("dxf.dxf", lambda: _dxf("0 CIRCLE 8 0 10 5 20 5 40 900 " * 20_000 + _ROOM)),
+    "a bag of many scans": ("bag.mcap", lambda: _bag(13_000, 8)),
+    "a bag of many beams": ("bag.mcap", lambda: _bag(2000, 8000)),
     "curves": ("splines.json", lambda: _repeated('{"knots":[0,1],"points":[[0,0]]},', '{"curves":[', "{}]}")),
 }
 """By name: what the file is called, and how it is made."""
+
+_NEEDS = {".dxf": "ezdxf", ".mcap": "mcap_ros2"}
+"""Modules without which files are not read."""
 
 
 def measured(names: Iterable[str] = tuple(CASES)) -> Iterator[tuple[str, dict[str, object]]]:
@@ -128,6 +229,8 @@ def measured(names: Iterable[str] = tuple(CASES)) -> Iterator[tuple[str, dict[st
         read_all(sorted(path for path in samples.iterdir() if path.is_file()), place)
         for name in names:
             called, make = CASES[name]
+            if importlib.util.find_spec(_NEEDS.get(Path(called).suffix, "lidarium")) is None:
+                continue
             path, content = place / called, make()
             if len(content) > MOST_BYTES:
                 raise ValueError(f"{name} has {len(content):,} bytes; want at most {MOST_BYTES:,}")

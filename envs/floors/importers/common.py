@@ -3,14 +3,16 @@
 They read text, find the free areas of pixel floors and put walls around line drawings.
 """
 
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.areas import floor_of_area
-from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip
+from lidarium.envs.floors.drawing import fill_shapes, strip, strip_edges
 from lidarium.envs.floors.extent import check_extent
 from lidarium.envs.floors.floor import Floor, Solid
 from lidarium.mapping.files.guarded_reading import read_text as read_guarded
@@ -19,6 +21,11 @@ from lidarium.mapping.files.names import printable
 
 MOST_TEXT_BYTES = 32 << 20
 """Longest text of a floor, unpacked: parsed it takes some twenty times as much."""
+
+MOST_POINTS = 250_000
+"""Most points of a drawing."""
+
+Part = TypeVar("Part")
 
 # Where a drawing has walls without thickness [m].
 WALL_THICKNESS = 0.1
@@ -55,6 +62,22 @@ def refuse_resolution(path: Path, resolution: float | None) -> None:
     """Raise ValueError if a resolution is given for a file that has its own scale."""
     if resolution is not None:
         raise ValueError(f"{path} has its own scale, but a resolution of {resolution} m is given; want none")
+
+
+def few_enough(path: Path, parts: Iterable[Part], points_of: Callable[[Part], int]) -> Iterator[Part]:
+    """Yield parts of a drawing, as long as they have not too many points.
+
+    Raises
+    ------
+    ValueError
+        At the first part with which they have more than `MOST_POINTS`.
+    """
+    points = 0
+    for part in parts:
+        points += points_of(part)
+        if points > MOST_POINTS:
+            raise ValueError(f"{path} has more than {MOST_POINTS:,} points; want a plan, or a picture of it")
+        yield part
 
 
 def floor_of_cells(
@@ -139,13 +162,7 @@ def enclosed(
     resolution = max(_OUTLINE_RESOLUTION, float(np.sqrt(size.prod() / _MAX_OUTLINE_CELLS)))
     origin = (float(low[0] - widest), float(low[1] - widest))
     drawn = np.zeros((int(size[1] / resolution) + 1, int(size[0] / resolution) + 1), dtype=np.uint8)
-    fill_shapes(
-        drawn,
-        origin,
-        resolution,
-        [ring_edges(strip(line, WALL_THICKNESS, WALL_THICKNESS / 2.0)) for line in lines],
-        1,
-    )
+    fill_shapes(drawn, origin, resolution, strip_edges(lines, WALL_THICKNESS, 0.5), 1)
     distance = _distance(1 - drawn, resolution)
     union, insides, areas = np.zeros_like(drawn), [], []
     for gap in _GAPS:

@@ -4,6 +4,8 @@ Blocks are taken apart where they are inserted. The drawing's unit says how larg
 """
 
 import io
+import logging
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,22 +14,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.envs.floors.floor import Floor
-from lidarium.envs.floors.importers.common import MOST_TEXT_BYTES, floor_of_lines
-from lidarium.mapping.files.guarded_reading import read_bytes
+from lidarium.envs.floors.importers.common import MOST_TEXT_BYTES, few_enough, floor_of_lines
+from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes
+
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # else it writes each repair to the console
 
 CURVE_ERROR_M = 0.01
 """How far the straight parts of a curve may be off it [m]."""
 
+CURVE_SHARE = 1e-4
+"""How far they may be off at least, as a share of the size of the curve."""
+
 _METRES = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 10: 0.9144, 14: 0.1}
 """Metres of a unit by the number that $INSUNITS has for it."""
+
+_UNIT = re.compile(rb"\$INSUNITS\s+70\s+(\d{1,3})\s")
 
 _KINDS = frozenset(("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"))
 """Entities that are walls; texts, dimensions, hatches and the like are none."""
 
+_COMPOUND = frozenset(("INSERT", "MLINE"))
+"""Entities that are made of others."""
+
+MOST_FROM_BLOCKS = 30_000
+"""Most entities that are put where blocks are inserted."""
+
+_DEEPEST = 16
+
 
 def has_scale(path: Path) -> bool:
-    """Return whether the drawing has a unit."""
-    return _unit(_document(path)) is not None
+    """Return whether the drawing has a unit; the rest of it is not parsed for that."""
+    found = _UNIT.search(read_bytes(path, MOST_TEXT_BYTES))
+    return found is not None and int(found[1]) in _METRES
 
 
 def load(path: Path, resolution: float | None) -> Floor:
@@ -45,7 +63,8 @@ def load(path: Path, resolution: float | None) -> Floor:
         raise ValueError(f"{path} has no unit; give --resolution, the metres of a unit")
     scale = resolution if unit is None else unit
     assert scale is not None
-    lines = [line for line in _lines(document, CURVE_ERROR_M / scale) if len(line) > 1]
+    walls = few_enough(path, _lines(path, document, CURVE_ERROR_M / scale), len)
+    lines = [line for line in walls if len(line) > 1]
     if not lines:
         raise ValueError(f"{path} has no lines in model space; want a plan of {', '.join(sorted(_KINDS))}")
     segments = np.concatenate([np.hstack([line[:-1], line[1:]]) for line in lines]) * scale
@@ -57,6 +76,7 @@ def load(path: Path, resolution: float | None) -> Floor:
 def _document(path: Path) -> Any:  # noqa: ANN401
     """Return the drawing; ezdxf is imported here, since few need it."""
     try:
+        import ezdxf
         from ezdxf import recover
         from ezdxf.lldxf.const import DXFError
     except ImportError as error:
@@ -64,6 +84,11 @@ def _document(path: Path) -> Any:  # noqa: ANN401
     content = read_bytes(path, MOST_TEXT_BYTES)
     if not content.rstrip(b"\r\n\0 ").endswith(b"EOF"):
         raise ValueError(f"{path} has no EOF at its end; want a whole DXF drawing")
+    try:
+        # Repairs take twice as long as reading what is whole.
+        return ezdxf.read(io.StringIO(content.decode("utf-8", "surrogateescape").replace("\r\n", "\n")))
+    except (DXFError, *READING_ERRORS):
+        pass
     try:
         return recover.read(io.BytesIO(content))[0]
     except DXFError as error:
@@ -74,13 +99,57 @@ def _unit(document: Any) -> float | None:  # noqa: ANN401
     return _METRES.get(int(document.header.get("$INSUNITS", 0)))
 
 
-def _lines(document: Any, error: float) -> Iterator[NDArray[np.float64]]:  # noqa: ANN401
+def _lines(path: Path, document: Any, error: float) -> Iterator[NDArray[np.float64]]:  # noqa: ANN401
     """Yield the walls as polylines (n, 2) in the drawing's units."""
-    from ezdxf import disassemble, path
+    from ezdxf.path import make_path
 
-    for entity in disassemble.recursive_decompose(document.modelspace()):
-        layer = document.layers.get(entity.dxf.layer) if entity.dxf.layer in document.layers else None
-        if entity.dxftype() not in _KINDS or (layer is not None and (layer.is_off() or layer.is_frozen())):
+    for entity in _entities(path, document):
+        if entity.dxftype() == "LINE":  # most are, and paths of them cost ten times as much
+            start, end = entity.dxf.start, entity.dxf.end
+            yield np.array([(start.x, start.y), (end.x, end.y)])
             continue
-        for part in path.make_path(entity).sub_paths():
-            yield np.array([(point.x, point.y) for point in part.flattening(error)]).reshape(-1, 2)
+        for part in make_path(entity).sub_paths():
+            yield _flattened(part, error)
+
+
+def _flattened(part: Any, error: float) -> NDArray[np.float64]:  # noqa: ANN401
+    """Return points (n, 2) of a curve."""
+    corners = np.array([(point.x, point.y) for point in part.control_vertices()])
+    size = float(np.ptp(corners, axis=0).max()) if len(corners) else 0.0
+    points = part.flattening(max(error, CURVE_SHARE * size))
+    return np.array([(point.x, point.y) for point in points]).reshape(-1, 2)
+
+
+def _entities(path: Path, document: Any) -> Iterator[Any]:  # noqa: ANN401
+    """Yield what is a wall, blocks taken apart.
+
+    A few blocks that hold each other a few times make more entities than there is time for; all are counted.
+    """
+    waiting, count = [iter(document.modelspace())], 0
+    while waiting:
+        entity = next(waiting[-1], None)
+        if entity is None:
+            waiting.pop()
+            continue
+        count += len(waiting) > 1
+        if count > MOST_FROM_BLOCKS:
+            raise ValueError(f"{path} has blocks of more than {MOST_FROM_BLOCKS:,} entities; want a plan")
+        kind = entity.dxftype()
+        if not _is_shown(document, entity):
+            continue
+        if kind in _COMPOUND:
+            if len(waiting) > _DEEPEST:
+                raise ValueError(f"{path} has blocks nested more than {_DEEPEST} deep; want a plan")
+            has_rows = kind == "INSERT" and entity.mcount > 1
+            waiting.append(iter(entity.multi_insert() if has_rows else entity.virtual_entities()))
+        elif kind in _KINDS:
+            yield entity
+
+
+def _is_shown(document: Any, entity: Any) -> bool:  # noqa: ANN401
+    name = entity.dxf.layer
+    if name not in document.layers:
+        return True
+    layer = document.layers.get(name)
+    is_off = entity.dxftype() != "INSERT" and layer.is_off()  # what a block holds has layers of its own
+    return not (is_off or layer.is_frozen())

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip
+from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip, strip_edges
 from lidarium.envs.floors.extent import check_extent
 from lidarium.envs.floors.floor import MAX_RASTER_CELLS, Floor
 from lidarium.envs.floors.importers.common import floor_of_cells, read_text, refuse_resolution
@@ -70,12 +70,13 @@ def load(path: Path, resolution: float | None) -> Floor:
 def _draw_free_space(free: NDArray[np.uint8], origin: tuple[float, float], spaces: list[_Space]) -> None:
     fill_shapes(free, origin, RESOLUTION, [space.segments for space in spaces], 1)
     walls = [
-        ring_edges(strip(segment, _THIN_WALL, _THIN_WALL / 2.0))
+        segment
         for space in spaces
         for segment, kind in zip(space.segments, space.types, strict=True)
         if kind != "Portal"
     ]
-    fill_shapes(free, origin, RESOLUTION, walls, 0)
+    edges = strip_edges(np.array(walls).reshape(-1, 4), _THIN_WALL, 0.5)
+    fill_shapes(free, origin, RESOLUTION, edges, 0)
 
     def is_free(point: NDArray[np.float64]) -> bool:
         column, row = ((point - origin) / RESOLUTION).astype(int)

@@ -3,9 +3,13 @@
 Lines are as wide as they are drawn, and at least so wide that nothing leaks through them.
 """
 
+import functools
+import itertools
+import math
+import operator
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -13,11 +17,12 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip
+from lidarium.envs.floors.drawing import fill_shapes, ring_edges, strip_edges
 from lidarium.envs.floors.extent import check_extent
-from lidarium.envs.floors.floor import MAX_RASTER_CELLS, Floor
-from lidarium.envs.floors.importers.common import floor_of_cells, read_text
+from lidarium.envs.floors.floor import Floor
+from lidarium.envs.floors.importers.common import few_enough, floor_of_cells, read_text
 from lidarium.envs.floors.importers.svg_paths import Polyline, length, outlines, transform_of
+from lidarium.mapping.files.images import MOST_PIXELS
 from lidarium.mapping.geometry.bounds import shown
 
 RESOLUTION = 0.025
@@ -44,6 +49,7 @@ _UNSEEN = frozenset(
     )
 )
 _OF_STYLE = ("fill", "stroke", "stroke-width", "display", "visibility")
+_HAS_STYLE = frozenset(("class", "style", *_OF_STYLE))
 _DEFAULTS = {
     "fill": "black",
     "stroke": "none",
@@ -54,6 +60,12 @@ _DEFAULTS = {
 _RULES = re.compile(r"([^{}]+)\{([^{}]*)\}")
 
 Style = dict[str, str]
+
+
+_Layer = tuple[int, NDArray[np.float64] | None, NDArray[np.float64], float]
+"""Paint: 1 for solid, 0 for free; edges of an inside; lines (N, 4) with their width [m]."""
+
+_VALUE: Callable[[_Layer], int] = operator.itemgetter(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,36 +94,42 @@ def load(path: Path, resolution: float | None) -> Floor:
     if _kind(root) != "svg":
         raise ValueError(f"{path} begins with {shown(_kind(root))}; want an svg element")
     to_metres = np.diag([resolution, -resolution, 1.0])
-    shapes = list(_shapes(root, to_metres, dict(_DEFAULTS), _classes(root), 0))
+    found = _shapes(root, to_metres, dict(_DEFAULTS), _classes(root), 0)
+    shapes = list(few_enough(path, found, lambda shape: sum(map(len, shape.outlines))))
     drawn = [shape for shape in shapes if shape.is_solid_line or shape.is_solid_inside]
     if not drawn:
         raise ValueError(f"{path} has no dark lines or areas; want a plan whose walls are dark")
-    points = np.concatenate([outline for shape in drawn for outline in shape.outlines])
+    rings = [outline for shape in drawn for outline in shape.outlines]
+    points = np.concatenate(rings)
     low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
-    check_extent(str(path), (*low.tolist(), *high.tolist()), points.reshape(-1, 1, 2))
+    check_extent(str(path), (*low.tolist(), *high.tolist()), rings)
     columns, rows = (int(size) + 1 for size in (high - low) / RESOLUTION)
-    if rows * columns > MAX_RASTER_CELLS:
+    if rows * columns > MOST_PIXELS:
         raise ValueError(
-            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MAX_RASTER_CELLS}; give "
+            f"{path} has {columns} x {rows} cells at {RESOLUTION} m, more than {MOST_PIXELS:,}; give "
             "a smaller --resolution"
         )
-    solid = np.zeros((rows, columns), np.uint8)
-    for shape in shapes:
-        _paint(solid, (float(low[0]), float(low[1])), shape)
-    return floor_of_cells(path, solid == 0, (float(low[0]), float(low[1])), RESOLUTION)
+    solid, origin = np.zeros((rows, columns), np.uint8), (float(low[0]), float(low[1]))
+    # One over the other, as they are painted; those of one colour at once.
+    for value, layers in itertools.groupby(itertools.chain.from_iterable(map(_layers, shapes)), _VALUE):
+        _, insides, lines, widths = zip(*layers, strict=True)
+        fill_shapes(solid, origin, RESOLUTION, [each for each in insides if each is not None], value)
+        segments = np.concatenate(lines)
+        of_segments = np.repeat(widths, [len(each) for each in lines])
+        fill_shapes(solid, origin, RESOLUTION, strip_edges(segments, of_segments, 0.5), value)
+    return floor_of_cells(path, solid == 0, origin, RESOLUTION)
 
 
-def _paint(solid: NDArray[np.uint8], origin: tuple[float, float], shape: _Shape) -> None:
-    """Paint a shape over those before: its inside first, then its line."""
+def _layers(shape: _Shape) -> Iterator[_Layer]:
+    """Yield what a shape paints: its inside first, then its line."""
     if shape.is_solid_inside is not None:
         rings = [ring_edges(outline) for outline in shape.outlines if len(outline) > 2]
         if rings:
-            fill_shapes(solid, origin, RESOLUTION, [np.concatenate(rings)], int(shape.is_solid_inside))
+            yield int(shape.is_solid_inside), np.concatenate(rings), np.zeros((0, 4)), 0.0
     if shape.is_solid_line is not None:
         width = max(shape.width, LEAST_WIDTH) if shape.is_solid_line else shape.width
-        segments = np.concatenate([np.hstack([line[:-1], line[1:]]) for line in shape.outlines])
-        lines = [ring_edges(strip(segment, width, width / 2.0)) for segment in segments]
-        fill_shapes(solid, origin, RESOLUTION, lines, int(shape.is_solid_line))
+        segments = [np.hstack([line[:-1], line[1:]]) for line in shape.outlines]
+        yield int(shape.is_solid_line), None, np.concatenate(segments), width
 
 
 def _shapes(
@@ -126,11 +144,12 @@ def _shapes(
     style = _style(element, inherited, classes)
     if style["display"].strip() == "none":
         return
-    matrix = around @ transform_of(element)
+    matrix = around @ transform_of(element) if "transform" in element.attrib else around
     found = outlines(element, kind)
     if found and style["visibility"].strip() == "visible":
         placed = [outline @ matrix[:2, :2].T + matrix[:2, 2] for outline in found]
-        scale = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2]))))
+        (a, b), (c, d) = matrix[:2, :2].tolist()
+        scale = math.sqrt(abs(a * d - b * c))
         yield _Shape(
             placed,
             None if kind == "line" else _is_dark(style["fill"]),
@@ -151,6 +170,8 @@ def _style(element: Element, inherited: Style, classes: dict[str, Style]) -> Sty
 
     Its own goes before those of its classes, these before its attributes, these before what is inherited.
     """
+    if not classes and _HAS_STYLE.isdisjoint(element.attrib):
+        return inherited
     style = {**inherited, **{name: value for name in _OF_STYLE if (value := element.get(name)) is not None}}
     for name in (_kind(element), *(f".{each}" for each in element.get("class", "").split())):
         style |= classes.get(name, {})
@@ -174,6 +195,7 @@ def _declared(text: str) -> Style:
     return {name: value for name, value in found.items() if name in _OF_STYLE}
 
 
+@functools.cache
 def _is_dark(colour: str) -> bool | None:
     """Return whether a colour is dark; None where nothing is painted. Gradients and their like are dark."""
     from matplotlib.colors import to_rgb

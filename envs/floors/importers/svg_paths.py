@@ -20,6 +20,7 @@ CURVE_PARTS = 16
 """Straight parts of a curve, and of a quarter of a circle."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBERS = re.compile(_NUMBER)
 _COMMANDS = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
 # Flags are single digits that may stand together with what follows.
 _ARCS = re.compile(
@@ -31,7 +32,7 @@ _WANTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7
 
 def numbers(text: str) -> list[float]:
     """Return the numbers of a text."""
-    return [float(number) for number in re.findall(_NUMBER, text)]
+    return [float(number) for number in _NUMBERS.findall(text)]
 
 
 def length(text: str | None, otherwise: float = 0.0) -> float:
@@ -135,7 +136,9 @@ def _path(text: str) -> Iterator[Polyline]:
             start, points, control = here, [here], None
             continue
         added, control = _part(command, given, here, control)
-        points = [*(points or [here]), *added]
+        if not points:
+            points = [here]
+        points += added
         here = points[-1]
     if len(points) > 1:
         yield _points(points)

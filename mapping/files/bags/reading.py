@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.mapping.files.bags import schemas
-from lidarium.mapping.files.guarded_reading import open_guarded, reading
+from lidarium.mapping.files.guarded_reading import most_unpacked, open_guarded, reading
 from lidarium.mapping.files.laser_logs import LaserLog, made_usable, symmetric_scans
 from lidarium.mapping.files.names import printable
 from lidarium.mapping.files.trajectories import interpolated
@@ -20,6 +20,9 @@ from lidarium.mapping.files.trajectories import interpolated
 _WANTED = "want a whole MCAP file of ROS 2 messages (ros2msg, CDR)"
 _RECORD_BYTES = 1 << 28
 _LEAST_BYTES = 64
+_MAP_RATIO = 2
+"""Chunks hold maps, too, which pack better than what is read of them."""
+
 """A bag has its magic bytes twice, a header and a footer."""
 
 _TF, _STATIC = "/tf", "/tf_static"
@@ -115,6 +118,8 @@ def _messages(path: Path, topic: str | None) -> Messages:
         summary = reader.get_summary()
         if summary is None:
             raise ValueError(f"{path} has no index at its end, it is cut off; {_WANTED}")
+        allowed = most_unpacked(os.fstat(file.fileno()).st_size)
+        _check_chunks(path, file, summary, _MAP_RATIO * allowed)
         topics: dict[str, set[str]] = {}
         for channel in summary.channels.values():
             schema = summary.schemas.get(channel.schema_id)
@@ -122,7 +127,10 @@ def _messages(path: Path, topic: str | None) -> Messages:
         scans = _chosen(path, topics.get(schemas.LASER_SCAN, set()), topic)
         odometry = _most_alike(scans, topics.get(schemas.ODOMETRY, set()))
         wanted = [name for name in (scans, odometry, _TF, _STATIC) if name is not None]
-        for _, channel, _, content in reader.iter_decoded_messages(wanted):
+        for _, channel, message, content in reader.iter_decoded_messages(wanted):
+            allowed -= len(message.data)
+            if allowed < 0:
+                raise ValueError(f"{path} packs its scans too well; want a bag of a robot")
             if channel.topic == scans:
                 found.scans.append(content)
             elif channel.topic == odometry:
@@ -133,6 +141,25 @@ def _messages(path: Path, topic: str | None) -> Messages:
             else:
                 _note_transforms(found, content, is_static=channel.topic == _STATIC)
     return found
+
+
+def _check_chunks(path: Path, file: BinaryIO, summary: Any, allowed: int) -> None:  # noqa: ANN401
+    """Raise ValueError where chunks have too many bytes when unpacked, or another number than they say."""
+    import zstandard
+    from mcap.data_stream import ReadDataStream
+    from mcap.records import Chunk
+
+    unpacked = 0
+    for index in summary.chunk_indexes:
+        file.seek(index.chunk_start_offset + 9)  # behind the record's kind and length
+        chunk = Chunk.read(ReadDataStream(file))
+        size = chunk.uncompressed_size
+        if chunk.compression == "zstd" and zstandard.frame_content_size(chunk.data) not in (-1, size):
+            raise ValueError(f"{path} has a chunk of another size than it says; {_WANTED}")
+        unpacked += size
+        if unpacked > allowed:
+            raise ValueError(f"{path} has more than {allowed:,} bytes when unpacked; want fewer")
+    file.seek(0)
 
 
 def _chosen(path: Path, topics: Iterable[str], topic: str | None) -> str:

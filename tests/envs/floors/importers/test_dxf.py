@@ -99,3 +99,59 @@ def test_a_file_that_is_cut_off_is_refused(drawing, tmp_path):
         (tmp_path / "cut.dxf").write_bytes(content[: int(share * len(content))])
         with pytest.raises(ValueError, match=r"cut.dxf has no EOF at its end; want a whole DXF drawing"):
             load_file(tmp_path / "cut.dxf")
+
+
+def test_dimensions_are_no_walls_and_multilines_are(drawing, tmp_path):
+    space = drawing.modelspace()
+    space.add_linear_dim((0, 2000), (0, 0), (6000, 0)).render()
+    space.add_mline([(3000, 0), (3000, 3000)])
+    floor = load_file(saved(drawing, tmp_path))
+    # Two lines of a millimetre's distance, as a multiline's style has it.
+    assert free_area(floor) == pytest.approx(5.9 * 3.9 - 0.1 * 2.95, rel=0.01)
+
+
+def test_what_a_frozen_block_holds_is_left_out(drawing, tmp_path):
+    drawing.layers.add("old").freeze()
+    drawing.blocks.new("WALL").add_line((0, 0), (6000, 0))
+    drawing.modelspace().add_blockref("WALL", (0, 2000), {"layer": "old"})
+    assert free_area(load_file(saved(drawing, tmp_path))) == pytest.approx(5.9 * 3.9, rel=0.01)
+
+
+def test_blocks_that_multiply_are_refused_before_they_are_drawn(drawing, tmp_path):
+    for k in range(9):
+        block = drawing.blocks.new(f"B{k}")
+        for _ in range(9):
+            block.add_blockref(f"B{k + 1}", (0, 0))
+    drawing.blocks.new("B9")
+    drawing.modelspace().add_blockref("B0", (0, 0))
+    with pytest.raises(ValueError, match=r"plan.dxf has blocks of more than 30,000 entities; want a plan"):
+        load_file(saved(drawing, tmp_path))
+
+
+def test_rows_and_columns_of_a_block_are_counted(drawing, tmp_path):
+    drawing.blocks.new("DESK").add_line((0, 0), (1, 0))
+    insert = drawing.modelspace().add_blockref("DESK", (0, 0))
+    insert.grid((30_000, 30_000), (1, 1))
+    with pytest.raises(ValueError, match=r"plan.dxf has blocks of more than 30,000 entities; want a plan"):
+        load_file(saved(drawing, tmp_path))
+
+
+def test_a_large_curve_has_few_parts(drawing, tmp_path):
+    drawing.modelspace().add_circle((3000, 2000), 900_000)
+    floor = load_file(saved(drawing, tmp_path))
+    assert len(floor.solids) < 2000
+    assert floor.bounds == pytest.approx((-897.05, -898.05, 903.05, 902.05), abs=0.1)
+
+
+def test_too_many_points_are_refused(drawing, tmp_path):
+    for k in range(2000):
+        drawing.modelspace().add_circle((k, k), 900_000)
+    with pytest.raises(ValueError, match=r"has more than 250,000 points; want a plan, or a picture of it"):
+        load_file(saved(drawing, tmp_path))
+
+
+def test_a_drawing_with_small_faults_is_repaired(drawing, tmp_path, caplog, capsys):
+    path = saved(drawing, tmp_path)
+    path.write_text(path.read_text().replace("6000.0", "6000.0abc", 1))
+    assert load_file(path).bounds == pytest.approx((-0.05, -0.05, 6.05, 4.05))
+    assert capsys.readouterr() == ("", "")

@@ -274,3 +274,37 @@ def test_nothing_is_written_where_writing_fails(log, tmp_path):
     write_all(lent.__enter__())
     assert not lent.__exit__(RuntimeError, RuntimeError("half-way"), None)
     assert list(tmp_path.iterdir()) == []
+
+
+def bombed(path, *, says: int | None = None):
+    """Write a bag with a chunk of 200 MB of zeros; it may say to have another size."""
+    with open(path, "wb") as file:
+        writer = Writer(file, chunk_size=1 << 30)
+        writer.start()
+        schema = writer.register_schema(schemas.LASER_SCAN, "ros2msg", b"")
+        writer.add_message(writer.register_channel("/scan", "cdr", schema), 0, bytes(200_000_000), 0)
+        writer.finish()
+    if says is not None:
+        content = path.read_bytes()
+        size = make_reader(io.BytesIO(content)).get_summary().chunk_indexes[0].uncompressed_size
+        path.write_bytes(content.replace(size.to_bytes(8, "little"), says.to_bytes(8, "little")))
+
+
+def test_a_bag_that_unpacks_to_more_than_it_may_is_refused_before_it_is_unpacked(tmp_path):
+    bombed(tmp_path / "bag.mcap")
+    with pytest.raises(ValueError, match=r"bag.mcap has more than [\d,]+ bytes when unpacked; want fewer"):
+        read_mcap_log(tmp_path / "bag.mcap")
+
+
+def test_a_chunk_of_another_size_than_it_says_is_refused(tmp_path):
+    bombed(tmp_path / "bag.mcap", says=1000)
+    with pytest.raises(ValueError, match=r"bag.mcap has a chunk of another size than it says"):
+        read_mcap_log(tmp_path / "bag.mcap")
+
+
+def test_scans_that_pack_too_well_are_refused(log, tmp_path):
+    geometry = ScanGeometry(beams=10_000, field_of_view=math.pi, range_max=5.0)
+    alike = LaserLog(np.arange(200.0), np.ones((200, 10_000), np.float32), geometry, np.zeros((200, 3)))
+    write_mcap_log(tmp_path / "log.mcap", alike)
+    with pytest.raises(ValueError, match=r"log.mcap packs its scans too well; want a bag of a robot"):
+        read_mcap_log(tmp_path / "log.mcap")
