@@ -7,6 +7,7 @@ import io
 import logging
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +64,9 @@ def load(path: Path, resolution: float | None) -> Floor:
         raise ValueError(f"{path} has no unit; give --resolution, the metres of a unit")
     scale = resolution if unit is None else unit
     assert scale is not None
-    walls = few_enough(path, _lines(path, document, CURVE_ERROR_M / scale), len)
-    lines = [line for line in walls if len(line) > 1]
+    with _damage(path):
+        walls = few_enough(path, _lines(path, document, CURVE_ERROR_M / scale), len)
+        lines = [line for line in walls if len(line) > 1]
     if not lines:
         raise ValueError(f"{path} has no lines in model space; want a plan of {', '.join(sorted(_KINDS))}")
     segments = np.concatenate([np.hstack([line[:-1], line[1:]]) for line in lines]) * scale
@@ -89,8 +91,17 @@ def _document(path: Path) -> Any:  # noqa: ANN401
         return ezdxf.read(io.StringIO(content.decode("utf-8", "surrogateescape").replace("\r\n", "\n")))
     except (DXFError, *READING_ERRORS):
         pass
-    try:
+    with _damage(path):
         return recover.read(io.BytesIO(content))[0]
+
+
+@contextmanager
+def _damage(path: Path) -> Iterator[None]:
+    """Name the file where ezdxf finds that it cannot be a drawing."""
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        yield
     except DXFError as error:
         raise ValueError(f"{path} is not a DXF drawing: {error}") from error
 

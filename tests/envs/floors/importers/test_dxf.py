@@ -155,3 +155,9 @@ def test_a_drawing_with_small_faults_is_repaired(drawing, tmp_path, caplog, caps
     path.write_text(path.read_text().replace("6000.0", "6000.0abc", 1))
     assert load_file(path).bounds == pytest.approx((-0.05, -0.05, 6.05, 4.05))
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_block_that_is_not_there_is_refused(drawing, tmp_path):
+    drawing.modelspace().add_blockref("NOWHERE", (0, 0))
+    with pytest.raises(ValueError, match=r"plan.dxf is not a DXF drawing: .*NOWHERE"):
+        load_file(saved(drawing, tmp_path))
