@@ -4,10 +4,8 @@ The floors of the set ``test`` and real ones choose nothing: neither settings no
 """
 
 import json
-import math
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import date
 from importlib import resources
 from pathlib import Path
@@ -17,17 +15,15 @@ import numpy as np
 
 import lidarium
 from lidarium.agents.learned.weights import CARD
+from lidarium.benchmarks.studies.shared.bounded import Bounded, measure_bound
 from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
 from lidarium.benchmarks.studies.shared.real_floors import real_floors
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.envs.floors.catalogue.names import set_floors
-from lidarium.envs.settings.making import make_settings
-from lidarium.evaluation.bounds.bound import known_floor_bound
 from lidarium.evaluation.statistics.means import paired_ratio
 from lidarium.evaluation.statistics.medians import median_interval
 from lidarium.evaluation.suites.campaign import EPISODES_FILE
 from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
-from lidarium.evaluation.suites.starts import drawn_starts, starts_in
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
@@ -77,19 +73,6 @@ bound that `learned` saves.
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Bounded:
-    """A floor and a number of robots whose bound is wanted."""
-
-    floor: str
-    robots: int
-
-    @property
-    def key(self) -> str:
-        """Name that no other one of its file has."""
-        return f"{self.floor} | {self.robots}"
-
-
 def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
     """Return the suites: all floors for the two, a part of them for classic explorers.
 
@@ -125,17 +108,8 @@ def _suite(policies: Sequence[str], floors: Sequence[str]) -> Suite:
 def work(folder: Path, _data: Path | None, every: int, workers: int) -> Progress:
     """Bound a part of the floors."""
     floors = set_floors("test")[:: BOUNDS_EVERY * every]
-    teams = [Bounded(floor, robots) for floor in floors for robots in TEAMS]
+    teams = [Bounded(floor, robots, SETTINGS) for floor in floors for robots in TEAMS]
     yield from do_missing(folder / BOUNDS_FILE, "bounds", teams, measure_bound, workers)
-
-
-def measure_bound(team: Bounded) -> dict[str, Any]:
-    """Return what a team needs that knows the floor, from where the explorers start."""
-    settings = make_settings(robots=team.robots, **SETTINGS)
-    starts = drawn_starts(team.floor, settings, 0) or starts_in(team.floor, settings, 0)
-    bound = known_floor_bound(team.floor, settings, starts)
-    known = bound.time_s if math.isfinite(bound.time_s) else None
-    return {"floor": team.floor, "robots": team.robots, "known_s": known}
 
 
 def page(folder: Path, command: str) -> str:

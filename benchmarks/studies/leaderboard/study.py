@@ -10,65 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import lidarium
-from lidarium.benchmarks.studies.shared.real_floors import real_floors
+from lidarium.benchmarks.studies.leaderboard.worlds import KINDS, suites
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.report import write_report
 from lidarium.evaluation.suites.suite import Suite
 from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
 
-POLICIES = (
-    "nearest_frontier",
-    "nearest_frontier_own_map",
-    "utility_frontier",
-    "explore_lite",
-    "tour_frontier",
-    "learned",
-    "srt",
-    "random_walk",
-)
-BASELINE = "nearest_frontier"
-TEAMS = (1, 2, 3)
-SETTINGS = {"resolution": 0.025, "stop_coverage": 0.99, "horizon_s": 1800.0}
-
 CHANCE = 0.05
 """Least p value that is no evidence."""
-
-KINDS = {
-    "test": "generated floors of the set `test`",
-    "kth": "KTH campus floors, of which at least 80 % are connected",
-    "lifull": "LIFULL apartments",
-    "slam": "maps that robots made of real buildings",
-    "dungeon": "dungeons, 0.1 m a pixel",
-}
-
-
-def suites(data: Path | None, every: int = 1) -> dict[str, Suite]:
-    """Return the suites by kind of floor.
-
-    Parameters
-    ----------
-    data : Path or None
-        Folder of real floors; generated floors alone where None.
-    every : int
-        Of each kind every so many-th floor is run.
-    """
-    from lidarium.envs.floors.catalogue.names import set_floors
-
-    floors = {"test": list(set_floors("test"))}
-    if data is not None:
-        floors |= {kind: [str(path) for path in paths] for kind, paths in real_floors(data).items()}
-    return {
-        kind: Suite(
-            policies=POLICIES,
-            floors=tuple(found[::every]),
-            robots=TEAMS,
-            seeds=(0,),
-            variants={DEFAULT_VARIANT: SETTINGS},
-        )
-        for kind, found in floors.items()
-        if found
-    }
-
 
 def page(folder: Path, command: str) -> str:
     """Write the report of each suite, and return the leaderboard as markdown.
