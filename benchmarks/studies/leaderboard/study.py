@@ -1,130 +1,170 @@
-"""The leaderboard: all policies on the test set and on real floors.
+"""The leaderboard: all policies on generated and real floors, in worlds that are more or less real."""
 
-Teams have 1, 2 and 3 robots that know where they start.
-"""
-
+import json
 import platform
-from collections.abc import Iterable, Mapping
+import shutil
+from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
 from typing import Any
 
-import lidarium
-from lidarium.benchmarks.studies.leaderboard.worlds import KINDS, suites
-from lidarium.benchmarks.studies.shared.study import Study
-from lidarium.evaluation.report import write_report
-from lidarium.evaluation.suites.suite import Suite
-from lidarium.evaluation.suites.trial import DEFAULT_VARIANT
+import numpy as np
 
-CHANCE = 0.05
-"""Least p value that is no evidence."""
+import lidarium
+from lidarium.benchmarks.studies.leaderboard.tables import Multiples, Part, short_table, table
+from lidarium.benchmarks.studies.leaderboard.worlds import (
+    BOUNDED,
+    HORIZON_S,
+    KINDS,
+    SETTINGS,
+    TEAMS,
+    floors_of,
+    parts,
+    suites,
+)
+from lidarium.benchmarks.studies.shared.bounded import Bounded, measure_bound
+from lidarium.benchmarks.studies.shared.kept import Progress, do_missing, kept_lines
+from lidarium.benchmarks.studies.shared.study import Study
+from lidarium.evaluation.episodes.output import write_text
+from lidarium.evaluation.report import write_report
+from lidarium.evaluation.suites.campaign import EPISODES_FILE
+from lidarium.evaluation.suites.episodes_file import KEY, read_episodes
+
+BOUNDS_FILE = "bounds.jsonl"
+ALL = "all"
+"""Folder of the episodes of all kinds and worlds, for the page that a browser shows."""
+
+README_TEAM = 3
+"""Number of robots of the table in the README."""
+
+BEGIN, END = "<!-- leaderboard -->", "<!-- end of the leaderboard -->"
+"""Between these lines of the README is its table."""
+
+PAGE = """# Leaderboard
+
+Made by `{command}` on {date}: lidarium {version}, Python {python}. To sort and filter it, save
+[leaderboard.html](leaderboard.html) and open it in a browser.
+
+Simulated time; Kobuki, the URG laser (240 deg, 5.6 m), maps of 5 cm, cut at {horizon:.0f} s. Starts are drawn
+by the seed, the same for every policy.
+
+- The world *ideal* has perfect poses, no noise and known starts. *Lab* has SLAM on noisy scans and odometry.
+- Robots with *unknown starts* localize by SLAM, too, and find out by their maps where the others are.
+- *By camera* a floor counts as seen where depth cameras saw the ground.
+
+An entry of time is the median with its 95 % interval; runs that did not get there count as never. Multiples
+are of the time that a team needs that [knows the floor](../reference/bounds.md), medians over the floors that
+have a bound. The difference is that of the restricted means to the baseline of the world
+(`nearest_frontier`, or `independent` where starts are unknown), pair by pair, with its 95 % interval. It is
+bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm).
+{notes}
+{kinds}
+"""
+
+
+def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
+    """Bound a part of the floors."""
+    floors = floors_of(data, every)
+    teams = [
+        Bounded(floor, robots, SETTINGS)
+        for kind, nth in BOUNDED.items()
+        for floor in floors.get(kind, ())[::nth]
+        for robots in TEAMS
+    ]
+    yield from do_missing(folder / BOUNDS_FILE, "bounds", teams, measure_bound, workers)
+
 
 def page(folder: Path, command: str) -> str:
-    """Write the report of each suite, and return the leaderboard as markdown.
-
-    Each report goes into the folder of its suite.
-    """
-    parts = [
-        "# Leaderboard",
-        f"Made by `{command}` on {date.today().isoformat()}: lidarium {lidarium.__version__}, Python "
-        f"{platform.python_version()}. "
-        "Simulated time; perfect poses, no noise, the URG laser (240 deg, 5.6 m), maps of 2.5 cm, known "
-        "starts, cut at 1,800 s. "
-        "Starts are drawn by the seed, the same for every policy. An entry of time is the median with its 95 "
-        "% interval; "
-        "runs that did not get there count as never. The difference is that of the restricted means to "
-        "`nearest_frontier`, pair by "
-        "pair, with its 95 % interval; in bold where Wilcoxon's signed rank test says that it is beyond "
-        "chance (5 %, Holm).",
-    ]
-    is_run = {kind: (folder / kind / "episodes.jsonl").exists() for kind in KINDS}
-    if "--every" in command:
-        parts.append(
+    """Return the leaderboard as markdown; each suite's report goes into its folder."""
+    found = _parts_in(folder)
+    notes = []
+    if "--every" in command or "--share" in command:
+        notes.append(
             "A part of the floors of each kind, too few for firm words: the intervals say so. Without "
             "`--every` the command runs all."
         )
-    if not all(is_run.values()):
-        parts.append(f"Not in it: {', '.join(about for kind, about in KINDS.items() if not is_run[kind])}.")
-    for kind, about in KINDS.items():
-        if not is_run[kind]:
-            continue
-        numbers = write_report(folder / kind, folder / kind / "report", BASELINE)
-        floors = sorted({floor for group in numbers["groups"] for floor in group["floors"]})
-        parts += [f"## {about[0].upper()}{about[1:]} ({len(floors)})", _table(numbers["groups"])]
-        if any("fewer than" in warning for warning in numbers["warnings"]):
-            parts.append(
-                "Fewer than 50 runs or pairs: intervals may hold the truth less often than they say ([how "
-                "often](interval_coverage.md))."
-            )
-    return "\n\n".join(parts) + "\n"
+    if missing := [about for kind, about in KINDS.items() if kind not in found]:
+        notes.append(f"Not in it: {', '.join(missing)}.")
+    return PAGE.format(
+        command=command,
+        date=date.today().isoformat(),
+        version=lidarium.__version__,
+        python=platform.python_version(),
+        horizon=HORIZON_S,
+        notes="".join(f"\n{note}\n" for note in notes),
+        kinds="\n\n".join(_section(kind, kind_parts) for kind, kind_parts in found.items()),
+    )
 
 
-def _table(groups: Iterable[Mapping[str, Any]]) -> str:
-    by_team: dict[int, list[Mapping[str, Any]]] = {}
-    for group in groups:
-        by_team.setdefault(group["robots"], []).append(group)
-    lines = [
-        "| robots | policy | runs | reached 99 % | time to 90 % [s] | time to 99 % [s] | less the baseline "
-        "[s] | path of all [m] | "
-        "overlap [%] |",
-        "|---:|---|---:|---:|---:|---:|---:|---:|---:|",
-    ]
-    for robots, members in sorted(by_team.items()):
-        for group in members:
-            lines += [
-                _row(robots, policy, group)
-                for policy in sorted(group["times"]["t99_s"], key=lambda name: _order(name, group))
-            ]
-    return "\n".join(lines)
+def beside(folder: Path, out: Path) -> None:
+    """Write the page for browsers beside the other, and the README's table where there is one."""
+    shutil.copyfile(_browser_page(folder), out / "leaderboard.html")
+    readme = out.resolve().parent.parent / "README.md"
+    text = readme.read_text(encoding="utf-8") if readme.is_file() else ""
+    found = _parts_in(folder)
+    if BEGIN in text and END in text and "test" in found:
+        before, rest = text.split(BEGIN, 1)
+        after = rest.split(END, 1)[1]
+        write_text(readme, f"{before}{BEGIN}\n\n{short_table(found['test'], README_TEAM)}\n\n{END}{after}")
 
 
-def _order(policy: str, group: Mapping[str, Any]) -> float:
-    """Best first: by the restricted mean of the time to 99 %."""
-    mean = group["times"]["t99_s"][policy]["restricted_mean"]
-    return float("inf") if mean is None else float(mean["estimate"])
+def _section(kind: str, found: list[Part]) -> str:
+    floors = {floor for part in found for group in part.groups for floor in group["floors"]}
+    about = KINDS[kind]
+    return f"## {about[0].upper()}{about[1:]} ({len(floors)})\n\n{table(found)}"
 
 
-def _row(robots: int, policy: str, group: Mapping[str, Any]) -> str:
-    t90, t99 = (group["times"][key][policy] for key in ("t90_s", "t99_s"))
-    values = group["values"][policy]
-    cells = [
-        str(robots),
-        f"`{policy}`",
-        str(t99["size"]),
-        f"{100.0 * t99['success']['estimate']:.0f} %",
-        _interval(t90["median"]),
-        _interval(t99["median"]),
-        _difference(policy, group),
-        _estimate(values, "path_m"),
-        _estimate(values, "overlap_percent"),
-    ]
-    return f"| {' | '.join(cells)} |"
+def _parts_in(folder: Path) -> dict[str, list[Part]]:
+    """Return what has run, by kind of floor."""
+    bounds = _bounds_in(folder)
+    found: dict[str, list[Part]] = {}
+    for kind, name, world in parts():
+        path = folder / f"{kind}_{name}"
+        if (path / EPISODES_FILE).exists():
+            groups = _report(path, world.policies[0])["groups"]
+            multiples = _multiples(path, bounds)
+            found.setdefault(kind, []).append(Part(world, groups, multiples))
+    return found
 
 
-def _interval(figure: Mapping[str, Any]) -> str:
-    def shown(value: float | None) -> str:
-        return "never" if value is None else f"{value:.0f}"
-
-    if figure["low"] is None:
-        return f"{shown(figure['estimate'])} (too few for an interval)"
-    return f"{shown(figure['estimate'])} ({shown(figure['low'])} to {shown(figure['high'])})"
-
-
-def _difference(policy: str, group: Mapping[str, Any]) -> str:
-    for comparison in group["comparisons"]:
-        figure = comparison["difference"]
-        if comparison["policy"] == policy and comparison["key"] == "t99_s" and figure is not None:
-            bounds = [figure["low"], figure["high"]]
-            # Of very few pairs there is an estimate alone.
-            text = f"{figure['estimate']:+.0f}" + (
-                "" if None in bounds else f" ({bounds[0]:+.0f} to {bounds[1]:+.0f})"
-            )
-            return f"**{text}**" if comparison["p_holm"] < CHANCE else text
-    return "-"
+def _report(path: Path, baseline: str) -> dict[str, Any]:
+    """Return the numbers of a report, which is written where the episodes are newer."""
+    episodes, made = path / EPISODES_FILE, path / "report" / "report.json"
+    if made.exists() and made.stat().st_mtime > episodes.stat().st_mtime:
+        return dict(json.loads(made.read_text(encoding="utf-8")))
+    return write_report(path, path / "report", baseline)
 
 
-def _estimate(values: Mapping[str, Any], key: str) -> str:
-    return f"{values[key]['median']['estimate']:.0f}"
+def _bounds_in(folder: Path) -> dict[tuple[str, int], float]:
+    path = folder / BOUNDS_FILE
+    lines = kept_lines(path) if path.exists() else []
+    return {(line["floor"], line["robots"]): line["known_s"] for line in lines if line["known_s"]}
 
 
-STUDY = Study(page, suites)
+def _multiples(path: Path, bounds: Mapping[tuple[str, int], float]) -> Multiples:
+    """Return medians of multiples of the bound; who did not get to 99 % took the whole time."""
+    found: dict[tuple[str, int], list[float]] = {}
+    for episode in read_episodes(path / EPISODES_FILE):
+        # Floors by the names that were asked for; `building:3000000` calls itself by its kind.
+        team = episode[KEY].split(" | ")[1], episode["robots"]
+        if team in bounds:
+            time_s = HORIZON_S if episode["t99_s"] is None else float(episode["t99_s"])
+            found.setdefault((episode["policy"], team[1]), []).append(time_s / bounds[team])
+    return {key: float(np.median(multiples)) for key, multiples in found.items()}
+
+
+def _browser_page(folder: Path) -> Path:
+    """Return the report page of all episodes, each with its kind of floor and world as its settings."""
+    lines = []
+    for kind, name, world in parts():
+        path = folder / f"{kind}_{name}" / EPISODES_FILE
+        variant = f"{world.about}: {KINDS[kind].partition(',')[0]}"
+        for episode in read_episodes(path) if path.exists() else []:
+            key = " | ".join([variant, *episode[KEY].split(" | ")[1:]])
+            lines.append(json.dumps({**episode, KEY: key, "variant": variant}))
+    write_text(folder / ALL / EPISODES_FILE, "\n".join(lines) + "\n")
+    write_report(folder / ALL, folder / ALL / "report")
+    return folder / ALL / "report" / "report.html"
+
+
+STUDY = Study(page, suites, work, beside)

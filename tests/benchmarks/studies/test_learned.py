@@ -53,21 +53,6 @@ def test_bounds_say_what_is_saved(episodes):
     assert learned.bounds_table([], episodes).startswith("No floor")
 
 
-def test_a_bound_begins_where_explorers_do(monkeypatch):
-    seen = {}
-
-    def bound(floor, settings, starts):
-        from lidarium.evaluation.bounds.bound import KnownFloorBound
-
-        seen.update(starts=starts, robots=settings.robots)
-        return KnownFloorBound(12.0, 1.0, 1.0, 0.99, [])
-
-    monkeypatch.setattr(learned, "known_floor_bound", bound)
-    found = learned.measure_bound(learned.Bounded("apartment:7", 2))
-    assert found == {"floor": "apartment:7", "robots": 2, "known_s": 12.0}
-    assert len(seen["starts"]) == seen["robots"] == 2
-
-
 def test_kinds_that_did_not_run_are_named():
     assert learned.missing_text([]) == ""
     assert "LIFULL apartments" in learned.missing_text(["slam", "lifull"])
