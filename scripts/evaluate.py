@@ -4,6 +4,7 @@ With teams, seeds and settings; an evaluation in the folder can be continued.
 """
 
 import os
+import re
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -67,6 +68,8 @@ class Evaluate(TeamCommand):
     """processes that run episodes; 0 for as many as there are cores"""
     ray: str | None = None
     """Ray cluster that runs episodes in place of --workers: auto, or HOST:PORT (extra `ray`)"""
+    shard: str | None = None
+    """part of the episodes that runs, as K/N: the K-th of N, for machines that do not know each other"""
     bounds: bool = False
     """set each episode beside how soon a team that knew the floor could have seen it (extra `bounds`)"""
     records: bool = True
@@ -88,25 +91,38 @@ def execute(command: Evaluate) -> Answer:
         raise ValueError(f"--workers is {command.workers}; want 0 for as many as there are cores, or more")
     folder = command.out or DEFAULT_FOLDER
     check_writable(folder)
+    part = _shard(command.shard)
+    suite = _suite(command)
     campaign = Campaign(
-        _suite(command),
+        suite,
         folder,
         command.workers or len(os.sched_getaffinity(0)),
         command.records,
+        list(suite.trials())[part],
         cluster=command.ray,
     )
     first_start.compile_first(command.json)
     is_interrupted = False
     runs = campaign.run()
     try:
-        missing = sum(1 for _ in campaign.suite.trials())
-        for _ in counted(runs, missing, "episodes", command.json):
+        for _ in counted(runs, len(campaign.trials or ()), "episodes", command.json):
             pass
     except KeyboardInterrupt:
         is_interrupted = True
     finally:
         runs.close()
     return _answer(campaign, folder, is_interrupted)
+
+
+def _shard(text: str | None) -> slice:
+    """Return which of the trials a shard has."""
+    if text is None:
+        return slice(None)
+    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+    shard, count = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not 1 <= shard <= count:
+        raise ValueError(f"--shard is {text!r}; want K/N with K from 1 to N, such as 2/8")
+    return slice(shard - 1, None, count)
 
 
 def _suite(command: Evaluate) -> "Suite":
@@ -162,7 +178,7 @@ def _answer(campaign: "Campaign", folder: Path, is_interrupted: bool) -> Answer:
 
     for trial, error in campaign.failures:
         notify(f"{trial.key}: {type(error).__name__}: {error}")
-    keys = {trial.key for trial in campaign.suite.trials()}
+    keys = {trial.key for trial in campaign.trials or ()}
     episodes = [episode for episode in read_episodes(folder / EPISODES_FILE) if episode["key"] in keys]
     if len(episodes) < campaign.done:
         raise FileNotFoundError(

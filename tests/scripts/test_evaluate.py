@@ -6,10 +6,11 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 
-from lidarium.evaluation.suites.episodes_file import read_episodes
+from lidarium.evaluation.suites.episodes_file import TIMINGS, read_episodes
 from lidarium.scripts.main import main
 
 SHORT = ["--robots", "1", "--seeds", "2", "--horizon-s", "5", "--map-resolution", "0.05", "--workers", "1"]
@@ -35,6 +36,21 @@ def test_an_evaluation_writes_a_folder_and_tells_its_medians(tmp_path, capsys):
     assert [row["policy"] for row in result["summary"]] == ["random_walk"]
 
 
+def test_shards_together_are_the_whole_evaluation(tmp_path):
+    def lines(*folders):
+        rows = [row for folder in folders for row in read_episodes(tmp_path / folder / "episodes.jsonl")]
+        return sorted(
+            json.dumps({name: value for name, value in row.items() if name not in TIMINGS}) for row in rows
+        )
+
+    assert evaluate("--policies", "random_walk", *SHORT, "--seeds", "3", "--out", tmp_path / "all") == 0
+    for shard in (1, 2):
+        part = ["--shard", f"{shard}/2", "--out", tmp_path / f"part-{shard}", "--json"]
+        assert evaluate("--policies", "random_walk", *SHORT, "--seeds", "3", *part) == 0
+    assert lines("part-1", "part-2") == lines("all")
+    assert len(lines("part-1")) == 2
+
+
 def test_a_file_says_what_to_run(tmp_path, capsys):
     path = tmp_path / "suite.toml"
     path.write_text(
@@ -53,6 +69,8 @@ def test_a_file_says_what_to_run(tmp_path, capsys):
         (["--floors", "appartment"], "did you mean 'apartment'"),
         (["--seeds", "0"], "--seeds is 0"),
         (["--workers", "-1"], "--workers is -1"),
+        (["--shard", "3/2"], "--shard is '3/2'; want K/N with K from 1 to N"),
+        (["--shard", "second"], "--shard is 'second'; want K/N"),
         (["--preset", "ariadn"], "did you mean 'ariadne'"),
         (["--preset", "ariadne"], "give --data"),
         (["none.toml"], "no suite none.toml"),
@@ -113,10 +131,12 @@ def test_an_interrupted_evaluation_keeps_what_is_finished_and_goes_on(tmp_path, 
 
 
 def test_the_leaderboard_is_made_by_one_command(tmp_path, capsys, monkeypatch):
-    from lidarium.benchmarks.studies.leaderboard import study as leaderboard
+    from lidarium.benchmarks.studies.leaderboard import study, worlds
 
-    monkeypatch.setattr(leaderboard, "SETTINGS", {"resolution": 0.05, "horizon_s": 4.0})
-    monkeypatch.setattr(leaderboard, "TEAMS", (1,))
+    policies = worlds.WORLDS["ideal"].policies
+    monkeypatch.setattr(worlds, "SETTINGS", {"resolution": 0.05, "horizon_s": 4.0})
+    monkeypatch.setattr(worlds, "WORLDS", {"ideal": replace(worlds.WORLDS["ideal"], teams=(1,))})
+    monkeypatch.setattr(study, "BOUNDED", {})
     arguments = [
         "reproduce",
         "leaderboard",
@@ -131,8 +151,9 @@ def test_the_leaderboard_is_made_by_one_command(tmp_path, capsys, monkeypatch):
     ]
     assert main(arguments) == 0
     page = (tmp_path / "out" / "leaderboard.md").read_text()
-    assert all(f"| `{policy}` |" in page for policy in leaderboard.POLICIES)
+    assert all(f"| `{policy}` |" in page for policy in policies)
     assert "Generated floors of the set `test` (2)" in page
+    assert (tmp_path / "out" / "leaderboard.html").stat().st_size > 50_000
     assert main([*arguments, "--every", "0"]) == 2
     assert main([*arguments, "--data", str(tmp_path)]) == 2
     assert "no real floors below" in capsys.readouterr().err

@@ -2,7 +2,6 @@
 
 import json
 import platform
-import shutil
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
@@ -98,7 +97,7 @@ def page(folder: Path, command: str) -> str:
 
 def beside(folder: Path, out: Path) -> None:
     """Write the page for browsers beside the other, and the README's table where there is one."""
-    shutil.copyfile(_browser_page(folder), out / "leaderboard.html")
+    write_text(out / "leaderboard.html", _browser_page(folder).read_text(encoding="utf-8"))
     readme = out.resolve().parent.parent / "README.md"
     text = readme.read_text(encoding="utf-8") if readme.is_file() else ""
     found = _parts_in(folder)
