@@ -43,6 +43,11 @@ STUDIES.register(
     "learned explorers beside classic ones and beside bounds, on floors that no training has seen",
 )
 STUDIES.register(
+    "machines",
+    f"{_PACKAGE}.evaluation.machines_study:STUDY",
+    "10^5 episodes, two nodes of a Ray cluster beside one, and nodes that are killed",
+)
+STUDIES.register(
     "merging",
     f"{_PACKAGE}.merging.study:STUDY",
     "map merging on a bank of maps that robots made, beside the thesis and ROS map_merge",
