@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import Positional, arg
 
 from lidarium.scripts.common import DONE, NO, Answer, Command, notify, table
+from lidarium.scripts.options.film import FilmFiles
 
 if TYPE_CHECKING:
     from lidarium.envs.exploration import ExplorationEnv
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replay(Command):
+class Replay(Command, FilmFiles):
     """Run a recorded episode again and compare its end, or draw its record.
 
     It reports whether the episode ends in the same state to the bit.
@@ -33,11 +34,6 @@ class Replay(Command):
 
     Works for records of other versions too
     """
-    video: Path | None = None
-    """film the record as an mp4 file instead of running it again.
-
-    Works for records of other versions too
-    """
     html: Path | None = None
     """write a page that replays the record in a browser, as one HTML file without network.
 
@@ -45,8 +41,6 @@ class Replay(Command):
     """
     mcap: Path | None = None
     """run the record again and write what was sensed as a bag of ROS 2 (extra mcap)"""
-    video_speed: float = 10.0
-    """simulated seconds per second of the film"""
 
 
 def execute(command: Replay) -> Answer:
@@ -60,14 +54,13 @@ def execute(command: Replay) -> Answer:
     from lidarium.evaluation.episodes.output import check_writable, write_json
     from lidarium.evaluation.record import read_record
 
-    drawn = [
-        path for path in (command.picture, command.video, command.html, command.mcap) if path is not None
-    ]
-    for folder in (command.out, *(path.parent for path in drawn)):
+    files = [path for path in (command.picture, command.html, command.mcap) if path is not None]
+    for folder in (command.out, *(path.parent for path in files)):
         if folder is not None:
             check_writable(folder)
+    command.check_films()
     record = read_record(command.file)
-    answer = _drawn(command, record) if drawn else _run_again(command, record)
+    answer = _drawn(command, record) if files or command.films else _run_again(command, record)
     if command.out is not None:
         write_json(command.out / "replay.json", answer.result)
     return answer
@@ -80,18 +73,18 @@ def _about(command: Replay, record: "EpisodeRecord") -> dict[str, Any]:
 
 
 def _drawn(command: Replay, record: "EpisodeRecord") -> Answer:
-    from lidarium.evaluation.drawing.record_frames import save_track_film, save_track_picture
-    from lidarium.evaluation.drawing.video import check_speed
+    from lidarium.evaluation.drawing.films.track_film import save_track_film
+    from lidarium.evaluation.drawing.record_frames import save_track_picture
 
-    check_speed(command.video_speed)
     files = []
     if command.picture is not None:
         save_track_picture(command.picture, record)
         files.append(str(command.picture))
-    if command.video is not None:
+    floor = _floor_of_camera(command, record) if command.films else None
+    for path in command.films:
         notify(f"filming {record.display.times[-1]:.0f} s")
-        save_track_film(command.video, record, command.video_speed, floor=_floor_of_camera(command, record))
-        files.append(str(command.video))
+        save_track_film(path, record, command.film_settings, floor)
+        files.append(str(path))
     if command.html is not None:
         _write_page(command.html, command, record)
         files.append(str(command.html))

@@ -10,17 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from lidarium.scripts.common import Answer, Command, counted, table
+from lidarium.scripts.common import Answer, Command, counted, notify, table
+from lidarium.scripts.options.film import FilmFiles
 
 if TYPE_CHECKING:
     from lidarium.evaluation.analysis.episodes import Row
+    from lidarium.evaluation.report.film_choice import Chosen
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report(Command):
+class Report(Command, FilmFiles):
     """Compare policies over the episodes of a directory.
 
-    Writes report.html, report.md, report.json and plots to --out, or to DIR/report.
+    Writes report.html, report.md, report.json and plots to --out, or to DIR/report. A film shows recorded
+    episodes of one floor and seed side by side, one of each policy.
     """
 
     directory: Positional[Path]
@@ -32,6 +35,14 @@ class Report(Command):
     """
     replays: int = 30
     """most recorded episodes that run again for replays on the page, 0 for none"""
+    film_floor: str | None = None
+    """floor of the episodes that a film shows; where left out, one that most policies have explored"""
+    film_robots: int | None = None
+    """number of robots of the episodes that a film shows"""
+    film_seed: int | None = None
+    """seed of the episodes that a film shows"""
+    film_policies: tuple[str, ...] = ()
+    """policies that a film shows, in this order; all of them where left out, nine at most"""
 
 
 def execute(command: Report) -> Answer:
@@ -45,12 +56,38 @@ def execute(command: Report) -> Answer:
     from lidarium.evaluation.report import write_report
 
     out = command.out or command.directory / "report"
+    command.check_films()
+    chosen = _chosen(command) if command.films else None
 
     def progress(rows: Sequence["Row"]) -> Iterable["Row"]:
         return counted(rows, len(rows), "replays", command.json)
 
     result = write_report(command.directory, out, command.baseline, command.seed, command.replays, progress)
-    return Answer(result, _summary(result, out))
+    if chosen is not None:
+        _film(command, chosen)
+    return Answer(result, "\n".join([_summary(result, out), *(f"film: {path}" for path in command.films)]))
+
+
+def _chosen(command: Report) -> "Chosen":
+    """Return the episodes of the films."""
+    from lidarium.evaluation.report.film_choice import Wanted, choose_episodes
+
+    wanted = Wanted(command.film_floor, command.film_robots, command.film_seed, command.film_policies)
+    chosen = choose_episodes(command.directory, wanted)
+    if chosen.left_out:
+        notify(f"the film has no room for {', '.join(chosen.left_out)}; --film-policies chooses")
+    return chosen
+
+
+def _film(command: Report, chosen: "Chosen") -> None:
+    """Film episodes side by side."""
+    from lidarium.evaluation.drawing.films.track_film import save_side_by_side
+    from lidarium.evaluation.record import read_record
+
+    records = {policy: read_record(path) for policy, path in chosen.records.items()}
+    for path in command.films:
+        notify(f"filming {len(records)} episode{'s' if len(records) > 1 else ''}: {chosen.title}")
+        save_side_by_side(path, records, chosen.title, command.film_settings)
 
 
 def _summary(result: dict[str, Any], out: Path) -> str:

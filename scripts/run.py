@@ -1,14 +1,16 @@
 """`lidarium run`: a team explores a floor, and writes what it found."""
 
-from contextlib import ExitStack
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, file_name
+from lidarium.scripts.options.film import FilmOptions
 from lidarium.scripts.options.policy import policy_options
 from lidarium.scripts.options.supervisor import check_supervised, supervisor_options
 from lidarium.scripts.output.run_files import write_run
+from lidarium.scripts.output.run_films import RunFilms, Shown
 from lidarium.scripts.output.run_summary import run_summary
 from lidarium.scripts.process import first_start
 
@@ -40,10 +42,10 @@ STOP_COVERAGE = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(TeamCommand):
+class Run(TeamCommand, FilmOptions):
     """Let a team explore a floor.
 
-    Writes its figures, its map, a picture and, if asked for, a record and a film.
+    Writes its figures, its map, a picture and, if asked for, a record and films.
     """
 
     floor: str = "apartment"
@@ -86,13 +88,23 @@ class Run(TeamCommand):
     """
     video: bool = False
     """write a film of the run, run.mp4"""
-    video_speed: float = 10.0
-    """simulated seconds per second of the film"""
+    gif: bool = False
+    """write a film of the run as an animated picture, run.gif"""
+    film_shows: Shown = "auto"
+    """what films show: maps, what each robot knows and how maps are joined; or scans, what lasers see.
+
+    Left out, maps where robots do not know their starts and have no cameras
+    """
 
     @property
     def chosen_policy(self) -> str:
         """Who decides, once what was left out is known."""
         return self.policy or LONE_POLICY
+
+    @property
+    def films(self) -> list[str]:
+        """Names of the films that are asked for."""
+        return ["run.mp4"] * self.video + ["run.gif"] * self.gif
 
 
 def execute(command: Run) -> Answer:
@@ -115,8 +127,9 @@ def execute(command: Run) -> Answer:
     recorder = _recorder(command)
     env, history = _environment(command, policy, recorder)
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
+    films = RunFilms(env, policy, command.films, command.film_shows, command.film_settings)
     first_start.compile_first(command.json)
-    episode = _explore(command, policy, env, {} if starts is None else {"starts": starts})
+    episode = _explore(command, policy, env, films, {} if starts is None else {"starts": starts})
     assert env.floor is not None
     folder = _folder(command, env.floor.name)
     from lidarium.evaluation.episodes.result import result_of
@@ -124,7 +137,7 @@ def execute(command: Run) -> Answer:
     result = result_of(episode, command.chosen_policy, history)
     if options:
         result["policy_settings"] = options
-    files = write_run(folder, episode, result, recorder, command.chosen_policy, has_film=command.video)
+    files = write_run(folder, episode, result, recorder, command.chosen_policy, command.films)
     return Answer(
         result,
         run_summary(command.chosen_policy, episode, result, folder, files),
@@ -218,50 +231,29 @@ def _parsed_starts(text: str, robots: int) -> "NDArray[np.float64] | str":
     return starts
 
 
-def _explore(command: Run, policy: Any, env: "WatchedExploration", options: dict[str, Any]) -> "Episode":  # noqa: ANN401
-    """Run the episode under a progress bar and, if asked for, a camera."""
-    from lidarium.evaluation.episodes.runner import run_episode
-
-    progress = Progress(is_quiet=command.json)
-    try:
-        if not command.video:
-            return run_episode(policy, env, command.seed, options, progress.show, raise_interrupt=False)
-        return _film(command, policy, env, options, progress)
-    finally:
-        progress.close()
-
-
-def _film(
+def _explore(
     command: Run,
     policy: Any,  # noqa: ANN401
     env: "WatchedExploration",
+    films: RunFilms,
     options: dict[str, Any],
-    progress: Progress,
 ) -> "Episode":
-    from lidarium.evaluation.drawing.supervision_marks import recent_supervision
-    from lidarium.evaluation.drawing.video import Film, film
+    """Run the episode under a progress bar and, if asked for, cameras."""
     from lidarium.evaluation.episodes.runner import run_episode
 
-    with ExitStack() as stack:
-        camera: list[Film] = []
+    progress = Progress(is_quiet=command.json)
 
-        def on_decision(current: "ExplorationEnv") -> None:
-            # The folder is named by the floor, which a set draws at the reset; nothing is written before
-            # that.
-            if not camera:
-                over = recent_supervision(policy)
-                assert current.floor is not None
-                path = _folder(command, current.floor.name) / "run.mp4"
-                camera.append(stack.enter_context(film(path, command.video_speed, draw_over=over)))
-                camera[0].begin(current)
-                env.watchers.append(camera[0])
-            progress.show(current)
+    def on_decision(current: "ExplorationEnv") -> None:
+        # The folder is named by the floor, which a set draws at the reset; nothing is written before that.
+        assert current.floor is not None
+        films.begin(_folder(command, current.floor.name))
+        progress.show(current)
 
+    with closing(progress), films.kept():
         episode = run_episode(policy, env, command.seed, options, on_decision, raise_interrupt=False)
-        env.watchers[:] = [watcher for watcher in env.watchers if watcher not in camera]
-        if camera and not episode.is_interrupted:
-            camera[0].end(env)
-        return episode
+        if not episode.is_interrupted:
+            films.end()
+    return episode
 
 
 def _folder(command: Run, floor: str) -> Path:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from films_read import read_film
 
 from lidarium.agents.catalogue import POLICIES
 from lidarium.scripts.main import Choice
@@ -76,10 +77,13 @@ def test_the_rewards_of_the_tutorial_have_the_terms_that_it_shows(capsys):
     assert capsys.readouterr().out == re.search(r"```text\n(.*?)```", text, re.DOTALL)[1]
 
 
-def test_the_page_of_the_tutorial_is_written(tmp_path, monkeypatch):
+def test_the_page_and_the_film_of_the_tutorial_are_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     exec(compile(code_of("share_results.md"), "share_results.md", "exec"), {})
     assert "explore_lite on apartment, 2 robots, seed 0" in (tmp_path / "episode.html").read_text()
+    film = read_film(tmp_path / "episode.gif")
+    assert film.frames.shape[2] == 480
+    assert film.seconds == pytest.approx(30.0 / 10.0 + 0.1 + 1.5)
 
 
 def test_networks_of_the_tutorial_explore(capsys):

@@ -45,6 +45,9 @@ SHIFT = 4
 
 BORDER = 10
 
+LEAST_WIDTH = 360
+"""Of a frame with a header [pixels]."""
+
 
 def team_colours(robots: int) -> list[Colour]:
     """Return a colour (red, green, blue) for each robot.
@@ -126,6 +129,18 @@ def _span(is_used: NDArray[np.bool_], margin: int) -> slice:
     return slice(max(low - margin, 0), min(high + margin, len(is_used)))
 
 
+def blocks_of(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
+    """Return a map's three levels with blocks of cells as one where there are more cells than pixels.
+
+    Occupied cells show.
+    """
+    if view.block == 1:
+        return levels
+    rows, columns = (side // view.block for side in levels.shape)
+    whole = levels[: rows * view.block, : columns * view.block]
+    return np.asarray(whole.reshape(rows, view.block, columns, view.block).min(axis=(1, 3)))
+
+
 def enlarged(picture: Frame, view: View) -> Frame:
     """Return a picture of a view's cells, as large as the view.
 
@@ -172,6 +187,12 @@ def draw_robots(
         )
 
 
+def pale(colour: Colour) -> Colour:
+    """Return a colour mixed with white, for what is free on the map of a robot of this colour."""
+    red, green, blue = ((channel + 2 * 255) // 3 for channel in colour)
+    return red, green, blue
+
+
 def _paler(colour: Colour) -> Colour:
     red, green, blue = (channel + (220 - channel) // 2 for channel in colour)
     return red, green, blue
@@ -180,10 +201,10 @@ def _paler(colour: Colour) -> Colour:
 def with_header(picture: Frame, name: str, coverage: float, time_s: float) -> Frame:
     """Return a picture in a frame below a line of text and a bar of coverage.
 
-    Both sides even, as video codecs want them.
+    Both sides are even, as `even` has it.
     """
-    width = max(picture.shape[1] + 2 * BORDER, 360)
-    return _even(np.concatenate([_header(name, coverage, time_s, width), _framed(picture, width)]))
+    width = max(picture.shape[1] + 2 * BORDER, LEAST_WIDTH)
+    return even(np.concatenate([_header(name, coverage, time_s, width), _framed(picture, width)]))
 
 
 def _header(name: str, share: float, time_s: float, width: int) -> Frame:
@@ -199,9 +220,32 @@ def _header(name: str, share: float, time_s: float, width: int) -> Frame:
     while name and _text_width(name, 0.6 * scale) > room:
         name = name[:-1]
     _put(header, name, (margin, baseline), FAINT_INK, 0.6 * scale)
-    header[-6:] = UNEXPLORED
-    header[-6:, : round(width * min(share, 1.0))] = (22, 163, 74)
+    draw_bar(header[-6:], share)
     return header
+
+
+def line_of_text(
+    words: str, size: tuple[int, int], colour: Colour, background: Colour, right: str = ""
+) -> Frame:
+    """Return a line with as many letters of the words as there is room for, and others at its right end.
+
+    The size is (width, height) [pixels].
+    """
+    width, height = size
+    line = np.full((height, width, 3), background, np.uint8)
+    words, scale, margin, baseline = _plain(words), height / 51.0, height // 3, round(0.71 * height)
+    right_width = _text_width(right, scale) + margin if right else 0
+    while words and _text_width(words, scale) > width - 2 * margin - right_width:
+        words = words[:-1]
+    _put(line, words.rstrip(), (margin, baseline), colour, scale)
+    _put(line, right, (width - right_width, baseline), colour, scale)
+    return line
+
+
+def draw_bar(line: Frame, share: float) -> None:
+    """Draw a bar of coverage over all of a line."""
+    line[:] = UNEXPLORED
+    line[:, : round(line.shape[1] * min(share, 1.0))] = (22, 163, 74)
 
 
 def _plain(text: str) -> str:
@@ -226,7 +270,8 @@ def _framed(picture: Frame, width: int) -> Frame:
     )
 
 
-def _even(picture: Frame) -> Frame:
+def even(picture: Frame) -> Frame:
+    """Return a picture both sides of which are even, as video codecs want them."""
     rows, columns = picture.shape[0] % 2, picture.shape[1] % 2
     return np.asarray(
         cv2.copyMakeBorder(picture, 0, rows, 0, columns, cv2.BORDER_CONSTANT, value=BACKGROUND), np.uint8

@@ -1,4 +1,4 @@
-"""Pictures and films of what any version can show of a record.
+"""Pictures of what any version can show of a record, and frames of films.
 
 They show the team's map, paths, coverage, targets and endings.
 """
@@ -22,7 +22,7 @@ from lidarium.envs.drawing.frame_parts import (
     UNEXPLORED,
     WALL,
     Frame,
-    View,
+    blocks_of,
     draw_paths,
     draw_robots,
     enlarged,
@@ -48,7 +48,6 @@ from lidarium.evaluation.drawing.picture_parts import (
     save_titled_figure,
     show_cells,
 )
-from lidarium.evaluation.drawing.video import FRAMES_PER_SECOND, LAST_FRAME_S, check_speed, film_writer
 from lidarium.evaluation.metrics import path_lengths
 from lidarium.evaluation.record.episode_record import EpisodeRecord
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
@@ -71,13 +70,21 @@ class TrackFrames:
         Longer side of the explored part in a frame [pixels].
     floor : Floor or None
         The floor of the record: what the first robot's camera sees is then beside a frame.
+    shown : (rows, columns) bool or None
+        Cells of the team's map that frames show; those that the team knows at the end where None.
     """
 
-    def __init__(self, record: EpisodeRecord, size: int = SIZE, floor: Floor | None = None) -> None:
+    def __init__(
+        self,
+        record: EpisodeRecord,
+        size: int = SIZE,
+        floor: Floor | None = None,
+        shown: NDArray[np.bool_] | None = None,
+    ) -> None:
         self._record, self._display = record, record.display
         display = record.display
-        known = display.map_at(math.inf) != UNKNOWN
-        self.view = view_around(known, display.origin, display.resolution, size)
+        shown = known_at_end(record) if shown is None else shown
+        self.view = view_around(shown, display.origin, display.resolution, size)
         self._agents = [f"robot_{robot}" for robot in range(display.poses.shape[1])]
         self._colours = team_colours(len(self._agents))
         camera, robot = (record.header["settings"].get(name) for name in ("camera", "robot"))
@@ -85,13 +92,21 @@ class TrackFrames:
         self._views = None if floor is None else views_of(floor, Robot(**robot), len(self._agents))
 
     def draw(self, time_s: float) -> Frame:
-        """Return the frame at a time: the team's map, paths, targets and robots.
+        """Return the frame at a time: what `picture` shows below a header, beside it a camera's view."""
+        coverage = self._display.coverage_at(time_s)
+        frame = with_header(self.picture(time_s), self._record.header["floor"], coverage, time_s)
+        if self._camera is None:
+            return frame
+        return self._with_panel(frame, self._camera, self._display.poses_at(time_s))
+
+    def picture(self, time_s: float) -> Frame:
+        """Return the team's map at a time, with paths, targets and robots.
 
         Paths are those of the last minute, targets are rings, and robots have their headings.
         """
         display, view = self._display, self.view
         levels = without_small_components(display.map_at(time_s))[view.rows, view.columns]
-        frame = enlarged(_PALETTE[_blocks(levels, view)], view)
+        frame = enlarged(_PALETTE[blocks_of(levels, view)], view)
         recent = (display.times >= time_s - RECENT_S) & (display.times <= time_s + 1e-9)
         poses = display.poses_at(time_s)
         draw_paths(
@@ -105,8 +120,7 @@ class TrackFrames:
         }
         has_ended = [agent in ended for agent in self._agents]
         draw_robots(frame, view, poses, radius_of(self._record), has_ended, self._colours)
-        frame = with_header(frame, self._record.header["floor"], display.coverage_at(time_s), time_s)
-        return frame if self._camera is None else self._with_panel(frame, self._camera, poses)
+        return frame
 
     def _with_panel(self, frame: Frame, camera: DepthCamera, poses: NDArray[np.float64]) -> Frame:
         """Put what the first robot's camera sees beside a frame."""
@@ -139,29 +153,9 @@ class TrackFrames:
                 cv2.circle(frame, there, radius << SHIFT, colour, 2, cv2.LINE_AA, SHIFT)
 
 
-def save_track_film(
-    path: Path, record: EpisodeRecord, speed: float = 10.0, size: int = SIZE, floor: Floor | None = None
-) -> None:
-    """Film what a record shows (mp4, H.264).
-
-    The speed is so many simulated seconds per second; ``floor`` as for ``TrackFrames``.
-
-    Raises
-    ------
-    ValueError
-        Where the speed is not positive.
-    OSError
-        Where nothing can be written there.
-    """
-    check_speed(speed)
-    frames, end = TrackFrames(record, size, floor), float(record.display.times[-1])
-    count = math.ceil(end * FRAMES_PER_SECOND / speed)
-    with film_writer(path) as writer:
-        for frame in range(count):
-            writer.append_data(frames.draw(frame * speed / FRAMES_PER_SECOND))
-        last = frames.draw(end)
-        for _ in range(round(LAST_FRAME_S * FRAMES_PER_SECOND)):
-            writer.append_data(last)
+def known_at_end(record: EpisodeRecord) -> NDArray[np.bool_]:
+    """Return which cells of the team's map are known at the end, (rows, columns)."""
+    return np.asarray(record.display.map_at(math.inf) != UNKNOWN)
 
 
 def save_track_picture(path: Path, record: EpisodeRecord) -> None:
@@ -213,18 +207,6 @@ def radius_of(record: EpisodeRecord) -> float:
     return float(robot.get("radius", _DEFAULT_RADIUS)) if isinstance(robot, dict) else _DEFAULT_RADIUS
 
 
-def _blocks(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
-    """Return a map with blocks of cells as one where there are more cells than pixels.
-
-    Occupied cells show.
-    """
-    if view.block == 1:
-        return levels
-    rows, columns = (side // view.block for side in levels.shape)
-    whole = levels[: rows * view.block, : columns * view.block]
-    return np.asarray(whole.reshape(rows, view.block, columns, view.block).min(axis=(1, 3)))
-
-
 def _counts(events: list[dict[str, Any]]) -> dict[str, int]:
     """Count the events of each kind but endings, which are listed by themselves."""
     names = {
@@ -256,3 +238,10 @@ def _draw_legend(figure: Figure) -> None:
         labelcolor=INK,
         handlelength=1.2,
     )
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    """Return a name that has moved; it warns."""
+    from lidarium.moved import moved_name
+
+    return moved_name(__name__, name)

@@ -12,8 +12,8 @@ from lidarium.agents.report import GivenOrder
 from lidarium.envs.drawing.frame_parts import SHIFT, Frame, View, team_colours
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.envs.radio.messages import OrderKind
+from lidarium.evaluation.drawing.films.film import DrawOver
 from lidarium.evaluation.drawing.picture_parts import INK, hex_colours
-from lidarium.evaluation.drawing.video import DrawOver
 from lidarium.evaluation.episodes.events import in_floor_frame
 
 SHOWN_S = 4.0

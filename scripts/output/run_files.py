@@ -1,5 +1,6 @@
 """The files of a run."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ def write_run(
     result: dict[str, Any],
     recorder: "Recorder | None",
     policy: str,
-    has_film: bool,
+    films: Sequence[str],
 ) -> list[str]:
     """Write the figures of a run first, then the record, the maps and the pictures.
 
@@ -35,8 +36,8 @@ def write_run(
         What recorded it; None where nothing did.
     policy : str
         Name of the policy.
-    has_film : bool
-        Whether a film was written there before.
+    films : sequence of str
+        Names of the films that were written there before.
 
     Returns
     -------
@@ -67,7 +68,7 @@ def write_run(
     if report.supervision is not None:
         write_text(folder / "decisions.jsonl", decision_lines(report))
         files.append("decisions.jsonl")
-    files += [*(["episode.npz"] if recorder is not None else []), *(["run.mp4"] if has_film else [])]
+    files += [*(["episode.npz"] if recorder is not None else []), *films]
     check_written(folder, files)
     return files
 

@@ -129,7 +129,14 @@ MOVED: dict[str, tuple[str, ...]] = {
     ),
     "evaluation.teams": ("benchmarks.studies.supervisor",),
     "evaluation.tree_picture": ("evaluation.drawing.tree_picture",),
-    "evaluation.video": ("evaluation.drawing.video",),
+    "evaluation.drawing.video": (
+        "evaluation.drawing.films.film",
+        "evaluation.drawing.films.writing",
+    ),
+    "evaluation.video": (
+        "evaluation.drawing.films.film",
+        "evaluation.drawing.films.writing",
+    ),
     "evaluation.watching": ("evaluation.episodes.watching",),
     "evaluation.workers": ("evaluation.suites.workers",),
     "mapping.bit_words": ("mapping.kernels.bit_words",),
@@ -236,6 +243,7 @@ MOVED_NAMES: dict[str, tuple[str, ...]] = {
     ),
     "envs.radio.exchange": ("envs.radio.map_blocks", "envs.radio.radio_links"),
     "envs.simulation.kernels.motion": ("envs.simulation.kernels.contact",),
+    "evaluation.drawing.record_frames": ("evaluation.drawing.films.track_film",),
     "evaluation.truth": ("evaluation.truth.true_map",),
     "evaluation.truth.map_counts": ("evaluation.truth.team_counts",),
     "mapping.files": (

@@ -1,14 +1,13 @@
-"""Pictures and films of what a record shows, without its floor or version."""
+"""Pictures of what a record shows, without its floor or version."""
 
 from dataclasses import replace
 
 import cv2
-import imageio.v2 as imageio
 import numpy as np
 import pytest
 
 from lidarium.envs.drawing.frame_parts import EXPLORED, UNEXPLORED, team_colours
-from lidarium.evaluation.drawing.record_frames import TrackFrames, save_track_film, save_track_picture
+from lidarium.evaluation.drawing.record_frames import TrackFrames, save_track_picture
 
 
 @pytest.fixture
@@ -47,20 +46,6 @@ def test_a_robot_is_drawn_in_its_colour_where_it_is(foreign):
     )
     around = frame[row - 12 : row + 12, column - 12 : column + 12]
     assert share_of(around, team_colours(2)[1]) > 0.3
-
-
-def test_a_film_runs_at_its_speed(foreign, tmp_path):
-    save_track_film(tmp_path / "track.mp4", foreign, speed=40.0, size=128)
-    with imageio.get_reader(tmp_path / "track.mp4") as reader:
-        frames = reader.count_frames()
-    assert frames == pytest.approx(20.0 * foreign.display.times[-1] / 40.0 + 30, abs=2)
-    assert [path.name for path in tmp_path.iterdir()] == ["track.mp4"]
-
-
-def test_a_film_wants_a_speed(foreign, tmp_path):
-    with pytest.raises(ValueError, match="speed of the film is 0"):
-        save_track_film(tmp_path / "track.mp4", foreign, speed=0.0)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_picture_shows_the_end(foreign, tmp_path):

@@ -1,0 +1,1 @@
+"""Films: what they show, how their frames become a file."""
