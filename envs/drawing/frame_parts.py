@@ -138,7 +138,9 @@ def blocks_of(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
         return levels
     rows, columns = (side // view.block for side in levels.shape)
     whole = levels[: rows * view.block, : columns * view.block]
-    return np.asarray(whole.reshape(rows, view.block, columns, view.block).min(axis=(1, 3)))
+    # Along rows first: a whole row of cells at a time.
+    lowest = whole.reshape(rows, view.block, columns * view.block).min(axis=1)
+    return np.asarray(lowest.reshape(rows, columns, view.block).min(axis=2))
 
 
 def enlarged(picture: Frame, view: View) -> Frame:

@@ -32,11 +32,9 @@ def map_within(env: ExplorationEnv, row: int, rows: slice, columns: slice) -> ND
         return on_floor(env, row, log_odds)[rows, columns]
     tables, resolution = env.world.floors[0], env.settings.occupancy.resolution
     assert tables is not None
-    y, x = np.meshgrid(
-        *((np.arange(side.start, side.stop) + 0.5) * resolution for side in (rows, columns)), indexing="ij"
-    )
+    y, x = ((np.arange(side.start, side.stop) + 0.5) * resolution for side in (rows, columns))
     start_x, start_y, theta = env.world.starts[row]
-    east, north = x + tables.laser.origin[0] - start_x, y + tables.laser.origin[1] - start_y
+    east, north = x + tables.laser.origin[0] - start_x, (y + tables.laser.origin[1] - start_y)[:, None]
     own_x = math.cos(theta) * east + math.sin(theta) * north - env.beliefs.origins[row, 0]
     own_y = math.cos(theta) * north - math.sin(theta) * east - env.beliefs.origins[row, 1]
     own_columns, own_rows = (np.floor(own / resolution).astype(np.int64) for own in (own_x, own_y))
@@ -46,7 +44,7 @@ def map_within(env: ExplorationEnv, row: int, rows: slice, columns: slice) -> ND
         & (own_columns >= 0)
         & (own_columns < log_odds.shape[1])
     )
-    placed = np.zeros(x.shape, np.int8)
+    placed = np.zeros(own_x.shape, np.int8)
     placed[is_inside] = log_odds[own_rows[is_inside], own_columns[is_inside]]
     return placed
 

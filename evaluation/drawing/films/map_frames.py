@@ -14,6 +14,7 @@ from lidarium.envs.drawing.frame_parts import (
     BACKGROUND,
     BORDER,
     EXPLORED,
+    INK,
     SHIFT,
     UNEXPLORED,
     Colour,
@@ -34,6 +35,9 @@ from lidarium.evaluation.drawing.maps.joined_maps import overlaid, shades_of
 from lidarium.evaluation.episodes.supervision import joined_groups
 from lidarium.evaluation.truth.beliefs import maps_on_floor
 from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, three_levels
+
+CAPTION = 28
+"""Height of the line between the maps and the floor [pixels]."""
 
 
 class MapFrames:
@@ -63,11 +67,23 @@ class MapFrames:
         if self._own is None:
             self._own = OwnMaps(env, self._width)
         self._shown, joined = self._joined(env)
-        picture = np.concatenate(
-            [self._own.draw(env, self._shown), _floor(env, self._width, self._shown, joined)]
+        parts = (
+            self._own.draw(env, self._shown),
+            self._caption(joined),
+            _floor(env, self._width, self._shown, joined),
         )
         name = env.floor.name if env.floor else ""
-        return with_header(picture, name, env.scorer.coverage, env.scorer.time)
+        return with_header(np.concatenate(parts), name, env.scorer.coverage, env.scorer.time)
+
+    def _caption(self, joined: list[tuple[int, int]]) -> Frame:
+        """Return the line between the maps and the floor: which are joined just now, or what white is."""
+        size = self._width, CAPTION
+        if joined:
+            pairs = ", ".join(f"{a} and {b}" for a, b in joined)
+            return line_of_text(f"the station joins the maps of robots {pairs}", size, EXPLORED, JOINED)
+        has_station = self._policy.report().supervision is not None
+        words = "white: maps that the station has joined" if has_station else "each map in its robot's colour"
+        return line_of_text(words, size, INK, BACKGROUND)
 
     def _joined(self, env: ExplorationEnv) -> tuple[list[set[int]], list[tuple[int, int]]]:
         """Return the groups of robots whose maps are joined, and by which pairs since the frame before."""
@@ -91,16 +107,12 @@ def _floor(
     radii = [robot.radius for robot in env.settings.team]
     draw_robots(frame, view, scene.poses, radii, scene.has_ended, colours)
     left = (width - view.width) // 2  # of a tall floor
-    frame = np.asarray(
+    return np.asarray(
         cv2.copyMakeBorder(
             frame, 0, 0, left, width - left - view.width, cv2.BORDER_CONSTANT, value=BACKGROUND
         ),
         np.uint8,
     )
-    for line, (a, b) in enumerate(joined):
-        words = f"the station joins the maps of robot {a} and robot {b}"
-        frame[30 * line : 30 * line + 30] = line_of_text(words, (width, 30), EXPLORED, JOINED)
-    return frame
 
 
 def _known(env: ExplorationEnv, view: View, groups: Sequence[set[int]], colours: list[Colour]) -> Frame:
