@@ -9,7 +9,9 @@ import time
 from pathlib import Path
 
 import pytest
+from films_read import read_film, share_of
 
+from lidarium.envs.drawing.frame_parts import EXPLORED
 from lidarium.evaluation.episodes.interrupts import PatientInterrupt, Termination
 from lidarium.evaluation.suites.episodes_file import read_episodes
 from lidarium.scripts.main import main
@@ -64,7 +66,9 @@ def is_there(number):
 
 def test_a_run_that_is_terminated_keeps_its_finished_parts(tmp_path):
     out = tmp_path / "out"
-    process = begin("run", "--floor", "office:3", "--policy", "random_walk", "--robots", 1, "--out", out)
+    process = begin(
+        "run", "--floor", "office:3", "--policy", "random_walk", "--robots", 1, "--gif", "--out", out
+    )
     while "explored" not in process.stderr.readline():
         pass
     process.send_signal(signal.SIGTERM)
@@ -73,7 +77,10 @@ def test_a_run_that_is_terminated_keeps_its_finished_parts(tmp_path):
     assert "interrupted" in told
     assert "Traceback" not in errors
     assert json.loads((out / "result.json").read_text())["interrupted"] is True
-    assert {path.name for path in out.iterdir()} >= {"result.json", "map.yaml", "map.pgm", "run.png"}
+    names = {path.name for path in out.iterdir()}
+    assert names >= {"result.json", "map.yaml", "map.pgm", "run.png", "run.gif"}
+    assert not [name for name in names if name.startswith(".")]
+    assert share_of(read_film(out / "run.gif").frames[-1], EXPLORED) > 0.0
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="the system does not tell of processes")
