@@ -1,4 +1,7 @@
-"""`lidarium animate`: what `lidarium run --gif` films, as merging.webp; it goes with release 0.3."""
+"""`lidarium animate`: what `lidarium run --gif` films, as merging.webp.
+
+It goes with release 0.3.
+"""
 
 from contextlib import closing
 from dataclasses import dataclass

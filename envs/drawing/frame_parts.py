@@ -130,9 +130,9 @@ def _span(is_used: NDArray[np.bool_], margin: int) -> slice:
 
 
 def blocks_of(levels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
-    """Return a map's three levels with blocks of cells as one where there are more cells than pixels.
+    """Return a map's three levels with blocks of cells as one.
 
-    Occupied cells show.
+    That is where there are more cells than pixels; occupied cells show.
     """
     if view.block == 1:
         return levels
@@ -229,9 +229,9 @@ def _header(name: str, share: float, time_s: float, width: int) -> Frame:
 def line_of_text(
     words: str, size: tuple[int, int], colour: Colour, background: Colour, right: str = ""
 ) -> Frame:
-    """Return a line with as many letters of the words as there is room for, and others at its right end.
+    """Return a line of words, and others at its right end.
 
-    The size is (width, height) [pixels].
+    It has as many letters of the first as there is room for. The size is (width, height) [pixels].
     """
     width, height = size
     line = np.full((height, width, 3), background, np.uint8)

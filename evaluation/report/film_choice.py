@@ -1,4 +1,7 @@
-"""Which recorded episodes of a directory a film shows: those of one floor and seed, one of each policy."""
+"""Which recorded episodes of a directory a film shows.
+
+They have one floor and seed; of each policy there is one.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -65,4 +65,6 @@ class FilmFiles(FilmOptions):
         for path in self.films:
             check_writable(path.parent)
             format_of(path)
+            if path.is_dir():
+                raise IsADirectoryError(f"cannot write to {path}: it is a folder; want a new name")
         assert self.film_settings

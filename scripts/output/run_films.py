@@ -65,7 +65,7 @@ class RunFilms:
         return max((made.writer.seconds for made in self._films), default=0.0)
 
     def begin(self, folder: Path) -> None:
-        """Begin the films, after the reset of the policy; where they have begun, do nothing."""
+        """Begin the films, unless they have begun; the policy has been reset."""
         if self._has_begun:
             return
         from lidarium.evaluation.drawing.films.film import film

@@ -144,9 +144,11 @@ def test_names_of_no_film_and_places_that_cannot_be_written_are_refused(
 ):
     what = folder if command == "report" else next((folder / "records").iterdir())
     (tmp_path / "file").write_text("mine")
+    (tmp_path / "folder.gif").mkdir()
     for place, message in (
         (tmp_path / "films" / "film.avi", "film.avi has no ending of a film; want one of .mp4, .gif, .webp"),
         (tmp_path / "file" / "film.gif", "cannot write to"),
+        (tmp_path / "folder.gif", "it is a folder"),
     ):
         assert main([command, str(what), option, str(place)]) == 2
         assert message in capsys.readouterr().err

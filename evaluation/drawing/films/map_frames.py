@@ -76,7 +76,7 @@ class MapFrames:
         return with_header(np.concatenate(parts), name, env.scorer.coverage, env.scorer.time)
 
     def _caption(self, joined: list[tuple[int, int]]) -> Frame:
-        """Return the line between the maps and the floor: which are joined just now, or what white is."""
+        """Return the line below the maps: which are joined just now, or what white is."""
         size = self._width, CAPTION
         if joined:
             pairs = ", ".join(f"{a} and {b}" for a, b in joined)
@@ -86,7 +86,7 @@ class MapFrames:
         return line_of_text(words, size, INK, BACKGROUND)
 
     def _joined(self, env: ExplorationEnv) -> tuple[list[set[int]], list[tuple[int, int]]]:
-        """Return the groups of robots whose maps are joined, and by which pairs since the frame before."""
+        """Return groups of joined maps, and the pairs joined since the frame before."""
         groups, pairs = joined_groups(self._policy.report(), env.possible_agents)
         return groups, [pair for pair in pairs if not any(set(pair) <= group for group in self._shown)]
 
@@ -94,7 +94,7 @@ class MapFrames:
 def _floor(
     env: ExplorationEnv, width: int, groups: Sequence[set[int]], joined: list[tuple[int, int]]
 ) -> Frame:
-    """Draw the floor: what is known of it, the robots, and which maps are joined just now."""
+    """Draw what is known of the floor, the robots, and who is joined just now."""
     colours, scene = team_colours(env.settings.robots), env.scene()
     tables = env.world.floors[0]
     assert tables is not None
@@ -116,7 +116,7 @@ def _floor(
 
 
 def _known(env: ExplorationEnv, view: View, groups: Sequence[set[int]], colours: list[Colour]) -> Frame:
-    """Draw what each group of robots knows over the floor; where several know it, mixed."""
+    """Draw what each group of robots knows of the floor, mixed where several do."""
     tables = env.world.floors[0]
     assert tables is not None
     raster, maps = tables.laser, maps_on_floor(env)

@@ -1,4 +1,4 @@
-"""The maps that robots with unknown starts make, each in its own frame, drawn in a row of tiles."""
+"""Draws the maps of robots with unknown starts, each in its own frame."""
 
 import math
 from collections.abc import Sequence
@@ -60,7 +60,7 @@ class OwnMaps:
         ]
 
     def draw(self, env: ExplorationEnv, groups: Sequence[set[int]]) -> Frame:
-        """Return the tiles, those of robots whose maps are joined below a line of another colour."""
+        """Return the tiles; above maps that are joined the line has another colour."""
         rows = -(-len(self._views) // self._columns)
         line = LINE + self._height
         picture = np.full((rows * (line + GAP), self._width, 3), BACKGROUND, np.uint8)
@@ -99,9 +99,9 @@ def _origin(env: ExplorationEnv, row: int) -> tuple[float, float]:
 
 
 def _within_floor(env: ExplorationEnv, row: int) -> NDArray[np.bool_]:
-    """Return which cells of a robot's map are in the rectangle around the floor's free cells.
+    """Return which cells of a robot's map the floor can fill, as the robot started.
 
-    The robot's map lies to the floor as the robot started.
+    They are those in the rectangle around the floor's free cells.
     """
     tables = env.world.floors[0]
     assert tables is not None

@@ -1,4 +1,7 @@
-"""Films of what records show, whatever version made them: one, or several side by side in step."""
+"""Films of what records show: of one, or of several side by side in step.
+
+Any version can film them.
+"""
 
 import math
 from collections.abc import Callable, Mapping
@@ -137,7 +140,7 @@ class _Tiles:
 
 
 def _columns(count: int) -> int:
-    """Return the columns of so many tiles: three at most, two where that leaves no gap."""
+    """Return the columns of so many tiles: three at most, two of four tiles."""
     return min(count, 2 if count == 4 else 3)
 
 

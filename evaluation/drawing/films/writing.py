@@ -125,7 +125,7 @@ def film_writer(path: Path, settings: FilmSettings | None = None) -> Iterator[Fi
 
 
 def _write_with_palette(frames: Path, film: Path, encoded: FilmFormat) -> bool:
-    """Write frames in the 256 colours that suit all of them; return whether it was done.
+    """Write frames in the 256 colours that suit all; return whether it was done.
 
     FFmpeg then writes of each frame what has changed since the one before.
     """
