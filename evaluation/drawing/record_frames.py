@@ -85,6 +85,7 @@ class TrackFrames:
         display = record.display
         shown = known_at_end(record) if shown is None else shown
         self.view = view_around(shown, display.origin, display.resolution, size)
+        self._sample, self._map = -1, np.zeros((0, 0, 3), np.uint8)
         self._agents = [f"robot_{robot}" for robot in range(display.poses.shape[1])]
         self._colours = team_colours(len(self._agents))
         camera, robot = (record.header["settings"].get(name) for name in ("camera", "robot"))
@@ -105,8 +106,7 @@ class TrackFrames:
         Paths are those of the last minute, targets are rings, and robots have their headings.
         """
         display, view = self._display, self.view
-        levels = without_small_components(display.map_at(time_s))[view.rows, view.columns]
-        frame = enlarged(_PALETTE[blocks_of(levels, view)], view)
+        frame = self._map_at(time_s)
         recent = (display.times >= time_s - RECENT_S) & (display.times <= time_s + 1e-9)
         poses = display.poses_at(time_s)
         draw_paths(
@@ -121,6 +121,18 @@ class TrackFrames:
         has_ended = [agent in ended for agent in self._agents]
         draw_robots(frame, view, poses, radius_of(self._record), has_ended, self._colours)
         return frame
+
+    def _map_at(self, time_s: float) -> Frame:
+        """Return the picture of the team's map alone, the caller's own.
+
+        It is drawn again when the map changes, which it does less often than robots move.
+        """
+        sample = int(np.searchsorted(self._display.changes.times, time_s + 1e-9, side="right"))
+        if sample != self._sample:
+            view = self.view
+            levels = without_small_components(self._display.map_at(time_s))[view.rows, view.columns]
+            self._sample, self._map = sample, enlarged(_PALETTE[blocks_of(levels, view)], view)
+        return self._map.copy()
 
     def _with_panel(self, frame: Frame, camera: DepthCamera, poses: NDArray[np.float64]) -> Frame:
         """Put what the first robot's camera sees beside a frame."""

@@ -36,6 +36,13 @@ def test_frames_show_the_map_as_it_grows_and_the_robots(foreign):
     assert share_of(first, UNEXPLORED) > share_of(last, UNEXPLORED)
 
 
+def test_a_frame_is_the_same_whatever_was_drawn_before(foreign):
+    frames = TrackFrames(foreign, 320)
+    times = [3.0, 3.5, 30.0, 4.1, 0.0, 1000.0]
+    for time_s in times:
+        assert (frames.draw(time_s) == TrackFrames(foreign, 320).draw(time_s)).all()
+
+
 def test_a_robot_is_drawn_in_its_colour_where_it_is(foreign):
     frames = TrackFrames(foreign, 640)
     frame, view = frames.draw(30.0), frames.view
