@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from films_read import read_film
 
 from lidarium.envs.simulation.kernels.arrays import WorldArrays
 from lidarium.evaluation.suites.suite import read_suite
@@ -68,6 +69,20 @@ def test_the_readme_names_commands_that_exist():
     named = set(re.findall(r"`?lidarium (?!-)([a-z]+) ?(?:--|`|\w+ --|runs)", text_of("README.md")))
     assert named
     assert named <= known
+
+
+def test_pictures_of_pages_load_soon():
+    large = [path.name for path in (ROOT / "docs" / "images").iterdir() if path.stat().st_size > 3_000_000]
+    assert not large
+
+
+def test_the_animation_of_the_readme_is_that_of_a_run():
+    (name,) = re.findall(r"\((docs/images/\w+\.gif)\)", text_of("README.md"))
+    film = read_film(ROOT / name)
+    options = dict(re.findall(r"--film-(\w+) (\d+)", text_of("README.md")))
+    assert film.frames.shape[2] == int(options["width"])
+    # A minute of simulated time, two joins that are held, and the end.
+    assert 15.0 < film.seconds < 25.0
 
 
 def test_entries_of_the_changelog_are_short():

@@ -1,5 +1,8 @@
 """Frames become a film as they are made, whole or not at all."""
 
+import os
+import subprocess
+import sys
 import weakref
 
 import numpy as np
@@ -124,6 +127,36 @@ def test_an_encoder_that_ends_early_is_an_error_without_its_command_line(tmp_pat
         writer.append_data(frame_of(0))
     assert "COMMAND" not in str(told.value)
     assert f"f{ending}" in str(told.value)
+    assert not list(tmp_path.iterdir())
+
+
+NOISE = """
+import sys
+from pathlib import Path
+import numpy as np
+from lidarium.evaluation.drawing.films.writing import film_writer
+draws = np.random.default_rng(0)
+try:
+    with film_writer(Path(sys.argv[1])) as writer:
+        for _ in range(40):
+            writer.append_data(draws.integers(0, 256, (90, 160, 3), np.uint8))
+except OSError as error:
+    print(error)
+"""
+
+
+def limit_files():
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such limits there")
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_film_that_does_not_fit_is_an_error_and_is_not_there(tmp_path, ending):
+    command = [sys.executable, "-c", NOISE, str(tmp_path / f"film{ending}")]
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limit_files, timeout=120)
+    assert "the film is not whole" in done.stdout, done.stderr
     assert not list(tmp_path.iterdir())
 
 
