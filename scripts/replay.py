@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replay(Command, FilmFiles):
+class Replay(FilmFiles, Command):
     """Run a recorded episode again and compare its end, or draw its record.
 
-    It reports whether the episode ends in the same state to the bit.
+    It reports whether the episode ends in the same state to the bit. Pictures, films and pages show records
+    of other versions too.
     """
 
     file: Annotated[Positional[Path], arg(metavar="FILE")]

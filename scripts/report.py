@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report(Command, FilmFiles):
+class Report(FilmFiles, Command):
     """Compare policies over the episodes of a directory.
 
     Writes report.html, report.md, report.json and plots to --out, or to DIR/report. A film shows recorded

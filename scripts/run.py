@@ -42,7 +42,7 @@ STOP_COVERAGE = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(TeamCommand, FilmOptions):
+class Run(FilmOptions, TeamCommand):
     """Let a team explore a floor.
 
     Writes its figures, its map, a picture and, if asked for, a record and films.

@@ -40,9 +40,9 @@ class FilmFiles(FilmOptions):
     """Where films of records are written to."""
 
     gif: Path | None = None
-    """make a film as an animated picture; the name ends in .gif or .webp"""
+    """write a film as an animated picture; its name ends in .gif or .webp"""
     video: Path | None = None
-    """make a film as a video; the name ends in .mp4"""
+    """write a film as a video; its name ends in .mp4"""
 
     @property
     def films(self) -> list[Path]:
