@@ -46,7 +46,7 @@ With all {episodes:,} there, the command opens the file in {opened_s:.1f} s when
 
 A line takes {line_bytes:,.0f} bytes. Files above {most:,.1f} GB are refused, so a folder ends at
 {limit:,.0f} episodes: that breaks first. Before it, the memory of the report becomes tight:
-{mb_each:.1f} kB an episode. [Run many episodes](../how_to/run_many_episodes.md) says how to part them.
+{mb_each:.1f} kB an episode. [Run many episodes](../tutorials/run_many_episodes.md) says how to part them.
 
 ## Nodes
 
