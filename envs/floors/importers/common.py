@@ -35,7 +35,7 @@ WALL_THICKNESS = 0.1
 _GAPS = (0.0, 0.2, 0.5, 1.0, 2.0)
 _CLOSED_SHARE = 0.85
 _OUTLINE_RESOLUTION = 0.02
-_MAX_OUTLINE_CELLS = 30_000_000  # 12,000 m2; wider drawings have coarser cells
+_MAX_OUTLINE_CELLS = 20_000_000  # 8,000 m2; wider drawings have coarser cells
 
 
 def read_text(path: Path) -> str:
@@ -167,7 +167,7 @@ def enclosed(
     union, insides, areas = np.zeros_like(drawn), [], []
     for gap in _GAPS:
         union |= _inside(distance, gap / 2.0, resolution)
-        insides.append(np.packbits(union))  # five of them, of up to 30 MB each
+        insides.append(np.packbits(union))  # five of them, of up to 20 MB each
         areas.append(np.count_nonzero(union))
     if areas[-1] == 0:
         raise ValueError(f"{path} has no walls that enclose a space; want a floor plan")
