@@ -62,16 +62,20 @@ WORLDS = {
 
 KINDS = {
     "test": "generated floors of the set `test`",
-    "kth": "KTH campus floors, of which at least 80 % are connected",
     "lifull": "LIFULL apartments",
-    "slam": "maps that robots made of real buildings",
+    "kth": "KTH campus floors, of which at least 80 % are connected",
     "dungeon": "dungeons, 0.1 m a pixel",
+    "slam": "maps that robots made of real buildings",
 }
-EVERY = {"kth": 3, "lifull": 3, "slam": 2}
+EVERY = {"lifull": 3, "kth": 3, "slam": 3}
 """Of a kind every so many-th floor is taken, beside what is asked for: one for kinds that are not named."""
 
-ONLY_IDEAL = ("slam",)
-"""Kinds whose floors run in the ideal world alone: their episodes take hours otherwise."""
+NOT_RUN = {
+    "kth": ("unknown", "camera"),
+    "dungeon": ("lab", "unknown", "camera"),
+    "slam": ("lab", "unknown", "camera"),
+}
+"""Worlds in which large floors are left out: an episode takes minutes there."""
 
 BOUNDED = {"test": 2, "lifull": 4}
 """Kinds whose floors are bounded, and of how many one is."""
@@ -113,5 +117,5 @@ def parts() -> Iterator[tuple[str, str, World]]:
     """Yield each kind of floor with the worlds in which its floors run, and their names."""
     for kind in KINDS:
         for name, world in WORLDS.items():
-            if name == "ideal" or kind not in ONLY_IDEAL:
+            if name not in NOT_RUN.get(kind, ()):
                 yield kind, name, world

@@ -19,6 +19,7 @@ def test_all_policies_that_need_no_goal_are_in_it():
     assert set(POLICIES) - asked == {"oracle_starts"}  # a bound of supervised teams, in their own study
 
 
-def test_maps_of_robots_run_in_the_ideal_world_alone():
+def test_large_floors_are_left_out_of_slow_worlds():
     assert {name for kind, name, _ in worlds.parts() if kind == "slam"} == {"ideal"}
-    assert {name for kind, name, _ in worlds.parts() if kind == "kth"} == set(worlds.WORLDS)
+    assert {name for kind, name, _ in worlds.parts() if kind == "kth"} == {"ideal", "lab"}
+    assert {name for kind, name, _ in worlds.parts() if kind == "lifull"} == set(worlds.WORLDS)
