@@ -89,7 +89,7 @@ def _document(path: Path) -> Any:  # noqa: ANN401
     try:
         # Repairs take twice as long as reading what is whole.
         return ezdxf.read(io.StringIO(content.decode("utf-8", "surrogateescape").replace("\r\n", "\n")))
-    except (DXFError, *READING_ERRORS):
+    except (AssertionError, DXFError, *READING_ERRORS):
         pass
     with _damage(path):
         return recover.read(io.BytesIO(content))[0]
@@ -102,7 +102,7 @@ def _damage(path: Path) -> Iterator[None]:
 
     try:
         yield
-    except DXFError as error:
+    except (AssertionError, DXFError) as error:
         raise ValueError(f"{path} is not a DXF drawing: {error}") from error
 
 
