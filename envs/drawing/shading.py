@@ -191,16 +191,23 @@ def shade(
 
 def _face_colours(faces: Faces, walls: NDArray[np.bool_] | NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the colour of each face (faces, 3): what it belongs to, lit from above on one side."""
+    light = _LIGHT / np.linalg.norm(_LIGHT)
+    brightness = 0.72 + 0.28 * np.abs(faces.planes[:, :3] @ light)
+    brightness[faces.owners < 0] = np.where(faces.owners[faces.owners < 0] == SURROUNDINGS, 0.9, 1.0)
+    return np.asarray(owner_colours(faces, walls) * brightness[:, None], np.float64)
+
+
+def owner_colours(faces: Faces, walls: NDArray[np.bool_] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the colour of what each face belongs to, (faces, 3).
+
+    ``walls`` is which solids are walls, (solids,), or the colours of the solids, (solids, 3).
+    """
     furniture: NDArray[np.float64] = np.asarray(walls, np.float64)
     if walls.ndim == 1:
         furniture = np.where(walls[:, None], _WALL, _FURNITURE[np.arange(len(walls)) % len(_FURNITURE)])
     special = np.array([_COLOURS[owner] for owner in sorted(_COLOURS)])
     # Owners below 0 count from the end.
-    base = np.concatenate([furniture, special])[faces.owners]
-    light = _LIGHT / np.linalg.norm(_LIGHT)
-    brightness = 0.72 + 0.28 * np.abs(faces.planes[:, :3] @ light)
-    brightness[faces.owners < 0] = np.where(faces.owners[faces.owners < 0] == SURROUNDINGS, 0.9, 1.0)
-    return np.asarray(base * brightness[:, None], np.float64)
+    return np.asarray(np.concatenate([furniture, special])[faces.owners], np.float64)
 
 
 def _with_edges(picture: NDArray[np.float64], numbers: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -125,3 +125,23 @@ def free_as_held(env: ExplorationEnv, maps: NDArray[np.int8]) -> NDArray[np.bool
     if not shares_one_map(env):
         return np.asarray(maps < 0)
     return np.broadcast_to(np.sum(maps, axis=0, dtype=np.int16) < 0, maps.shape)
+
+
+def believed_on_floor(env: ExplorationEnv) -> NDArray[np.float64]:
+    """Return the believed poses in the floor's frame, (robots, 3) [m, rad].
+
+    Those of robots that do not know their starts are seen from their true starts.
+    """
+    believed = env.beliefs.believed.copy()
+    if env.settings.known_starts:
+        return believed
+    starts = env.world.starts
+    cosine, sine = np.cos(starts[:, 2]), np.sin(starts[:, 2])
+    return np.stack(
+        [
+            starts[:, 0] + cosine * believed[:, 0] - sine * believed[:, 1],
+            starts[:, 1] + sine * believed[:, 0] + cosine * believed[:, 1],
+            starts[:, 2] + believed[:, 2],
+        ],
+        axis=1,
+    )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lidarium.envs.exploration import ExplorationEnv
 from lidarium.evaluation.episodes.watching import Watcher
 from lidarium.evaluation.report.page.map_layers import Grid, Layer, coarse, grid_around
-from lidarium.evaluation.truth.beliefs import map_within
+from lidarium.evaluation.truth.beliefs import believed_on_floor, map_within
 from lidarium.evaluation.truth.true_map import occupied_in_truth, truth_of
 
 MAP_PERIOD_S, SCAN_PERIOD_S = 1.0, 0.4
@@ -159,23 +159,3 @@ class ReplaySampler(Watcher):
             first = min(max(int(low[axis]), 0), size)
             sides.append(slice(first, min(max(int(high[axis]) + 1, first), size)))
         return sides[0], sides[1]
-
-
-def believed_on_floor(env: ExplorationEnv) -> NDArray[np.float64]:
-    """Return the believed poses in the floor's frame, (robots, 3) [m, rad].
-
-    Those of robots that do not know their starts are seen from their true starts.
-    """
-    believed = env.beliefs.believed.copy()
-    if env.settings.known_starts:
-        return believed
-    starts = env.world.starts
-    cosine, sine = np.cos(starts[:, 2]), np.sin(starts[:, 2])
-    return np.stack(
-        [
-            starts[:, 0] + cosine * believed[:, 0] - sine * believed[:, 1],
-            starts[:, 1] + sine * believed[:, 0] + cosine * believed[:, 1],
-            starts[:, 2] + believed[:, 2],
-        ],
-        axis=1,
-    )
