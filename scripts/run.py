@@ -1,5 +1,6 @@
 """`lidarium run`: a team explores a floor, and writes what it found."""
 
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,6 +10,7 @@ from lidarium.scripts.common import INTERRUPTED, Answer, Progress, TeamCommand, 
 from lidarium.scripts.options.film import FilmOptions
 from lidarium.scripts.options.policy import policy_options
 from lidarium.scripts.options.supervisor import check_supervised, supervisor_options
+from lidarium.scripts.options.view import ViewOptions, opened_view
 from lidarium.scripts.output.run_files import write_run
 from lidarium.scripts.output.run_films import RunFilms, Shown
 from lidarium.scripts.output.run_summary import run_summary
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from lidarium.envs.settings.exploration import ExplorationSettings
     from lidarium.evaluation.episodes.history import History
     from lidarium.evaluation.episodes.runner import Episode
-    from lidarium.evaluation.episodes.watching import WatchedExploration
+    from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
     from lidarium.evaluation.record import Recorder
 
 DEFAULT_FOLDER = Path("runs")
@@ -42,7 +44,7 @@ STOP_COVERAGE = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(FilmOptions, TeamCommand):
+class Run(FilmOptions, TeamCommand, ViewOptions):
     """Let a team explore a floor.
 
     Writes its figures, its map, a picture and, if asked for, a record and films.
@@ -124,8 +126,15 @@ def execute(command: Run) -> Answer:
     policy = lidarium.policy(command.chosen_policy, **options)
     if "depth" in policy.observes and command.camera is None:
         command = replace(command, camera=CAMERA)
+    with opened_view(command, policy, command.chosen_policy) as views:
+        return _answer(command, policy, options, views)
+
+
+def _answer(command: Run, policy: "Policy", options: dict[str, Any], views: "Sequence[Watcher]") -> Answer:
+    """Run the episode before all who watch, and write what it left."""
     recorder = _recorder(command)
     env, history = _environment(command, policy, recorder)
+    env.watchers += views
     starts = None if command.starts is None else _parsed_starts(command.starts, command.robots)
     films = RunFilms(env, policy, command.films, command.film_shows, command.film_settings)
     first_start.compile_first(command.json)

@@ -2,13 +2,19 @@
 
 import pytest
 
-from lidarium.benchmarks.studies.evaluation.browser import HEIGHT, WIDTH, headless_chromium, show_on_screen
+from lidarium.benchmarks.studies.evaluation.browser import (
+    HEIGHT,
+    PLAIN,
+    WIDTH,
+    headless_chromium,
+    show_on_screen,
+)
 
 
-def chromium():
+def chromium(graphics=PLAIN):
     """Return a driver of a headless Chromium, or skip."""
     try:
-        return headless_chromium()
+        return headless_chromium(graphics)
     except ValueError as error:
         pytest.skip(str(error))
 

@@ -92,3 +92,12 @@ def test_networks_of_the_tutorial_explore(capsys):
     text = (TUTORIALS / name).read_text(encoding="utf-8")
     shown = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
     assert capsys.readouterr().out == "".join(shown)
+
+
+def test_the_view_of_the_tutorial_is_served(capsys):
+    pytest.importorskip("viser", reason='viser is not installed: pip install "lidarium[viewer]"')
+    code = code_of("watch_a_run.md").replace("horizon_s=10.0", "horizon_s=1.0")
+    exec(compile(code, "watch_a_run.md", "exec"), {})
+    address, seen = capsys.readouterr().out.splitlines()
+    assert address.startswith("http://127.0.0.1:")
+    assert 0.0 < float(seen.split()[0]) < 100.0

@@ -29,6 +29,14 @@ class Termination:
         raise KeyboardInterrupt
 
 
+_entered: list["PatientInterrupt"] = []
+
+
+def is_end_asked() -> bool:
+    """Whether a ``PatientInterrupt`` that is entered has noted a signal: who waits within should not."""
+    return any(interrupt.is_asked for interrupt in _entered)
+
+
 class PatientInterrupt:
     """Context in which a first SIGINT is only noted, to be acted on between two steps.
 
@@ -50,6 +58,7 @@ class PatientInterrupt:
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> "PatientInterrupt":
+        _entered.append(self)
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
                 before = signal.getsignal(number)
@@ -61,6 +70,7 @@ class PatientInterrupt:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        _entered.remove(self)
         while self._before:
             signal.signal(*self._before.popitem())
 

@@ -166,6 +166,8 @@ def run_episode(
     check_observed(policy, type(policy).__name__, env.settings.observe)
     level = at_level(env, policy.level, policy.shares_map, policy.decision_period_s)
     driver = _driver_of(level)
+    if isinstance(env, WatchedExploration):
+        env.driver = None if driver is None else driver.driver
     world: World = _planning_sparsely(level, policy.shares_map) if plans_sparsely else level
     world = world if merging is None else MergedMaps(world, merging)
     episode = Episode(env, policy, seed)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarium.agents.report import GivenUp
+from lidarium.envs.driving.team_driver import TeamDriver
 from lidarium.envs.episode_start import EpisodeStart
 from lidarium.envs.exploration import ExplorationEnv, Observation
 from lidarium.envs.floors.floor_choice import Floors
@@ -70,6 +71,12 @@ class WatchedExploration(ExplorationEnv):
         As for ``ExplorationEnv``.
     watchers : iterable of Watcher
         Who watches, in this order; the list ``watchers`` may change between steps.
+
+    Attributes
+    ----------
+    driver : TeamDriver or None
+        What drives the robots to their targets; None where a policy decides speeds, and before
+        `run_episode`.
     """
 
     def __init__(
@@ -81,6 +88,7 @@ class WatchedExploration(ExplorationEnv):
     ) -> None:
         super().__init__(floor, settings, image_resolution=image_resolution)
         self.watchers: list[Watcher] = list(watchers)
+        self.driver: TeamDriver | None = None
 
     def start(self, beginning: EpisodeStart) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode, as ``ExplorationEnv.start``."""

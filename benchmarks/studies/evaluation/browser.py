@@ -1,6 +1,7 @@
 """A headless Chromium for pages: found on the system, driven by selenium (extra ``browser``)."""
 
 import shutil
+from collections.abc import Sequence
 from typing import Any
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -8,8 +9,18 @@ WIDTH, HEIGHT = 1280, 800
 """Size of the screen [pixels]."""
 
 
-def headless_chromium() -> Any:  # noqa: ANN401
+PLAIN = ("--disable-gpu",)
+SOLID = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""Options for pages that draw in three dimensions: WebGL without a graphics card."""
+
+
+def headless_chromium(graphics: Sequence[str] = PLAIN) -> Any:  # noqa: ANN401
     """Return a driver of a headless Chromium; the caller ends it with ``quit``.
+
+    Parameters
+    ----------
+    graphics : sequence of str
+        Options of how it draws: ``PLAIN`` or ``SOLID``.
 
     Raises
     ------
@@ -30,9 +41,9 @@ def headless_chromium() -> Any:  # noqa: ANN401
     for argument in (
         "--headless=new",
         "--no-sandbox",
-        "--disable-gpu",
         "--disable-dev-shm-usage",
         "--hide-scrollbars",
+        *graphics,
     ):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

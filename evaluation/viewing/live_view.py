@@ -1,0 +1,177 @@
+"""Shows a run in a browser while it goes."""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.agents.policy import Policy
+from lidarium.agents.report import GivenUp
+from lidarium.envs.drawing.views import CUT_M, false_colours
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.radio.messages import Orders
+from lidarium.evaluation.episodes.interrupts import is_end_asked
+from lidarium.evaluation.episodes.supervision import joined_groups
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
+from lidarium.evaluation.viewing.controls import Controls, Layer, follow
+from lidarium.evaluation.viewing.maps import TeamMaps
+from lidarium.evaluation.viewing.moment import Moment, moment_of
+from lidarium.evaluation.viewing.pace import LONGEST_WAIT_S, Pace
+from lidarium.evaluation.viewing.scene import TeamScene
+from lidarium.evaluation.viewing.words import events_text, status_text
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+FRAME_S, MAPS_S = 0.1, 0.5
+"""Least wall time between two frames, and between two drawings of maps and words [s]."""
+
+MAPS_SHARE = 0.1
+"""Most of the wall time that drawing maps takes."""
+
+LOW_WALLS_M = 0.4
+"""Height at which walls are cut at first where nobody looks at furniture [m]."""
+
+DEPTH_SIZE = 180, 240
+"""Rows and columns of the depth image at the side [pixels]."""
+
+
+class LiveView(Watcher):
+    """A page that shows the run at hand; the run is the same to the bit with and without it.
+
+    Parameters
+    ----------
+    server : ViserServer
+        Whose page.
+    policy : Policy
+        Who decides.
+    name : str
+        The policy's.
+    clock : callable
+        Wall time [s].
+    pace : Pace or None
+        What keeps the run to the speed that was chosen.
+
+    Attributes
+    ----------
+    has_ended : bool
+        Whether the run has come to its end.
+    """
+
+    def __init__(
+        self,
+        server: "ViserServer",
+        policy: Policy,
+        name: str,
+        clock: Callable[[], float] = time.monotonic,
+        pace: Pace | None = None,
+    ) -> None:
+        self._server, self._policy, self._name, self._clock = server, policy, name, clock
+        self._pace = pace or Pace()
+        self.has_ended, self._decisions = False, 0
+        self._frame_due = self._maps_due = 0.0
+        self._drawn_layers: frozenset[Layer] = frozenset()
+        self._followed: tuple[int, NDArray[np.float64]] | None = None
+
+    def begin(self, env: ExplorationEnv) -> None:
+        """Lay out the page and draw the start."""
+        assert isinstance(env, WatchedExploration)
+        assert env.floor is not None
+        self._env = env
+        has_cameras = env.simulation.camera is not None
+        ceiling = min(env.floor.ceiling, 2.0 * CUT_M)
+        self._controls = Controls(
+            self._server, env.possible_agents, has_cameras, (ceiling, CUT_M if has_cameras else LOW_WALLS_M)
+        )
+        self._maps = TeamMaps(env)
+        self._scene = TeamScene(self._server, env, self._maps)
+        self._draw_all()
+
+    def step(self, env: ExplorationEnv, commands: NDArray[np.float64], /) -> None:
+        """Draw where it is time to, and wait until the next step is due."""
+        controls = self._controls
+        self._draw_due()
+        self._pace.wait(
+            env.scorer.time, lambda: controls.speed, lambda: controls.is_paused, self._answer_controls
+        )
+
+    def decision(self, env: ExplorationEnv, orders: Orders | None, given_up: Sequence[GivenUp]) -> None:
+        """Count a decision."""
+        self._decisions += 1
+
+    def outcome(self, env: ExplorationEnv) -> None:
+        """Draw the end, where all robots have ended."""
+        if not env.agents:
+            self.has_ended = True
+            self._controls.end()
+            self._draw_all()
+
+    def stay(self) -> None:
+        """Keep answering the controls until ``KeyboardInterrupt``, as Ctrl-C and SIGTERM raise it."""
+        while True:
+            time.sleep(LONGEST_WAIT_S)
+            self._answer_controls()
+
+    def _answer_controls(self) -> bool:
+        """Follow what was chosen at the side; return whether nobody wants the run to end."""
+        layers = self._controls.layers
+        self._scene.cut_walls(self._controls.wall_height)
+        self._scene.show(layers)
+        if layers & {Layer.JOINED, Layer.OWN} != self._drawn_layers:
+            self._draw_maps()
+        return not is_end_asked()
+
+    def _draw_due(self) -> None:
+        now = self._clock()
+        if now >= self._frame_due:
+            self._frame_due = now + FRAME_S
+            self._draw(moment_of(self._env))
+            self._answer_controls()
+        if now >= self._maps_due:
+            self._draw_maps()
+
+    def _draw_all(self) -> None:
+        self._draw(moment_of(self._env))
+        self._draw_maps()
+        self._answer_controls()
+
+    def _draw(self, moment: Moment) -> None:
+        with self._server.atomic():
+            self._scene.draw(moment)
+        self._follow(moment)
+
+    def _draw_maps(self) -> None:
+        """Draw maps, frontiers and words; then not for so long that it takes a small share of the time."""
+        began, env, report = self._clock(), self._env, self._policy.report()
+        self._drawn_layers = self._controls.layers & {Layer.JOINED, Layer.OWN}
+        groups = self._shown_groups(joined_groups(report, env.possible_agents)[0])
+        levels = self._maps.levels(env, groups)
+        self._scene.draw_ground(self._maps.picture(groups, levels), self._maps.frontiers(levels))
+        status = status_text(env, self._name, report, self._decisions)
+        self._controls.write(status, events_text(env, report), env.scorer.coverage)
+        if env.simulation.camera is not None:
+            robot = self._controls.followed or 0
+            sensor = env.simulation.camera
+            self._controls.show_depth(false_colours(sensor.frames[robot], sensor.camera, DEPTH_SIZE))
+        self._maps_due = self._clock() + max(MAPS_S, (self._clock() - began) / MAPS_SHARE)
+
+    def _shown_groups(self, joined: list[set[int]]) -> list[set[int]]:
+        """Return the robots whose maps are drawn as one: robots that know their starts need no station."""
+        robots = range(self._env.settings.robots)
+        groups = [set(robots)] if self._env.settings.known_starts else joined
+        if Layer.JOINED not in self._drawn_layers:
+            groups = [{robot} for robot in robots]
+        is_wanted = {False: Layer.OWN in self._drawn_layers, True: Layer.JOINED in self._drawn_layers}
+        return [group for group in groups if is_wanted[len(group) > 1]]
+
+    def _follow(self, moment: Moment) -> None:
+        robot = self._controls.followed
+        if robot is None:
+            self._followed = None
+            return
+        here = np.array([*moment.robots[robot].pose[:2], 0.0])
+        is_same = self._followed is not None and self._followed[0] == robot
+        follow(self._server, here, self._followed[1] if self._followed and is_same else None)
+        self._followed = robot, here

@@ -1,0 +1,195 @@
+"""A view draws what the world is like, answers its controls, and changes nothing of the run."""
+
+import signal
+import threading
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from recorded_scene import RecordedServer
+
+import lidarium
+from lidarium.agents.policy import settings_for
+from lidarium.envs.exploration import ExplorationEnv
+from lidarium.envs.settings.making import make_settings
+from lidarium.evaluation.episodes.runner import run_episode
+from lidarium.evaluation.episodes.watching import WatchedExploration, Watcher
+from lidarium.evaluation.viewing.controls import GO_ON, PAUSE
+from lidarium.evaluation.viewing.live_view import LiveView
+
+SETTINGS = make_settings(robots=2, horizon_s=8.0, resolution=0.05)
+APART = make_settings(
+    robots=2, horizon_s=8.0, resolution=0.05, known_starts=False, localization="slam", noise="datasheet",
+    odometry="typical",
+)  # fmt: skip
+
+
+class AtStep(Watcher):
+    """Does something after a number of steps."""
+
+    def __init__(self, steps, act):
+        self._left, self._act = steps, act
+
+    def step(self, env, commands):
+        self._left -= 1
+        if self._left == 0:
+            self._act()
+
+
+def quick(policy):
+    """A view that draws every step and waits for nothing, and what it draws."""
+    server = RecordedServer(Speed="As fast as it goes")
+    return server, LiveView(server, policy, "a policy", clock=iter(range(10**6)).__next__)
+
+
+def seen(settings, policy_name="nearest_frontier", floor="apartment", watchers=(), seed=3, **options):
+    """Run an episode before a view; return its server and the environment."""
+    policy = lidarium.policy(policy_name)
+    server, view = quick(policy)
+    env = WatchedExploration(floor, settings, watchers=[*watchers, view])
+    episode = run_episode(policy, env, seed, **options)
+    return SimpleNamespace(server=server, env=env, view=view, episode=episode, nodes=server.scene.nodes)
+
+
+@pytest.mark.parametrize(
+    ("settings", "policy"),
+    [(SETTINGS, "nearest_frontier"), (APART, "supervised"), (SETTINGS, "random_walk")],
+)
+def test_a_viewed_run_is_the_same_to_the_bit(settings, policy):
+    viewed, env = seen(settings, policy).env, ExplorationEnv("apartment", settings)
+    run_episode(lidarium.policy(policy), env, seed=3)
+    np.testing.assert_array_equal(viewed.world.poses, env.world.poses)
+    np.testing.assert_array_equal(viewed.simulation.beliefs.log_odds, env.simulation.beliefs.log_odds)
+    np.testing.assert_array_equal(viewed.simulation.ranges, env.simulation.ranges)
+    assert viewed.scorer.times == env.scorer.times
+
+
+def test_robots_are_drawn_where_they_are_and_where_they_believe_to_be():
+    run = seen(APART, "supervised")
+    for row, (x, y, theta) in enumerate(run.env.world.poses):
+        body = run.nodes[f"/robots/robot_{row}"]
+        assert np.allclose(body.position, (x, y, 0.0))
+        assert np.allclose(body.wxyz, (np.cos(theta / 2), 0.0, 0.0, np.sin(theta / 2))) or np.allclose(
+            body.wxyz, (-np.cos(theta / 2), 0.0, 0.0, -np.sin(theta / 2))
+        )
+        believed = run.nodes[f"/believed/robot_{row}"].position
+        off = np.hypot(*(believed[:2] - (x, y)))
+        assert 0.0 < off < 0.2
+    assert run.view.has_ended
+
+
+def test_the_page_says_where_the_run_is():
+    run = seen(SETTINGS)
+    text = run.server.gui.controls["html 0"].content
+    assert "apartment" in text
+    assert "8.0 s" in text
+    assert f"{100 * run.env.scorer.coverage:.1f} %" in text
+    assert f"{len(run.episode.decision_seconds)}" in text
+    assert run.server.gui.controls["progress"].value == pytest.approx(100 * run.env.scorer.coverage)
+
+
+def test_layers_come_and_go():
+    run = seen(SETTINGS)
+    boxes, view = run.server.gui.controls, run.view
+    layers = {
+        "True walls": "/floor/0",
+        "Robots": "/robots/robot_0",
+        "Believed poses": "/believed/robot_1",
+        "Scans": "/scans/robot_0",
+        "Paths driven": "/trails/robot_0",
+        "Plans and goals": "/plans/robot_1",
+        "Frontiers": "/frontiers",
+    }
+    for label, node in layers.items():
+        assert run.nodes[node].visible, label
+        boxes[label].value = False
+        view._answer_controls()
+        assert not run.nodes[node].visible, label
+    both = run.nodes["/ground"].image
+    boxes["Joined map"].value = False
+    view._answer_controls()
+    own = run.nodes["/ground"].image
+    assert (own != both).any()
+    boxes["Own maps"].value = False
+    view._answer_controls()
+    assert len(np.unique(run.nodes["/ground"].image.reshape(-1, 3), axis=0)) == 1
+
+
+def test_walls_are_cut_where_the_slider_says():
+    run = seen(SETTINGS)
+    run.server.gui.controls["Walls cut [m]"].value = 1.0
+    run.view._answer_controls()
+    assert max(node.given[0][:, 2].max() for name, node in run.nodes.items() if "/floor/" in name) == 1.0
+
+
+def test_a_camera_follows_a_robot():
+    policy = lidarium.policy("nearest_frontier")
+    server, view = quick(policy)
+    camera = SimpleNamespace(position=np.array([1.0, 2.0, 3.0]), look_at=np.zeros(3))
+    server.clients[0] = SimpleNamespace(camera=camera)
+
+    def choose():
+        server.gui.controls["Follow"].value = "robot_1"
+
+    env = WatchedExploration("apartment", SETTINGS, watchers=[AtStep(5, choose), view])
+    run_episode(policy, env, 3)
+    there = env.world.poses[1, :2]
+    assert np.allclose(camera.position[:2] - there, (0.0, -4.5))
+    assert camera.position[2] == 6.0
+
+
+def test_a_pause_holds_the_run_until_it_goes_on():
+    policy, held = lidarium.policy("nearest_frontier"), threading.Event()
+    server, view = quick(policy)
+
+    def pause():
+        server.gui.controls[PAUSE].press()
+        held.set()
+
+    env = WatchedExploration("apartment", SETTINGS, watchers=[AtStep(3, pause), view])
+    run = threading.Thread(target=run_episode, args=(policy, env, 3))
+    run.start()
+    assert held.wait(60.0)
+    button = server.gui.controls[PAUSE]
+    run.join(0.3)
+    assert run.is_alive()
+    assert env.scorer.time == pytest.approx(0.3)
+    assert button.label == GO_ON
+    button.press()
+    run.join(60.0)
+    assert not run.is_alive()
+    assert env.scorer.time == pytest.approx(8.0)
+
+
+def test_an_interrupt_ends_a_paused_run():
+    policy = lidarium.policy("nearest_frontier")
+    server, view = quick(policy)
+
+    def pause():
+        server.gui.controls[PAUSE].press()
+        signal.raise_signal(signal.SIGINT)
+
+    env = WatchedExploration("apartment", SETTINGS, watchers=[AtStep(3, pause), view])
+    episode = run_episode(policy, env, 3, raise_interrupt=False)
+    assert episode.is_interrupted
+    assert env.scorer.time < 8.0
+    assert not view.has_ended
+
+
+def test_depth_images_and_sparse_maps_are_shown_where_there_are_cameras():
+    settings = make_settings(
+        robots=1, horizon_s=3.0, resolution=0.05, camera="xtion_tilted", observe=("scan", "depth")
+    )
+    policy = lidarium.policy("sparse_frontier")
+    run = seen(settings_for(policy, settings), "sparse_frontier", "open_apartment")
+    cloud, boxes = run.nodes["/clouds/robot_0"].points, run.nodes["/boxes/robot_0/all"].given[0]
+    x_min, y_min, x_max, y_max = run.env.floor.bounds
+    assert len(cloud) > 500
+    assert ((cloud > (x_min - 0.1, y_min - 0.1, -0.2)) & (cloud < (x_max + 0.1, y_max + 0.1, 3.0))).all()
+    assert len(boxes) % 8 == 0
+    assert len(boxes)
+    assert run.server.gui.controls["Depth image"].image.std() > 0.0
+
+
+def test_layers_of_cameras_are_not_offered_without_cameras():
+    assert "Depth images" not in seen(SETTINGS).server.gui.controls

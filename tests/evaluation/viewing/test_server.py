@@ -1,0 +1,70 @@
+"""The page is served on this machine alone, at the port that was asked for, without a word on stdout."""
+
+import socket
+import sys
+import urllib.request
+
+import pytest
+
+pytest.importorskip("viser", reason="viser is not installed: extra [viewer]")
+
+from lidarium.evaluation.viewing.server import HOST, address_of, view_server
+
+
+def fetch(address):
+    with urllib.request.urlopen(address, timeout=20.0) as answer:
+        return answer.status, answer.read()
+
+
+def test_a_page_is_served_and_gone_afterwards():
+    with view_server(0) as server:
+        address = address_of(server)
+        status, content = fetch(address)
+        assert status == 200
+        assert b"<html" in content.lower()
+        port = server.get_port()
+    with socket.socket() as probe:
+        assert probe.connect_ex((HOST, port)) != 0
+
+
+def test_the_page_asks_for_nothing_from_elsewhere():
+    with view_server(0) as server:
+        _, content = fetch(address_of(server))
+    assert b'<script src="http' not in content
+    assert b'<link rel="stylesheet" href="http' not in content
+
+
+def test_it_is_bound_to_this_machine_alone():
+    with view_server(0) as server, socket.socket() as probe:
+        assert server.get_host() == "127.0.0.1"
+        probe.bind(("127.0.0.2", server.get_port()))  # all of the machine's addresses would be taken
+
+
+def test_the_port_is_the_one_that_was_asked_for():
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        port = probe.getsockname()[1]
+    for _ in range(2):  # and is free again at once
+        with view_server(port) as server:
+            assert server.get_port() == port
+
+
+def test_a_port_in_use_is_named():
+    with socket.socket() as other:
+        other.bind((HOST, 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(OSError, match=f"port {port} of 127.0.0.1 is in use; want a free --view-port"):
+            view_server(port).__enter__()
+
+
+def test_a_missing_package_is_named_with_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(ValueError, match=r"needs the package viser; pip install \"lidarium\[viewer\]\""):
+        view_server(0).__enter__()
+
+
+def test_nothing_is_printed(capfd):
+    with view_server(0) as server:
+        fetch(address_of(server))
+    assert capfd.readouterr().out == ""
