@@ -26,6 +26,9 @@ class Scene:
             return self._add
         return lambda *_, **__: None
 
+    def reset(self):
+        self.nodes.clear()
+
     def _add(self, name, *given, **named):
         node = self.nodes[name] = Node(given=given, remove=lambda: self.nodes.pop(name), **named)
         return node
@@ -34,6 +37,9 @@ class Scene:
 class Gui:
     def __init__(self, choices):
         self.controls, self._choices = {}, choices
+
+    def reset(self):
+        self.controls.clear()
 
     @contextmanager
     def add_folder(self, label):

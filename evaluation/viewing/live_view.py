@@ -70,16 +70,17 @@ class LiveView(Watcher):
     ) -> None:
         self._server, self._policy, self._name, self._clock = server, policy, name, clock
         self._pace = pace or Pace()
-        self.has_ended, self._decisions = False, 0
-        self._frame_due = self._maps_due = 0.0
-        self._drawn_layers: frozenset[Layer] = frozenset()
-        self._followed: tuple[int, NDArray[np.float64]] | None = None
+        self.has_ended = False
 
     def begin(self, env: ExplorationEnv) -> None:
-        """Lay out the page and draw the start."""
+        """Lay out the page and draw the start; what was seen of an episode before is forgotten."""
         assert isinstance(env, WatchedExploration)
         assert env.floor is not None
-        self._env = env
+        self._env, self.has_ended, self._decisions = env, False, 0
+        self._frame_due = self._maps_due = 0.0
+        self._followed: tuple[int, NDArray[np.float64]] | None = None
+        self._server.scene.reset()
+        self._server.gui.reset()
         has_cameras = env.simulation.camera is not None
         ceiling = min(env.floor.ceiling, 2.0 * CUT_M)
         self._controls = Controls(
@@ -121,6 +122,7 @@ class LiveView(Watcher):
         self._scene.show(layers)
         if layers & {Layer.JOINED, Layer.OWN} != self._drawn_layers:
             self._draw_maps()
+        self._follow()
         return not is_end_asked()
 
     def _draw_due(self) -> None:
@@ -138,9 +140,9 @@ class LiveView(Watcher):
         self._answer_controls()
 
     def _draw(self, moment: Moment) -> None:
+        self._places = np.array([[*robot.pose[:2], 0.0] for robot in moment.robots])
         with self._server.atomic():
             self._scene.draw(moment)
-        self._follow(moment)
 
     def _draw_maps(self) -> None:
         """Draw maps, frontiers and words; then not for so long that it takes a small share of the time."""
@@ -166,12 +168,14 @@ class LiveView(Watcher):
         is_wanted = {False: Layer.OWN in self._drawn_layers, True: Layer.JOINED in self._drawn_layers}
         return [group for group in groups if is_wanted[len(group) > 1]]
 
-    def _follow(self, moment: Moment) -> None:
+    def _follow(self) -> None:
         robot = self._controls.followed
         if robot is None:
             self._followed = None
             return
-        here = np.array([*moment.robots[robot].pose[:2], 0.0])
-        is_same = self._followed is not None and self._followed[0] == robot
-        follow(self._server, here, self._followed[1] if self._followed and is_same else None)
+        here, followed = self._places[robot], self._followed
+        is_same = followed is not None and followed[0] == robot
+        before = followed[1] if followed is not None and is_same else None
+        if before is None or not np.array_equal(here, before):
+            follow(self._server, here, before)
         self._followed = robot, here

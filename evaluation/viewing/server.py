@@ -1,5 +1,6 @@
 """The web server of a view: on this machine alone, on a port that is free, quiet."""
 
+import os
 import socket
 import threading
 from collections.abc import Iterator
@@ -37,7 +38,15 @@ def view_server(port: int) -> Iterator["ViserServer"]:
     _check_free(port)
     console = rich.get_console()
     was_quiet, console.quiet = console.quiet, True  # viser writes to standard output, where results go
-    server = viser.ViserServer(HOST, port, label="lidarium", verbose=False)
+
+    class LocalServer(viser.ViserServer):
+        """A server that nobody can ask, from a page of others either, to be shared by a public one."""
+
+        def request_share_url(self, verbose: bool = True) -> str | None:
+            """Share nothing."""
+            return None
+
+    server = LocalServer(HOST, port, label="lidarium", verbose=False)
 
     def stop() -> None:
         server.stop()
@@ -45,7 +54,7 @@ def view_server(port: int) -> Iterator["ViserServer"]:
 
     try:
         if port not in (0, server.get_port()):  # taken since; viser goes on to the next
-            raise OSError(_in_use(port))
+            raise OSError(_unusable(port, "Address already in use"))
         yield server
     finally:
         # Nobody can connect any more at once. Browsers keep spare connections open, for whose end viser waits
@@ -62,13 +71,13 @@ def address_of(server: "ViserServer") -> str:
 
 def _check_free(port: int) -> None:
     with socket.socket() as probe:
-        # What a server that has just ended leaves behind does not count as use.
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if os.name == "posix":  # what a server that has just ended leaves behind does not count as use
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((HOST, port))
         except OSError as error:
-            raise OSError(_in_use(port)) from error
+            raise OSError(_unusable(port, error.strerror or str(error))) from error
 
 
-def _in_use(port: int) -> str:
-    return f"port {port} of {HOST} is in use; want a free --view-port, or 0 for any"
+def _unusable(port: int, why: str) -> str:
+    return f"port {port} of {HOST} cannot be used: {why}; want another --view-port, or 0 for any that is free"

@@ -37,6 +37,8 @@ def events_text(env: WatchedExploration, report: PolicyReport) -> str:
     if report.supervision is not None:
         joins = report.supervision.joins
         events += [(join.time_s, f"{join.a} and {join.b} joined") for join in joins if join.is_used]
+    if not events:
+        return _BOX.format("nothing yet")
     latest = sorted(events, key=lambda event: event[0])[: -MOST_EVENTS - 1 : -1]
     return _BOX.format(_table([(_safe(words), f"{time_s:.1f} s") for time_s, words in latest]))
 

@@ -24,6 +24,12 @@ APART = make_settings(
 )  # fmt: skip
 
 
+WITH_CAMERA = settings_for(
+    lidarium.policy("sparse_frontier"),
+    make_settings(robots=1, horizon_s=3.0, resolution=0.05, camera="xtion_tilted"),
+)
+
+
 class AtStep(Watcher):
     """Does something after a number of steps."""
 
@@ -52,11 +58,17 @@ def seen(settings, policy_name="nearest_frontier", floor="apartment", watchers=(
 
 
 @pytest.mark.parametrize(
-    ("settings", "policy"),
-    [(SETTINGS, "nearest_frontier"), (APART, "supervised"), (SETTINGS, "random_walk")],
+    ("settings", "policy", "floor"),
+    [
+        (SETTINGS, "nearest_frontier", "apartment"),
+        (SETTINGS, "tour_frontier", "apartment"),
+        (APART, "supervised", "apartment"),
+        (SETTINGS, "random_walk", "apartment"),
+        (WITH_CAMERA, "sparse_frontier", "open_apartment"),
+    ],
 )
-def test_a_viewed_run_is_the_same_to_the_bit(settings, policy):
-    viewed, env = seen(settings, policy).env, ExplorationEnv("apartment", settings)
+def test_a_viewed_run_is_the_same_to_the_bit(settings, policy, floor):
+    viewed, env = seen(settings, policy, floor).env, ExplorationEnv(floor, settings)
     run_episode(lidarium.policy(policy), env, seed=3)
     np.testing.assert_array_equal(viewed.world.poses, env.world.poses)
     np.testing.assert_array_equal(viewed.simulation.beliefs.log_odds, env.simulation.beliefs.log_odds)
@@ -177,11 +189,7 @@ def test_an_interrupt_ends_a_paused_run():
 
 
 def test_depth_images_and_sparse_maps_are_shown_where_there_are_cameras():
-    settings = make_settings(
-        robots=1, horizon_s=3.0, resolution=0.05, camera="xtion_tilted", observe=("scan", "depth")
-    )
-    policy = lidarium.policy("sparse_frontier")
-    run = seen(settings_for(policy, settings), "sparse_frontier", "open_apartment")
+    run = seen(WITH_CAMERA, "sparse_frontier", "open_apartment")
     cloud, boxes = run.nodes["/clouds/robot_0"].points, run.nodes["/boxes/robot_0/all"].given[0]
     x_min, y_min, x_max, y_max = run.env.floor.bounds
     assert len(cloud) > 500
@@ -191,5 +199,35 @@ def test_depth_images_and_sparse_maps_are_shown_where_there_are_cameras():
     assert run.server.gui.controls["Depth image"].image.std() > 0.0
 
 
+def test_sparse_maps_that_no_policy_asks_for_are_not_made():
+    run = seen(WITH_CAMERA, "nearest_frontier", "open_apartment")
+    assert run.env.perception.sparse_maps.made == {}
+    assert "/boxes/robot_0/all" not in run.nodes
+    assert len(run.nodes["/clouds/robot_0"].points) > 500
+
+
 def test_layers_of_cameras_are_not_offered_without_cameras():
     assert "Depth images" not in seen(SETTINGS).server.gui.controls
+
+
+def test_another_episode_has_the_page_for_itself():
+    policy = lidarium.policy("nearest_frontier")
+    server, view = quick(policy)
+    env = WatchedExploration("apartment", SETTINGS, watchers=[view])
+    run_episode(policy, env, 3)
+    once = set(server.scene.nodes), set(server.gui.controls)
+    run_episode(policy, env, 4)
+    assert (set(server.scene.nodes), set(server.gui.controls)) == once
+    assert view.has_ended
+
+
+def test_who_is_chosen_while_the_run_stands_is_looked_at():
+    run = seen(SETTINGS)
+    camera = SimpleNamespace(position=np.zeros(3), look_at=np.zeros(3))
+    run.server.clients[0] = SimpleNamespace(camera=camera)
+    run.server.gui.controls["Follow"].value = "robot_0"
+    run.view._answer_controls()
+    assert np.allclose(camera.look_at[:2], run.env.world.poses[0, :2])
+    camera.position = np.array([9.0, 9.0, 9.0])  # as a person turns the view
+    run.view._answer_controls()
+    assert np.array_equal(camera.position, (9.0, 9.0, 9.0))

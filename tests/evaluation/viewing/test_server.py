@@ -54,7 +54,9 @@ def test_a_port_in_use_is_named():
         other.bind((HOST, 0))
         other.listen()
         port = other.getsockname()[1]
-        with pytest.raises(OSError, match=f"port {port} of 127.0.0.1 is in use; want a free --view-port"):
+        with pytest.raises(
+            OSError, match=f"port {port} of 127.0.0.1 cannot be used: .*; want another --view-port"
+        ):
             view_server(port).__enter__()
 
 
@@ -62,6 +64,11 @@ def test_a_missing_package_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(ValueError, match=r"needs the package viser; pip install \"lidarium\[viewer\]\""):
         view_server(0).__enter__()
+
+
+def test_nobody_can_have_it_shared_by_a_public_server():
+    with view_server(0) as server:
+        assert server.request_share_url() is None
 
 
 def test_nothing_is_printed(capfd):

@@ -83,7 +83,7 @@ def test_a_port_in_use_is_refused_before_anything_is_written(tmp_path, capsys):
         port = other.getsockname()[1]
         arguments = [*SHORT, "--view", "--view-port", str(port), "--out", str(tmp_path / "out")]
         assert main(arguments) == 2
-    assert f"port {port} of 127.0.0.1 is in use; want a free --view-port" in capsys.readouterr().err
+    assert f"port {port} of 127.0.0.1 cannot be used: Address already in use" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
