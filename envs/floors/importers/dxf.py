@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarium.envs.floors.extent import MOST_COORDINATE_M
 from lidarium.envs.floors.floor import Floor
 from lidarium.envs.floors.importers.common import MOST_TEXT_BYTES, few_enough, floor_of_lines
 from lidarium.mapping.files.guarded_reading import READING_ERRORS, read_bytes
@@ -120,12 +121,16 @@ def _lines(path: Path, document: Any, error: float) -> Iterator[NDArray[np.float
             yield np.array([(start.x, start.y), (end.x, end.y)])
             continue
         for part in make_path(entity).sub_paths():
-            yield _flattened(part, error)
+            yield _flattened(path, part, error)
 
 
-def _flattened(part: Any, error: float) -> NDArray[np.float64]:  # noqa: ANN401
+def _flattened(path: Path, part: Any, error: float) -> NDArray[np.float64]:  # noqa: ANN401
     """Return points (n, 2) of a curve."""
-    corners = np.array([(point.x, point.y) for point in part.control_vertices()])
+    corners = np.array([tuple(point) for point in part.control_vertices()]).reshape(-1, 3)
+    # Where numbers are too coarse for it, parts of a curve never come near enough, and there is no end.
+    farthest = MOST_COORDINATE_M / CURVE_ERROR_M * error
+    if not (np.abs(corners) <= farthest).all():
+        raise ValueError(f"{path} has a curve that reaches beyond {MOST_COORDINATE_M:,.0f} m; want a plan")
     size = float(np.ptp(corners, axis=0).max()) if len(corners) else 0.0
     points = part.flattening(max(error, CURVE_SHARE * size))
     return np.array([(point.x, point.y) for point in points]).reshape(-1, 2)

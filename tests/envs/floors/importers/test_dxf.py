@@ -161,3 +161,11 @@ def test_a_block_that_is_not_there_is_refused(drawing, tmp_path):
     drawing.modelspace().add_blockref("NOWHERE", (0, 0))
     with pytest.raises(ValueError, match=r"plan.dxf is not a DXF drawing: .*NOWHERE"):
         load_file(saved(drawing, tmp_path))
+
+
+@pytest.mark.parametrize("height", [0.0, 1e300])
+def test_curves_that_are_too_far_away_are_refused(drawing, tmp_path, height):
+    x = 3000 if height else 1e17
+    drawing.modelspace().add_open_spline([(x, 0, height), (x, 100, -height), (x, 200, 0), (x, 900, 0)])
+    with pytest.raises(ValueError, match=r"plan.dxf has a curve that reaches beyond 100,000,000 m"):
+        load_file(saved(drawing, tmp_path))
