@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from lidarium.mapping.files.map_files import MapImage
     from lidarium.mapping.geometry.rigid import Transform
-    from lidarium.mapping.merging.bend.deforming import Deformation
-    from lidarium.mapping.merging.fusion import FusedMap
+    from lidarium.mapping.merging.bend.deforming import Deformation, Deformed
     from lidarium.mapping.merging.joining.merged_maps import Merged
     from lidarium.mapping.merging.settings import MergeSettings
 
@@ -121,8 +120,7 @@ def execute(command: Merge) -> Answer:
     for group, bent in zip(joined, deformed, strict=False):
         for name, deformation in zip(group, bent.deformations, strict=True):
             result["maps"][name]["deformation"] = _deformation(deformation)
-    fused = [bent.fused for bent in deformed] or [merged.fused(group) for group in joined]
-    files = _write(merged, fused, images, result, out)
+    files = _write(merged, deformed, images, result, out)
     is_whole = len(merged.groups()) == 1
     return Answer(
         result,
@@ -231,26 +229,28 @@ def _placed(merged: "Merged", images: "dict[str, MapImage]") -> PlacedMaps:
 
 
 def _deformation(found: "Deformation | None") -> dict[str, float] | None:
-    """Return how much a map is bent to agree with those before it."""
+    """Return how much a map is bent, and what agrees with those before it then."""
     if found is None:
         return None
     return {
         "mean_m": round(found.mean_m, 4),
         "most_m": round(found.most_m, 4),
         "strain": round(found.bend.strain, 5),
+        "agreeing_m": round(found.agreement.agreeing_m, 3),
+        "contradiction_m": round(found.agreement.contradicting_m, 3),
     }
 
 
 def _write(
     merged: "Merged",
-    fused_maps: "list[FusedMap]",
+    deformed: "list[Deformed]",
     images: "dict[str, MapImage]",
     result: dict[str, Any],
     out: Path,
 ) -> list[str]:
     """Write transforms, the picture and the fused map of each group of two maps or more.
 
-    In the ROS frame of the group's first map.
+    In the ROS frame of the group's first map; bent where the groups were.
     """
     from lidarium.evaluation.drawing.merge_picture import save_merge_picture
     from lidarium.evaluation.episodes.output import check_written, write_json
@@ -259,12 +259,14 @@ def _write(
 
     files = []
     joined = [group for group in merged.groups() if len(group) > 1]
+    fused_maps = [bent.fused for bent in deformed] or [merged.fused(group) for group in joined]
     for number, (group, fused) in enumerate(zip(joined, fused_maps, strict=True)):
         name = "map" if number == 0 else f"map-{number + 1}"
         origin = _corner(images[group[0]]) @ Transform(*fused.origin)
         write_ros_map(out, name, fused.levels, (origin.x, origin.y, origin.theta), fused.resolution)
         files += [f"{name}.yaml", f"{name}.pgm"]
-    save_merge_picture(out / "merge.png", merged, {name: _corner(image) for name, image in images.items()})
+    corners = {name: _corner(image) for name, image in images.items()}
+    save_merge_picture(out / "merge.png", merged, corners, deformed)
     write_json(out / "transforms.json", result)
     files += ["transforms.json", "merge.png"]
     check_written(out, files)

@@ -3,12 +3,10 @@
 Each map has its colour.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -18,20 +16,19 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from lidarium.envs.drawing.rendering import Colour, team_colours
+from lidarium.evaluation.drawing.maps.merge_panels import Panel, contradicting, panels_of
 from lidarium.evaluation.drawing.plain_words import plain_words
 from lidarium.evaluation.episodes.output import whole_file
-from lidarium.mapping.files.guarded_reading import shortened
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED
+from lidarium.mapping.merging.bend.deforming import Deformed
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.joining.merged_maps import Merged
 
 INK, SEVERAL = "#1f2937", np.array([31, 41, 55], np.uint8)
 DPI = 130
 _HEIGHT, _WIDEST = 7.0, 14.0
-_MOST_PANELS, _MOST_COLUMNS, _MOST_TITLE = 6, 3, 60
-_MISS_M = 0.15
-"""A wall contradicts where all within this distance is free [m]."""
+_MOST_COLUMNS = 3
 
 _MATCHED: dict[str, Any] = {
     "color": "#e11d48",
@@ -42,29 +39,9 @@ _MATCHED: dict[str, Any] = {
 }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Panel:
-    """Maps that are drawn over each other.
-
-    Attributes
-    ----------
-    names : list of str
-        The maps, that in whose frame is drawn first.
-    root_from_map : list of Transform
-        How their lower left corners lie in that map.
-    title : str
-        What is to be said of them.
-    matched : list of (n, 2, 2) float64
-        Matched corners of pairs of them, in the root's frame [m].
-    """
-
-    names: list[str]
-    root_from_map: list[Transform]
-    title: str
-    matched: list[NDArray[np.float64]]
-
-
-def save_merge_picture(path: Path, merged: Merged, corners: Mapping[str, Transform]) -> None:
+def save_merge_picture(
+    path: Path, merged: Merged, corners: Mapping[str, Transform], deformed: Sequence[Deformed] = ()
+) -> None:
     """Draw each group of joined maps, and each refused pair as it would lie best.
 
     Walls and free space have the colour of the map that saw them, walls that several saw are dark, and walls
@@ -79,13 +56,19 @@ def save_merge_picture(path: Path, merged: Merged, corners: Mapping[str, Transfo
         What `merge_maps` found.
     corners : mapping of str to Transform
         From cells' metres into each map's ROS frame.
+    deformed : sequence of Deformed
+        How each group of two maps or more was bent: it is drawn so, with what agrees and contradicts then.
     """
-    panels = _panels(merged)
+    panels = panels_of(merged, deformed)
     if not panels:
         _save_nothing(path)
         return
     fused = [
-        fuse([merged.levels[name] for name in panel.names], panel.root_from_map, merged.resolution)
+        fuse(
+            [one.levels for one in panel.layers],
+            [one.common_from_cells for one in panel.layers],
+            merged.resolution,
+        )
         for panel in panels
     ]
     columns = min(len(panels), _MOST_COLUMNS)
@@ -99,7 +82,7 @@ def save_merge_picture(path: Path, merged: Merged, corners: Mapping[str, Transfo
     colours = dict(zip(names, team_colours(len(names)), strict=True))
     every = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, panel, one in zip(every, panels, fused, strict=False):
-        _draw_panel(axes, merged, panel, one, (colours, corners[panel.names[0]]))
+        _draw_panel(axes, panel, one, (colours, corners[panel.names[0]]))
     for axes in every[len(panels) :]:
         axes.set_axis_off()
     with whole_file(path) as beside, plain_words(figure):
@@ -115,39 +98,9 @@ def _save_nothing(path: Path) -> None:
         figure.savefig(beside)
 
 
-def _panels(merged: Merged) -> list[_Panel]:
-    """Return what is drawn: joined groups, and refused pairs of maps that join none, else the maps alone."""
-    known = {name for name, levels in merged.levels.items() if (levels != UNKNOWN).any()}
-    panels = [_group_panel(merged, group) for group in merged.groups() if len(group) > 1]
-    joined = {name for panel in panels for name in panel.names}
-    for (a, b), result in merged.pairs.items():
-        is_refused = {a, b} <= known and not {a, b} <= joined
-        if len(panels) < _MOST_PANELS and is_refused and result.a_from_b is not None:
-            title = f"refused, {shortened(result.reason, _MOST_TITLE)}"
-            panels.append(_Panel([a, b], [Transform(), result.a_from_b], title, []))
-    return panels or [
-        _Panel([name], [Transform()], "joins none", []) for name in sorted(known)[:_MOST_PANELS]
-    ]
-
-
-def _group_panel(merged: Merged, group: list[str]) -> _Panel:
-    transforms = {name: merged.tree.lookup(group[0], name) or Transform() for name in group}
-    matched, walls_m = [], 0.0
-    for (a, b), result in merged.pairs.items():
-        if result.is_accepted and a in group and b in group:
-            ends = [
-                transforms[name].apply(points) for name, points in zip((a, b), result.joined, strict=True)
-            ]
-            matched.append(np.stack(ends, axis=1))
-            walls_m += result.agreement.agreeing_m
-    title = f"{walls_m:.0f} m of walls agree, {sum(map(len, matched))} matched corners"
-    return _Panel(group, [transforms[name] for name in group], title, matched)
-
-
 def _draw_panel(
     axes: Axes,
-    merged: Merged,
-    panel: _Panel,
+    panel: Panel,
     fused: FusedMap,
     style: tuple[dict[str, Colour], Transform],
 ) -> None:
@@ -168,13 +121,7 @@ def _draw_panel(
     axes.set_ylim(rim[:, 1].min(), rim[:, 1].max())
     for ends in panel.matched:
         axes.plot(*corner.apply(ends.reshape(-1, 2)).reshape(-1, 2, 2).transpose(2, 1, 0), **_MATCHED)
-    against = [
-        transform.apply(_contradicting(merged, (panel, i), j))
-        for i, transform in enumerate(panel.root_from_map)
-        for j in range(len(panel.names))
-        if i != j
-    ]
-    places = corner.apply(np.concatenate(against)) if against else np.zeros((0, 2))
+    places = corner.apply(contradicting(panel.layers, fused.resolution))
     axes.plot(*places.T, linestyle="none", marker="s", markersize=1.0, color="#dc2626", zorder=3)
     handles = [Patch(color="#{:02x}{:02x}{:02x}".format(*colours[name]), label=name) for name in panel.names]
     handles += [Patch(color=INK, label="agrees"), Patch(color="#dc2626", label="contradicts")]
@@ -190,21 +137,6 @@ def _draw_panel(
     axes.set_title(f"{names}: {panel.title}", fontsize=9, color=INK)
     axes.set_xlabel(f"x in the frame of {panel.names[0]} [m]", fontsize=8)
     axes.tick_params(labelsize=8)
-
-
-def _contradicting(merged: Merged, drawn: tuple[_Panel, int], other: int) -> NDArray[np.float64]:
-    """Return the walls of a map that stand where another one is free, in its own metres (n, 2)."""
-    panel, one = drawn
-    levels, under = (merged.levels[panel.names[k]] for k in (one, other))
-    walls = np.argwhere(levels == OCCUPIED)[:, ::-1] + 0.5
-    other_from_one = panel.root_from_map[other].inverse() @ panel.root_from_map[one]
-    cells = np.floor(other_from_one.apply(walls * merged.resolution) / merged.resolution).astype(np.int64)
-    rows, columns = under.shape
-    is_on = (cells >= 0).all(axis=1) & (cells[:, 0] < columns) & (cells[:, 1] < rows)
-    walls, cells = walls[is_on], cells[is_on]
-    clear = cv2.distanceTransform((under == FREE).astype(np.uint8), cv2.DIST_L2, 5)
-    reach = max(_MISS_M / merged.resolution, 1.5)
-    return np.asarray(walls[clear[cells[:, 1], cells[:, 0]] > reach] * merged.resolution)
 
 
 def _coloured(fused: FusedMap, colours: list[Colour]) -> NDArray[np.uint8]:

@@ -277,7 +277,7 @@ def test_maps_are_bent_to_agree_only_where_asked(tmp_path, capsys):
         str(write_ros_map(tmp_path / "in", name, levels[name], (0.0, 0.0, 0.0), RESOLUTION))
         for name in levels
     ]
-    walls = {}
+    walls, pictures = {}, set()
     for name, options in (("rigid", []), ("bent", ["--deform"])):
         out = tmp_path / name
         assert main(["merge", *paths, "--out", str(out), *options, "--json"]) == 0
@@ -285,9 +285,13 @@ def test_maps_are_bent_to_agree_only_where_asked(tmp_path, capsys):
         bowed_map = result["maps"]["bowed"]
         assert ("deformation" in bowed_map) == bool(options)
         walls[name] = int((read_ros_map(out / "map.yaml").levels == 0).sum())
+        pictures.add((out / "merge.png").read_bytes())
+    assert len(pictures) == 2
     assert result["maps"]["straight"]["deformation"] is None
     found = bowed_map["deformation"]
-    assert set(found) == {"mean_m", "most_m", "strain"}
+    assert set(found) == {"mean_m", "most_m", "strain", "agreeing_m", "contradiction_m"}
+    assert found["contradiction_m"] < 1.0
+    assert found["agreeing_m"] > 30.0
     assert 0.05 < found["mean_m"] < found["most_m"] < 0.6
     # Walls that lie on each other are fewer cells than walls beside each other.
     assert walls["bent"] < 0.9 * walls["rigid"]

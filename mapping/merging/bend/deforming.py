@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.grids.occupancy import UNKNOWN
+from lidarium.mapping.merging.agreement.validation import Agreement
 from lidarium.mapping.merging.bend.bent_agreement import compare_bent
 from lidarium.mapping.merging.bend.estimation import Bend, BendSettings, estimate_bend
 from lidarium.mapping.merging.bend.hypotheses import MOST_STRAIN, Hypothesis
@@ -30,10 +31,20 @@ class Deformed:
         Their map, in the frame of the first.
     deformations : list of Deformation or None
         How each map is bent; None where it is laid as it was joined.
+    laid : list of Laid
+        Each map as it is laid.
     """
 
     fused: FusedMap
     deformations: "list[Deformation | None]"
+    laid: "list[Laid]"
+
+    def places(self, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where points (n, 2) of a map, from its lower left corner, lie in the common frame [m]."""
+        deformation = self.deformations[number]
+        if deformation is None:
+            return np.asarray(self.laid[number].common_from_cells.apply(points))
+        return deformation.places(points)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,10 +57,20 @@ class Deformation:
         In the cells of their fused map.
     moves : (n, 2) float64
         How far its walls are moved from where it was joined [m].
+    agreement : Agreement
+        What agrees with the maps before it once it is bent.
+    common_from_under : Transform
+        Where the lower left corner of their fused map lies in the common frame.
     """
 
     bend: Bend
     moves: NDArray[np.float64]
+    agreement: Agreement
+    common_from_under: Transform
+
+    def places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where points (n, 2) of the bent map lie in the common frame [m]."""
+        return np.asarray(self.common_from_under.apply(self.bend.field.bent(self.bend.a_from_b, points)))
 
     @property
     def mean_m(self) -> float:
@@ -101,12 +122,12 @@ def deform(
         known = _fused(laid, resolution)
         under = describe_map(known.levels, resolution)
         corner = Transform(*known.origin)
-        deformation = _held(under, one, corner.inverse() @ transform, settings)
+        deformation = _held(under, one, (corner, transform), settings)
         found.append(deformation)
         laid.append(
             Laid(one.levels, transform) if deformation is None else bent_map(one, deformation.bend, corner)
         )
-    return Deformed(_fused(laid, resolution), found)
+    return Deformed(_fused(laid, resolution), found, laid)
 
 
 def bent_map(one: DescribedMap, bend: Bend, corner: Transform) -> Laid:
@@ -145,13 +166,18 @@ def _fused(laid: Sequence[Laid], resolution: float) -> FusedMap:
 
 
 def _held(
-    a: DescribedMap, b: DescribedMap, a_from_b: Transform, settings: BendSettings
+    a: DescribedMap, b: DescribedMap, frames: tuple[Transform, Transform], settings: BendSettings
 ) -> Deformation | None:
-    """Return how map b is bent against map a, None where it is better laid rigidly."""
+    """Return how map b is bent against map a, None where it is better laid rigidly.
+
+    The frames are those of both maps in the common one.
+    """
     if len(a.walls) == 0 or len(b.walls) == 0:
         return None
+    a_from_b = frames[0].inverse() @ frames[1]
     bend = estimate_bend(a, b, a_from_b, settings)
-    found = Deformation(bend, bend.field.bent(bend.a_from_b, b.walls) - a_from_b.apply(b.walls))
+    moves = bend.field.bent(bend.a_from_b, b.walls) - a_from_b.apply(b.walls)
+    found = Deformation(bend, moves, compare_bent(a, b, bend), frames[0])
     if not bend.is_held or bend.strain > MOST_STRAIN or found.most_m > settings.reach_m:
         return None
     rigid = replace(
@@ -159,5 +185,5 @@ def _held(
         a_from_b=a_from_b,
         field=OffsetField(bend.field.corner, bend.field.spacing_m, 0.0 * bend.field.offsets),
     )
-    evidence = [Hypothesis(one, compare_bent(a, b, one)).evidence_m for one in (bend, rigid)]
-    return found if evidence[0] > evidence[1] else None
+    evidence_m = Hypothesis(bend, found.agreement).evidence_m
+    return found if evidence_m > Hypothesis(rigid, compare_bent(a, b, rigid)).evidence_m else None
