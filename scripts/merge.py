@@ -6,11 +6,12 @@ The robots know nothing of each other's start.
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from tyro.conf import Positional
 
 from lidarium.scripts.common import DONE, NO, Answer, Command, file_name, table
+from lidarium.scripts.output.merged_files import corner_of, draw_regions, write_merged
 from lidarium.scripts.output.transforms import PlacedMaps, transforms
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from lidarium.mapping.files.map_files import MapImage
     from lidarium.mapping.geometry.rigid import Transform
-    from lidarium.mapping.merging.bend.deforming import Deformation, Deformed
+    from lidarium.mapping.merging.bend.deforming import Deformation
     from lidarium.mapping.merging.joining.merged_maps import Merged
     from lidarium.mapping.merging.settings import MergeSettings
 
@@ -47,6 +48,13 @@ class Merge(Command):
     """rules of merging: default, or thesis for those of the thesis as printed."""
     tolerance: Literal["strict", "normal", "drift"] = "normal"
     """how far maps may be bent against each other: strict for not at all, drift for maps that have drifted"""
+    structure: Literal["corners", "regions", "all"] = "all"
+    """what proposes how maps lie before everything is tried.
+
+    Corners; regions of free space and the doors between them; or both. Mode thesis knows corners alone
+    """
+    regions: bool = False
+    """also draw the regions of each map and their doors, as regions.png"""
     guess: str | None = None
     """X,Y,THETA of the second map's ROS frame in that of the first [m, rad].
 
@@ -109,7 +117,8 @@ def execute(command: Merge) -> Answer:
     images = _read(command)
     settings = merge_settings(command.mode, max(image.resolution for image in images.values()))
     if command.mode == "default":
-        settings = replace(settings, confidence=TOLERANCES[command.tolerance])
+        confidence = TOLERANCES[command.tolerance]
+        settings = replace(settings, confidence=confidence, structure=command.structure)
     merged, images, scale = _merged(command, images, settings)
     result = transforms(_placed(merged, images))
     second = result["maps"][list(images)[1]]
@@ -120,7 +129,9 @@ def execute(command: Merge) -> Answer:
     for group, bent in zip(joined, deformed, strict=False):
         for name, deformation in zip(group, bent.deformations, strict=True):
             result["maps"][name]["deformation"] = _deformation(deformation)
-    files = _write(merged, deformed, images, result, out)
+    files = write_merged(merged, deformed, images, result, out)
+    if command.regions:
+        files.append(draw_regions(merged, images, settings.regions, out))
     is_whole = len(merged.groups()) == 1
     return Answer(
         result,
@@ -175,7 +186,7 @@ def _guess(command: Merge, images: "list[MapImage]") -> "Transform | None":
         raise ValueError(f"guess is {command.guess!r}; want X,Y,THETA in metres and radians")
     if len(images) != 2:
         raise ValueError(f"a guess is of two maps; {len(images)} are given")
-    first, second = (_corner(image) for image in images)
+    first, second = (corner_of(image) for image in images)
     return first.inverse() @ Transform(x, y, theta) @ second
 
 
@@ -201,16 +212,9 @@ def _read(command: Merge) -> "dict[str, MapImage]":
     return images
 
 
-def _corner(image: "MapImage") -> "Transform":
-    """Return the transform from cells' metres into the map's ROS frame."""
-    from lidarium.mapping.geometry.rigid import Transform
-
-    return Transform(*image.origin)
-
-
 def _placed(merged: "Merged", images: "dict[str, MapImage]") -> PlacedMaps:
     """Return how the maps lie, between their ROS frames."""
-    corners = {name: _corner(image) for name, image in images.items()}
+    corners = {name: corner_of(image) for name, image in images.items()}
     groups = []
     for group in merged.groups():
         frames = {}
@@ -239,38 +243,6 @@ def _deformation(found: "Deformation | None") -> dict[str, float] | None:
         "agreeing_m": round(found.agreement.agreeing_m, 3),
         "contradiction_m": round(found.agreement.contradicting_m, 3),
     }
-
-
-def _write(
-    merged: "Merged",
-    deformed: "list[Deformed]",
-    images: "dict[str, MapImage]",
-    result: dict[str, Any],
-    out: Path,
-) -> list[str]:
-    """Write transforms, the picture and the fused map of each group of two maps or more.
-
-    In the ROS frame of the group's first map; bent where the groups were.
-    """
-    from lidarium.evaluation.drawing.merge_picture import save_merge_picture
-    from lidarium.evaluation.episodes.output import check_written, write_json
-    from lidarium.mapping.files.map_files import write_ros_map
-    from lidarium.mapping.geometry.rigid import Transform
-
-    files = []
-    joined = [group for group in merged.groups() if len(group) > 1]
-    fused_maps = [bent.fused for bent in deformed] or [merged.fused(group) for group in joined]
-    for number, (group, fused) in enumerate(zip(joined, fused_maps, strict=True)):
-        name = "map" if number == 0 else f"map-{number + 1}"
-        origin = _corner(images[group[0]]) @ Transform(*fused.origin)
-        write_ros_map(out, name, fused.levels, (origin.x, origin.y, origin.theta), fused.resolution)
-        files += [f"{name}.yaml", f"{name}.pgm"]
-    corners = {name: _corner(image) for name, image in images.items()}
-    save_merge_picture(out / "merge.png", merged, corners, deformed)
-    write_json(out / "transforms.json", result)
-    files += ["transforms.json", "merge.png"]
-    check_written(out, files)
-    return files
 
 
 def _summary(merged: "Merged", files: list[str], out: Path, scale: float | None) -> str:

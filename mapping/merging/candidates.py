@@ -12,6 +12,7 @@ from lidarium.mapping.merging.alignment import Candidate, distinct, find_inliers
 from lidarium.mapping.merging.correlation import best_translations
 from lidarium.mapping.merging.correspondence import Matches
 from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.regions.proposals import propose_motions
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.wall_alignment import rank_by_walls, refine_on_walls
 
@@ -118,6 +119,38 @@ def correlated(
     )
     reach, samples = settings.alignment.refinement_reach_m, settings.alignment.wall_samples
     refined = (refine_on_walls(a, b, Transform(*transforms[k].tolist()), reach, samples) for k in chosen)
+    return [judge(a, b, Candidate(transform, NO_INLIERS), settings) for transform in refined]
+
+
+def region_candidates(a: DescribedMap, b: DescribedMap, settings: MergeSettings) -> list[Judged]:
+    """Judge the motions of regions and doors for which most walls speak.
+
+    Parameters
+    ----------
+    a, b : DescribedMap
+        Maps of one resolution with walls, described with their regions.
+    settings : MergeSettings
+        How.
+
+    Raises
+    ------
+    ValueError
+        Where a map was described without its regions.
+    """
+    if a.regions is None or b.regions is None:
+        raise ValueError("a map is described without its regions; want both described by these settings")
+    chosen, alignment = settings.regions, settings.alignment
+    motions = propose_motions(a.regions, b.regions, chosen)
+    walls = rank_by_walls(a, b, motions, alignment.wall_samples // 2)
+    kept = distinct(
+        motions,
+        np.argsort(-walls, kind="stable"),
+        _middle(b),
+        chosen.candidates,
+        (chosen.apart_m, chosen.apart_angle),
+    )
+    reach, samples = alignment.refinement_reach_m, alignment.wall_samples
+    refined = (refine_on_walls(a, b, Transform(*motions[k].tolist()), reach, samples) for k in kept)
     return [judge(a, b, Candidate(transform, NO_INLIERS), settings) for transform in refined]
 
 

@@ -109,6 +109,10 @@ class Matches:
         return len(self.first)
 
 
+NO_MATCHES = Matches(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+"""Of maps whose corners are not matched."""
+
+
 def match_corners(
     first: Corners,
     second: Corners,

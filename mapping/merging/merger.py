@@ -15,9 +15,9 @@ from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.description.described_map import (
     DescribedMap,
     check_resolution,
-    resampled,
     three_levels_of,
 )
+from lidarium.mapping.merging.description.resampling import resampled
 from lidarium.mapping.merging.frame_tree import FrameTree
 from lidarium.mapping.merging.joining.joined_tree import joined_tree, pair_edge
 from lidarium.mapping.merging.joining.merged_maps import Merged

@@ -3,9 +3,10 @@
 import math
 import time
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.counts import disc_agreement
@@ -14,6 +15,7 @@ from lidarium.mapping.merging.agreement.validation import compare, has_contradic
 from lidarium.mapping.merging.alignment import Candidate, refine
 from lidarium.mapping.merging.candidates import (
     NO_INLIERS,
+    Judged,
     ambiguity,
     beside,
     corner_candidates,
@@ -22,13 +24,16 @@ from lidarium.mapping.merging.candidates import (
     most_evident,
     near,
     polished,
+    region_candidates,
 )
-from lidarium.mapping.merging.correspondence import Matches, match_corners
+from lidarium.mapping.merging.correspondence import NO_MATCHES, Matches, match_corners
 from lidarium.mapping.merging.description.described_map import DescribedMap, describe_map
 from lidarium.mapping.merging.pair_result import NO_POINTS as NO_POINTS
 from lidarium.mapping.merging.pair_result import PairResult as PairResult
 from lidarium.mapping.merging.pair_result import explained as explained
 from lidarium.mapping.merging.pair_result import or_bent
+from lidarium.mapping.merging.regions.directions import likely_rotations
+from lidarium.mapping.merging.regions.graph import find_regions
 from lidarium.mapping.merging.settings import MergeSettings
 from lidarium.mapping.merging.wall_alignment import refine_on_walls
 
@@ -37,7 +42,10 @@ NO_WALLS = "too few corners: a map has no walls that border on free space"
 
 def described(levels: ArrayLike, resolution: float, settings: MergeSettings) -> DescribedMap:
     """Describe a map by the settings of merging; see `describe_map`."""
-    return describe_map(levels, resolution, settings.corners, settings.descriptors)
+    found = describe_map(levels, resolution, settings.corners, settings.descriptors)
+    if settings.structure == "corners":
+        return found
+    return replace(found, regions=find_regions(found.levels, found.resolution, settings.regions))
 
 
 def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None = None) -> PairResult:
@@ -66,7 +74,9 @@ def merge_pair(a: DescribedMap, b: DescribedMap, settings: MergeSettings | None 
             f"maps have resolutions of {a.resolution} and {b.resolution} m; want one, see resampled"
         )
     began = time.process_time()
-    matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, settings.correspondence)
+    matches = NO_MATCHES
+    if settings.structure != "regions":
+        matches = match_corners(a.corners, b.corners, a.descriptors, b.descriptors, settings.correspondence)
     merge = _merge_by_discs if settings.validation.test == "discs" else _merge_by_walls
     result = _exactly(a, b, merge(a, b, matches, settings), settings)
     return replace(result, matches=len(matches), time_ms=1e3 * (time.process_time() - began))
@@ -187,21 +197,7 @@ def _merge_by_walls(
 ) -> PairResult:
     if len(a.walls) == 0 or len(b.walls) == 0:
         return PairResult(False, NO_WALLS)
-    candidates, shortage = corner_candidates(a, b, matches, settings)
-    judged = [
-        judge(a, b, refine(a, b, matches, candidate, settings.alignment), settings)
-        for candidate in candidates
-    ]
-    best, found_by = most_evident(judged), "corners"
-    if (best is None or best.refusal is not None) and settings.correlation.rotations > 0:
-        angles = np.arange(settings.correlation.rotations) * (2.0 * math.pi / settings.correlation.rotations)
-        judged += correlated(a, b, angles, 5 * settings.alignment.candidates, settings)
-        fallback = most_evident(judged)
-        if fallback is not None and fallback.refusal is not None:
-            judged += beside(a, b, judged, settings)
-            fallback = most_evident(judged)
-        if fallback is not None and fallback is not best:
-            best, found_by = fallback, "correlation"
+    judged, best, found_by, shortage = _searched(a, b, matches, settings)
     if best is None:
         return PairResult(False, shortage or "too few inliers: no transform was found")
     best = polished(a, b, best, settings)
@@ -222,6 +218,55 @@ def _merge_by_walls(
         tried=tuple(one.candidate.a_from_b for one in judged),
     )
     return or_bent(a, b, result, settings)
+
+
+class _Search(NamedTuple):
+    """What was judged, the best of it and what has proposed that, and why corners proposed nothing."""
+
+    judged: list[Judged]
+    best: Judged | None
+    found_by: str
+    shortage: str | None
+
+
+def _searched(a: DescribedMap, b: DescribedMap, matches: Matches, settings: MergeSettings) -> _Search:
+    """Judge what corners, regions and all rotations and translations propose, until something passes."""
+    shortage, judged, best, found_by = None, list[Judged](), None, "corners"
+    if settings.structure != "regions":
+        candidates, shortage = corner_candidates(a, b, matches, settings)
+        judged = [
+            judge(a, b, refine(a, b, matches, candidate, settings.alignment), settings)
+            for candidate in candidates
+        ]
+        best = most_evident(judged)
+    if settings.structure != "corners" and (best is None or best.refusal is not None):
+        proposed = region_candidates(a, b, settings)
+        # What is refused stays out: it would be bent too, and strangers fit by more of their rooms.
+        if any(one.refusal is None for one in proposed):
+            judged += proposed
+            best, found_by = _better(best, judged, (found_by, "regions"))
+    if settings.correlation.rotations > 0 and (best is None or best.refusal is not None):
+        angles = _rotations(a, b, settings)
+        judged += correlated(a, b, angles, 5 * settings.alignment.candidates, settings)
+        fallback = most_evident(judged)
+        if fallback is not None and fallback.refusal is not None:
+            judged += beside(a, b, judged, settings)
+        best, found_by = _better(best, judged, (found_by, "correlation"))
+    return _Search(judged, best, found_by, shortage)
+
+
+def _rotations(a: DescribedMap, b: DescribedMap, settings: MergeSettings) -> NDArray[np.float64]:
+    """Return the rotations that are tried: all, or those under which walls run alike."""
+    count = settings.correlation.rotations
+    if not settings.regions.likely_rotations or a.regions is None or b.regions is None:
+        return np.arange(count, dtype=np.float64) * (2.0 * math.pi / count)
+    return likely_rotations(a.regions.directions, b.regions.directions, count)
+
+
+def _better(best: Judged | None, judged: list[Judged], by: tuple[str, str]) -> tuple[Judged | None, str]:
+    """Return the most evident candidate, and by what it was found: the first where it is still the best."""
+    found = most_evident(judged)
+    return found, by[0] if found is best else by[1]
 
 
 def _merge_by_discs(

@@ -38,8 +38,8 @@ class PairResult:
     agreement : Agreement
         What the score is made of.
     found_by : str
-        ``corners``, ``correlation``, or ``verification`` of what was found before; ``bend`` where the maps
-        agree only once they are bent; ``scale`` where one has grown.
+        ``corners``, ``regions``, ``correlation``, or ``verification`` of what was found before; ``bend``
+        where the maps agree only once they are bent; ``scale`` where one has grown.
     time_ms : float
         Processor time, descriptions of the maps not included [ms].
     joined : ((n, 2), (n, 2)) float64

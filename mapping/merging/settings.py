@@ -11,8 +11,12 @@ from lidarium.mapping.merging.correlation import CorrelationSettings
 from lidarium.mapping.merging.correspondence import CorrespondenceSettings
 from lidarium.mapping.merging.description.corners import CornerSettings
 from lidarium.mapping.merging.description.descriptors import DescriptorSettings
+from lidarium.mapping.merging.regions.settings import RegionSettings
 
 MODES = ("default", "thesis")
+
+STRUCTURES = ("corners", "regions", "all")
+"""What proposes transforms before all rotations and translations are tried."""
 
 TOLERANCES = {"strict": 2.0, "normal": 0.8, "drift": 0.6}
 """Confidence from which maps are joined that agree only once they are bent, by the name of the tolerance."""
@@ -26,6 +30,11 @@ class MergeSettings:
     ----------
     corners, descriptors, correspondence, alignment, validation, correlation
         Settings of each stage.
+    structure : str
+        One of `STRUCTURES`: ``corners``; ``regions`` of free space and the doors between them; ``all`` for
+        regions where corners give no transform that passes.
+    regions : RegionSettings
+        How regions are found and matched.
     bend : BendSettings
         How much maps may be bent where no rigid motion is believed.
     confidence : float
@@ -41,6 +50,8 @@ class MergeSettings:
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     validation: ValidationSettings = field(default_factory=ValidationSettings)
     correlation: CorrelationSettings = field(default_factory=CorrelationSettings)
+    structure: str = "corners"
+    regions: RegionSettings = field(default_factory=RegionSettings)
     bend: BendSettings = field(default_factory=BendSettings)
     confidence: FromZero = TOLERANCES["normal"]
     cycle_distance_m: Length = 0.15
@@ -48,6 +59,12 @@ class MergeSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, "merging")
+        if self.structure not in STRUCTURES:
+            raise ValueError(
+                f"structure of merging is {self.structure!r}; want one of {', '.join(STRUCTURES)}"
+            )
+        if self.structure != "corners" and self.validation.test == "discs":
+            raise ValueError("the disc test needs matched corners; want structure corners with it")
 
 
 def merge_settings(mode: str = "default", resolution: float = 0.025) -> MergeSettings:

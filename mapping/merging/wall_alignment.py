@@ -27,11 +27,15 @@ def rank_by_walls(
 ) -> NDArray[np.int64]:
     """Return per proposal how many walls of b lie on those of a, less conflicts.
 
-    Walls of map b that lie in the free space of map a are subtracted twice.
+    Walls of map b that lie in the free space of map a are subtracted twice. A proposal is x, y [m], theta
+    [rad], and where there is a fourth column by how much map b grows.
     """
     scores = np.empty(len(proposals), np.int64)
     walls = b.walls[wall_sample(len(b.walls), samples)]
-    _score_walls(a.levels, a.distance, 1.0 / a.resolution, walls, proposals, near_m, scores)
+    grown = proposals
+    if proposals.shape[1] == 3:
+        grown = np.column_stack([proposals, np.ones(len(proposals))])
+    _score_walls(a.levels, a.distance, 1.0 / a.resolution, walls, grown, near_m, scores)
     return scores
 
 
@@ -41,7 +45,8 @@ def _score_walls(
 ) -> None:
     rows, columns = levels.shape
     for k in range(proposals.shape[0]):
-        cosine, sine = math.cos(proposals[k, 2]) * scale, math.sin(proposals[k, 2]) * scale
+        grown = scale * proposals[k, 3]
+        cosine, sine = math.cos(proposals[k, 2]) * grown, math.sin(proposals[k, 2]) * grown
         x0, y0 = proposals[k, 0] * scale, proposals[k, 1] * scale
         hits, misses = 0, 0
         for i in range(walls.shape[0]):

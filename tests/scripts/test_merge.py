@@ -265,6 +265,39 @@ def test_bent_maps_join_with_a_tolerance_alone(tmp_path, capsys):
     assert pair["confidence"] > 0.8
 
 
+@pytest.mark.parametrize("structure", ["corners", "regions", "all"])
+def test_maps_are_joined_by_each_structure(structure, maps, tmp_path, capsys):
+    paths, _ = maps
+    options = ["--structure", structure, "--json", "--out", str(tmp_path / "out")]
+    assert main(["merge", *paths, *options]) == 0
+    (pair,) = json.loads(capsys.readouterr().out)["pairs"]
+    assert (pair["matches"] > 0) == (structure != "regions")
+    assert (
+        pair["found_by"]
+        in {
+            "corners": {"corners", "correlation"},
+            "regions": {"regions", "correlation"},
+            "all": {"corners", "regions", "correlation"},
+        }[structure]
+    )
+
+
+def test_regions_are_drawn_where_asked(maps, tmp_path, capsys):
+    paths, _ = maps
+    assert main(["merge", *paths, "--out", str(tmp_path / "plain")]) == 0
+    assert not (tmp_path / "plain" / "regions.png").exists()
+    capsys.readouterr()
+    assert main(["merge", *paths, "--regions", "--out", str(tmp_path / "out")]) == 0
+    assert "merge.png, regions.png" in capsys.readouterr().out
+    assert (tmp_path / "out" / "regions.png").stat().st_size > 10_000
+
+
+def test_unknown_structures_are_named(maps, tmp_path, capsys):
+    paths, _ = maps
+    assert main(["merge", *paths, "--structure", "rooms", "--out", str(tmp_path / "out")]) == 2
+    assert "structure" in capsys.readouterr().err
+
+
 def test_unknown_modes_are_named(maps, tmp_path, capsys):
     (west, east), _ = maps
     assert main(["merge", west, east, "--mode", "printed", "--out", str(tmp_path / "out")]) == 2

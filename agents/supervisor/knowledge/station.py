@@ -16,7 +16,7 @@ from lidarium.envs.station.reports import Report
 from lidarium.envs.station.trails import without_bodies, without_own_trail
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.validation import ValidationSettings
-from lidarium.mapping.merging.description.described_map import resampled
+from lidarium.mapping.merging.description.resampling import resampled
 from lidarium.mapping.merging.frame_tree import Edge, FrameTree
 from lidarium.mapping.merging.fusion import FusedMap, fuse
 from lidarium.mapping.merging.growing_maps import GrowingMap

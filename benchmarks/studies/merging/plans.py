@@ -25,12 +25,16 @@ from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.pair_result import PairResult
 from lidarium.mapping.merging.scaling.scale_search import ScaleSettings
 from lidarium.mapping.merging.scaling.scaled_merge import merge_scaled
+from lidarium.mapping.merging.settings import MergeSettings
 
 THRESHOLDS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)
 """Confidences of the curve."""
 
 EVERY = 3
 """Of the pairs of maps of different buildings one in so many is tried."""
+
+STRUCTURE = "all"
+"""What proposes placements: that of `lidarium merge`."""
 
 Rows = list[dict[str, Any]]
 
@@ -149,7 +153,7 @@ def _read(folder: Path, name: str) -> Grid:
 
 def _merged(a: Grid, b: Grid) -> tuple[PairResult, float]:
     """Return what comes of two maps, and by how much the second grows."""
-    scaled = merge_scaled({"a": a, "b": b})
+    scaled = merge_scaled({"a": a, "b": b}, MergeSettings(structure=STRUCTURE))
     (result,) = scaled.merged.pairs.values()
     return result, scaled.scale
 

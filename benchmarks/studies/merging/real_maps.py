@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from lidarium.mapping.files.map_files import read_grey_map, read_ros_map
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.merging.description.described_map import resampled
+from lidarium.mapping.merging.description.resampling import resampled
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.pair_result import PairResult, explained
-from lidarium.mapping.merging.settings import merge_settings
+from lidarium.mapping.merging.settings import MergeSettings, merge_settings
 
 HALMSTAD_M, REAL_M = 0.02, 0.05
 """Sides of the pixels of maps that do not say it [m]."""
@@ -93,16 +93,19 @@ class Row:
     time_ms: float
 
 
-def merge_real_maps(data: Path) -> list[dict[str, Any]]:
+def merge_real_maps(data: Path, settings: MergeSettings | None = None) -> list[dict[str, Any]]:
     """Merge all pairs of real maps below a folder, those of one building first.
 
     Returns a `Row` of each; none where the folder has none.
     """
+    settings = settings or merge_settings()
     cv2.setNumThreads(1)
     folder = Path(data) / "map_pairs"
     if not folder.is_dir():
         return []
-    rows = itertools.chain(_halmstad(folder / "halmstad"), _exact(folder), _strangers(Path(data)))
+    rows = itertools.chain(
+        _halmstad(folder / "halmstad", settings), _exact(folder, settings), _strangers(Path(data), settings)
+    )
     return [asdict(row) for row in rows]
 
 
@@ -131,7 +134,7 @@ def correspondence_error(
     return distance, abs(math.remainder(a_from_b.theta + math.radians(truth["theta_deg"]), 2.0 * math.pi))
 
 
-def _halmstad(folder: Path) -> Iterator[Row]:
+def _halmstad(folder: Path, settings: MergeSettings) -> Iterator[Row]:
     """Yield the usable pairs of sensor maps with correspondences."""
     if not (folder / "ground_truth.json.gz").is_file():
         return
@@ -143,7 +146,7 @@ def _halmstad(folder: Path) -> Iterator[Row]:
             Grid(read_grey_map(folder / f"{one}.png", HALMSTAD_M).levels, HALMSTAD_M)
             for one in (target, source)
         )
-        result, time_ms = _merged(a, b)
+        result, time_ms = _merged(a, b, settings)
         best, error = _best(result), None
         if best is not None:
             error = correspondence_error(truth, HALMSTAD_M, (len(a.levels), len(b.levels)), best)
@@ -151,7 +154,7 @@ def _halmstad(folder: Path) -> Iterator[Row]:
         yield _row((name, "halmstad"), source.startswith(TUNED_BUILDING), (result, time_ms), error, is_right)
 
 
-def _exact(folder: Path) -> Iterator[Row]:
+def _exact(folder: Path, settings: MergeSettings) -> Iterator[Row]:
     """Yield the pairs with an exact truth in pixels."""
     for collection in ("real", "log_split"):
         path = folder / collection / "ground_truth.json"
@@ -162,7 +165,7 @@ def _exact(folder: Path) -> Iterator[Row]:
             a, b = (
                 Grid(read_grey_map(path.parent / truth[key], resolution).levels, resolution) for key in "AB"
             )
-            result, time_ms = _merged(a, b)
+            result, time_ms = _merged(a, b, settings)
             wanted = transform_of_pixels(truth.get("pixel", truth), resolution, len(a.levels), len(b.levels))
             best, error = _best(result), None
             if best is not None:
@@ -172,12 +175,14 @@ def _exact(folder: Path) -> Iterator[Row]:
             yield _row((name, collection), is_tuned, (result, time_ms), error, is_right)
 
 
-def _strangers(data: Path) -> Iterator[Row]:
+def _strangers(data: Path, settings: MergeSettings) -> Iterator[Row]:
     """Yield all pairs of maps of different buildings; every other one was for tuning."""
     every = list(single_maps(data))
     pairs = [(first, second) for first, second in itertools.combinations(every, 2) if first[1] != second[1]]
     for number, ((a, _, grid), (b, _, other)) in enumerate(pairs, 1):
-        yield _row((f"{a}, {b}", "strangers"), number % 2 == 0, _merged(grid, other), None, is_right=False)
+        yield _row(
+            (f"{a}, {b}", "strangers"), number % 2 == 0, _merged(grid, other, settings), None, is_right=False
+        )
 
 
 def single_maps(data: Path) -> Iterator[tuple[str, str, Grid]]:
@@ -197,12 +202,12 @@ def single_maps(data: Path) -> Iterator[tuple[str, str, Grid]]:
         yield path.stem, path.stem, Grid(read_grey_map(path, REAL_M).levels, REAL_M)
 
 
-def _merged(a: Grid, b: Grid) -> tuple[PairResult, float]:
+def _merged(a: Grid, b: Grid, settings: MergeSettings) -> tuple[PairResult, float]:
     """Return what comes of two maps, in cells of the coarser one, and how long it took [ms].
 
     What is explained of a pair that is joined at once is not in the time.
     """
-    settings, side = merge_settings(), max(a.resolution, b.resolution)
+    side = max(a.resolution, b.resolution)
     levels = [resampled(grid.levels, grid.resolution, side) for grid in (a, b)]
     began = time.process_time()
     first, second = (described(each, side, settings) for each in levels)

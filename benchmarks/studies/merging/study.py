@@ -6,6 +6,7 @@ They stand beside the thesis's tables and the pipeline of ROS map_merge.
 import json
 import platform
 from collections import Counter
+from dataclasses import replace
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Any
 import lidarium
 from lidarium.benchmarks.studies.merging import tables
 from lidarium.benchmarks.studies.merging.bank.bank import read_maps, read_pairs
+from lidarium.benchmarks.studies.merging.bank.drives import RESOLUTION
 from lidarium.benchmarks.studies.merging.bank.floors import bank_floors
 from lidarium.benchmarks.studies.merging.bank.groups import merge_teams
 from lidarium.benchmarks.studies.merging.bank.making import kept_floors, make_bank
@@ -27,6 +29,8 @@ from lidarium.benchmarks.studies.merging.pictures import draw_pairs
 from lidarium.benchmarks.studies.merging.plans import merge_plans, plan_tables
 from lidarium.benchmarks.studies.merging.real_maps import merge_real_maps
 from lidarium.benchmarks.studies.merging.real_tables import real_maps
+from lidarium.benchmarks.studies.merging.structure.tables import draw_regions, structure_text
+from lidarium.benchmarks.studies.merging.structure.trials import compare_structures
 from lidarium.benchmarks.studies.merging.thesis_stages import (
     stages_text,
     thesis_stages,
@@ -38,9 +42,12 @@ from lidarium.benchmarks.studies.shared.kept import Progress
 from lidarium.benchmarks.studies.shared.study import Study
 from lidarium.evaluation.episodes.output import write_json
 from lidarium.evaluation.suites.workers import shared_out
+from lidarium.mapping.merging.settings import STRUCTURES, MergeSettings, merge_settings
 
 EXTRA_FILE = "extra.json"
-EXTRA = ("detectors", "descriptors", "methods", "stages", "twelve", "teams", "real", "plans")
+EXTRA = ("detectors", "descriptors", "methods", "stages", "twelve", "teams", "structure", "real", "plans")
+PROPOSED = tuple(structure for structure in STRUCTURES if structure != MergeSettings().structure)
+"""Structures that are tried beside the default."""
 
 
 def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
@@ -55,6 +62,10 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
     for method in METHODS:
         for done in try_pairs(folder / "outcomes", maps, tested, method, workers):
             yield f"pairs, {method}", done, len(tested)
+    for structure in PROPOSED:
+        settings = replace(merge_settings("default", RESOLUTION), structure=structure)
+        for done in try_pairs(_proposed(folder, structure), maps, tested, "default", workers, settings):
+            yield f"pairs, {structure}", done, len(tested)
     kept = folder / EXTRA_FILE
     extra: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
     missing = [name for name in EXTRA if name not in extra]
@@ -65,6 +76,11 @@ def work(folder: Path, data: Path | None, every: int, workers: int) -> Progress:
         yield "other experiments", len(extra), len(EXTRA)
     if missing:
         write_json(kept, extra)
+
+
+def _proposed(folder: Path, structure: str) -> Path:
+    """Return the folder of what a structure says of the bank's pairs."""
+    return folder / "structures" / structure
 
 
 def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]]:
@@ -83,6 +99,8 @@ def _measured(folder: Path, data: Path | None, name: str) -> list[dict[str, Any]
         return twelve_pairs(maps)
     if name == "teams":
         return merge_teams(maps)
+    if name == "structure":
+        return compare_structures(data)
     if data is None:
         return []
     return merge_plans(data) if name == "plans" else merge_real_maps(data)
@@ -116,6 +134,13 @@ def page(folder: Path, command: str) -> str:
         "## Matching\n\n" + tables.methods(extra["methods"]),
         "## Five robots\n\n" + tables.teams(extra["teams"]),
     ]
+    outcomes = {MergeSettings().structure: tried["default"]} | {
+        structure: list(
+            zip(pairs, read_outcomes(_proposed(folder, structure), pairs, "default"), strict=True)
+        )
+        for structure in PROPOSED
+    }
+    parts.append("## Regions and doors\n\n" + structure_text(extra["structure"], outcomes))
     if extra["real"]:
         parts.append("## Maps of real robots\n\n" + real_maps(extra["real"]))
     if extra["plans"]:
@@ -138,7 +163,8 @@ def _about_thesis(extra: dict[str, Any]) -> str:
 
 
 def pictures(folder: Path, out: Path) -> None:
-    """Draw pairs of the bank beside the page."""
+    """Draw pairs of the bank, and regions of a corridor, beside the page."""
+    draw_regions(out / "merging_regions.png")
     floors = kept_floors(folder)
     pairs = [pair for pair in read_pairs(folder) or [] if pair.half == "test"]
     draw_pairs(

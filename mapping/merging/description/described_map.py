@@ -11,6 +11,7 @@ from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.kernels.compilation import Array, kernel
 from lidarium.mapping.merging.description.corners import Corners, CornerSettings, detect_corners
 from lidarium.mapping.merging.description.descriptors import Descriptors, DescriptorSettings, describe_corners
+from lidarium.mapping.merging.regions.graph import RegionGraph
 
 MAX_SIDE, MAX_CELLS = 20_000, 50_000_000
 """Most rows or columns of a map, and most cells: each takes some 20 bytes while maps are compared."""
@@ -54,6 +55,8 @@ class DescribedMap:
         Distance to the nearest of these walls [m]; large where there is none.
     is_open : (rows, columns) uint8
         1 where all around a cell is free, so that no wall that is seen elsewhere can belong there.
+    regions : RegionGraph or None
+        Its regions of free space; None where they were not asked for.
     """
 
     levels: NDArray[np.uint8]
@@ -64,6 +67,7 @@ class DescribedMap:
     normals: NDArray[np.float64]
     distance: NDArray[np.float32]
     is_open: NDArray[np.uint8]
+    regions: RegionGraph | None = None
 
 
 def describe_map(
@@ -132,40 +136,6 @@ def check_resolution(resolution: float) -> None:
     """Raise ValueError where a resolution is not a positive number."""
     if not (math.isfinite(resolution) and resolution > 0.0):
         raise ValueError(f"the resolution of a map is {resolution} m; want a positive number")
-
-
-def resampled(levels: NDArray[np.uint8], resolution: float, wanted: float) -> NDArray[np.uint8]:
-    """Return a map in coarser cells.
-
-    A cell with an occupied one in it is occupied, else free where most known ones are.
-
-    Parameters
-    ----------
-    levels : (rows, columns) uint8
-        The three-level map.
-    resolution, wanted : float
-        Its side of a cell and the new one, not smaller [m].
-
-    Returns
-    -------
-    (rows, columns) uint8
-        The map from the same corner; the last cells may reach beyond it.
-    """
-    if math.isclose(resolution, wanted, rel_tol=1e-6):
-        return levels
-    ratio = resolution / wanted
-    rows, columns = (math.ceil(side * ratio - 1e-9) for side in levels.shape)
-    row, column = (
-        np.minimum(((np.arange(side) + 0.5) * ratio).astype(np.int64), count - 1)
-        for side, count in zip(levels.shape, (rows, columns), strict=True)
-    )
-    place = (row[:, None] * columns + column[None, :]).ravel()
-    counts = {
-        level: np.bincount(place[(levels == level).ravel()], minlength=rows * columns)
-        for level in (OCCUPIED, UNKNOWN, FREE)
-    }
-    coarse = np.where(counts[FREE] > counts[UNKNOWN], FREE, UNKNOWN)
-    return np.where(counts[OCCUPIED] > 0, OCCUPIED, coarse).astype(np.uint8).reshape(rows, columns)
 
 
 def _walls(levels: NDArray[np.uint8]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:

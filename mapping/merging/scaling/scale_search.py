@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from lidarium.mapping.geometry.bounds import Angle, Count, Counted, above, check_settings, share, within
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.correlation import CorrelationSettings, best_translations
-from lidarium.mapping.merging.description.described_map import DescribedMap, resampled
+from lidarium.mapping.merging.description.described_map import DescribedMap
+from lidarium.mapping.merging.description.resampling import resampled
 
 AXIS_STEP = math.radians(0.5)
 """Between the directions of walls that are tried [rad]."""

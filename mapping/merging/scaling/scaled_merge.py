@@ -6,18 +6,24 @@ another place, or another scale of one place.
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lidarium.mapping.geometry.rigid import Transform
+from lidarium.mapping.geometry.rigid import Transform, wrapped
 from lidarium.mapping.grids.occupancy import UNKNOWN
 from lidarium.mapping.merging.bend.bent_agreement import compare_bent
 from lidarium.mapping.merging.bend.estimation import estimate_bend
-from lidarium.mapping.merging.bend.hypotheses import Hypothesis, confidence_of, is_other, signs_of
+from lidarium.mapping.merging.bend.hypotheses import (
+    RIVAL_ANGLE,
+    RIVAL_M,
+    Hypothesis,
+    confidence_of,
+    signs_of,
+)
 from lidarium.mapping.merging.description.described_map import (
     DescribedMap,
     check_resolution,
@@ -28,6 +34,7 @@ from lidarium.mapping.merging.joining.joined_tree import joined_tree
 from lidarium.mapping.merging.joining.merged_maps import Merged
 from lidarium.mapping.merging.pair import NO_WALLS
 from lidarium.mapping.merging.pair_result import PairResult
+from lidarium.mapping.merging.scaling.region_placements import region_placements
 from lidarium.mapping.merging.scaling.scale_search import (
     Placement,
     ScaleSettings,
@@ -97,7 +104,7 @@ def merge_scaled(
     maps : mapping of str to ((rows, columns) uint8, float)
         Occupancy (dark is occupied, row 0 at the lowest y) and side of a cell [m] of each of two maps.
     settings : MergeSettings or None
-        How maps may be bent.
+        How maps may be bent, and whether regions propose scales.
     scaling : ScaleSettings or None
         How the scale is sought.
 
@@ -160,11 +167,26 @@ def _checked(name: str, grid: ArrayLike, resolution: float, settings: MergeSetti
 def _ranked(
     a: DescribedMap, grid: tuple[NDArray[np.uint8], float], settings: MergeSettings, scaling: ScaleSettings
 ) -> list[Grown]:
-    """Return hypotheses of how a map lies at some scale, the best first."""
+    """Return hypotheses of how a map lies at some scale, the best first.
+
+    All scales are tried where regions are not asked, or propose nothing that is believed.
+    """
     b = describe_map(grown_levels(*grid, a.resolution), a.resolution)
     if len(a.walls) == 0 or len(b.walls) == 0:
         return []
-    found = [_refined(a, grid, one, settings, scaling.rounds) for one in placements(a, b, scaling)]
+    found: list[Grown] = []
+    if settings.structure != "corners":
+        starts = region_placements(a, b, settings.regions, scaling)
+        found = _by_evidence([_refined(a, grid, one, settings, scaling.rounds) for one in starts])
+        is_enough = _confidence(a, found) >= scaling.confidence
+        if found and (is_enough or settings.structure == "regions"):
+            return found
+    starts = placements(a, b, scaling)
+    return _by_evidence([*found, *(_refined(a, grid, one, settings, scaling.rounds) for one in starts)])
+
+
+def _by_evidence(found: Iterable[Grown | None]) -> list[Grown]:
+    """Return the hypotheses that there are, the best first."""
     return sorted((one for one in found if one is not None), key=lambda one: (-one.own_evidence_m, one.scale))
 
 
@@ -195,8 +217,13 @@ def _refined(
 
 def _is_rival(best: Grown, other: Grown) -> bool:
     """Whether a hypothesis is of another place, or of another scale."""
-    is_scale = abs(math.log(best.scale / other.scale)) > SAME_SCALE
-    return is_scale or is_other(best.hypothesis, other.hypothesis)
+    if abs(math.log(best.scale / other.scale)) > SAME_SCALE:
+        return True
+    first, second = (one.hypothesis.bend.a_from_b for one in (best, other))
+    # A point of the map as it is drawn is elsewhere in the grown maps.
+    centre = np.array(best.hypothesis.agreement.centre)
+    distance = float(np.linalg.norm(first.apply(centre) - second.apply(centre * other.scale / best.scale)))
+    return distance > RIVAL_M or abs(wrapped(first.theta - second.theta)) > RIVAL_ANGLE
 
 
 def _confidence(a: DescribedMap, ranked: list[Grown]) -> float:

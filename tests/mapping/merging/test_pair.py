@@ -11,7 +11,8 @@ from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.counts import disc_agreement
 from lidarium.mapping.merging.agreement.validation import Agreement, ValidationSettings, compare, why_refused
-from lidarium.mapping.merging.description.described_map import describe_map, resampled
+from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.description.resampling import resampled
 from lidarium.mapping.merging.pair import described, merge_pair
 from lidarium.mapping.merging.settings import TOLERANCES, MergeSettings, merge_settings
 

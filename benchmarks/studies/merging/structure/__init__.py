@@ -1,0 +1,1 @@
+"""What proposes transforms: corners beside regions of free space and the doors between them."""

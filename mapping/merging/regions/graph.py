@@ -1,0 +1,182 @@
+"""The regions of a map, their shapes, and the doors between them."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.grids.occupancy import FREE, OCCUPIED, UNKNOWN
+from lidarium.mapping.merging.regions.directions import direction_histogram, region_axes, wall_slopes
+from lidarium.mapping.merging.regions.doors import Doors, find_doors
+from lidarium.mapping.merging.regions.meetings import NONE, find_meetings
+from lidarium.mapping.merging.regions.segmentation import clearance_of, free_space, split_regions
+from lidarium.mapping.merging.regions.settings import RegionSettings
+
+_MOST_CELLS = 2000
+"""About so many cells of a region show its extents."""
+
+_RIM = 0.02
+"""Share of a region's cells beyond each side of its box: niches and doorways."""
+
+_SNAP = math.radians(25.0)
+"""A door runs across the walls of its regions where its direction differs from theirs by less [rad]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegionGraph:
+    """Regions of a map's free space and the doors between them.
+
+    Attributes
+    ----------
+    labels : (rows, columns) int32
+        The region of each cell, or -1; row 0 at the lowest y.
+    resolution : float
+        Side of these cells [m].
+    corner : (x, y)
+        Lower left corner of cell (0, 0) in the map's frame [m].
+    areas : (n,) float64
+        Of each region [m2].
+    axes : (n,) float64
+        Direction of the walls of each, from 0 to a quarter turn [rad].
+    low, high : (n, 2) float64
+        Its box along its walls: in the map's frame turned by its axis [m].
+    doors : Doors
+        Through which regions meet.
+    directions : (90,) float64
+        How many walls run in each direction of a quarter turn.
+    """
+
+    labels: NDArray[np.int32]
+    resolution: float
+    corner: tuple[float, float]
+    areas: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    doors: Doors
+    directions: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """Return the number of regions."""
+        return len(self.areas)
+
+    @property
+    def extents(self) -> NDArray[np.float64]:
+        """Length of each region along and across its axis, (n, 2) [m]."""
+        return self.high - self.low
+
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """Middle of each region's box in the map's frame, (n, 2) [m]."""
+        return turned(0.5 * (self.low + self.high), self.axes)
+
+    @property
+    def door_counts(self) -> NDArray[np.int64]:
+        """Number of doors of each region, (n,)."""
+        return np.bincount(self.doors.regions.ravel(), minlength=len(self)).astype(np.int64)
+
+    @property
+    def adjacency(self) -> dict[int, list[int]]:
+        """The regions that each meets through doors, in order."""
+        found: dict[int, set[int]] = {region: set() for region in range(len(self))}
+        for first, second in self.doors.regions.tolist():
+            found[first].add(second)
+            found[second].add(first)
+        return {region: sorted(beside) for region, beside in found.items()}
+
+
+def turned(points: NDArray[np.float64], angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points (n, 2), each turned by its angle (n,) about the origin."""
+    cosine, sine = np.cos(angles), np.sin(angles)
+    x, y = points[..., 0], points[..., 1]
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+
+def find_regions(levels: NDArray[np.uint8], resolution: float, settings: RegionSettings) -> RegionGraph:
+    """Return the regions of a map and their doors.
+
+    Parameters
+    ----------
+    levels : (rows, columns) uint8
+        The three-level map.
+    resolution : float
+        Side of its cells [m]; finer ones than the settings' are joined.
+    settings : RegionSettings
+        Where regions are split.
+    """
+    known, corner = _cropped(levels)
+    origin = np.array(corner) * resolution
+    count = max(
+        int(settings.cell_m / resolution + 1e-6), math.ceil(math.sqrt(known.size / settings.most_cells))
+    )
+    known, resolution = _joined(known, count), count * resolution
+    free = free_space(known, round(settings.least_obstacle_m / resolution))
+    clearance = clearance_of(free)
+    labels = split_regions(clearance, resolution, settings)
+    count = int(labels.max(initial=NONE)) + 1
+    slopes = wall_slopes(known, free, labels)
+    axes = region_axes(slopes, count)
+    low, high = _boxes(labels, resolution, origin, axes)
+    doors = find_doors(find_meetings(labels, clearance), resolution)
+    doors = doors._replace(places=doors.places + origin, normals=_snapped(doors, axes))
+    areas = np.bincount(labels[labels != NONE], minlength=count).astype(np.float64) * resolution**2
+    return RegionGraph(
+        labels, resolution, tuple(origin.tolist()), areas, axes, low, high, doors, direction_histogram(slopes)
+    )
+
+
+def _cropped(levels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
+    """Return what a map knows of itself, and the column and row at which that begins."""
+    is_known = levels != UNKNOWN
+    rows, columns = np.flatnonzero(is_known.any(axis=1)), np.flatnonzero(is_known.any(axis=0))
+    if len(rows) == 0:
+        return levels[:1, :1], (0, 0)
+    part = levels[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return np.ascontiguousarray(part), (int(columns[0]), int(rows[0]))
+
+
+def _joined(levels: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
+    """Return a map in cells of so many rows and columns: as `resampled`, in whole cells."""
+    if count == 1:
+        return levels
+    rows, columns = (-(-side // count) for side in levels.shape)
+    whole = np.full((rows * count, columns * count), UNKNOWN, np.uint8)
+    whole[: levels.shape[0], : levels.shape[1]] = levels
+    shares = [
+        cv2.resize((whole == level).astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
+        for level in (OCCUPIED, FREE)
+    ]
+    least = 0.5 / count**2
+    joined = np.where(shares[1] > 0.5 * (1.0 - shares[0]) + 0.5 * least, FREE, UNKNOWN)
+    return np.where(shares[0] > least, OCCUPIED, joined).astype(np.uint8)
+
+
+def _boxes(
+    labels: NDArray[np.int32], side: float, origin: NDArray[np.float64], axes: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the boxes of regions along their axes, as low and high ends (n, 2) [m]."""
+    cells = np.flatnonzero(labels != NONE)
+    order = cells[np.argsort(labels.ravel()[cells], kind="stable")]
+    ends = np.cumsum(np.bincount(labels.ravel()[cells], minlength=len(axes)))
+    low, high = np.zeros((len(axes), 2)), np.zeros((len(axes), 2))
+    for region, own in enumerate(np.split(order, ends[:-1]) if len(axes) else []):
+        chosen = own[:: max(len(own) // _MOST_CELLS, 1)]
+        places = np.column_stack([chosen % labels.shape[1], chosen // labels.shape[1]]) + 0.5
+        box = turned(places * side + origin, np.full(len(chosen), -axes[region]))
+        first, last = np.quantile(box, (_RIM, 1.0 - _RIM), axis=0)
+        beyond = _RIM / (1.0 - 2.0 * _RIM) * (last - first)
+        low[region], high[region] = first - beyond, last + beyond
+    return low, high
+
+
+def _snapped(doors: Doors, axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the directions of doors, across walls of their regions where they nearly are."""
+    if len(doors.normals) == 0:
+        return doors.normals
+    quarter = math.pi / 2.0
+    off = (doors.normals[:, None] - axes[doors.regions] + 0.5 * quarter) % quarter - 0.5 * quarter
+    best = np.abs(off).argmin(axis=1)
+    off = off[np.arange(len(best)), best]
+    return np.where(np.abs(off) < _SNAP, doors.normals - off, doors.normals)

@@ -1,0 +1,224 @@
+"""Free space of a map split into regions at doors: a watershed of the clearance.
+
+Cells are taken from the middles of rooms outwards. Where two basins meet, they stay apart if the passage is
+as narrow as a door and narrower than either of them; else they become one.
+
+References
+----------
+Watershed of clearance for rooms: Bormann, Jordan, Li, Hampp, Haegele, "Room segmentation: survey,
+implementation, and analysis", Proc. IEEE Int. Conf. Robotics and Automation, 2016. Basins that merge by their
+depth: Najman, Schmitt, "Geodesic saliency of watershed contours and hierarchical segmentation", IEEE
+Transactions on Pattern Analysis and Machine Intelligence 18, 1996.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarium.mapping.grids.occupancy import FREE
+from lidarium.mapping.kernels.compilation import Array, kernel
+from lidarium.mapping.merging.regions.meetings import NONE, find_meetings
+from lidarium.mapping.merging.regions.settings import RegionSettings
+
+_LEVELS_A_CELL = 8
+
+
+class SplitRule(NamedTuple):
+    """Where basins stay apart; lengths in cells.
+
+    Half the width of the widest door, its share of the narrower region, radius of a region at least.
+    """
+
+    half_door: float
+    door_share: float
+    least_radius: float
+
+
+def free_space(levels: NDArray[np.uint8], least_obstacle: int) -> NDArray[np.uint8]:
+    """Return 1 where a map is free, or holds no more than a small obstacle.
+
+    Parameters
+    ----------
+    levels : (rows, columns) uint8
+        The three-level map.
+    least_obstacle : int
+        Obstacles amid free space of fewer rows and fewer columns are free [cells].
+    """
+    free = np.asarray(levels == FREE, np.uint8)
+    count, parts, statistics, _ = cv2.connectedComponentsWithStats(1 - free, connectivity=8)
+    rows, columns = levels.shape
+    left, top = statistics[:, cv2.CC_STAT_LEFT], statistics[:, cv2.CC_STAT_TOP]
+    width, height = statistics[:, cv2.CC_STAT_WIDTH], statistics[:, cv2.CC_STAT_HEIGHT]
+    is_small = (width < least_obstacle) & (height < least_obstacle)
+    is_small &= (left > 0) & (top > 0) & (left + width < columns) & (top + height < rows)
+    is_small[0] = False
+    if count > 1 and is_small.any():
+        free |= is_small[parts].astype(np.uint8)
+    return free
+
+
+def clearance_of(free: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return the distance of each cell to the nearest that is not free, or to the rim [cells]."""
+    framed = cv2.copyMakeBorder(free, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0.0,))
+    return np.ascontiguousarray(cv2.distanceTransform(framed, cv2.DIST_L2, 5)[1:-1, 1:-1])
+
+
+def split_regions(clearance: NDArray[np.float32], side: float, settings: RegionSettings) -> NDArray[np.int32]:
+    """Return the region of each cell, numbered from 0, or `NONE`.
+
+    Parameters
+    ----------
+    clearance : (rows, columns) float32
+        Distance to what is not free [cells], 0 there.
+    side : float
+        Side of a cell [m].
+    settings : RegionSettings
+        Where regions are split.
+    """
+    rule = SplitRule(0.5 * settings.widest_door_m / side, settings.door_share, settings.least_radius_m / side)
+    labels = np.full(clearance.shape, NONE, np.int32)
+    order = np.empty(np.count_nonzero(clearance), np.int64)
+    _sort(clearance, np.zeros(int(clearance.max() * _LEVELS_A_CELL) + 2, np.int64), order)
+    parent, peak = np.empty(len(order), np.int32), np.empty(len(order), np.float32)
+    areas = np.zeros(len(order), np.int64)
+    count = _flood(clearance, order, rule, (parent, peak, areas), labels)
+    least = settings.least_area_m2 / side**2
+    return _without_small(labels, clearance, (areas[:count], peak[:count]), (least, rule.least_radius))
+
+
+@kernel
+def _sort(clearance: Array, ends: Array, order: Array) -> None:
+    """Write the indices of free cells, those with most clearance first; ends are zeros, one per level."""
+    last = ends.shape[0] - 1
+    for row in range(clearance.shape[0]):
+        for column in range(clearance.shape[1]):
+            if clearance[row, column] > 0.0:
+                ends[last - int(clearance[row, column] * _LEVELS_A_CELL)] += 1
+    total = 0
+    for level in range(last + 1):
+        total += ends[level]
+        ends[level] = total - ends[level]
+    for row in range(clearance.shape[0]):
+        for column in range(clearance.shape[1]):
+            if clearance[row, column] > 0.0:
+                level = last - int(clearance[row, column] * _LEVELS_A_CELL)
+                order[ends[level]] = row * clearance.shape[1] + column
+                ends[level] += 1
+
+
+@kernel
+def _flood(
+    clearance: Array, order: Array, rule: SplitRule, basins: tuple[Array, Array, Array], labels: Array
+) -> int:
+    """Label the cells by basins, with parent, peak and area of each; returns how many there are.
+
+    Each cell joins the basin from which the slope to it is steepest. Where it touches several, those merge
+    that no door keeps apart.
+    """
+    parent, peak, areas = basins
+    rows, columns = clearance.shape
+    count = 0
+    for cell in order:
+        row, column = cell // columns, cell % columns
+        top, left = max(row - 1, 0), max(column - 1, 0)
+        bottom, right = min(row + 2, rows), min(column + 2, columns)
+        height, steepest, best = clearance[row, column], -1.0, NONE
+        for y in range(top, bottom):
+            for x in range(left, right):
+                if labels[y, x] != NONE and clearance[y, x] > steepest:
+                    steepest, best = clearance[y, x], labels[y, x]
+        if best == NONE:
+            best = count
+            parent[best], peak[best] = best, height
+            count += 1
+        best = _root(parent, best)
+        labels[row, column] = best
+        for y in range(top, bottom):
+            for x in range(left, right):
+                if labels[y, x] != NONE and labels[y, x] != best:
+                    best = _met(parent, peak, best, _root(parent, labels[y, x]), height, rule)
+    for cell in order:
+        root = _root(parent, labels[cell // columns, cell % columns])
+        labels[cell // columns, cell % columns] = root
+        areas[root] += 1
+    return count
+
+
+@kernel(inline=True)
+def _root(parent: Array, basin: int) -> int:
+    """Return the basin into which one has merged; the path is halved."""
+    while parent[basin] != basin:
+        parent[basin] = parent[parent[basin]]
+        basin = parent[basin]
+    return basin
+
+
+@kernel(inline=True)
+def _met(parent: Array, peak: Array, one: int, other: int, height: float, rule: SplitRule) -> int:
+    """Merge two basins that meet, unless a door keeps them apart; returns that of the first one."""
+    if one == other or _is_door(height, min(peak[one], peak[other]), rule):
+        return one
+    low, high = (one, other) if peak[one] < peak[other] else (other, one)
+    parent[low] = high
+    return high
+
+
+@kernel(inline=True)
+def _is_door(height: float, peak: float, rule: SplitRule) -> bool:
+    """Whether a passage keeps two basins apart, by its clearance and the peak of the narrower one."""
+    return bool(height <= rule.half_door and peak >= rule.least_radius and height <= rule.door_share * peak)
+
+
+def _without_small(
+    labels: NDArray[np.int32],
+    clearance: NDArray[np.float32],
+    basins: tuple[NDArray[np.int64], NDArray[np.float32]],
+    least: tuple[float, float],
+) -> NDArray[np.int32]:
+    """Return the labels numbered from 0, small regions in the neighbour with the widest passage.
+
+    What is small and has no neighbour is no region. Areas, peaks and the least of both are in cells.
+    """
+    areas, peaks = basins
+    passages, nowhere = _passages(labels, clearance), len(areas)
+    into, present = np.arange(nowhere + 1), np.flatnonzero(areas)
+    for basin in present[np.argsort(areas[present], kind="stable")].tolist():
+        if areas[basin] >= least[0] and peaks[basin] >= least[1]:
+            continue
+        beside = passages.pop(basin, {})
+        into[basin] = target = max(beside, key=lambda one: (beside[one], -one), default=nowhere)
+        if target != nowhere:
+            areas[target] += areas[basin]
+            peaks[target] = max(peaks[target], peaks[basin])
+            _give_passages(passages, basin, beside, target)
+        areas[basin] = 0
+    while (into[into] != into).any():
+        into = into[into]
+    number = np.full(nowhere + 1, NONE, np.int32)
+    number[np.flatnonzero(areas)] = np.arange(np.count_nonzero(areas))
+    # The last number is that of cells outside, and of regions that are none.
+    return np.asarray(number[into][labels], np.int32)
+
+
+def _give_passages(
+    passages: dict[int, dict[int, float]], basin: int, beside: dict[int, float], target: int
+) -> None:
+    """Give the passages of a basin that is no more to another one."""
+    for other, height in beside.items():
+        del passages[other][basin]
+        if other != target:
+            for one, two in ((other, target), (target, other)):
+                passages[one][two] = max(passages[one].get(two, 0.0), height)
+
+
+def _passages(labels: NDArray[np.int32], clearance: NDArray[np.float32]) -> dict[int, dict[int, float]]:
+    """Return of each basin the most clearance where it meets another one."""
+    found: dict[int, dict[int, float]] = {}
+    met = find_meetings(labels, clearance)
+    for (first, second), height in zip(met.regions.tolist(), met.clearance.tolist(), strict=True):
+        for one, two in ((first, second), (second, first)):
+            beside = found.setdefault(one, {})
+            beside[two] = max(beside.get(two, 0.0), height)
+    return found
