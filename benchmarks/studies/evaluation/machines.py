@@ -143,7 +143,8 @@ def kill_nodes(count: int, seed: int = 0) -> dict[str, Any]:
                 victim, wait = cluster.add_node(num_cpus=1), int(generator.integers(1, 20))
             runs.close()
             # What was under way at the last kill has to be done too.
-            trials = [trial for trial in suite.trials() if trial.key in _asked(suite, there)]
+            asked = _asked(suite, there)
+            trials = [trial for trial in suite.trials() if trial.key in asked]
             for _ in Campaign(suite, there, records=False, trials=trials, cluster=cluster.address).run():
                 pass
         for _ in Campaign(suite, here, records=False, trials=trials).run():

@@ -56,7 +56,7 @@ WORLDS = {
     "unknown": World(
         "lab, unknown starts", SUPERVISED, {"realism": "lab", "known_starts": False}, every=2, teams=(2, 3)
     ),
-    "camera": World("ideal, by camera", ("sparse_frontier",), {"camera": "xtion_tilted"}, every=4),
+    "camera": World("ideal, by camera", ("sparse_frontier",), {"camera": "xtion_tilted"}, every=8),
 }
 """By the name of the folder of their episodes, behind the kind of floor."""
 
