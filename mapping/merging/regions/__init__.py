@@ -1,1 +1,1 @@
-"""Regions of free space, the doors between them, and motions under which those of two maps meet."""
+"""Regions of free space with their doors, by which maps may be joined."""

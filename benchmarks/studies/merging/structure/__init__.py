@@ -1,1 +1,1 @@
-"""What proposes transforms: corners beside regions of free space and the doors between them."""
+"""Pairs of maps with few corners, joined by corners or by regions of free space."""
