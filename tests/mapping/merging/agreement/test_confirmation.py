@@ -2,9 +2,8 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from drawn_maps import RESOLUTION, about_middle, apartment, blank, moved
+from drawn_maps import RESOLUTION, apartment, blank
 
 from lidarium.mapping.geometry.rigid import Transform
 from lidarium.mapping.merging.agreement.confirmation import MANY_WALLS, Confirmation
@@ -26,31 +25,6 @@ def corridor_corner(alcove):
     levels[20:200, 20:90] = 255
     levels[(slice(170, 190), slice(4, 20)) if alcove else (slice(4, 20), slice(170, 190))] = 255
     return levels
-
-
-def test_walls_are_counted_once_however_long_they_are():
-    for length in (60, 120):
-        levels = blank(160, 200)
-        levels[18 : 22 + length, 18:102] = 0
-        levels[20 : 20 + length, 20:100] = 255
-        one = describe_map(levels, RESOLUTION)
-        assert distinct_walls(one, one, Transform(), HIT_M) == 4
-
-
-def test_furniture_adds_walls_and_what_lies_elsewhere_none():
-    one = describe_map(apartment(), RESOLUTION)
-    assert distinct_walls(one, one, Transform(), HIT_M) >= 20
-    assert distinct_walls(one, one, Transform(100.0, 0.0), HIT_M) == 0
-
-
-def test_the_number_of_walls_does_not_depend_on_the_frame():
-    truth = about_middle(0.5 * np.pi, apartment())
-    one, turned = describe_map(apartment(), RESOLUTION), describe_map(moved(apartment(), truth), RESOLUTION)
-    counts = (
-        distinct_walls(turned, one, truth, HIT_M),
-        distinct_walls(one, one, Transform(), HIT_M),
-    )
-    assert abs(counts[0] - counts[1]) <= 2
 
 
 def test_two_corners_of_corridors_agree_and_do_not_convince():
