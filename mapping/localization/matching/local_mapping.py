@@ -150,7 +150,7 @@ class LocalMapper:
         Returns
         -------
         bool
-            Whether the robot has left what the local maps can hold; ``begin`` has to be called then.
+            False where the robot has left what the local maps can hold; ``begin`` has to be called then.
         """
         for active in self._active:
             pose = pose if active is self._active[0] else relative(active.in_older, pose)

@@ -4,50 +4,15 @@ import pickle
 
 import numpy as np
 import pytest
-from polygon_scans import biased_odometry, ring, scan
+from polygon_scans import biased_odometry
+from tracked_world import LASER, POSES, SCANS, follow, gap
 
 from lidarium.mapping.geometry.rigid import Transform
-from lidarium.mapping.grids.scan_geometry import ScanGeometry
 from lidarium.mapping.localization.dead_reckoning.localizer import Localizer, Sensing
-from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf, SplineEkfSettings
-from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter, SplineFilterSettings
-from lidarium.mapping.localization.on_splines.tracking_settings import TrackingSettings
+from lidarium.mapping.localization.on_splines.spline_ekf import SplineEkf
+from lidarium.mapping.localization.on_splines.spline_filter import SplineFilter
 
-LASER = ScanGeometry()
-WORLD_2 = np.vstack(
-    [
-        ring((-1.5, -1.5), (4.5, -1.5), (4.5, 4.5), (-1.5, 4.5)),
-        ring((-0.7, 2.2), (2.0, 2.2), (2.0, -0.5), (2.3, -0.5), (2.3, 2.5), (-0.7, 2.5)),
-    ]
-)
 KINDS = (SplineFilter, SplineEkf)
-
-
-def way_round(steps=90):
-    """A way from the start of the world with an L past its right side."""
-    corners = np.array([(0.0, 0.0), (1.6, -1.0), (2.8, -0.9), (3.3, 1.0), (3.0, 3.5)])
-    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    along = np.linspace(0.0, lengths[-1], steps)
-    places = np.stack([np.interp(along, lengths, corners[:, k]) for k in (0, 1)], axis=1)
-    headings = np.unwrap(np.arctan2(*np.gradient(places, axis=0).T[::-1]))
-    kernel = np.ones(9) / 9.0
-    smooth = np.convolve(np.pad(headings, 4, mode="edge"), kernel, mode="valid")
-    return np.column_stack([places, smooth])
-
-
-POSES = way_round()
-SCANS = [scan(WORLD_2, pose, LASER, noise=0.01, seed=k) for k, pose in enumerate(POSES)]
-
-
-def follow(localizer, odometry, seed=0, scans=SCANS):
-    localizer.reset(POSES[0], seed)
-    return np.array(
-        [localizer.localize(Sensing(0.1 * k, odometry[k], ranges)) for k, ranges in enumerate(scans)]
-    )
-
-
-def gap(first, second):
-    return float(np.hypot(*(first - second)[:2])), abs(math.remainder(float(first[2] - second[2]), math.tau))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -66,28 +31,6 @@ def test_the_same_seed_gives_the_same_poses_to_the_bit(kind):
     odometry = biased_odometry(POSES, 0.05)[:30]
     first, second = (follow(kind(), odometry, seed=3, scans=SCANS[:30]) for _ in range(2))
     np.testing.assert_array_equal(first, second)
-
-
-@pytest.mark.parametrize("bias", [-0.08, 0.08])
-def test_particles_learn_what_wheels_tell_too_much(bias):
-    localizer = SplineFilter()
-    follow(localizer, biased_odometry(POSES, bias))
-    of_way, _ = localizer.weights @ localizer.scales
-    assert of_way == pytest.approx(1.0 / (1.0 + bias), abs=0.03)
-
-
-def test_what_is_learned_of_the_wheels_carries_a_robot_that_sees_nothing_more():
-    odometry, nothing = biased_odometry(POSES, 0.08), np.full(LASER.beams, np.inf, np.float32)
-    seen = [*SCANS[:60], *[nothing] * 30]
-    untaught = SplineFilterSettings(distance_bias=0.0, turn_bias=0.0, bias_wander=0.0)
-    taught, told = (follow(SplineFilter(settings), odometry, scans=seen)[-1] for settings in (None, untaught))
-    assert gap(taught, POSES[-1])[0] < 0.7 * gap(told, POSES[-1])[0]
-
-
-def test_another_seed_draws_other_particles():
-    odometry = biased_odometry(POSES, 0.05)[:10]
-    first, second = (follow(SplineFilter(), odometry, seed=seed, scans=SCANS[:10]) for seed in (0, 1))
-    assert (first != second).any()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -120,16 +63,6 @@ def test_a_single_blind_scan_among_others_does_no_harm(kind):
     ]
     track = follow(kind(), biased_odometry(POSES, 0.05), scans=scans)
     assert gap(track[-1], POSES[-1])[0] < 0.06
-
-
-def test_a_laser_of_one_beam_leaves_the_pose_to_odometry():
-    localizer = SplineFilter(geometry=ScanGeometry(beams=1))
-    localizer.reset(np.zeros(3), 0)
-    for k in range(5):
-        pose = localizer.localize(
-            Sensing(0.1 * k, np.array([0.1 * k, 0.0, 0.0]), np.array([2.0], np.float32))
-        )
-    assert pose[0] == pytest.approx(0.4, abs=0.1)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -168,37 +101,3 @@ def test_what_cannot_be_sensed_is_refused(kind):
         localizer.localize(Sensing(3.0, np.zeros(3), np.ones(3, np.float32)))
     with pytest.raises(ValueError, match="pose"):
         localizer.reset(np.array([0.0, np.inf, 0.0]), 0)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_particles_that_were_led_astray_find_back(seed):
-    localizer = SplineFilter(SplineFilterSettings(particles=400))
-    localizer.reset(POSES[0], seed)
-    still = np.zeros(3)
-    for k in range(3):
-        localizer.localize(Sensing(0.1 * k, still, SCANS[0]))
-    astray = Transform(0.0, 0.0, -POSES[0][2]).apply(np.array([[0.15, 0.15]]))[0]
-    localizer.particles[:, :2] += astray
-    localizer.local = localizer.local + np.array([*astray, 0.0])
-    for k in range(3, 60):
-        turned = POSES[0] + np.array([0.0, 0.0, 0.02 * (k % 2)])
-        ranges = scan(WORLD_2, turned, LASER, 0.01, seed=k)
-        pose = localizer.localize(Sensing(0.1 * k, np.array([0.0, 0.0, 0.02 * (k % 2)]), ranges))
-    assert gap(pose, turned)[0] < 0.02
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: TrackingSettings(curve_sigma=0.0),
-        lambda: TrackingSettings(ray_stride=0),
-        lambda: TrackingSettings(slip_per_metre=-1.0),
-        lambda: SplineFilterSettings(particles=0),
-        lambda: SplineFilterSettings(recovered_share=2.0),
-        lambda: SplineFilterSettings(distance_bias=-0.1),
-        lambda: SplineEkfSettings(gate_sigmas=math.nan),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(make):
-    with pytest.raises(ValueError, match="want"):
-        make()

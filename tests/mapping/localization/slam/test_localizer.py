@@ -1,5 +1,4 @@
 import copy
-import math
 import pickle
 from dataclasses import replace
 
@@ -9,12 +8,9 @@ from driven_rooms import GEOMETRY, RING_ROUND, TWINS_VISITED, cast, driven, odd_
 
 from lidarium.mapping.geometry.rigid import composed, relative
 from lidarium.mapping.localization.dead_reckoning.localizer import Sensing
-from lidarium.mapping.localization.dead_reckoning.odometry import Odometry
 from lidarium.mapping.localization.matching.settings.graph import ClosureSettings, GraphSettings
 from lidarium.mapping.localization.matching.settings.matching import MatchingSettings
-from lidarium.mapping.localization.matching.settings.odometry import OdometryUncertainty
 from lidarium.mapping.localization.matching.settings.slam import SlamSettings
-from lidarium.mapping.localization.registry import LOCALIZERS, make_localizer
 from lidarium.mapping.localization.slam.localizer import Slam
 
 EAGER = SlamSettings(graph=GraphSettings(waiting=5))
@@ -261,59 +257,3 @@ def test_scans_are_matched_after_enough_motion_only():
     slam = Slam(SlamSettings(matching=MatchingSettings(distance_m=0.1)), GEOMETRY)
     follow(slam, [sensing(scan, k, 0.001 * k) for k in range(50)])
     assert slam.counts.matches == 0
-
-
-def test_dead_reckoning_adds_motions_to_the_start():
-    odometry = Odometry(OdometryUncertainty())
-    odometry.reset(np.array([1.0, 2.0, math.pi / 2]), 0)
-    ranges = np.zeros(0, np.float32)
-    assert odometry.localize(Sensing(0.0, np.array([5.0, 5.0, 0.0]), ranges)).tolist() == [
-        1.0,
-        2.0,
-        math.pi / 2,
-    ]
-    assert not odometry.covariance.any()
-    assert odometry.localize(Sensing(1.0, np.array([6.0, 5.0, 0.0]), ranges)) == pytest.approx(
-        [1.0, 3.0, math.pi / 2]
-    )
-    small = odometry.covariance
-    assert odometry.localize(Sensing(2.0, np.full(3, np.nan), ranges)) == pytest.approx(
-        [1.0, 3.0, math.pi / 2]
-    )
-    odometry.localize(Sensing(3.0, np.array([7.0, 5.0, 0.0]), ranges))
-    assert np.trace(odometry.covariance) > np.trace(small) > 0.0
-    assert odometry.take_correction() is None
-
-
-@pytest.mark.parametrize("name", LOCALIZERS)
-def test_localizers_are_made_by_name(name):
-    made = make_localizer(name, GEOMETRY)
-    made.reset(np.array([1.0, 0.0, 0.0]), 0)
-    pose = made.localize(sensing(np.full(GEOMETRY.beams, 1.0), 0))
-    # Only particles are spread about the pose that they are told.
-    assert (
-        pose.tolist() == [1.0, 0.0, 0.0]
-        if name != "splines"
-        else pose == pytest.approx([1.0, 0.0, 0.0], abs=0.005)
-    )
-    assert made.covariance.shape == (3, 3)
-    assert made.take_correction() is None
-
-
-def test_names_without_localizer_are_refused():
-    with pytest.raises(ValueError, match=r"unknown localizer 'gps'.*known: odometry, slam"):
-        make_localizer("gps", GEOMETRY)
-
-
-@pytest.mark.parametrize(
-    ("kind", "name", "value"),
-    [
-        (MatchingSettings, "distance_m", -1.0),
-        (MatchingSettings, "points", 0),
-        (ClosureSettings, "delay_s", math.nan),
-        (OdometryUncertainty, "turn_share", 0.0),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(kind, name, value):
-    with pytest.raises(ValueError, match=name):
-        kind(**{name: value})
