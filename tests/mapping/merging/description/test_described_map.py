@@ -7,17 +7,8 @@ import pytest
 from drawn_maps import blank, room
 
 from lidarium.mapping.files.map_files import FREE, OCCUPIED, UNKNOWN
-from lidarium.mapping.merging.description.described_map import describe_map, resampled
-
-
-def test_coarser_cells_keep_thin_walls():
-    levels = np.full((40, 40), FREE, np.uint8)
-    levels[:, 17] = OCCUPIED
-    coarse = resampled(levels, 0.025, 0.1)
-    assert coarse.shape == (10, 10)
-    assert (coarse[:, 4] == OCCUPIED).all()
-    assert (np.delete(coarse, 4, axis=1) == FREE).all()
-    assert resampled(levels, 0.1, 0.1) is levels
+from lidarium.mapping.merging.description.described_map import describe_map
+from lidarium.mapping.merging.description.resampling import resampled
 
 
 @pytest.mark.parametrize(
