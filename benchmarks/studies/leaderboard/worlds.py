@@ -77,7 +77,7 @@ NOT_RUN = {
 }
 """Worlds in which large floors are left out: an episode takes minutes there."""
 
-BOUNDED = {"test": 2, "lifull": 4}
+BOUNDED = {"test": 2, "lifull": 1}
 """Kinds whose floors are bounded, and of how many one is."""
 
 
