@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import lidarium
+from lidarium.benchmarks.studies.leaderboard.pairs import merges_text, pairs_table
 from lidarium.benchmarks.studies.leaderboard.tables import Multiples, Part, short_table, table
 from lidarium.benchmarks.studies.leaderboard.worlds import (
     BOUNDED,
@@ -17,6 +18,7 @@ from lidarium.benchmarks.studies.leaderboard.worlds import (
     KINDS,
     SETTINGS,
     TEAMS,
+    WORLDS,
     floors_of,
     parts,
     suites,
@@ -57,6 +59,13 @@ have a bound. The difference is that of the restricted means to the baseline of 
 (`nearest_frontier`, or `independent` where starts are unknown), pair by pair, with its 95 % interval. It is
 bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm).
 {notes}
+## Pairs
+
+On floors of the set `test`, all teams together: ratios of times to 99 % with their 95 % interval. Below 1 is
+less time; runs that did not get there count as the whole time. {merges}
+
+{pairs}
+
 {kinds}
 """
 
@@ -90,6 +99,11 @@ def page(folder: Path, command: str) -> str:
         version=lidarium.__version__,
         python=platform.python_version(),
         horizon=HORIZON_S,
+        pairs=pairs_table(
+            {name: _episodes(folder, "test", name) for name in WORLDS},
+            {name: world.about for name, world in WORLDS.items()},
+        ),
+        merges=merges_text(each for kind in KINDS for each in _episodes(folder, kind, "unknown")),
         notes="".join(f"\n{note}\n" for note in notes),
         kinds="\n\n".join(_section(kind, kind_parts) for kind, kind_parts in found.items()),
     )
@@ -105,6 +119,11 @@ def beside(folder: Path, out: Path) -> None:
         before, rest = text.split(BEGIN, 1)
         after = rest.split(END, 1)[1]
         write_text(readme, f"{before}{BEGIN}\n\n{short_table(found['test'], README_TEAM)}\n\n{END}{after}")
+
+
+def _episodes(folder: Path, kind: str, world: str) -> list[dict[str, Any]]:
+    path = folder / f"{kind}_{world}" / EPISODES_FILE
+    return read_episodes(path) if path.exists() else []
 
 
 def _section(kind: str, found: list[Part]) -> str:
@@ -156,9 +175,8 @@ def _browser_page(folder: Path) -> Path:
     """Return the report page of all episodes, each with its kind of floor and world as its settings."""
     lines = []
     for kind, name, world in parts():
-        path = folder / f"{kind}_{name}" / EPISODES_FILE
         variant = f"{world.about}: {KINDS[kind].partition(',')[0]}"
-        for episode in read_episodes(path) if path.exists() else []:
+        for episode in _episodes(folder, kind, name):
             key = " | ".join([variant, *episode[KEY].split(" | ")[1:]])
             lines.append(json.dumps({**episode, KEY: key, "variant": variant}))
     write_text(folder / ALL / EPISODES_FILE, "\n".join(lines) + "\n")

@@ -1,0 +1,67 @@
+"""Policies beside each other pair by pair, and how the maps of supervised teams were joined."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from lidarium.benchmarks.studies.leaderboard.worlds import HORIZON_S
+from lidarium.evaluation.statistics.means import paired_ratio
+from lidarium.evaluation.suites.episodes_file import KEY
+
+PAIRS = (
+    ("ideal", "tour_frontier", "explore_lite"),
+    ("ideal", "learned", "tour_frontier"),
+    ("lab", "tour_frontier", "explore_lite"),
+    ("lab", "learned", "tour_frontier"),
+    ("unknown", "supervised", "independent"),
+    ("unknown", "supervised_tours", "supervised"),
+    ("unknown", "supervised_learned", "supervised"),
+)
+"""World, policy, and which one it is set beside."""
+
+HEADER = "| world | policy | over | pairs | time, geometric mean | faster |\n|---|---|---|---:|---:|---:|"
+
+Episode = Mapping[str, Any]
+
+
+def pairs_table(episodes: Mapping[str, Sequence[Episode]], names: Mapping[str, str]) -> str:
+    """Return the table of pairs of all teams.
+
+    Parameters
+    ----------
+    episodes : mapping
+        By name of the world.
+    names : mapping
+        What worlds are called in the table.
+    """
+    rows = [HEADER]
+    for world, ours, theirs in PAIRS:
+        first, second = (_times(episodes.get(world, ()), policy) for policy in (ours, theirs))
+        both = sorted(set(first) & set(second))
+        if len(both) < 2:
+            continue
+        a, b = [first[key] for key in both], [second[key] for key in both]
+        ratio = paired_ratio(a, b)
+        faster = sum(x < y for x, y in zip(a, b, strict=True)) / len(both)
+        shown = f"{ratio.estimate:.3f} ({ratio.low:.3f} to {ratio.high:.3f})"
+        rows.append(
+            f"| {names[world]} | `{ours}` | `{theirs}` | {len(both)} | {shown} | {100.0 * faster:.0f} % |"
+        )
+    return "\n".join(rows)
+
+
+def merges_text(episodes: Iterable[Episode]) -> str:
+    """Return how many joins of maps were accepted, and how many of them joined wrong places."""
+    merges = [episode["merges"] for episode in episodes]
+    accepted, wrong = (sum(each[name] for each in merges) for name in ("accepted", "wrong"))
+    return f"Teams with unknown starts joined maps {accepted:,} times, {wrong:,} of them in a wrong place."
+
+
+def _times(episodes: Iterable[Episode], policy: str) -> dict[tuple[str, int], float]:
+    """Return times to 99 % by floor and team; who did not get there took the whole time."""
+    return {
+        (episode[KEY].split(" | ")[1], episode["robots"]): (
+            HORIZON_S if episode["t99_s"] is None else float(episode["t99_s"])
+        )
+        for episode in episodes
+        if episode["policy"] == policy
+    }
