@@ -3,14 +3,17 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from lidarium.benchmarks.studies.leaderboard.worlds import HORIZON_S
+from lidarium.benchmarks.studies.leaderboard.worlds import HORIZON_S, TEAMS
 from lidarium.evaluation.statistics.means import paired_ratio
 from lidarium.evaluation.suites.episodes_file import KEY
 
 PAIRS = (
     ("ideal", "tour_frontier", "explore_lite"),
+    ("ideal", "srt", "tour_frontier"),
     ("ideal", "learned", "tour_frontier"),
+    ("ideal", "learned", "srt"),
     ("lab", "tour_frontier", "explore_lite"),
+    ("lab", "srt", "tour_frontier"),
     ("lab", "learned", "tour_frontier"),
     ("unknown", "supervised", "independent"),
     ("unknown", "supervised_tours", "supervised"),
@@ -18,7 +21,10 @@ PAIRS = (
 )
 """World, policy, and which one it is set beside."""
 
-HEADER = "| world | policy | over | pairs | time, geometric mean | faster |\n|---|---|---|---:|---:|---:|"
+_ROBOTS = " | ".join(f"{robots} robot{'s' * (robots > 1)}" for robots in TEAMS)
+HEADER = (
+    f"| world | policy | over | floors | {_ROBOTS} | all |\n|---|---|---|---:|{'---:|' * (len(TEAMS) + 1)}"
+)
 
 Episode = Mapping[str, Any]
 
@@ -37,16 +43,23 @@ def pairs_table(episodes: Mapping[str, Sequence[Episode]], names: Mapping[str, s
     for world, ours, theirs in PAIRS:
         first, second = (_times(episodes.get(world, ()), policy) for policy in (ours, theirs))
         both = sorted(set(first) & set(second))
-        if len(both) < 2:
+        if not both:
             continue
-        a, b = [first[key] for key in both], [second[key] for key in both]
-        ratio = paired_ratio(a, b)
-        faster = sum(x < y for x, y in zip(a, b, strict=True)) / len(both)
-        shown = f"{ratio.estimate:.3f} ({ratio.low:.3f} to {ratio.high:.3f})"
-        rows.append(
-            f"| {names[world]} | `{ours}` | `{theirs}` | {len(both)} | {shown} | {100.0 * faster:.0f} % |"
-        )
+        by_team = [[key for key in both if key[1] == robots] for robots in TEAMS]
+        cells = [_ratio(first, second, keys) for keys in (*by_team, both)]
+        floors = len({floor for floor, _ in both})
+        rows.append(f"| {names[world]} | `{ours}` | `{theirs}` | {floors} | {' | '.join(cells)} |")
     return "\n".join(rows)
+
+
+Times = Mapping[tuple[str, int], float]
+
+
+def _ratio(first: Times, second: Times, keys: Sequence[tuple[str, int]]) -> str:
+    if len(keys) < 2:
+        return "-"
+    ratio = paired_ratio([first[key] for key in keys], [second[key] for key in keys])
+    return f"{ratio.estimate:.3f} ({ratio.low:.3f} to {ratio.high:.3f})"
 
 
 def merges_text(episodes: Iterable[Episode]) -> str:

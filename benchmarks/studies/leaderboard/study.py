@@ -61,7 +61,7 @@ bold where Wilcoxon's signed rank test says that it is beyond chance (5 %, Holm)
 {notes}
 ## Pairs
 
-On floors of the set `test`, all teams together: ratios of times to 99 % with their 95 % interval. Below 1 is
+On floors of the set `test`: geometric means of ratios of times to 99 %, with their 95 % interval. Below 1 is
 less time; runs that did not get there count as the whole time. {merges}
 
 {pairs}
@@ -91,8 +91,8 @@ def page(folder: Path, command: str) -> str:
             "A part of the floors of each kind, too few for firm words: the intervals say so. Without "
             "`--every` the command runs all."
         )
-    if missing := [about for kind, about in KINDS.items() if kind not in found]:
-        notes.append(f"Not in it: {', '.join(missing)}.")
+    if missing := _missing(folder, found):
+        notes.append(f"Not in it: {'; '.join(missing)}.")
     return PAGE.format(
         command=command,
         date=date.today().isoformat(),
@@ -124,6 +124,16 @@ def beside(folder: Path, out: Path) -> None:
 def _episodes(folder: Path, kind: str, world: str) -> list[dict[str, Any]]:
     path = folder / f"{kind}_{world}" / EPISODES_FILE
     return read_episodes(path) if path.exists() else []
+
+
+def _missing(folder: Path, found: Mapping[str, Any]) -> list[str]:
+    """Return which kinds of floors did not run, and which worlds of kinds that did."""
+    worlds = [
+        f"{KINDS[kind]} in the world {world.about}"
+        for kind, name, world in parts()
+        if kind in found and not (folder / f"{kind}_{name}" / EPISODES_FILE).exists()
+    ]
+    return [about for kind, about in KINDS.items() if kind not in found] + worlds
 
 
 def _section(kind: str, found: list[Part]) -> str:

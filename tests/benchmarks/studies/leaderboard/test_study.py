@@ -37,7 +37,8 @@ def test_the_page_has_a_table_of_what_ran_and_names_what_did_not(folder):
     assert [row.split(" | ")[2] for row in rows] == ["`nearest_frontier`", "`random_walk`"]
     # Nobody got to 99 % in 40 s, so that all took the horizon of the leaderboard.
     assert rows[1].split(" | ")[6] == f"{worlds.HORIZON_S / 9.0:.2f}"
-    assert "Not in it: LIFULL apartments, KTH campus floors" in page
+    assert "Not in it: LIFULL apartments; KTH campus floors" in page
+    assert "generated floors of the set `test` in the world lab;" in page
     assert "A part of the floors" in page
 
 
