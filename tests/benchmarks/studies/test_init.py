@@ -15,6 +15,7 @@ NAMES = (
         "interval_coverage",
         "leaderboard",
         "learned",
+        "machines",
         "merging",
         "merging_tuning",
     ),

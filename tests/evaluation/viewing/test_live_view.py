@@ -173,6 +173,15 @@ def test_a_pause_holds_the_run_until_it_goes_on():
     assert env.scorer.time == pytest.approx(8.0)
 
 
+@pytest.fixture
+def usual_interrupts():
+    """Ctrl-C as it is in a program of its own: other tests of this process may have left a handler."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("usual_interrupts")
 def test_an_interrupt_ends_a_paused_run():
     policy = lidarium.policy("nearest_frontier")
     server, view = quick(policy)
